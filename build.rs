@@ -26,7 +26,7 @@ fn commit() -> String {
     };
     // Looked at again when the sources or the commit change. A commit on a branch leaves HEAD as it is,
     // but adds a line to its log.
-    for path in ["src", "drive-core/src"] {
+    for path in ["src", "drive-core"] {
         println!("cargo::rerun-if-changed={path}");
     }
     for name in ["HEAD", "logs/HEAD"] {

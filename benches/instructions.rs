@@ -9,11 +9,11 @@
 
 use std::hint::black_box;
 
-use drive_core::identify::rls::{Rls, RlsSettings};
 use drive_core::{AlphaBeta, Command, Drive, Measured, Mode};
 use gungraun::{library_benchmark, library_benchmark_group, main};
 use hil_sim::Config;
 use hil_sim::rig::Rig;
+use rotor_id::rls::{Rls, RlsSettings};
 
 /// A drive that regulates 1.5 A without a sensor, and its next input.
 fn regulating() -> (Drive, Measured) {

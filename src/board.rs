@@ -16,9 +16,9 @@ mod flash;
 
 pub use flash::{SETTINGS_SLOT_BYTES, STORED_SLOTS, settings_address, settings_page};
 
-use drive_core::Settings;
+use drive_core::Line;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::{CurrentSensors, Inverter, Line, Scales, Sequence};
+use drive_settings::{CurrentSensors, Inverter, Scales, Sequence, Settings};
 
 use crate::boards::converter::REFERENCE_V;
 use crate::boards::pin::{self, Pin, pc};

@@ -15,8 +15,9 @@ mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
 mod reference;
 
-use drive_core::settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
-use drive_core::settings::{Flux, Line, Ntc};
+use drive_core::Line;
+use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
+use drive_settings::{Flux, Ntc};
 
 use pin::Pin;
 

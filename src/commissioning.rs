@@ -1,7 +1,8 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
-use drive_core::commission::{Collector, Commissioning, Next, Record, Refusal, Report, Step};
-use drive_core::{Command, Excited, Mode, Refused, Settings, Stop};
+use drive_commission::{Collector, Commissioning, Next, Record, Refusal, Report, Step};
+use drive_core::{Command, Excited, Mode, Refused, Stop};
+use drive_settings::Settings;
 
 use crate::rotor_tracking::Observation;
 

@@ -28,7 +28,7 @@ mod tests;
 use core::fmt;
 
 use drive_core::homing::{Failure, Homing};
-use drive_core::identify::learning::Learned;
+use drive_core::learned::Learned;
 
 use crate::commissioning::News;
 use crate::link::trace::Plan;
@@ -220,7 +220,7 @@ impl Console {
             let learned = self.settings.in_force().learned.as_ref();
             if let Some(result) = self.unbelievable.as_ref().or(learned) {
                 self.out.line(format_args!("{}", announce::outcome(result)));
-                if let Some(tracked) = result.tracked(&self.settings.in_force().drive) {
+                if let Some(tracked) = self.settings.in_force().drive.tracked(result) {
                     self.out.line(format_args!("learned: {tracked}"));
                 }
             }

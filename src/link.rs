@@ -4,8 +4,7 @@ pub mod mailbox;
 pub mod stream;
 pub mod trace;
 
-use drive_core::dc_link::Limiting;
-use drive_core::{Accepted, Excited, Hardware, Refused, Room, Sample, State, Telemetry};
+use drive_core::{Accepted, Excited, Hardware, Limiting, Refused, Room, Sample, State, Telemetry};
 
 /// The drive's answer to a command.
 pub type Answer = Result<Accepted, Refused>;

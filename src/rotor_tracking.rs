@@ -4,10 +4,10 @@
 use core::f32::consts::TAU;
 use core::fmt;
 
-use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use drive_core::io::PERIOD_S;
-use drive_core::settings::AngleSource;
-use drive_core::{Accepted, AlphaBeta, Dq, Settings, Telemetry};
+use drive_core::{Accepted, AlphaBeta, AngleSource, Dq, Telemetry};
+use drive_settings::Settings;
+use rotor_id::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 
 use crate::board;
 

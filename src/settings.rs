@@ -8,9 +8,9 @@ pub mod staging;
 #[cfg(test)]
 mod tests;
 
-use drive_core::identify::learning::Learned;
-use drive_core::settings::SettingsError;
-use drive_core::{Coefficients, Settings};
+use drive_core::Coefficients;
+use drive_core::learned::Learned;
+use drive_settings::{Settings, SettingsError};
 
 use crate::board;
 use crate::boards::{Board, SELECTED};

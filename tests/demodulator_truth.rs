@@ -6,9 +6,7 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
-use drive_core::carrier::CarrierSample;
-use drive_core::carrier::demodulator::{Demodulate, Literal, Rectified};
-use drive_core::carrier::injection::CarrierPeriod;
+use drive_core::carrier::{CarrierPeriod, CarrierSample, Demodulate, Literal, Rectified};
 use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 

@@ -4,9 +4,9 @@
 mod common;
 
 use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
+use drive_core::Command;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::settings::SettingsError;
-use drive_core::{Command, Settings};
+use drive_settings::{Settings, SettingsError};
 use hil_sim::config::plant_settings;
 use hil_sim::config::{Config, LoadMode};
 use hil_sim::experiments::learning;

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{all, config, run};
-use drive_core::identify::learning::Learned;
-use drive_core::settings::table::ReferenceTable;
+use drive_core::learned::Learned;
+use drive_core::table::ReferenceTable;
 use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::experiments::learning;
 use hil_sim::plant::Load;

@@ -6,13 +6,14 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::config;
-use drive_core::flux::indirect::TAU_R_LIMITS;
-use drive_core::identify::online::{NoEstimate, Online, SpeedInput};
-use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
+use drive_core::flux::TAU_R_LIMITS;
+use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused};
+use drive_settings::Settings;
 use hil_sim::config::plant_settings;
 use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig};
+use rotor_id::online::{NoEstimate, Online, SpeedInput};
 
 /// r_r grows by 30 % between 3 and 6 s.
 const CASE: WarmingCase = WarmingCase {

@@ -3,8 +3,7 @@
 mod common;
 
 use common::config;
-use drive_core::dc_link::Limiting;
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Limiting, Mode, State};
 use hil_sim::rig::Rig;
 
 /// Largest load of an i²t body of `tau_s` s that carries `carried` A for ever, with the true current; the mean current of the last

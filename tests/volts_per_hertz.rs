@@ -4,9 +4,8 @@
 mod common;
 
 use common::{config, plant_settings};
-use drive_core::dc_link::Limiting;
-use drive_core::settings::Motor;
-use drive_core::{Command, Fault, Mode, Refused, Settings, State, Stop};
+use drive_core::{Command, Fault, Limiting, Mode, Motor, Refused, State, Stop};
+use drive_settings::Settings;
 use hil_sim::Config;
 use hil_sim::plant::{Channel, CurrentFault, Load};
 use hil_sim::rig::Rig;

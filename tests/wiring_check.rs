@@ -37,7 +37,7 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
     let mut peak = 0.0_f64;
     for _ in 0..6000 {
         let mut sample = plant.sample();
-        let zero = |line: drive_core::settings::Line| (-2.0 * line.offset / line.gain) as u16;
+        let zero = |line: drive_core::Line| (-2.0 * line.offset / line.gain) as u16;
         match wiring {
             Wiring::Sensors => {
                 sample =

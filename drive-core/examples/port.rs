@@ -10,11 +10,11 @@
 use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use drive_core::identify::learning::Learned;
-use drive_core::settings::{Line, Ntc, Scales, Settings};
-use drive_core::{
-    Accepted, Command, Compare, Drive, FrontEndState, Hardware, Mode, Refused, Sample,
+use induction_drive_core::learned::Learned;
+use induction_drive_core::{
+    Accepted, Command, Compare, Drive, FrontEndState, Hardware, Line, Mode, Refused, Sample,
 };
+use induction_drive_settings::{Ntc, Scales, Settings};
 
 /// Hardware access of the interrupt.
 trait Board {

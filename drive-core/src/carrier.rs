@@ -1,12 +1,17 @@
 //! The injected carrier: generation of its voltage and demodulation of its current.
 
-pub mod asymmetry;
-pub mod demodulator;
-pub mod drift;
-pub mod injection;
+pub(crate) mod asymmetry;
+pub(crate) mod demodulator;
+pub(crate) mod drift;
+pub(crate) mod injection;
 mod kind;
 mod sample;
-pub mod synchronous;
+pub(crate) mod synchronous;
 
+pub use asymmetry::Asymmetry;
+#[cfg(feature = "printed")]
+pub use demodulator::{Demodulate, Literal, Rectified};
+pub use injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod, Injection};
 pub use kind::DemodulatorKind;
-pub use sample::{CarrierCurrent, CarrierSample, Saliency};
+pub use sample::CarrierSample;
+pub(crate) use sample::{CarrierCurrent, Saliency};

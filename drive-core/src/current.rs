@@ -1,7 +1,13 @@
 //! The current loop and the inverter: PI control, dead-time compensation, modulation.
 
-pub mod dead_time;
-pub mod inverter_drop;
-pub mod modulation;
-pub mod pi;
-pub mod voltage_limit;
+pub(crate) mod dead_time;
+pub(crate) mod inverter_drop;
+pub(crate) mod modulation;
+pub(crate) mod pi;
+pub(crate) mod voltage_limit;
+
+pub use dead_time::DeadTime;
+pub use inverter_drop::InverterDrop;
+pub use modulation::Modulator;
+pub use pi::{DqPi, Pi, PiState, ReferenceFilter};
+pub use voltage_limit::VoltageLimit;

@@ -23,7 +23,7 @@
 
 use core::fmt;
 
-use crate::io::PERIOD_S;
+use crate::PERIOD_S;
 
 /// Control periods per step: those of a carrier period.
 pub const DIVIDER: u8 = 10;
@@ -99,11 +99,12 @@ impl Default for DcLinkSettings {
 
 /// Why torque is limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Limiting {
     /// It is not.
     #[default]
     No,
-    /// The dc link has no more voltage at this speed; see [`voltage_limit`](crate::current::voltage_limit).
+    /// The dc link has no more voltage at this speed; see `voltage_limit`.
     Voltage,
     /// The heat sink is hot.
     HeatSink,

@@ -52,7 +52,7 @@ use crate::supply::RelayState;
 
 use axes::Axes;
 use catching::Residual;
-pub use coefficients::Coefficients;
+pub use coefficients::{Catching, Coefficients, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::Excite;
@@ -66,8 +66,8 @@ pub use telemetry::{Room, Telemetry};
 /// The drive: coefficients, the phase that it is in, and that which outlives a phase.
 ///
 /// ```
-/// use drive_core::settings::{AngleSource, Settings};
-/// use drive_core::{Command, Drive, FrontEndState, Mode, Sample, State};
+/// use induction_drive_core::{AngleSource, Command, Drive, FrontEndState, Mode, Sample, State};
+/// use induction_drive_settings::Settings;
 ///
 /// // Without an encoder it would have to learn its motor first.
 /// let settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
@@ -379,7 +379,7 @@ impl Drive {
         }
     }
 
-    /// Whether [`online`](crate::identify::online) is to be given what the last step saw.
+    /// Whether `online` is to be given what the last step saw.
     pub fn tracks_rotor(&self) -> bool {
         self.c.track_rotor && matches!(&self.phase, Phase::Field(field) if field.regulates())
     }
@@ -486,6 +486,7 @@ impl Drive {
     }
 
     /// That which a run leaves to the next one.
+    #[cold]
     fn left(&self) -> Left {
         match &self.phase {
             Phase::Off(left) | Phase::Fault(_, left) => *left,

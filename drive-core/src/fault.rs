@@ -22,6 +22,7 @@ macro_rules! faults {
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
             /// Short description.
+            #[cold]
             pub const fn text(self) -> &'static str {
                 match self { $(Self::$name => $text,)+ }
             }
@@ -108,6 +109,7 @@ impl Fault {
 
 /// Causes and cure of the fault with this number.
 #[expect(clippy::manual_range_patterns, reason = "the build script lists the numbers")]
+#[cold]
 const fn remedy(code: u8) -> (&'static [&'static str], &'static str) {
     include!(concat!(env!("OUT_DIR"), "/remedies.rs"))
 }

@@ -1,10 +1,27 @@
 //! Angle of the rotor flux: from encoder and slip, or from the saliency measured with the carrier.
 
-pub mod catch;
-pub mod estimator;
-pub mod hand_over;
-pub mod indirect;
-pub mod observer;
-pub mod schedule;
-pub mod tracker;
-pub mod volts_per_hertz;
+pub(crate) mod catch;
+pub(crate) mod estimator;
+pub(crate) mod hand_over;
+pub(crate) mod indirect;
+pub(crate) mod observer;
+pub(crate) mod schedule;
+pub(crate) mod tracker;
+pub(crate) mod volts_per_hertz;
+
+pub use catch::Path;
+pub use estimator::{AngleLoop, ConstantReference, Estimator, Reference};
+pub use indirect::{Indirect, TAU_R_LIMITS};
+pub use observer::{Leakage, Observer};
+pub use schedule::GainSchedule;
+pub use tracker::{Pll, THIRD_POLE, Tracker};
+pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
+
+/// The source of the flux angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AngleSource {
+    /// Encoder and slip, Eq. 2.10.
+    Encoder,
+    /// The injected carrier: no sensor on the shaft.
+    Injection,
+}

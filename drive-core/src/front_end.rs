@@ -11,27 +11,28 @@ pub(crate) mod shunts;
 
 use crate::fault::Fault;
 use crate::io::{Compare, Measured, Output, Sample};
+use crate::line::Line;
 use crate::math::frames::Abc;
-use crate::settings::{HeatSink, Line};
+use crate::protect::HeatSink;
 use shunts::{ShuntState, Shunts};
 
 /// Coefficients of the front end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontEnd {
     /// Calibration of current a, A.
-    pub(crate) current_a: Line,
+    pub current_a: Line,
     /// Calibration of current b, A.
-    pub(crate) current_b: Line,
+    pub current_b: Line,
     /// The third current, with three shunts below the low sides.
-    pub(crate) shunts: Option<Shunts>,
+    pub shunts: Option<Shunts>,
     /// Calibration of the dc-link voltage, V.
-    pub(crate) dc_link: Line,
+    pub dc_link: Line,
     /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
-    pub(crate) full_scale: u16,
+    pub full_scale: u16,
     /// Compare value at which a high side is on throughout.
-    pub(crate) top: f32,
+    pub top: f32,
     /// Checks of the heat sink.
-    pub(crate) heat_sink: HeatSink,
+    pub heat_sink: HeatSink,
 }
 
 /// State of the front end. The default is that with the outputs off.

@@ -13,8 +13,8 @@
 use core::fmt;
 use core::ops::RangeInclusive;
 
-use crate::drive::{Command, State};
 use crate::motion::LARGEST_POSITION;
+use crate::{Command, State};
 
 /// Speeds, mechanical rpm.
 const RPM: RangeInclusive<f32> = 5.0..=60.0;
@@ -70,6 +70,8 @@ pub struct Seen {
 }
 
 /// The next action.
+///
+/// Exhaustive on purpose: every action has to be carried out.
 #[allow(clippy::large_enum_variant)] // taken at once
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
@@ -83,6 +85,7 @@ pub enum Next {
 
 /// Why there is no position 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Failure {
     /// The drive does not regulate the position any more.
     Left(State),

@@ -1,5 +1,3 @@
-//! Identification on the drive itself: learning with locked shaft, and the rotor time constant online.
+//! Identification in the control step: learning with locked shaft.
 
-pub mod learning;
-pub mod online;
-pub mod rls;
+pub(crate) mod learning;

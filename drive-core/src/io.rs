@@ -23,7 +23,8 @@ pub const PERIOD_S: f32 = 1.0 / 6000.0;
 pub const CONVERTER_CODES: u16 = 4095;
 
 /// Whole control periods in a time in s, rounded. Not for the control step.
-pub(crate) fn periods(seconds: f32) -> u32 {
+#[cold]
+pub fn periods(seconds: f32) -> u32 {
     libm::roundf(seconds / PERIOD_S) as u32
 }
 
@@ -73,12 +74,12 @@ pub struct Sample {
     pub current_a: u16,
     /// Converter code of the current into phase b.
     pub current_b: u16,
-    /// Converter code of the current into phase c; not used unless [`Scales::shunts`](crate::settings::Scales) says so.
+    /// Converter code of the current into phase c; not used unless `Scales::shunts` says so.
     pub current_c: u16,
     /// Converter code of the dc-link voltage.
     pub dc_link: u16,
     /// Converter code of the heat-sink temperature. A board without a thermistor gives a code inside the window of
-    /// [`Ntc`](crate::settings::Ntc), for example 1309 for 25 °C with the defaults.
+    /// `Ntc`, for example 1309 for 25 °C with the defaults.
     pub heat_sink: u16,
     /// Position counter of the quadrature encoder, four counts a line, wrapping, upwards when the
     /// rotor turns from phase a towards phase b.
@@ -110,7 +111,7 @@ bitflags! {
 
 /// The compare values of the timer for the period from `(k + 1) T` to `(k + 2) T`.
 ///
-/// The counter runs up and down between 0 and [`Inverter::top`](crate::settings::Inverter::top)
+/// The counter runs up and down between 0 and `Inverter::top`
 /// and the high side of a leg is on while it is below the compare value; the period starts at the
 /// top, so that 0 means low side on throughout and `top` means high side on throughout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,9 +1,9 @@
-//! The result of a [learning](crate::identify::learning): what it found, and whether the motor can be tracked with it.
+//! The result of a learning: what it found, and whether the motor can be tracked with it.
 
 use core::fmt;
 
-use crate::carrier::asymmetry::Asymmetry;
-use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
+use crate::carrier::Asymmetry;
+use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Largest accepted spread of the even part of the reference. Noise gives 0.001.
 pub(crate) const SPREAD: f32 = 0.005;
@@ -16,7 +16,7 @@ pub(crate) const LARGEST_ASYMMETRY: f32 = 0.1;
 pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
 /// Least magnitude of the slope without torque current, 1/rad, with negative and with positive sign: at 5 mA of sensor noise
 /// 5° rms.
-pub const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
+pub(crate) const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
 /// Up to this multiple of it the tracking is weak.
 const WEAK: f32 = 1.5;
 /// Largest accepted part of the signal that repeats four times in a turn, relative to the slope without torque current: 8.6°.
@@ -44,6 +44,7 @@ impl Fitted {
 
 /// Whether, and how well, the motor can be tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Verdict {
     /// Accepted.
     Sound,
@@ -156,44 +157,6 @@ impl fmt::Display for Learned {
             Verdict::OutOfRange => f.write_str("a value is out of its range"),
         }?;
         if self.verdict.is_accepted() { Ok(()) } else { f.write_str("; nothing was changed") }
-    }
-}
-
-/// Range of torque that a drive tracks with a [result](Learned).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracked {
-    /// Largest torque current, A, and torque, Nm; both signs.
-    pub i_q: f32,
-    /// See `i_q`.
-    pub torque: f32,
-    /// Direct current, A, and rotor flux L_m i_d, Wb peak.
-    pub i_d: f32,
-    /// See `i_d`.
-    pub flux: f32,
-    /// The reason of the limit.
-    pub limit: TrackedLimit,
-}
-
-/// Reason of the limit of the torque current of a drive that tracks the saliency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrackedLimit {
-    /// The slope is lost beyond.
-    Slope,
-    /// The current limit beside the direct current: the slope is there as far as it was learned.
-    Current,
-}
-
-impl fmt::Display for Tracked {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { i_q, torque, i_d, flux, limit } = self;
-        let limit = match limit {
-            TrackedLimit::Slope => "the slope, which is lost beyond",
-            TrackedLimit::Current => "the current limit",
-        };
-        write!(
-            f,
-            "trackable from -{torque:.2} to {torque:.2} Nm (-{i_q:.2} to {i_q:.2} A) at {flux:.3} Wb ({i_d:.2} A); the limit is {limit}"
-        )
     }
 }
 

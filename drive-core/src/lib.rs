@@ -17,25 +17,22 @@
 //!
 //! | room | contents |
 //! |---|---|
-//! | [`io`], [`fault`] | input and output of a step; the numbered faults |
-//! | [`front_end`] | converter codes to SI units, duties to timer counts |
-//! | [`math`], [`filter`] | angles and frames; second-order sections |
+//! | the root | [`Drive`], its [`Coefficients`], states and commands; front end, faults, motor, scales; speed loop, dc link, relay |
+//! | [`io`] | input and output of a step and of the front end |
+//! | [`math`], [`filter`] | vectors and frames; second-order sections |
 //! | [`current`] | PI, modulation, dead time and drop of the inverter |
 //! | [`carrier`] | the injected voltage and the demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
-//! | [`motion`] | speed and position loop |
-//! | [`dc_link`] | limits of the torque current by the dc link, chopper |
-//! | [`supply`] | precharge relay |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
-//! | [`learned`] | what a learning has found |
+//! | [`learned`], [`table`] | the result of a learning with locked shaft, and its tables |
 //! | [`homing`] | finding a stop of the shaft |
-//! | [`commission`] | from the nameplate to the parameters of the motor |
-//! | [`identify`] | learning of the tracking reference; rotor time constant while running |
-//! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
-//! | `drive` | [`Drive`], its [`Coefficients`], states and commands |
 //!
-//! Each block is a small pair of coefficients (made from settings in SI units, outside the
-//! interrupt) and state, with one step function. Equation, table, figure and section numbers are
+//! The coefficients come from outside: the crate `induction-drive-settings` designs them from settings in SI units.
+//! `induction-drive-commission` finds the parameters of the motor, `induction-drive-rotor-id` its rotor time constant while it
+//! runs.
+//!
+//! Each block is a small pair of coefficients, which are public, and state, which the drive alone has, with one step function.
+//! Equation, table, figure and section numbers are
 //! those of R. A. N. Barroso, "Controle de torque sensorless de um motor de indução com injeção de
 //! sinal de alta frequência no eixo de quadratura", UFC, 2017.
 //!
@@ -49,35 +46,52 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod carrier;
-pub mod commission;
 pub mod current;
-pub mod dc_link;
+mod dc_link;
 mod drive;
-pub mod fault;
+mod fault;
 pub mod filter;
 pub mod flux;
-pub mod front_end;
+mod front_end;
 pub mod homing;
-pub mod identify;
+mod identify;
 pub mod io;
 pub mod learned;
+mod line;
 pub mod math;
-pub mod motion;
+mod motion;
+mod motor;
 pub mod protect;
-pub mod settings;
-pub mod supply;
-pub mod tuning;
+mod supply;
+pub mod table;
 
+pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    Room, Stage, State, Stop, Telemetry,
+    Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode,
+    Protection, Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
+pub use flux::AngleSource;
+pub use front_end::shunts::Shunts;
 pub use front_end::{FrontEnd, FrontEndState};
-pub use io::{Compare, Hardware, Measured, Output, Sample};
+pub use identify::learning::Learning;
+pub use io::{CONVERTER_CODES, Compare, Hardware, Measured, Output, PERIOD_S, Sample, periods};
+pub use line::Line;
 pub use math::angle::{Angle, UnitVector};
-pub use math::frames::{Abc, AlphaBeta, DmQm, Dq};
-pub use settings::Settings;
+pub use math::frames::{Abc, AlphaBeta, Dq, SQRT_3};
+pub use motion::{Motion, MotionGains, Ramps};
+pub use motor::{FirstOrder, Motor};
+pub use supply::Relay;
+
+/// The settings and the design, compiled into the unit tests: as a dependency they would bring a second instance of this crate.
+#[cfg(test)]
+#[path = "../settings/src/settings/mod.rs"]
+pub mod settings;
+#[cfg(test)]
+#[path = "../settings/src/tuning/mod.rs"]
+pub mod tuning;
+#[cfg(test)]
+extern crate self as drive_core;
 
 /// The examples of the documents.
 #[cfg(doctest)]

@@ -1,10 +1,10 @@
 //! Angles, vectors with their reference frames, and decimal output.
 
-pub mod angle;
-pub mod frames;
+pub(crate) mod angle;
+pub(crate) mod frames;
 
 /// `value` clamped to a range; NaN stays NaN.
-pub(crate) fn within(value: f32, (least, most): (f32, f32)) -> f32 {
+pub fn within(value: f32, (least, most): (f32, f32)) -> f32 {
     if value > most {
         most
     } else if value < least {
@@ -15,7 +15,7 @@ pub(crate) fn within(value: f32, (least, most): (f32, f32)) -> f32 {
 }
 
 /// `value` clamped to ±`largest`; NaN stays NaN.
-pub(crate) fn limited(value: f32, largest: f32) -> f32 {
+pub fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {
         largest
     } else if value < -largest {

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The speed mode enters at the limit. The PI controller of Eq. 3.35 is designed by
-//! [`design_motion_loops`](crate::tuning::design_motion_loops) for the inertia and for the source of the
+//! `tuning::design_motion_loops` of the settings for the inertia and for the source of the
 //! rotor position; the current for the ramp is fed forward. (The PI on the position of Eq. 4.2 is unstable
 //! with the plant of Eq. 4.1, |z| = 1.046: its design ignores one integrator of the plant. A PI on the
 //! speed inside a P on the position has the same terms.)
@@ -28,10 +28,9 @@ pub mod ramp;
 #[cfg(test)]
 mod tests;
 
-use crate::current::pi::{Pi, PiState};
-use crate::math::angle::Angle;
+use crate::Angle;
+use crate::current::{Pi, PiState};
 use crate::math::{limited, within};
-use crate::tuning::MotionDesign;
 
 use ramp::{Ramp, RampState};
 
@@ -46,6 +45,23 @@ pub const LARGEST_POSITION: f32 = 1000.0;
 /// how many steps of the loops: 0.1 s.
 const REST: f32 = 0.2;
 const REST_STEPS: u8 = 10;
+
+/// The controllers of speed and position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionGains {
+    /// Gain of the PI controller of the speed, A per turn/s.
+    pub k_c: f64,
+    /// Zero of that controller.
+    pub z_c: f64,
+    /// Gain of the P controller of the position, turns/s per turn.
+    pub k_x: f64,
+    /// Acceleration per ampere of torque current, mechanical turns/s^2.
+    pub acceleration: f64,
+    /// Share of the newest value in the first-order low-pass of the speed; 1 for none.
+    pub smoothing: f64,
+    /// Sampling period of the loops, s.
+    pub period_s: f64,
+}
 
 /// Limits of the speed reference's change.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,11 +142,16 @@ pub struct MotionState {
 }
 
 impl Motion {
-    /// Loops with the controllers of `design` and `counts` of the position per mechanical turn.
+    /// Control periods per step of the loops.
+    pub const DIVIDER: u8 = DIVIDER;
+    /// Counts of a rotor position that no encoder counts, per electrical turn.
+    pub const COUNTS_PER_TURN: u32 = COUNTS_PER_TURN;
+
+    /// Loops with the controllers `design` and `counts` of the position per mechanical turn.
     ///
     /// Limits of the references: `speed_limit`, mechanical turns/s; `ramps`; `i_q_limit`, A.
     pub fn new(
-        design: &MotionDesign,
+        design: &MotionGains,
         counts: u32,
         speed_limit: f32,
         ramps: &Ramps,
@@ -202,7 +223,7 @@ impl Motion {
     }
 
     /// Returns the quadrature current, A, for the goal at the position `count`; called in every control
-    /// period. The current changes every [`DIVIDER`] periods.
+    /// period. The current changes every `DIVIDER` periods.
     ///
     /// The computation is spread over three periods: speed, speed reference, current.
     ///
@@ -268,15 +289,6 @@ impl Motion {
 
 /// Counter of the estimated rotor angle in place of an encoder: [`COUNTS_PER_TURN`] per electrical turn,
 /// wrapping.
-///
-/// ```
-/// use drive_core::{Angle, motion::{COUNTS_PER_TURN, RotorCount}};
-///
-/// let mut rotor = RotorCount::default();
-/// let turns = [0.25, 0.5, 0.75, 0.0, 0.25];
-/// let counts = turns.map(|turns| rotor.follow(Angle::from_turns(turns)));
-/// assert_eq!(counts[4], 5 * COUNTS_PER_TURN / 4);
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RotorCount {
     count: u32,

@@ -1,9 +1,19 @@
 //! Protections: checks of sensors, wiring, saliency and lock. Each raises a fault.
 
-pub mod lock_monitor;
-pub mod noise_watch;
-pub mod offsets;
-pub mod plausibility;
-pub mod saliency_check;
-pub mod thermal;
-pub mod wiring_check;
+pub(crate) mod heat_sink;
+pub(crate) mod lock_monitor;
+pub(crate) mod noise_watch;
+pub(crate) mod offsets;
+pub(crate) mod plausibility;
+pub(crate) mod saliency_check;
+pub(crate) mod thermal;
+pub(crate) mod wiring_check;
+
+pub use heat_sink::HeatSink;
+pub use lock_monitor::{LockMonitor, LockMonitorSettings};
+pub use noise_watch::NoiseWatch;
+pub use offsets::OffsetCheck;
+pub use plausibility::Prediction;
+pub use saliency_check::SaliencyCheck;
+pub use thermal::{Body, Thermal};
+pub use wiring_check::{WiringCheck, WiringSettings};

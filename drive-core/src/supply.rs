@@ -53,7 +53,7 @@ impl Relay {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
-    use crate::io::PERIOD_S;
+    use crate::PERIOD_S;
 
     const END_V: f32 = 311.0;
 

@@ -4,8 +4,6 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use drive_core::identify::learning::{Learned, Verdict};
-use drive_core::{Drive, Measured, State};
 use induction_drive::console::Console;
 use induction_drive::console::announce::ANNOUNCEMENTS;
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
@@ -13,6 +11,8 @@ use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
 use libfuzzer_sys::fuzz_target;
+use drive_core::learned::{Learned, Verdict};
+use drive_core::{Drive, Measured, State};
 
 #[path = "../../src/console/tests/doubles.rs"]
 mod doubles;

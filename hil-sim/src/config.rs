@@ -1,7 +1,7 @@
 //! The configuration of an experiment: plain numbers under dotted names, those of the console of the drive.
 //!
 //! A key is one of the bench ([`BENCH`]: the simulated motor, inverter, sensors and load) or one of the drive
-//! ([`drive_core::settings::SETTINGS`]). A name that both have sets both: the drive knows its bench. `drive.NAME` sets
+//! ([`drive_settings::SETTINGS`]). A name that both have sets both: the drive knows its bench. `drive.NAME` sets
 //! the drive alone, which is then wrong about the bench. Assignments count in their order; in a file, those of `drive.`
 //! come last. `after.NAME` is a key of the plant whose value changes after the learning.
 
@@ -17,8 +17,8 @@ mod words;
 
 use std::path::Path;
 
-use drive_core::Coefficients;
-use drive_core::settings::{Line, Settings, SettingsError, find, value as drive};
+use drive_core::{Coefficients, Line};
+use drive_settings::{Settings, SettingsError, find, value as drive};
 
 pub use after::After;
 use file::FileAssignment;

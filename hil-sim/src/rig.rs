@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use drive_core::carrier::DemodulatorKind;
-use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::AngleSource;
+use drive_core::learned::Learned;
 use drive_core::{
-    Accepted, Command, Compare, Drive, FrontEndState, Mode, Sample, Settings, State, Stop,
+    Accepted, AngleSource, Command, Compare, Drive, FrontEndState, Mode, Sample, State, Stop,
 };
+use drive_settings::Settings;
 
 use crate::config::{self, Config, built, plant_settings};
 use crate::error::Error;

@@ -6,7 +6,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use drive_core::tuning::{EquivalentCircuit, FirstOrder, motor_plant, rule_3_8};
+use drive_core::FirstOrder;
+use drive_settings::tuning::{EquivalentCircuit, motor_plant, rule_3_8};
 use hil_sim::{Config, Outcome, experiments};
 
 const T: f64 = 1.0 / 6000.0;

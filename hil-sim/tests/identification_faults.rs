@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use drive_core::identify::rls::{Rls, RlsError, RlsSettings};
 use hil_sim::identification::signals::noise;
 use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Parameters, Signal, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rotor_id::rls::{Rls, RlsError, RlsSettings};
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;

@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use drive_core::identify::rls::{Rls, RlsSettings};
 use hil_sim::identification::models::model_c;
 use hil_sim::identification::recursive::{Plain, Reference};
 use hil_sim::identification::signals::{Filter, noise};
@@ -13,6 +12,7 @@ use num_complex::Complex32;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
+use rotor_id::rls::{Rls, RlsSettings};
 use rustfft::num_complex::Complex as Of;
 
 const H: f64 = 50e-6;

@@ -5,7 +5,7 @@ mod cli_common;
 use std::path::Path;
 
 use cli_common::{folder, hil_sim, text};
-use drive_core::settings::PlantSource;
+use drive_settings::PlantSource;
 use hil_sim::config::motors::Motor;
 use hil_sim::{Config, experiments};
 

@@ -1,6 +1,6 @@
 //! The converters' reference, which the scales of the sensors follow.
 
-use drive_core::settings::Line;
+use drive_core::Line;
 
 /// Reference of the converters, V: VREF+ of the Nucleo board is its 3.3 V supply.
 pub const REFERENCE_V: f32 = 3.3;

@@ -1,7 +1,8 @@
 //! ST's morpho connector for motor control, where all boards here have their signals, and the power boards of ST at it:
 //! drivers L639x, which switch a low side on at a low level, and three shunts below the low sides.
 
-use drive_core::settings::{Line, Ntc};
+use drive_core::Line;
+use drive_settings::Ntc;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};

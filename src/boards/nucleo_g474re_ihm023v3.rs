@@ -3,7 +3,7 @@
 //!
 //! A template: its sources are thin and nobody has tried it. Every step of the bench page comes before mains.
 
-use drive_core::settings::Flux;
+use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};

@@ -4,7 +4,7 @@
 //! Not tried with a motor yet. Set-up of the jumpers: JP1 and JP2 closed, J5 and J6 at three shunts, JP3 closed, J9 open
 //! above 12 V, C3, C5 and C7 removed, JP5 of the Nucleo at E5V.
 
-use drive_core::settings::Flux;
+use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb};

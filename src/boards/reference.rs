@@ -1,6 +1,7 @@
 //! The inverter of the dissertation on ST's morpho motor-control pins.
 
-use drive_core::settings::{Flux, Line};
+use drive_core::Line;
+use drive_settings::Flux;
 
 use super::converter::calibrated;
 use super::{Analog, Board, Currents, DcLinkLimits, Gates, Level, assumed, morpho, read};

@@ -92,7 +92,7 @@ fn the_voltages_of_every_board_are_in_order() {
         // By rule, and the highest that may be typed.
         for typed in [false, true] {
             if typed {
-                let entry = drive_core::settings::find("limits.dc_over_v").unwrap();
+                let entry = drive_settings::find("limits.dc_over_v").unwrap();
                 highest[1] = entry.range(&settings).unwrap().1;
                 settings.limits.dc_over_v = Some(highest[1]);
                 settings.check().unwrap();
@@ -115,9 +115,8 @@ fn the_voltages_of_every_board_are_in_order() {
         settings.scales.dc_link.gain *= 0.5;
         settings.limits.dc_over_v = None;
         settings.inverter.dc_link_v *= 0.5;
-        settings.limits.dc_over_v = Some(
-            drive_core::settings::find("limits.dc_over_v").unwrap().range(&settings).unwrap().1,
-        );
+        settings.limits.dc_over_v =
+            Some(drive_settings::find("limits.dc_over_v").unwrap().range(&settings).unwrap().1);
         assert!(protection(board, &settings).over_voltage.abs_diff(before) <= 1, "{}", board.name);
     }
 }

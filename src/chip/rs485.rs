@@ -8,7 +8,7 @@ use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use drive_core::settings::value::Words as _;
+use drive_settings::value::Words as _;
 use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;

@@ -1,5 +1,5 @@
-use drive_core::settings::PlantSource;
 use drive_core::{Command, Drive, Mode, Refused, State};
+use drive_settings::PlantSource;
 use hil_sim::Config;
 use hil_sim::config::{LoadMode, plant_settings};
 use hil_sim::experiments::commission::machine::Circuit;

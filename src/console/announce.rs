@@ -2,8 +2,9 @@
 
 use core::fmt;
 
-use drive_core::identify::learning::Learned;
-use drive_core::{Fault, Settings, State};
+use drive_core::learned::Learned;
+use drive_core::{Fault, State};
+use drive_settings::Settings;
 
 use crate::link::Status;
 

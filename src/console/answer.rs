@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use drive_core::commission::Step;
-use drive_core::settings::entry::Change;
+use drive_commission::Step;
 use drive_core::{Accepted, Command, Mode, State};
+use drive_settings::entry::Change;
 use thiserror::Error;
 
 use super::design::configure;
@@ -355,8 +355,7 @@ impl Console {
         if let Trigger::Level { signal, level, above } = &mut plan.trigger
             && let Some(signal) = SIGNALS.get(usize::from(*signal))
         {
-            let drive_core::settings::Line { gain, offset } =
-                signal.line(&self.settings.in_force().drive);
+            let drive_core::Line { gain, offset } = signal.line(&self.settings.in_force().drive);
             if gain == 0.0 {
                 return self.error(&"this board has no such sensor");
             }

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use drive_core::commission::Step;
-use drive_core::settings::value::Words as _;
+use drive_commission::Step;
 use drive_core::{Mode, Refused, State};
+use drive_settings::value::Words as _;
 
 use super::Console;
 use super::answer::Task;

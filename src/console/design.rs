@@ -1,7 +1,7 @@
 //! The design of the controllers.
 
 use drive_core::Command;
-use drive_core::settings::SettingsError;
+use drive_settings::SettingsError;
 use thiserror::Error;
 
 use super::handle::{CommandError, DriveHandle};

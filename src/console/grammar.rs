@@ -9,10 +9,9 @@ mod tests;
 
 use core::str::SplitAsciiWhitespace;
 
-use drive_core::commission::Step;
-use drive_core::homing;
-use drive_core::settings::value::{self, Words as _};
-use drive_core::{Fault, Mode, Stop};
+use drive_commission::Step;
+use drive_core::{Fault, Mode, Stop, homing};
+use drive_settings::value::{self, Words as _};
 
 use super::suggest::nearest;
 use crate::board;

@@ -2,10 +2,10 @@
 
 use core::fmt::{self, Write};
 
-use drive_core::commission::Step;
-use drive_core::identify::learning::Learned;
-use drive_core::settings::SettingsError;
-use drive_core::{Accepted, Coefficients, Command, Refused, Settings};
+use drive_commission::Step;
+use drive_core::learned::Learned;
+use drive_core::{Accepted, Coefficients, Command, Refused};
+use drive_settings::{Settings, SettingsError};
 use thiserror::Error;
 
 use super::grammar::Level;

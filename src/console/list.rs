@@ -4,8 +4,8 @@ use core::fmt;
 
 use drive_core::Fault;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::entry::Change;
-use drive_core::settings::value::Value;
+use drive_settings::entry::Change;
+use drive_settings::value::Value;
 
 use super::Console;
 use super::handle::DriveHandle;

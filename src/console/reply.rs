@@ -3,9 +3,9 @@
 use core::fmt;
 
 use drive_core::Fault;
-use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::settings::entry::Change;
-use drive_core::settings::value::Value;
+use drive_core::learned::{Fitted, Learned};
+use drive_settings::entry::Change;
+use drive_settings::value::Value;
 
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;

@@ -7,7 +7,7 @@
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use drive_core::identify::learning::Learned;
+use drive_core::learned::Learned;
 use thiserror::Error;
 
 use super::grammar::WORDS_IN_LINE;

@@ -3,11 +3,10 @@
 use core::f32::consts::TAU;
 use core::fmt;
 
-use drive_core::current::voltage_limit::VoltageLimit;
-use drive_core::dc_link::Limiting;
+use drive_core::current::VoltageLimit;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::CurrentSensors;
-use drive_core::{Hardware, Settings, State};
+use drive_core::{Hardware, Limiting, State};
+use drive_settings::{CurrentSensors, Settings};
 
 use super::Console;
 use super::handle::DriveHandle;

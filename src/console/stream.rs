@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use drive_core::Settings;
 use drive_core::io::PERIOD_S;
+use drive_settings::Settings;
 use drive_stream::{Frame, LONGEST, MOST_SIGNALS, wire_bytes};
 use thiserror::Error;
 

@@ -18,13 +18,13 @@ use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::keys;
 use doubles::{FakeDrive, FakePort, found};
-use drive_core::identify::learning::Verdict;
-use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
+use drive_core::learned::Verdict;
 use drive_core::{
     Command, Compare, Drive, Fault, FrontEndState, Hardware, Measured, Mode, Sample, State, Stop,
 };
 use proptest::prelude::*;
+use rotor_id::online::NoEstimate;
 
 /// A whole period of a drive with its front end.
 fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
@@ -171,7 +171,7 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.injection.synchronous.allow_unlearned = true;
     // The simulated converter is calibrated for its own reference.
-    settings.drive.scales = drive_core::settings::Scales::default();
+    settings.drive.scales = drive_settings::Scales::default();
     settings.confirm_board();
     let mut talk = Talk::new();
     talk.console = Console::new(settings);
@@ -308,7 +308,7 @@ fn status_tells_what_is_known_of_the_rotor_time_constant() {
     assert_eq!(of_the_rotor(&mut talk), None, "not while it is off");
     // One that regulates.
     let mut config = hil_sim::Config::default();
-    config.drive.angle_source = drive_core::settings::AngleSource::Encoder;
+    config.drive.angle_source = drive_core::AngleSource::Encoder;
     let mut rig = hil_sim::rig::Rig::from_config(&config, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
     talk.drive.drive = rig.drive;

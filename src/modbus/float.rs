@@ -1,6 +1,6 @@
 //! Settings as floats of 32 bits: their ranges depend on other settings, so that no scale would fit them all.
 
-use drive_core::settings::value::Value;
+use drive_settings::value::Value;
 use modbus_core::Exception;
 
 use crate::settings::FirmwareSettings;

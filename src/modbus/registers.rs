@@ -4,7 +4,7 @@
 
 use drive_core::State;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::value::Words as _;
+use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
 use super::cia402::{self, Power};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use drive_core::settings::value::Words as _;
+use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
 use super::Frame;

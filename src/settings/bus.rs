@@ -1,6 +1,6 @@
 //! The settings of the field bus, and what the USART makes of rate and format.
 
-use drive_core::settings::value::Words;
+use drive_settings::value::Words;
 
 use crate::board::CLOCK_HZ;
 

@@ -2,10 +2,9 @@
 
 use core::fmt;
 
-use drive_core::Settings;
-use drive_core::settings::entry::{Change, Entry};
-use drive_core::settings::value::{Value, ValueError};
-use drive_core::settings::{SETTINGS, SettingsError};
+use drive_settings::entry::{Change, Entry};
+use drive_settings::value::{Value, ValueError};
+use drive_settings::{SETTINGS, Settings, SettingsError};
 
 use super::FirmwareSettings;
 pub use super::own::BOARD;

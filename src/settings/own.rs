@@ -1,8 +1,8 @@
 //! The table of the firmware's own settings, beside those of the drive.
 
-use drive_core::entry;
-use drive_core::settings::entry::{Access, Change, Entry};
-use drive_core::settings::value::Words;
+use drive_settings::entry;
+use drive_settings::entry::{Access, Change, Entry};
+use drive_settings::value::Words;
 
 use super::FirmwareSettings as Settings;
 use super::bus::{Baud, Commander, Format};

@@ -2,11 +2,10 @@
 
 use core::fmt;
 
-use drive_core::Settings;
-use drive_core::identify::learning::Learned;
-use drive_core::settings::SettingsError;
-use drive_core::settings::entry::Change;
-use drive_core::settings::value::Value;
+use drive_core::learned::Learned;
+use drive_settings::entry::Change;
+use drive_settings::value::Value;
+use drive_settings::{Settings, SettingsError};
 use heapless::Vec;
 use thiserror::Error;
 

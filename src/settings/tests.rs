@@ -1,7 +1,7 @@
 //! The page of the settings lists the table of the settings.
 
-use drive_core::settings::entry::Change;
-use drive_core::settings::value::Value;
+use drive_settings::entry::Change;
+use drive_settings::value::Value;
 
 use super::FirmwareSettings;
 use super::keys::{self, Key};

@@ -14,7 +14,7 @@
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use drive_core::settings::entry::Change;
+use drive_settings::entry::Change;
 
 use super::flash::SLOT_WORDS;
 use super::learned;

@@ -17,9 +17,9 @@
 //! All but number 36 are in single precision. An earlier firmware had none from 38 on; a drive with such a record has to learn
 //! again before it starts without an encoder.
 
-use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::identify::learning::{Fitted, Learned, Verdict};
-use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
+use drive_core::carrier::Asymmetry;
+use drive_core::learned::{Fitted, Learned, Verdict};
+use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
 
 use crate::hash;
 

@@ -1,8 +1,8 @@
-use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::identify::learning::{Fitted, Learned, Verdict};
-use drive_core::settings::entry::Change;
-use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
-use drive_core::settings::value::Value;
+use drive_core::carrier::Asymmetry;
+use drive_core::learned::{Fitted, Learned, Verdict};
+use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
+use drive_settings::entry::Change;
+use drive_settings::value::Value;
 use proptest::prelude::*;
 
 use super::learned as learned_words;

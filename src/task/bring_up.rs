@@ -3,9 +3,9 @@
 use core::sync::atomic::Ordering;
 
 use cortex_m::{asm, singleton};
-use drive_core::identify::learning::Learned;
-use drive_core::settings::SettingsError;
+use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Drive, Stop};
+use drive_settings::SettingsError;
 use heapless::spsc::Queue;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;

@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
-use drive_core::identify::learning::Learned;
+use drive_core::learned::Learned;
 use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State};
 use heapless::spsc::Producer;
 use stm32g4xx_hal::pac::Interrupt;

@@ -4,11 +4,11 @@ use core::fmt;
 use core::sync::atomic::Ordering;
 
 use defmt::Display2Format;
-use drive_core::commission::Step;
-use drive_core::identify::learning::Learned;
+use drive_commission::Step;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::{Scales, Settings, SettingsError};
+use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Fault, Hardware};
+use drive_settings::{Scales, Settings, SettingsError};
 use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;

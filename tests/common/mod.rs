@@ -1,7 +1,8 @@
 //! The bench that the procedures share.
 #![allow(dead_code)] // every procedure uses its own part of it
 
-use drive_core::{Command, Mode, Settings};
+use drive_core::{Command, Mode};
+use drive_settings::Settings;
 pub use hil_sim::config::plant_settings;
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::Rig;

@@ -13,7 +13,7 @@ mod scenes;
 use std::fs;
 
 use drive_core::Drive;
-use drive_core::identify::learning::Learned;
+use drive_core::learned::Learned;
 use player::{BLOCK, Hashes, replay};
 use scenes::SCENES;
 

@@ -2,10 +2,9 @@
 
 use std::fmt;
 
-use drive_core::commission::{Collector, Commissioning, Next, Step};
-use drive_core::{
-    Command, Compare, Drive, FrontEndState, Mode, Output, Sample, Settings, Stop, Telemetry,
-};
+use drive_commission::{Collector, Commissioning, Next, Step};
+use drive_core::{Command, Compare, Drive, FrontEndState, Mode, Output, Sample, Stop, Telemetry};
+use drive_settings::Settings;
 use induction_drive::console::grammar::{self, Request};
 
 use crate::scenes::Scene;

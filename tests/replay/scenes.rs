@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::sync::LazyLock;
 
-use drive_core::identify::learning::Learned;
+use drive_core::learned::Learned;
 use drive_core::{Drive, Hardware, Sample, State};
 use hil_sim::Config;
 use hil_sim::config::plant_settings;

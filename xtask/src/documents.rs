@@ -19,7 +19,7 @@ const ELSEWHERE: [(&str, &str); 30] = [
     ("cargo test", "`cargo xtask test` runs all tests"),
     ("cargo clippy", "`cargo xtask test` runs it"),
     ("cargo fmt", "`cargo xtask test` checks the format"),
-    ("cargo run -p drive-core --example", "compiled by `cargo xtask test`; run by a person"),
+    ("cargo run -p induction-drive-core", "compiled by `cargo xtask test`; run by a person"),
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
@@ -44,9 +44,10 @@ const ELSEWHERE: [(&str, &str); 30] = [
     ("cargo flash", "named to be avoided"),
 ];
 
-/// Documents whose Rust is compiled and run: doctests of `drive-core` and `motor-plant`, a test of `hil-sim`.
-const RUST: [&str; 4] = [
+/// Documents whose Rust is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
+const RUST: [&str; 5] = [
     "drive-core/README.md",
+    "drive-core/settings/README.md",
     "hil-sim/plant/README.md",
     "docs/porting.md",
     "docs/add-an-experiment.md",

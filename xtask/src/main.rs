@@ -182,9 +182,9 @@ fn test() -> Result<()> {
 
     let target = steps.run("compiler for the controller", toolchain::for_target);
     let target = target.as_ref();
-    steps.with(target, "drive-core for the controller", |target| {
-        let core = ["--package", "drive-core"];
-        run::step("drive-core for the controller", target.cargo("build")?.args(core))
+    steps.with(target, "control crates for the controller", |target| {
+        let core = ["--package", "induction-drive-commission"];
+        run::step("control crates for the controller", target.cargo("build")?.args(core))
     });
     steps.with(target, "lints of the firmware", |target| {
         let lints = ["--package", "induction-drive", "--no-deps", "--", "-D", "warnings"];

@@ -27,7 +27,7 @@ pub fn mutants(shard: &str) -> Result<()> {
     let output = run::folder("mutants")?;
     let mut command = run::command(tool("cargo-mutants", "27.1.0")?);
     command
-        .args(["mutants", "--package", "drive-core", "--test-tool", "cargo", "-j2"])
+        .args(["mutants", "--package", "induction-drive-core", "--test-tool", "cargo", "-j2"])
         .args(["--minimum-test-timeout", "120", "--sharding", "round-robin", "--shard", shard])
         .arg("--output")
         .arg(&output)

@@ -13,8 +13,7 @@
 //! with the saliency of the flux are of second order and left.)
 
 use crate::carrier::Saliency;
-use crate::math::angle::UnitVector;
-use crate::math::frames::SQRT_3;
+use crate::{SQRT_3, UnitVector};
 
 /// The learned numbers, dimensionless; 0 without an asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,7 +70,7 @@ impl Asymmetry {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
-    use crate::math::angle::Angle;
+    use crate::Angle;
 
     /// Carrier current along the axis and saliency across it, relative to the ideal one, for a current `e^(j theta)`
     /// that both sensors and the stator distort: `i_a` becomes `a i_a + x i_b`, `i_b` becomes `b i_b`.

@@ -12,7 +12,7 @@
 //! | [`Rectified`] | A, 0.60 of the amplitude | saliency; leakage through the band-pass as ripple |
 //! | [`RmsImpedance`] | ohm | saliency, with the carrier along the flux (Ha and Sul) |
 //! | [`Envelope`] | A, 0.945 of the amplitude | saliency, with the least delay behind a band-pass |
-//! | [`SynchronousState`] | dimensionless | saliency, independent of amplitude and inductance |
+//! | `SynchronousState` | dimensionless | saliency, independent of amplitude and inductance |
 //!
 //! Delay of a small change of the saliency, measured on given currents, and noise of the signal as
 //! equivalent angle, on the simulated motor at i_q = 1 A with 5 mA rms in each current channel
@@ -23,7 +23,7 @@
 //! | [`Rectified`] | 33.0 | 3.3° | after the band-pass |
 //! | [`RmsImpedance`], 20 samples | 42.8 | 3.8° | before it |
 //! | [`Envelope`] | 14.5 | 3.6° | before it |
-//! | [`SynchronousState`] | 19.0 | 2.9° | - |
+//! | `SynchronousState` | 19.0 | 2.9° | - |
 //!
 //! The position of the rotation matters. The output of the band-pass is 8.8 samples old; resolved in the
 //! present axis it also contains the speed of the axis. At constant speed this is compensated. For the
@@ -43,7 +43,7 @@ mod rms_impedance;
 pub use {
     compared::Demodulator,
     envelope::Envelope,
-    printed::{Literal, PrintedChain, Rectified},
+    printed::{Literal, Rectified},
     rms_impedance::RmsImpedance,
 };
 
@@ -51,15 +51,8 @@ pub use {
 pub use absent::Demodulator;
 
 use crate::carrier::CarrierSample;
-#[cfg(doc)]
-use crate::carrier::synchronous::SynchronousState;
 #[cfg(feature = "printed")]
-use crate::{filter::dissertation::BPF, filter::sos::SosState, math::frames::DmQm};
-
-/// Least length of the rms filters of [`RmsImpedance`], samples.
-pub const MIN_RMS_SAMPLES: u8 = 2;
-/// Greatest length of the rms filters, samples.
-pub const MAX_RMS_SAMPLES: u8 = 60;
+use crate::{filter::BPF, filter::SosState, math::frames::DmQm};
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
 pub trait Demodulate {

@@ -20,9 +20,8 @@
 
 use crate::carrier::asymmetry::Asymmetry;
 use crate::carrier::injection::CARRIER_S;
-use crate::io::PERIOD_S;
-use crate::math::angle::UnitVector;
 use crate::math::limited;
+use crate::{PERIOD_S, UnitVector};
 
 /// Asymmetry per mismatch.
 const GAINS: Asymmetry = Asymmetry::of_gain_mismatch(1.0);
@@ -88,8 +87,8 @@ impl GainDrift {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
+    use crate::Angle;
     use crate::carrier::Saliency;
-    use crate::math::angle::Angle;
     use core::f64::consts::TAU;
 
     /// The estimate after `seconds` of a flux at `hz`, with sensors whose gains differ by `mismatch` and a ratio that is

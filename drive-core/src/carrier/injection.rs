@@ -4,10 +4,7 @@
 //! The fundamental may leave too little voltage for the full amplitude. [`Carrier::fit`] then reduces the
 //! carrier to a `share` of it, and reports when less than half would remain.
 
-use crate::fault::Fault;
-use crate::io::PERIOD_S;
-use crate::math::frames::Dq;
-use crate::tuning::FirstOrder;
+use crate::{Dq, Fault, FirstOrder, PERIOD_S};
 use num_complex::Complex64;
 
 /// Samples per period of the carrier.

@@ -4,24 +4,24 @@
 /// the dissertation, need the feature `printed`; settings that name them are refused without it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DemodulatorKind {
-    /// The chain of the dissertation as printed; see [`crate::carrier::demodulator::Literal`]. It cannot track.
+    /// The chain of the dissertation as printed. It cannot track.
     Literal,
-    /// The printed chain with a rectifier; see [`crate::carrier::demodulator::Rectified`].
+    /// The printed chain with a rectifier.
     Rectified,
-    /// Impedance difference after Ha and Sul, carrier along the flux; see
-    /// [`crate::carrier::demodulator::RmsImpedance`].
+    /// Impedance difference after Ha and Sul, carrier along the flux.
     RmsImpedance,
-    /// Difference of envelopes; see [`crate::carrier::demodulator::Envelope`].
+    /// Difference of envelopes.
     Envelope,
-    /// Synchronous demodulation with a learned reference; see [`crate::carrier::synchronous`].
+    /// Synchronous demodulation with a learned reference.
     #[default]
     Synchronous,
 }
 
 impl DemodulatorKind {
-    /// The word of the only one that this build has; `None`: it has all.
-    pub const ONLY: Option<&'static str> =
-        if cfg!(feature = "printed") { None } else { Some("synchronous") };
+    /// Whether this build has all of them, not the synchronous one alone.
+    pub const HAS_ALL: bool = cfg!(feature = "printed");
+    /// Smallest and largest length of the rms filters of [`RmsImpedance`](Self::RmsImpedance), samples.
+    pub const RMS_SAMPLES: (u8, u8) = (2, 60);
 
     /// Whether its signal follows the angle, so that the angle can be tracked or learned by it.
     pub const fn tracks(self) -> bool {

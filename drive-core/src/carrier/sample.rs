@@ -1,8 +1,7 @@
 //! Input and output signals of the demodulators.
 
 use crate::carrier::injection::CarrierPeriod;
-use crate::math::angle::UnitVector;
-use crate::math::frames::AlphaBeta;
+use crate::{AlphaBeta, UnitVector};
 
 /// Input of a demodulator, one per control period.
 #[derive(Clone, Copy, Debug)]

@@ -127,8 +127,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::carrier::demodulator::Demodulate;
     use crate::carrier::injection::{CARRIER_COS, CARRIER_SIN, CarrierPeriod};
-    use crate::math::angle::Angle;
-    use crate::math::frames::AlphaBeta;
+    use crate::{AlphaBeta, Angle};
     use core::f64::consts::TAU;
 
     /// Sample `k` of a current, injected along `axis`.

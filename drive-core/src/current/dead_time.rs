@@ -5,13 +5,12 @@
 //! (4.1 V at 311 V and 2.2 us). The compensation adds the same voltage in advance. Near zero current, where
 //! the sign is uncertain, it passes through zero linearly.
 
-use crate::io::PERIOD_S;
-use crate::math::frames::Abc;
+use crate::{Abc, PERIOD_S};
 
 /// Coefficients of the compensation.
 ///
 /// ```
-/// use drive_core::{Abc, current::dead_time::DeadTime};
+/// use induction_drive_core::{Abc, current::DeadTime};
 ///
 /// // Dead time 2.2 us, full compensation from 30 mA on; 311 V dc link, no further drop.
 /// let dead_time = DeadTime::new(2.2e-6, 0.03);
@@ -60,7 +59,7 @@ impl DeadTime {
     }
 
     /// Voltage to add, V per phase, for a dc link of `v_dc`, V. `drop` is the voltage lost beyond the dead
-    /// time, V (see [`crate::current::inverter_drop`]).
+    /// time, V (see `crate::current::inverter_drop`).
     pub fn voltage(&self, signs: Signs, v_dc: f32, drop: f32) -> Abc {
         signs.0 * ((self.ratio * v_dc + drop) * (1.0 / ONE))
     }

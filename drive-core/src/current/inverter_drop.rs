@@ -14,9 +14,7 @@
 //! temperature of the stator. An error of r_r of 30 % causes an error of 0.17 V. With a known drop the lower level
 //! alone gives r_s.
 
-use crate::io::periods;
-use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::{Dq, Motor, periods};
 
 /// Forcing current relative to the final direct current.
 const FORCED: f32 = 1.5;
@@ -164,7 +162,7 @@ impl InverterDrop {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
-    use crate::io::PERIOD_S;
+    use crate::PERIOD_S;
 
     /// For the motor of Table 5, magnetised with `i_d` A for 0.8 s.
     fn inverter_drop(i_d: f32, largest_a: f32) -> InverterDrop {

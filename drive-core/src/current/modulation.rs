@@ -4,8 +4,7 @@
 //! O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the two zero vectors, without
 //! sectors or tables. A test compares the on-times with Table 2.
 
-use crate::io::PERIOD_S;
-use crate::math::frames::{Abc, AlphaBeta, SQRT_3};
+use crate::{Abc, AlphaBeta, PERIOD_S, SQRT_3};
 
 /// Pulses shorter than the dead time plus this time are dropped or extended, s.
 const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
@@ -13,7 +12,7 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 /// Coefficients of the modulator.
 ///
 /// ```
-/// use drive_core::{Abc, AlphaBeta, current::modulation::Modulator};
+/// use induction_drive_core::{Abc, AlphaBeta, current::Modulator};
 ///
 /// let modulator = Modulator::new(2.2e-6, false);
 /// // Zero voltage: all legs at half the dc link.

@@ -17,12 +17,15 @@
 //! The state is the output itself, in `f32`: near 180 V it does not change for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
 
-use crate::math::frames::Dq;
+#[cfg(test)]
+mod tests;
+
+use crate::Dq;
 
 /// Coefficients of a PI controller, Eq. 3.35.
 ///
 /// ```
-/// use drive_core::current::pi::{Pi, PiState};
+/// use induction_drive_core::current::{Pi, PiState};
 ///
 /// let (pi, mut state) = (Pi { k_c: 2.0, z_c: 0.5 }, PiState::default());
 /// assert_eq!(pi.step(&mut state, 1.0), 2.0);

@@ -20,10 +20,8 @@
 
 use core::f32::consts::TAU;
 
-use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::PERIOD_S;
-use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::carrier::CARRIER_SAMPLES;
+use crate::{Dq, Motor, PERIOD_S};
 
 /// Share of the voltage that is used: the rest is for the current controllers.
 const USED: f32 = 0.92;

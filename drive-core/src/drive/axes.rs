@@ -2,9 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use crate::drive::coefficients::Coefficients;
-use crate::filter::dissertation::lpf_lag_samples;
-use crate::math::angle::UnitVector;
+use crate::filter::lpf_lag_samples;
+use crate::{Coefficients, UnitVector};
 
 /// Unit vectors relative to the flux at the sample; computed once a carrier period.
 #[derive(Clone, Copy, Debug)]

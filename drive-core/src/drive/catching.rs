@@ -4,15 +4,11 @@ use core::f32::consts::TAU;
 
 use super::{Field, FluxPhase, Kept};
 use crate::current::pi::ReferenceState;
-use crate::drive::coefficients::Coefficients;
-use crate::drive::coefficients::catching::WITH_FLUX;
-use crate::fault::Fault;
 use crate::flux::catch::{self, Caught};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::io::PERIOD_S;
-use crate::math::frames::Dq;
 use crate::math::within;
+use crate::{Catching, Coefficients, Dq, Fault, PERIOD_S};
 
 /// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
@@ -83,7 +79,7 @@ impl Field {
         if n == 0 && !drives {
             self.reference[0] = ReferenceState::at_rest(AT_ONCE * catching.current);
         }
-        let d = if drives { WITH_FLUX * catching.current } else { catching.current };
+        let d = if drives { Catching::WITH_FLUX * catching.current } else { catching.current };
         if n > catch::FROM {
             c.current_loop.hold(&mut self.current_loop);
         }

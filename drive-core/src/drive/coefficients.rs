@@ -1,125 +1,95 @@
-//! The coefficients of the control step, and their design from settings.
+//! The coefficients of the control step.
 
-pub(super) mod catching;
-mod estimator;
 #[cfg(test)]
 mod tests;
 
-use core::f32::consts::TAU;
+use crate::carrier::Injection;
+use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
+use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::protect::{
+    LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, WiringCheck,
+};
+use crate::{Angle, AngleSource, DcLink, FrontEnd, Learning, Motion, Relay, UnitVector};
 
-use crate::carrier::DemodulatorKind;
-use crate::carrier::injection::Injection;
-use crate::current::dead_time::DeadTime;
-use crate::current::inverter_drop::InverterDrop;
-use crate::current::modulation::Modulator;
-use crate::current::pi::{DqPi, Pi, ReferenceFilter};
-use crate::current::voltage_limit::VoltageLimit;
-use crate::dc_link::DcLink;
-use crate::filter::dissertation::lpf_lag_samples;
-use crate::flux::estimator::Estimator;
-use crate::flux::indirect::Indirect;
-use crate::flux::observer::{Leakage, Observer};
-use crate::flux::volts_per_hertz::VoltsPerHertz;
-use crate::front_end::FrontEnd;
-use crate::front_end::shunts::Shunts;
-use crate::identify::learning::Learning;
-use crate::io::{PERIOD_S, periods};
-use crate::math::angle::{Angle, UnitVector};
-use crate::motion::{self, Motion, Ramps};
-use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
-use crate::protect::noise_watch::NoiseWatch;
-use crate::protect::offsets::OffsetCheck;
-use crate::protect::plausibility::Prediction;
-use crate::protect::saliency_check::SaliencyCheck;
-use crate::protect::thermal::{Body, Thermal};
-use crate::protect::wiring_check::{WiringCheck, WiringSettings};
-use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
-use crate::supply::Relay;
-use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
-use catching::Catching;
-
-/// Time for which the lock is verified, s: the tracking loop settles in a third of it.
-const VERIFY_S: f32 = 0.3;
-/// Control periods between two steps of the thermal loads, and the time, s.
-pub(super) const THERMAL_EVERY: u32 = 60;
-const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
-/// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
-/// dissertation's motor, and 3 V beside the observer, which tracks the stator resistance.
-const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
-/// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
-/// 18 A/s.
-const MOVED_A: f32 = 0.03;
-/// Largest accepted offset of a current sensor with the dissertation's sensors, A.
-const LARGEST_OFFSET_A: f32 = 0.2;
-/// Largest mean sum of three phase currents with the dissertation's sensors, A: 7 % of the range.
-const LARGEST_SUM_A: f32 = 0.3;
-/// Sampling time of the converters, s, rounded up: the shunts are connected for so long before the sample, and as long
-/// after it for the third current.
-const SHUNT_SAMPLING_S: f32 = 1e-6;
-/// Peak current of the pulses of the wiring check with the dissertation's motor, A.
-const WIRING_A: f32 = 0.2;
-/// Its margin for noise with the dissertation's sensors, A.
-const WIRING_NOISE_A: f32 = 0.05;
-/// Largest voltage of its pulses, V, and largest test voltage of an axis, at 311 V.
-const LARGEST_TEST_V: f32 = 60.0;
-
-/// The coefficients of the control step, designed from [`Settings`] outside the interrupt.
+/// The coefficients of the control step, designed outside the interrupt.
 // In this order: the fields of every step come first and lie together; see the state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Coefficients {
-    pub(crate) front_end: FrontEnd,
-    pub(crate) protection: Protection,
-    pub(crate) source: AngleSource,
+    /// Scales of the sensors and checks of their samples.
+    pub front_end: FrontEnd,
+    /// Limits that trip.
+    pub protection: Protection,
+    /// Source of the angle of the frame.
+    pub source: AngleSource,
     /// Inject a carrier at all.
-    pub(crate) inject: bool,
+    pub inject: bool,
     /// Demodulate and, with the injection as source, track.
-    pub(crate) demodulate: bool,
-    pub(crate) track_rotor: bool,
-    pub(crate) reference_filter: [ReferenceFilter; 2],
-    pub(crate) current_loop: DqPi,
-    pub(crate) modulator: Modulator,
-    pub(crate) dead_time: DeadTime,
-    pub(crate) prediction: Prediction,
-    pub(crate) indirect: Indirect,
+    pub demodulate: bool,
+    /// Take a rotor time constant while running.
+    pub track_rotor: bool,
+    /// Filters of the current references, d and q.
+    pub reference_filter: [ReferenceFilter; 2],
+    /// Current controllers.
+    pub current_loop: DqPi,
+    /// Modulation of the voltages.
+    pub modulator: Modulator,
+    /// Compensation of the dead time.
+    pub dead_time: DeadTime,
+    /// Prediction of the current.
+    pub prediction: Prediction,
+    /// Flux angle from encoder and slip.
+    pub indirect: Indirect,
     /// Electrical turns per period for one mechanical turn/s.
-    pub(crate) freq_per_speed: f32,
+    pub freq_per_speed: f32,
     /// Delay of the measured current beside the filter, samples.
-    pub(crate) current_lag: f32,
+    pub current_lag: f32,
     /// 1 where the delays of the current are compensated, 0 where not.
-    pub(crate) lag_share: f32,
-    pub(crate) sequence: SequenceSteps,
-    pub(crate) estimator: Estimator,
+    pub lag_share: f32,
+    /// Times of a start and a stop.
+    pub sequence: SequenceSteps,
+    /// Estimator of the flux angle from the carrier.
+    pub estimator: Estimator,
     /// The observer, where the angle is not the injection's alone.
-    pub(crate) observer: Option<Observer>,
+    pub observer: Option<Observer>,
     /// The watch on the sensors' noise, where the angle is the injection's.
-    pub(crate) noise_watch: Option<NoiseWatch>,
-    pub(crate) injection: Injection,
+    pub noise_watch: Option<NoiseWatch>,
+    /// The carrier.
+    pub injection: Injection,
     /// The watch on the lock, if it is wanted.
-    pub(crate) lock_monitor: Option<LockMonitor>,
+    pub lock_monitor: Option<LockMonitor>,
     /// The start on a turning shaft, if it is wanted.
-    pub(crate) catching: Option<Catching>,
-    pub(crate) voltage_limit: VoltageLimit,
-    pub(crate) dc_link: DcLink,
-    pub(crate) motion: Motion,
+    pub catching: Option<Catching>,
+    /// Limit of the torque current by the voltage.
+    pub voltage_limit: VoltageLimit,
+    /// Limits of the torque current by the dc link, and chopper.
+    pub dc_link: DcLink,
+    /// Speed and position loop.
+    pub motion: Motion,
     /// Injection axis seen from the flux, as an angle and a unit vector.
-    pub(crate) injection_turn: Angle,
-    pub(crate) injection_axis: UnitVector,
+    pub injection_turn: Angle,
+    /// See `injection_turn`.
+    pub injection_axis: UnitVector,
     /// The check of a sensorless start, if it is wanted.
-    pub(crate) saliency_check: Option<SaliencyCheck>,
-    pub(crate) offsets: OffsetCheck,
-    pub(crate) wiring: WiringCheck,
+    pub saliency_check: Option<SaliencyCheck>,
+    /// The measurement of the offsets of the current sensors.
+    pub offsets: OffsetCheck,
+    /// The check of the wiring at the first start.
+    pub wiring: WiringCheck,
     /// Largest test voltage of an axis, V.
-    pub(crate) largest_test_v: f32,
-    pub(crate) inverter_drop: InverterDrop,
-    pub(crate) learning: Learning,
-    pub(crate) thermal: Thermal,
+    pub largest_test_v: f32,
+    /// The measurement of what the inverter drops beyond its dead time.
+    pub inverter_drop: InverterDrop,
+    /// The learning.
+    pub learning: Learning,
+    /// Thermal loads of motor and inverter.
+    pub thermal: Thermal,
     /// The precharge relay, if there is one.
-    pub(crate) relay: Option<Relay>,
+    pub relay: Option<Relay>,
     /// The mode without identification, where the pairs of poles fit the nameplate.
-    pub(crate) volts_per_hertz: Option<VoltsPerHertz>,
+    pub volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
-    pub(crate) unlearned: bool,
+    pub unlearned: bool,
 }
 
 impl Coefficients {
@@ -151,13 +121,14 @@ impl Coefficients {
 
 /// Limits in the units of the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Protection {
+pub struct Protection {
     /// Largest phase current, A.
     pub trip_a: f32,
-    /// Dc link, V.
+    /// Dc link above which the drive trips, V.
     pub dc_over: f32,
+    /// Dc link below which it trips, V.
     pub dc_under: f32,
-    /// Electrical turns per period.
+    /// Largest speed of the rotor, electrical turns per period.
     pub rotor_freq: f32,
     /// Square of the largest regulated current, A^2.
     pub current_squared: f32,
@@ -167,233 +138,39 @@ pub(crate) struct Protection {
 
 /// The sequence in control periods.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SequenceSteps {
+pub struct SequenceSteps {
+    /// Time with the low sides on, which charges the bootstraps.
     pub precharge: u32,
+    /// Magnetisation.
     pub magnetise: u32,
+    /// Verification of the lock.
     pub verify: u32,
+    /// Direct current, A.
     pub i_d: f32,
     /// A per period.
     pub stop_ramp: f32,
 }
 
-impl Settings {
-    /// Checks every value and runs the design rules.
-    ///
-    /// # Errors
-    /// The first value outside its range, by name, with the range; or why a design rule cannot be
-    /// met.
-    pub fn build(&self) -> Result<Coefficients, SettingsError> {
-        self.check()?;
-        let m = &self.motor;
-        let motor_plant = self.motor_plant()?;
-        let designs = self.current_loops()?;
-        let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
+/// Coefficients of a start on a turning shaft, control periods and A.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Catching {
+    /// Direct current that the rotor is looked for with, A.
+    pub current: f32,
+    /// Periods in which the injection alone corrects the angle.
+    pub alone: u32,
+    /// Periods in which the flux builds up.
+    pub built: u32,
+    /// Periods after which no flux is left in a motor that was switched off.
+    pub flux_gone: u32,
+    /// Model that the search subtracts from the voltage.
+    pub path: Path,
+    /// Largest voltage of flux that was left, V.
+    pub left_v: f32,
+    /// Decay of that flux per period.
+    pub decay: f32,
+}
 
-        let injecting =
-            self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
-        let t = &self.injection.synchronous;
-        let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
-        let current_lag = self.scales.current_delay_s / PERIOD_S;
-        let inj = &self.injection;
-        let motion_design = self.motion_loops()?;
-        let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
-        let carrier_v = self.carrier_v();
-        let injection = Injection::new(carrier_v, motor_plant, current_lag);
-        let (injection_turn, injection_axis) = if inj.demodulator.is_along_flux() {
-            (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 })
-        } else {
-            (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
-        };
-
-        let lock_monitor = self.watches_lock().then(|| {
-            LockMonitor::new(
-                &self.carrier(),
-                &LockMonitorSettings {
-                    slope: self.slope(),
-                    moved_a: self.share_of_rated(MOVED_A),
-                    smoothing_s: t.loss_s,
-                    allowed: t.allowed_loss,
-                    carrier_a: injection.current_amplitude,
-                },
-            )
-        });
-        Ok(Coefficients {
-            front_end: FrontEnd {
-                current_a: self.scales.current_a,
-                current_b: self.scales.current_b,
-                shunts: self.shunts(),
-                dc_link: self.scales.dc_link,
-                full_scale: self.scales.full_scale,
-                top: f32::from(self.inverter.top),
-                heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
-            },
-            offsets: OffsetCheck {
-                samples: periods(self.sequence.calibrate_s) as u16,
-                largest: self.share_of_range(LARGEST_OFFSET_A),
-                shunts: self.scales.sensors == CurrentSensors::LowSide,
-            },
-            source: self.angle_source,
-            track_rotor: self.track_rotor,
-            indirect: Indirect::new(
-                m,
-                self.scales.encoder_counts,
-                i_d,
-                2.0 * self.speed_trip_rpm() / 60.0,
-            ),
-            inject: injecting && carrier_v > 0.0,
-            demodulate: injecting,
-            injection,
-            injection_turn,
-            injection_axis,
-            lock_monitor,
-            saliency_check: self.saliency_check(),
-            noise_watch: (self.angle_source == AngleSource::Injection)
-                .then(|| NoiseWatch::new(t.flux_saliency, injection.current_amplitude)),
-            wiring: WiringCheck::new(&WiringSettings {
-                sigma_ls: m.sigma_l_s(),
-                expected_a: self.share_of_rated(WIRING_A),
-                noise_a: self.share_of_range(WIRING_NOISE_A),
-                highest_v: self.share_of_dc_link(LARGEST_TEST_V),
-            }),
-            largest_test_v: self.share_of_dc_link(LARGEST_TEST_V),
-            estimator: self.estimator(
-                lag_share,
-                current_lag + estimator::carrier_lag(motor_plant),
-                self.freq_of_rpm(self.speed_trip_rpm()),
-                (carrier_v, injection.current_amplitude),
-            ),
-            current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
-            reference_filter: [
-                ReferenceFilter::new(designs[0].p_f).with_direct(tuning::DIRECT_SHARE),
-                ReferenceFilter::new(designs[1].p_f).with_direct(tuning::DIRECT_SHARE),
-            ],
-            current_lag,
-            lag_share,
-            modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
-                .readable(self.shunts().map(|shunts| shunts.readable)),
-            dead_time: if self.inverter.compensate {
-                DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
-            } else {
-                DeadTime::NONE
-            },
-            inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit)
-                .known(self.inverter.drop_v),
-            thermal: Thermal {
-                motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
-                inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
-            },
-            relay: self.relay(),
-            volts_per_hertz: self.volts_per_hertz(),
-            learning: self.learning(),
-            unlearned: self.tracks_synchronously() && !t.allow_unlearned,
-            prediction: {
-                let allowed_v = self.unexplained_v();
-                let mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
-                Prediction::new(m, motor_plant, allowed_v, mean_v)
-            },
-            catching: self.catching(designs.map(|design| design.k_c as f32)),
-            voltage_limit: VoltageLimit::new(m, i_d, current_limit),
-            dc_link: DcLink::new(&self.dc_link_limits()),
-            motion: self.motion(&motion_design),
-            freq_per_speed: self.freq_of_rpm(60.0),
-            protection: Protection {
-                trip_a: self.trip_a(),
-                dc_over: self.dc_over_v(),
-                dc_under: self.dc_under_v(),
-                rotor_freq: self.freq_of_rpm(self.highest_rpm()),
-                current_squared: current_limit * current_limit,
-                i_q: current_limit,
-            },
-            observer: self.uses_observer().then(|| {
-                let leakage = Leakage {
-                    flux_saliency: 0.5 * self.slope().at_rest(),
-                    current_saliency: self.current_saliency(),
-                    share: self.observer.leakage_share,
-                    slope: self.observer.leakage_slope,
-                };
-                let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
-                Observer::new(m, &leakage, i_d, ages)
-            }),
-            sequence: SequenceSteps {
-                precharge: periods(self.sequence.precharge_s),
-                magnetise: periods(self.magnetise_s()),
-                verify: periods(VERIFY_S),
-                i_d,
-                stop_ramp: self.stop_a_per_s() * PERIOD_S,
-            },
-        })
-    }
-
-    /// The learning with these settings; they must be [valid](Self::check).
-    pub fn learning(&self) -> Learning {
-        let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
-        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), synchronous)
-    }
-
-    /// The choice of the phases, with three shunts.
-    fn shunts(&self) -> Option<Shunts> {
-        let s = &self.scales;
-        let window_s = self.inverter.dead_time_s + s.shunt_settle_s + SHUNT_SAMPLING_S;
-        let largest_sum = self.share_of_range(LARGEST_SUM_A);
-        (s.sensors == CurrentSensors::LowSide)
-            .then(|| Shunts::new(s.current_c, window_s, largest_sum))
-    }
-
-    fn motor_plant(&self) -> Result<FirstOrder, TuningError> {
-        tuning::motor_plant(&self.motor.circuit(), f64::from(PERIOD_S))
-    }
-
-    /// The design of the current controllers, d and q, with valid settings.
-    ///
-    /// # Errors
-    /// The design rule that cannot be met.
-    pub fn current_loops(&self) -> Result<[CurrentLoopDesign; 2], TuningError> {
-        let motor_plant = self.motor_plant()?;
-        let (d, q) = match self.current_plant.source {
-            PlantSource::Identified => (self.identified_d(), self.identified_q()),
-            PlantSource::Motor => (motor_plant, motor_plant),
-        };
-        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
-        Ok([design(d)?, design(q)?])
-    }
-
-    /// The design of the speed and the position loop, with valid settings.
-    ///
-    /// # Errors
-    /// The design rule that cannot be met.
-    pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
-        let m = &self.motor;
-        let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
-        let tracking_hz = match self.angle_source {
-            AngleSource::Encoder => None,
-            AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
-        };
-        tuning::design_motion_loops(
-            f64::from(acceleration),
-            tracking_hz,
-            f64::from(self.speed.phase_margin_deg),
-            f64::from(PERIOD_S) * f64::from(motion::DIVIDER),
-        )
-    }
-
-    fn motion(&self, design: &MotionDesign) -> Motion {
-        let counts = match self.angle_source {
-            AngleSource::Encoder => self.scales.encoder_counts,
-            AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
-        };
-        let limit = self.speed_limit_rpm() / 60.0;
-        let ramps = Ramps {
-            usual: self.ramp_rpm_per_s() / 60.0,
-            quick: self.quick_rpm_per_s() / 60.0,
-            rise_s: self.speed.s_ramp_s,
-        };
-        Motion::new(design, counts, limit, &ramps, self.i_q_limit_a())
-    }
-
-    /// Only a sensorless start with the synchronous demodulation is checked.
-    fn saliency_check(&self) -> Option<SaliencyCheck> {
-        let t = &self.injection.synchronous;
-        let checked = t.check && self.tracks_synchronously();
-        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r()))
-    }
+impl Catching {
+    /// Share of `current` that is enough where flux was left: the flux drives a current of its own.
+    pub const WITH_FLUX: f32 = 0.4;
 }

@@ -1,12 +1,12 @@
 //! The commands to the drive, and its answers.
 
-use crate::drive::coefficients::Coefficients;
 use crate::drive::excitation::Excitation;
 use crate::drive::state::{Mode, State};
-use crate::fault::Fault;
-use crate::math::frames::Dq;
+use crate::{Coefficients, Dq, Fault};
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
+///
+/// Exhaustive on purpose: who checks or names commands has to handle a new one.
 // The large variant is passed by reference and kept once, in a mailbox.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,10 +17,10 @@ pub enum Command {
     /// While regulating with the injection, at rest: no torque, magnetise again, verify that the flux is
     /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
     Relock,
-    /// From off: the next start checks the wiring first; see [`crate::protect::wiring_check`].
+    /// From off: the next start checks the wiring first; see `crate::protect::wiring_check`.
     CheckWiring,
     /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
-    /// offsets and charges the bootstraps first. See [`crate::commission`].
+    /// offsets and charges the bootstraps first. See `crate::commission`.
     Excite(Excitation),
     /// Stop in this way. A drive that neither regulates torque, speed or position nor turns by voltage and frequency does it by
     /// [`Stop::Coast`].
@@ -51,8 +51,8 @@ pub enum Command {
     /// A voltage in the flux frame, V, added to that of the current loop from the next period on: to
     /// identify the plant of the loop. Up to 60 V a component; a start takes it back.
     TestVoltage(Dq),
-    /// Rotor time constant that the slip is computed with, s, as [`online`](crate::identify::online) finds it.
-    /// Only with [`track_rotor`](crate::Settings::track_rotor); within
+    /// Rotor time constant that the slip is computed with, s, as `online` finds it.
+    /// Only with `track_rotor`; within
     /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and approached by no more than 2 % with each command.
     RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
@@ -72,6 +72,8 @@ pub enum Stop {
 }
 
 /// An accepted command.
+///
+/// Exhaustive on purpose: an answer that is overlooked would be taken for another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accepted {
     /// As it was given.
@@ -82,6 +84,7 @@ pub enum Accepted {
 
 /// The reason of a refusal. A refused command changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Refused {
     /// The value is not a number or infinite.
     NotFinite,

@@ -7,10 +7,9 @@ use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
 use crate::drive::allowed::allowed;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::Mode;
-use crate::math::angle::Angle;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::settings::AngleSource;
+use crate::{Angle, AngleSource};
 
 /// Periods for which a jog goes on: 0.5 s.
 const JOG: u32 = 3000;

@@ -1,16 +1,17 @@
 //! What the [commissioning](crate::commission) asks of a drive, and what it sees of it.
 
+use crate::AlphaBeta;
 use crate::drive::state::State;
-use crate::math::frames::AlphaBeta;
-use crate::protect::wiring_check::WiringSettings;
+use crate::protect::WiringSettings;
 
 /// Excitation of a motor at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Excitation {
     /// No voltage between the phases: the low sides are on.
     #[default]
     Rest,
-    /// The pulses of the [wiring check](crate::protect::wiring_check), once; then rest.
+    /// The pulses of the wiring check, once; then rest.
     Pulses(WiringSettings),
     /// A current along phase a.
     Current {
@@ -41,6 +42,7 @@ pub struct Regulator {
 
 /// The quantities of a drive that the commissioning needs beside the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Excited {
     /// State of the drive.
     pub state: State,

@@ -4,18 +4,18 @@
 //! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
 
 use super::{Drive, Job, Kept, Left, Phase};
-use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
-use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
-use crate::drive::coefficients::Coefficients;
+use crate::carrier::{CARRIER_COS, CARRIER_SAMPLES};
+use crate::current::pi::ReferenceState;
+use crate::current::{Pi, PiState, ReferenceFilter};
 use crate::drive::command::{Accepted, Refused};
 use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
-use crate::fault::Fault;
-use crate::filter::dissertation::{LPF, LpfState};
-use crate::io::{LOW_SIDES_ON, Measured};
-use crate::math::frames::{Abc, AlphaBeta, Dq};
+use crate::filter::{LPF, LpfState};
+use crate::io::LOW_SIDES_ON;
 use crate::math::limited;
-use crate::protect::wiring_check::{WiringCheck, WiringCheckState};
+use crate::protect::WiringCheck;
+use crate::protect::wiring_check::WiringCheckState;
+use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
 
 /// Control periods in which the carrier rises to its amplitude: twenty of its own.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
@@ -135,7 +135,7 @@ impl Excite {
 }
 
 impl Drive {
-    /// Whether [`Collector`](crate::commission::Collector) is to be given what the last step saw.
+    /// Whether `Collector` is to be given what the last step saw.
     pub fn excites(&self) -> bool {
         matches!(&self.phase, Phase::Excite(excite) if excite.state() == State::Exciting)
     }

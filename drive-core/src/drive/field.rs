@@ -4,20 +4,15 @@
 use super::catching::Residual;
 use super::in_turn::StepResults;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
-use crate::carrier::CarrierSample;
-use crate::carrier::injection::CarrierPeriod;
+use crate::carrier::{CarrierPeriod, CarrierSample};
 use crate::current::inverter_drop::DropSample;
-use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
-use crate::fault::Fault;
-use crate::filter::dissertation::LPF;
+use crate::filter::LPF;
 use crate::identify::learning::LearningState;
-use crate::io::{Measured, PERIOD_S};
-use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::limited;
-use crate::motion;
-use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
-use crate::settings::AngleSource;
+use crate::protect::SaliencyCheck;
+use crate::protect::saliency_check::SaliencyCheckAction;
+use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Measured, PERIOD_S, motion};
 
 /// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
 const STANDING_FREQ: f32 = PERIOD_S;

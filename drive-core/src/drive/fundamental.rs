@@ -5,10 +5,8 @@ use core::f32::consts::TAU;
 use super::Field;
 use super::in_turn::StepResults;
 use super::trust::Trust;
-use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
-use crate::math::angle::UnitVector;
-use crate::math::frames::AlphaBeta;
+use crate::{AlphaBeta, Coefficients, UnitVector};
 
 /// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
 const COMPARED_FROM: f32 = 0.3;

@@ -22,14 +22,8 @@ use super::trust::{Judged, Lock, Trust};
 use super::{Field, Kept};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};
-use crate::dc_link::Limiting;
-use crate::drive::coefficients::Coefficients;
-use crate::fault::Fault;
-use crate::io::Measured;
-use crate::math::angle::UnitVector;
-use crate::math::frames::{AlphaBeta, Dq};
 use crate::protect::plausibility::{Known, RotorFlux};
-use crate::settings::AngleSource;
+use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
 pub(super) struct StepResults<'a> {

@@ -1,13 +1,9 @@
 //! Learning with the shaft locked, as a state of the drive.
 
 use super::{Drive, End, Field, FluxPhase, Kept, Phase};
-use crate::drive::coefficients::Coefficients;
-use crate::fault::Fault;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
-use crate::learned::{Tracked, TrackedLimit};
-use crate::math::angle::Angle;
 use crate::math::limited;
-use crate::settings::{AngleSource, Settings};
+use crate::{Angle, AngleSource, Coefficients, Fault};
 
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.
@@ -87,26 +83,9 @@ impl Field {
     }
 }
 
-impl Learned {
-    /// Range of torque that a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
-    pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
-        self.slope.filter(|_| self.verdict.is_accepted())?;
-        let (i_d, motor) = (settings.i_d(), &settings.motor);
-        let last = self.reference.grid().current(self.points);
-        let lost = self.limit_a < last;
-        let i_q = self.limit_a.min(settings.i_q_limit_a());
-        Some(Tracked {
-            i_q,
-            torque: i_q * motor.torque_per_ampere(i_d),
-            i_d,
-            flux: i_d * motor.l_m,
-            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
-        })
-    }
-}
-
 impl Coefficients {
     /// Replaces settings by an accepted result of a learning.
+    #[cold]
     pub fn take(&mut self, learned: &Learned) {
         if !learned.verdict.is_accepted() {
             return;

@@ -3,12 +3,12 @@
 use super::{Drive, End, Phase};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
-use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
+use crate::drive::coefficients::Coefficients;
 use crate::io::Measured;
-use crate::protect::thermal::ThermalLoads;
+use crate::protect::thermal::{Thermal, ThermalLoads};
 
 /// Control period of those between two steps of the thermal loads in which the limits by heat are found.
-const HEAT_AT: u32 = THERMAL_EVERY / 2;
+const HEAT_AT: u32 = Thermal::EVERY / 2;
 
 /// Limits of the torque current. What the brake resistor has taken outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -78,7 +78,7 @@ impl Drive {
     /// bear; in every state.
     pub(super) fn watch_load(&mut self, measured: &Measured) -> Result<(), End> {
         let k = &mut self.kept;
-        match k.elapsed % THERMAL_EVERY {
+        match k.elapsed % Thermal::EVERY {
             0 => {}
             HEAT_AT => {
                 let i_d = k.references.current.d;
@@ -95,7 +95,7 @@ impl Drive {
         if on {
             Ok(borne?)
         } else {
-            self.c.dc_link.rest(&mut k.limits.dc_link, THERMAL_EVERY);
+            self.c.dc_link.rest(&mut k.limits.dc_link, Thermal::EVERY);
             Ok(())
         }
     }

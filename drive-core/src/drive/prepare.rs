@@ -3,15 +3,12 @@
 use super::excite::Excite;
 use super::scalar::Scalar;
 use super::{Drive, Field, FluxPhase, Goal, Job, Kept, Left, Phase, References, Telemetry};
-use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
-use crate::fault::Fault;
 use crate::flux::catch::CatchState;
-use crate::io::{LOW_SIDES_ON, Measured};
-use crate::math::angle::UnitVector;
-use crate::math::frames::Dq;
+use crate::io::LOW_SIDES_ON;
 use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
+use crate::{Coefficients, Dq, Fault, Measured, UnitVector};
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
@@ -94,6 +91,7 @@ impl Drive {
     }
 
     /// Goes on to the work that the drive was started for.
+    #[cold]
     fn energise(&mut self, encoder: u32) {
         let Phase::Prepare(prepare) = &self.phase else { return };
         let left = prepare.left;

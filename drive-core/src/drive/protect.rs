@@ -43,6 +43,7 @@ impl Coefficients {
     ///
     /// # Errors
     /// [`Fault`] of a wiring that drives too much current.
+    #[cold]
     pub(super) fn pulse(
         &self,
         pulses: &WiringCheck,

@@ -1,54 +1,13 @@
 //! Running by voltage and frequency, without a model of the motor: see [`volts_per_hertz`](crate::flux::volts_per_hertz).
 
-use core::f32::consts::TAU;
-
 use super::{End, Kept, Left, Telemetry};
-use crate::dc_link::{DIVIDER, Limiting};
-use crate::drive::coefficients::Coefficients;
+use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
-use crate::fault::Fault;
-use crate::flux::volts_per_hertz::{
-    Demand, VoltsPerHertz, VoltsPerHertzSettings, VoltsPerHertzState,
-};
-use crate::io::{Measured, PERIOD_S};
-use crate::settings::Settings;
-use crate::settings::rules::PEAK_OF_PHASE;
+use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
+use crate::{Coefficients, Fault, Limiting, Measured, PERIOD_S};
 
 /// Frequency below which a motor that stops is switched off, turns per period.
 const STANDS: f32 = 0.2 * PERIOD_S;
-
-/// Voltage that the inverter loses at most, with 311 V.
-const LOST_V: f32 = 15.0;
-/// Largest rated slip that is believed.
-const LARGEST_SLIP: f32 = 0.15;
-
-impl Settings {
-    /// The mode without identification, where the pairs of poles fit the nameplate.
-    pub(crate) fn volts_per_hertz(&self) -> Option<VoltsPerHertz> {
-        let plate = &self.nameplate;
-        let pole_pairs = f32::from(self.motor.pole_pairs);
-        let slip_hz = plate.frequency_hz - plate.speed_rpm / 60.0 * pole_pairs;
-        let fits = slip_hz > 0.0 && slip_hz < LARGEST_SLIP * plate.frequency_hz;
-        fits.then(|| {
-            VoltsPerHertz::new(&VoltsPerHertzSettings {
-                volts_per_hz: PEAK_OF_PHASE * self.volts_per_hz(),
-                rated_volts_per_hz: PEAK_OF_PHASE * plate.voltage_v / plate.frequency_hz,
-                frequency_hz: plate.frequency_hz,
-                slip_hz,
-                torque_nm: plate.power_w / (TAU * plate.speed_rpm / 60.0),
-                pole_pairs,
-                rated_a: self.rated_a(),
-                limit_a: self.current_limit_a(),
-                boost_a: self.boost_a(),
-                impedance: plate.base_impedance(),
-                lost_v: self.share_of_dc_link(LOST_V),
-                ramp_hz_per_s: self.ramp_rpm_per_s() / 60.0 * pole_pairs,
-                quick_hz_per_s: self.quick_rpm_per_s() / 60.0 * pole_pairs,
-                slip_share: self.vf.slip_share,
-            })
-        })
-    }
-}
 
 /// A drive that turns by voltage and frequency.
 #[derive(Clone, Debug)]

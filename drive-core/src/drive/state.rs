@@ -2,28 +2,32 @@
 
 use core::fmt;
 
-use crate::fault::Fault;
+use crate::Fault;
 
 /// The quantity that the drive regulates once it runs.
+///
+/// Exhaustive on purpose: who names or translates modes has to handle a new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Torque, by the current on the quadrature axis.
     Torque,
-    /// Speed of the rotor; see [`motion`](crate::motion).
+    /// Speed of the rotor; see `motion`.
     Speed,
-    /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
+    /// Position of the rotor. Without the encoder it drifts; see `motion`.
     Position,
     /// Speed of a motor that nobody has identified, by voltage in proportion to the frequency; see
-    /// [`volts_per_hertz`](crate::flux::volts_per_hertz).
+    /// `volts_per_hertz`.
     VoltsPerHertz,
-    /// Learning of the reference of the angle tracking with the shaft locked (see [`crate::identify::learning`]), then
+    /// Learning of the reference of the angle tracking with the shaft locked (see `crate::identify::learning`), then
     /// stops.
     Learning,
-    /// [Excitation](crate::Excitation) of the motor at rest, for the [commissioning](crate::commission).
+    /// [Excitation](crate::Excitation) of the motor at rest, for the commissioning.
     Commissioning,
 }
 
 /// The state of the drive.
+///
+/// Exhaustive on purpose: supervision and field bus have to decide on a new state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
     /// Outputs off.
@@ -35,7 +39,7 @@ pub enum State {
     Precharge,
     /// Short voltage pulses show whether sensors and phases belong together.
     CheckingWiring,
-    /// Exciting the motor at rest, for the [commissioning](crate::commission).
+    /// Exciting the motor at rest, for the commissioning.
     Exciting,
     /// Current along phase a, to find the speed of a turning shaft; then its flux builds up.
     Catching,
@@ -125,6 +129,8 @@ impl State {
 }
 
 /// A stage of a run.
+///
+/// Exhaustive on purpose: supervision and field bus have to decide on a new stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Outputs off.

@@ -1,7 +1,7 @@
 //! The ways to stop.
 
 use super::{Drive, End, Field, FluxPhase, Goal, Kept, Phase};
-use crate::drive::coefficients::Coefficients;
+use crate::Coefficients;
 use crate::drive::command::Stop;
 
 impl Drive {

@@ -1,8 +1,7 @@
 //! The quantities of a step that the drive shows.
 
 use super::{Drive, Phase};
-use crate::math::angle::Angle;
-use crate::math::frames::{AlphaBeta, Dq};
+use crate::{AlphaBeta, Angle, Dq};
 
 /// Measured, estimated and applied quantities of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,7 +38,7 @@ pub struct Telemetry {
     /// Voltage per phase that the power stage drops beyond its dead time, as measured at the start, V.
     pub inverter_drop: f32,
     /// Position in mechanical turns from the start; without the encoder it drifts, see
-    /// [`motion`](crate::motion).
+    /// `motion`.
     pub turns: f32,
 }
 
@@ -57,7 +56,7 @@ pub struct Room {
     pub i_q: (f32, f32),
     /// Torque current that the heat sink does not bear, of the largest current, A.
     pub too_hot_for: f32,
-    /// Voltage that [the limit of the direct current](crate::current::voltage_limit) reckons with, V peak; 0 where the direct
+    /// Voltage that the limit of the direct current reckons with, V peak; 0 where the direct
     /// current is that of the setting.
     pub voltage: f32,
 }

@@ -8,14 +8,14 @@ mod trust;
 
 use super::*;
 use crate::filter::dissertation::LPF;
+use crate::flux::AngleSource;
 use crate::math::frames::{Abc, AlphaBeta};
-use crate::settings::AngleSource;
 
 use crate::carrier::DemodulatorKind;
 use crate::front_end::FrontEndState;
 use crate::io::{Compare, Hardware, Sample};
+use crate::line::Line;
 use crate::math::angle::{Angle, UnitVector};
-use crate::settings::Line;
 use crate::settings::{IdentifiedPlant, Settings};
 use proptest::prelude::*;
 

@@ -6,7 +6,7 @@ use Lock::{Baseline, Off, OwnBaseline, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
 use super::{Field, FluxPhase, Frame};
-use crate::drive::coefficients::Coefficients;
+use crate::Coefficients;
 use crate::flux::hand_over::Source;
 
 /// How strictly the measured current is compared with that which voltage and flux explain.

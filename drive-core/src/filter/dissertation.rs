@@ -21,8 +21,8 @@
 //! | [`BPF`] | 0.01000 | -0.49 dB, -3.9° | 0.80 | 8.83 | 500 Hz to 700 Hz |
 //! | [`PP`] | 0.94406 | -75.8 dB | 24.46 | - | below 100 Hz |
 
+use crate::AlphaBeta;
 use crate::filter::sos::{Sos, SosState};
-use crate::math::frames::AlphaBeta;
 
 /// "LPF" as printed (Table 7): an 8th-order band stop around the injected 600 Hz.
 ///
@@ -65,8 +65,10 @@ pub const PP: Sos<2> = Sos::from_f64(&[
 /// State of [`LPF`] on a current vector.
 pub type LpfState = SosState<AlphaBeta, 4>;
 /// State of [`BPF`] on a current vector.
+#[cfg(feature = "printed")]
 pub type BpfState = SosState<AlphaBeta, 2>;
 /// State of [`PP`] on the current difference.
+#[cfg(feature = "printed")]
 pub type PpState = SosState<f32, 2>;
 
 const LPF_LAG: f32 = 1.530_412;

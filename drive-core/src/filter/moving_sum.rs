@@ -4,15 +4,6 @@
 //! loop here, and the length (up to `LENGTH`) is chosen at run time by the caller.
 
 /// Moving sums of `SIGNALS` signals over up to `LENGTH` samples.
-///
-/// ```
-/// use drive_core::filter::moving_sum::MovingSum;
-///
-/// let mut sums = MovingSum::<1, 8>::default();
-/// // The sum of the last two samples.
-/// let last = [1, 2, 3].iter().zip([0, 1, 0]).map(|(x, index)| sums.step(index, [*x])[0]);
-/// assert!(last.eq([1, 3, 5]));
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct MovingSum<const SIGNALS: usize, const LENGTH: usize> {
     ring: [[i32; SIGNALS]; LENGTH],
@@ -36,5 +27,18 @@ impl<const SIGNALS: usize, const LENGTH: usize> MovingSum<SIGNALS, LENGTH> {
         }
         *slot = new;
         self.sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sum_is_that_of_the_last_samples() {
+        let mut sums = MovingSum::<1, 8>::default();
+        // The sum of the last two samples.
+        let last = [1, 2, 3].iter().zip([0, 1, 0]).map(|(x, index)| sums.step(index, [*x])[0]);
+        assert!(last.eq([1, 3, 5]));
     }
 }

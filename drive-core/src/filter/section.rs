@@ -68,19 +68,8 @@ pub fn response(sections: &[Section], omega_t: f64) -> Complex64 {
     })
 }
 
-/// Group delay -d arg H / d(ωT) of a cascade in samples, computed analytically; `omega_t` in rad/sample.
-///
-/// NaN at a frequency with a zero on the unit circle. Not for the control step.
-pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
-    let delay = Complex64::cis(-omega_t);
-    let of = |[c0, c1, c2]: [f64; 3]| {
-        let derivative = polynomial([0.0, c1, 2.0 * c2], delay);
-        (derivative / polynomial([c0, c1, c2], delay)).re
-    };
-    sections.iter().map(|s| of(s.numerator()) - of(s.denominator())).sum()
-}
-
 /// c0 + c1 x + c2 x².
+#[cold]
 fn polynomial([c0, c1, c2]: [f64; 3], x: Complex64) -> Complex64 {
     Complex64::new(c0, 0.0) + x * (Complex64::new(c1, 0.0) + x * Complex64::new(c2, 0.0))
 }

@@ -15,7 +15,7 @@
 
 use core::ops::{Add, Mul, Sub};
 
-use crate::filter::section::{Section, group_delay, response};
+use crate::filter::section::{Section, response};
 use num_complex::Complex64;
 
 /// Coefficients of a cascade of `N` sections.
@@ -25,7 +25,7 @@ use num_complex::Complex64;
 /// (a zero pair on the unit circle) then needs one multiplication less.
 ///
 /// ```
-/// use drive_core::{AlphaBeta, filter::sos::{Sos, SosState}};
+/// use induction_drive_core::{AlphaBeta, filter::{Sos, SosState}};
 ///
 /// // y[k] = 0.5 x[k] + 0.5 y[k-1] on a vector.
 /// let low_pass = Sos::<1>::from_f64(&[[0.5, 0.0, 0.0, -0.5, 0.0]]);
@@ -87,11 +87,6 @@ impl<const N: usize> Sos<N> {
     /// [`response`] of this filter.
     pub fn response(&self, omega_t: f64) -> Complex64 {
         response(&self.sections, omega_t)
-    }
-
-    /// [`group_delay`] of this filter.
-    pub fn group_delay(&self, omega_t: f64) -> f64 {
-        group_delay(&self.sections, omega_t)
     }
 }
 

@@ -15,10 +15,7 @@
 
 use core::f32::consts::TAU;
 
-use crate::io::PERIOD_S;
-use crate::math::angle::Angle;
-use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::{Angle, Dq, Motor, PERIOD_S};
 
 /// Control periods that are averaged.
 const AVERAGED: u8 = 4;

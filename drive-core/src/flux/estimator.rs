@@ -4,18 +4,17 @@
 //! (reference of the current difference and PII controller) or, for the synchronous demodulation, a loop
 //! with learned reference, scheduled gain and slip feed-forward.
 
-use crate::carrier::asymmetry::Asymmetry;
 use crate::carrier::demodulator::Demodulator;
 use crate::carrier::drift::GainDrift;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
-use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
+use crate::carrier::{Asymmetry, CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::hand_over::Turning;
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
 use crate::learned::Learned;
-use crate::math::angle::{Angle, UnitVector};
-use crate::settings::table::ReferenceTable;
+use crate::table::ReferenceTable;
+use crate::{Angle, UnitVector};
 
 /// Reference `ref_delta_i` over i_q (section 3.3): odd, linear up to the current `from`, constant beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +236,7 @@ impl Estimator {
     /// reference of the quadrature current, A, `slip_freq` the slip, electrical turns per period.
     ///
     /// # Errors
-    /// [`TrackingLost`] when the PII tracker has reached its speed limit, or the other loop turned by what is no number. (The
+    /// `TrackingLost` when the PII tracker has reached its speed limit, or the other loop turned by what is no number. (The
     /// drive itself checks the speed of the other loop.)
     pub fn track(
         &self,

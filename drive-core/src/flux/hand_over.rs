@@ -15,8 +15,8 @@
 //! While the carrier is on, the observer's turn is its mean over a carrier period: a wobble of the axis at 600 Hz would bias the
 //! demodulation, by up to 12 degrees at 3 A.
 
-use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::PERIOD_S;
+use crate::PERIOD_S;
+use crate::carrier::CARRIER_SAMPLES;
 
 /// Frequencies of the stator between which the weight rises, turns per period.
 const FROM: f32 = 15.0 * PERIOD_S;

@@ -6,26 +6,10 @@
 
 use core::f32::consts::TAU;
 
-use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::PERIOD_S;
-use crate::math::angle::Angle;
-use crate::settings::Motor;
+use crate::carrier::CARRIER_SAMPLES;
+use crate::{Angle, Motor, PERIOD_S};
 
 /// Coefficients of the encoder and the slip.
-///
-/// ```
-/// use drive_core::flux::indirect::{Indirect, IndirectState};
-/// use drive_core::settings::Motor;
-///
-/// // Two pole pairs, 10 000 counts per mechanical turn, 0.7 A, at most 60 turns/s.
-/// let indirect = Indirect::new(&Motor::default(), 10_000, 0.7, 60.0);
-/// let mut state = IndirectState::default();
-/// // An eighth of a mechanical turn, without slip so far.
-/// let flux = indirect.angle(&mut state, 1250).unwrap();
-/// assert!((flux.phi.to_degrees() - 90.0).abs() < 0.01);
-/// // At standstill, 1250 counts from one period to the next are implausible.
-/// assert!(indirect.angle(&mut state, 2500).is_err());
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indirect {
     /// Electrical angle of one count in units of 2^-32 turn. Its rounding is a relative speed error below
@@ -121,11 +105,12 @@ impl Indirect {
         }
     }
 
-    /// Moves the rotor time constant towards `tau_r`, s, by at most [`TAU_R_STEP`] of the settings' rate,
+    /// Moves the rotor time constant towards `tau_r`, s, by at most `TAU_R_STEP` of the settings' rate,
     /// and returns the one now in use, s. Not for the control step: it divides.
     ///
     /// # Errors
     /// The smallest and the largest allowed value, s, when `tau_r` is outside [`TAU_R_LIMITS`].
+    #[cold]
     pub fn track_tau_r(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
         let limits = TAU_R_LIMITS.map(|factor| factor * PERIOD_S / self.nominal_rate);
         if !(limits[0]..=limits[1]).contains(&tau_r) {
@@ -147,7 +132,7 @@ impl Indirect {
     /// Flux angle at the present sample from the encoder `count`.
     ///
     /// # Errors
-    /// [`ImplausibleEncoder`] when the counter moved further than the rotor can turn in a period, or stopped
+    /// `ImplausibleEncoder` when the counter moved further than the rotor can turn in a period, or stopped
     /// abruptly while the rotor was fast: cable or supply interrupted.
     pub fn angle(
         &self,
@@ -316,5 +301,17 @@ mod tests {
             let moved = indirect().angle(&mut state, 7_u32.wrapping_add_signed(counts));
             assert_eq!(moved.is_ok(), possible, "{counts}");
         }
+    }
+
+    #[test]
+    fn an_eighth_of_a_turn_is_a_quarter_of_the_flux() {
+        // Two pole pairs, 10 000 counts per mechanical turn, 0.7 A, at most 60 turns/s.
+        let indirect = Indirect::new(&Motor::default(), 10_000, 0.7, 60.0);
+        let mut state = IndirectState::default();
+        // An eighth of a mechanical turn, without slip so far.
+        let flux = indirect.angle(&mut state, 1250).unwrap();
+        assert!((flux.phi.to_degrees() - 90.0).abs() < 0.01);
+        // At standstill, 1250 counts from one period to the next are implausible.
+        assert!(indirect.angle(&mut state, 2500).is_err());
     }
 }

@@ -23,12 +23,9 @@
 
 use core::f32::consts::TAU;
 
-use crate::io::PERIOD_S;
 use crate::learned::Learned;
-use crate::math::angle::UnitVector;
-use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::limited;
-use crate::settings::Motor;
+use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
 
 /// Gains `s_0` and `c`. Values of `c` from 0.2 to 0.7 differ by 0.1 degrees.
 const AT_REST: f32 = 1.0;

@@ -14,7 +14,7 @@
 //! steeper.
 
 use crate::carrier::Saliency;
-use crate::settings::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
+use crate::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 
 /// Minimum share of the proportional gain. Only errors faster than the current loop see the steep slope in
 /// full; full compensation leaves the tracking loop too little damping at large currents. (3.5 Hz, rotor
@@ -102,7 +102,7 @@ impl GainSchedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::table::Grid;
+    use crate::table::Grid;
 
     /// Slope of a saliency that is fixed to the flux alone.
     fn fixed(a: f32) -> SlopeTable {

@@ -8,25 +8,13 @@
 use core::f32::consts::TAU;
 
 use super::hand_over::Turning;
-use crate::io::PERIOD_S;
-use crate::math::angle::Angle;
 use crate::math::limited;
-use crate::tuning;
+use crate::{Angle, PERIOD_S};
+
+/// Third pole of the flux-tracking loop relative to its natural frequency, where the other two poles lie.
+pub const THIRD_POLE: f64 = 0.2;
 
 /// Coefficients of the PII tracker.
-///
-/// ```
-/// use core::f32::consts::TAU;
-/// use drive_core::flux::tracker::{Tracker, TrackerState};
-///
-/// let tracker = Tracker::new(0.01 * TAU, 0.5, 0.1);
-/// let mut state = TrackerState::default();
-/// assert!(tracker.step(&mut state, 1.0)); // one ampere: 0.01 turns per period
-/// assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.01).abs() < 1e-7);
-/// assert!(tracker.step(&mut state, 0.5)); // e[k] = z_s e[k-1]: the frequency is kept
-/// assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.02).abs() < 1e-7);
-/// assert!(!tracker.step(&mut state, 100.0)); // beyond the speed limit: the angle is lost
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracker {
     /// Gain, turns per period and ampere.
@@ -80,20 +68,6 @@ impl Tracker {
 /// weakens the flux, and with it the gain of the loop. The third pole is slow so that the loop stays stable
 /// down to a fifteenth of its gain. The schedule `g` scales the proportional part only: the gain rises with
 /// the torque current for fast errors, but not for slow ones.
-///
-/// ```
-/// use drive_core::flux::hand_over::Turning;
-/// use drive_core::flux::tracker::{Pll, TrackerState};
-///
-/// let (pll, mut state, mut rotor_freq) = (Pll::new(4.0), TrackerState::default(), 0.0);
-/// let axis = 0.02; // turns
-/// for _ in 0..12_000 {
-///     let error = core::f32::consts::TAU * (axis - state.angle.to_turns());
-///     let correction = pll.correction(error, 1.0, 0.0);
-///     Pll::step(&mut state, &mut rotor_freq, correction, 0.0, &Turning::default());
-/// }
-/// assert!((state.angle.to_turns() - axis).abs() < 1e-4 && rotor_freq.abs() < 1e-6);
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pll {
     /// Turns per period and radian.
@@ -115,7 +89,7 @@ impl Pll {
     /// Loop with the natural frequency w_n = 2 pi `bandwidth_hz`.
     pub fn new(bandwidth_hz: f32) -> Self {
         let w = TAU * bandwidth_hz * PERIOD_S;
-        let c = tuning::THIRD_POLE as f32;
+        let c = THIRD_POLE as f32;
         Self {
             proportional: (2.0 + c) * w / TAU,
             integral: (1.0 + 2.0 * c) * w * w / TAU,
@@ -283,5 +257,28 @@ mod tests {
             Tracker::new(0.13, 0.9, 0.01).step(&mut state, 0.0)
         };
         assert!(step(0.0099) && step(-0.0099) && !step(0.0101) && !step(-0.0101));
+    }
+
+    #[test]
+    fn the_zero_keeps_the_frequency() {
+        let tracker = Tracker::new(0.01 * TAU, 0.5, 0.1);
+        let mut state = TrackerState::default();
+        assert!(tracker.step(&mut state, 1.0)); // one ampere: 0.01 turns per period
+        assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.01).abs() < 1e-7);
+        assert!(tracker.step(&mut state, 0.5)); // e[k] = z_s e[k-1]: the frequency is kept
+        assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.02).abs() < 1e-7);
+        assert!(!tracker.step(&mut state, 100.0)); // beyond the speed limit: the angle is lost
+    }
+
+    #[test]
+    fn the_loop_comes_to_rest_on_the_axis() {
+        let (pll, mut state, mut rotor_freq) = (Pll::new(4.0), TrackerState::default(), 0.0);
+        let axis = 0.02; // turns
+        for _ in 0..12_000 {
+            let error = core::f32::consts::TAU * (axis - state.angle.to_turns());
+            let correction = pll.correction(error, 1.0, 0.0);
+            Pll::step(&mut state, &mut rotor_freq, correction, 0.0, &Turning::default());
+        }
+        assert!((state.angle.to_turns() - axis).abs() < 1e-4 && rotor_freq.abs() < 1e-6);
     }
 }

@@ -24,11 +24,8 @@
 //! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate alone: half the rated speed within 1 % of
 //! the rated one without load, within 3 % with 0.3 of the rated torque.
 
-use crate::fault::Fault;
-use crate::io::PERIOD_S;
-use crate::math::angle::{Angle, UnitVector};
-use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::{limited, within};
+use crate::{AlphaBeta, Angle, Dq, Fault, PERIOD_S, UnitVector};
 
 /// Gains of the boost, as shares of the base impedance: proportional, and per second.
 const BOOST_K: f32 = 0.03;

@@ -5,8 +5,7 @@
 //! read; its current then is minus the sum of the others. The modulator leaves at most one leg so
 //! ([`Modulator::readable`](crate::current::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
 
-use crate::io::PERIOD_S;
-use crate::settings::Line;
+use crate::{Line, PERIOD_S};
 
 /// Time constant of the mean of the sum, samples.
 const MEAN_SAMPLES: f32 = 16.0;

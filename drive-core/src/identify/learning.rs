@@ -36,14 +36,11 @@ mod tests;
 
 use core::f32::consts::{PI, TAU};
 
-use crate::carrier::asymmetry::Asymmetry;
-use crate::io::{PERIOD_S, periods};
-use crate::math::angle::Angle;
-use crate::math::frames::Dq;
-use crate::settings::Motor;
-use crate::settings::table::{Grid, POINTS};
+use crate::carrier::Asymmetry;
+use crate::table::{Grid, POINTS};
+use crate::{Angle, Dq, Motor, PERIOD_S, periods};
 
-pub use crate::learned::{Fitted, LEAST_SLOPE, Learned, Verdict};
+pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;
 use points::{AVERAGE_S, LEFT, Point, SETTLE_T};
 
@@ -269,6 +266,7 @@ impl Learning {
     }
 
     /// Evaluates the sums of a completed point. False when the shaft moved.
+    #[cold]
     fn finish(&self, state: &mut LearningState, point: Point) -> bool {
         let s = state.sums;
         state.sums = Sums::default();

@@ -13,7 +13,7 @@ use fixed::types::I0F32;
 /// sine and cosine to the bit.
 ///
 /// ```
-/// use drive_core::Angle;
+/// use induction_drive_core::Angle;
 ///
 /// let sum = Angle::from_degrees(170.0) + Angle::from_degrees(20.0);
 /// assert!((sum.to_degrees() + 170.0).abs() < 1e-4);

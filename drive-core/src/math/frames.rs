@@ -4,7 +4,7 @@
 //! cannot be mixed by accident; only a transformation converts one into another.
 //!
 //! ```
-//! use drive_core::{Abc, Angle};
+//! use induction_drive_core::{Abc, Angle};
 //!
 //! // A balanced set with peak 2 at angle 0, in the frame of a flux at 30°: it lies 30° behind d.
 //! let i = Abc::new(2.0, -1.0, -1.0).to_alpha_beta();

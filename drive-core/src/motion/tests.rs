@@ -11,7 +11,13 @@ const COUNTS: u32 = 10_000;
 
 fn motion(limit: f32, ramp: f32) -> Motion {
     let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
-    Motion::new(&design, COUNTS, limit, &Ramps { usual: ramp, quick: 3.0 * ramp, rise_s: 0.0 }, 3.0)
+    Motion::new(
+        &design.gains,
+        COUNTS,
+        limit,
+        &Ramps { usual: ramp, quick: 3.0 * ramp, rise_s: 0.0 },
+        3.0,
+    )
 }
 
 /// Result of a run of a rigid rotor, in f64.
@@ -128,5 +134,13 @@ fn the_braking_curve_ends_at_the_goal() {
     }
     let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
     let slope = f64::from(motion.braking_curve(1e-4)) / 1e-4;
-    assert!((slope / design.k_x - 1.0).abs() < 1e-3, "{slope}");
+    assert!((slope / design.gains.k_x - 1.0).abs() < 1e-3, "{slope}");
+}
+
+#[test]
+fn turns_are_counted() {
+    let mut rotor = RotorCount::default();
+    let turns = [0.25, 0.5, 0.75, 0.0, 0.25];
+    let counts = turns.map(|turns| rotor.follow(Angle::from_turns(turns)));
+    assert_eq!(counts[4], 5 * COUNTS_PER_TURN / 4);
 }

@@ -34,39 +34,13 @@
 //! `|C|_ref` is the carrier current measured during magnetisation, when the direction of the flux is known,
 //! times a learned even function of i_q.
 
+use crate::Fault;
 use crate::carrier::Saliency;
 use crate::carrier::injection::CARRIER_S;
-use crate::fault::Fault;
 use crate::learned::Learned;
-use crate::settings::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
+use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 
 /// Coefficients of the monitor.
-///
-/// ```
-/// use drive_core::carrier::Saliency;
-/// use drive_core::fault::Fault;
-/// use drive_core::protect::lock_monitor::{LockMonitor, LockMonitorSettings, LockMonitorState};
-/// use drive_core::settings::table::{CarrierTable, Grid, SlopeTable};
-///
-/// let settings = LockMonitorSettings {
-///     slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, -0.035),
-///     smoothing_s: 0.12,
-///     allowed: 0.55,
-///     carrier_a: 0.26,
-///     moved_a: 0.03,
-/// };
-/// let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
-/// let mut state = LockMonitorState::default();
-/// let carrier = |a: f32| Saliency { q: 0.0, carrier_squared: a * a, i_q: 0.0 };
-/// for _ in 0..600 {
-///     monitor.step(&mut state, &carrier(0.26), 1.0, true).unwrap(); // baseline while magnetising
-/// }
-/// // Without flux the carrier current falls by the saliency: 3.5 %.
-/// let gone = carrier(0.26 * (1.0 - 0.035));
-/// assert!(monitor.step(&mut state, &gone, 1.0, false).is_ok());
-/// let mut after = (0..90).map(|_| monitor.step(&mut state, &gone, 1.0, false));
-/// assert!(after.any(|result| result == Err(Fault::LostLock)));
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitor {
     /// Torque currents of the carrier table.

@@ -36,8 +36,7 @@
 //! fundamental wave at speed, show in `d` (2 A at 3000 rpm as 3 mA of noise), and noise turns the angle less: 178 mA rms by
 //! 15° at 3000 rpm, 360 mA by 20° at 1800 and by 39° at 900 (1.4 A of direct current, found without this limit).
 
-use crate::fault::Fault;
-use crate::io::Measured;
+use crate::{Fault, Measured};
 
 /// Allowed noise relative to the carrier current caused by the saliency.
 const ALLOWED: f32 = 1.1;

@@ -53,6 +53,7 @@ impl OffsetCheck {
         Ok(())
     }
 
+    #[cold]
     fn mean(
         &self,
         state: &mut OffsetCheckState,

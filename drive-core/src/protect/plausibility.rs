@@ -9,14 +9,8 @@
 
 use core::f32::consts::TAU;
 
-use crate::carrier::CarrierCurrent;
-use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::fault::Fault;
-use crate::io::PERIOD_S;
-use crate::math::angle::UnitVector;
-use crate::math::frames::{AlphaBeta, Dq, SQRT_3};
-use crate::settings::Motor;
-use crate::tuning::FirstOrder;
+use crate::carrier::{CARRIER_SAMPLES, CarrierCurrent};
+use crate::{AlphaBeta, Dq, Fault, FirstOrder, Motor, PERIOD_S, SQRT_3, UnitVector};
 
 /// Share of the expected carrier amplitude below which a channel counts as silent.
 const SILENT: f32 = 0.25;
@@ -178,7 +172,7 @@ impl Prediction {
         state.flux = (axis, self.emf * flux.magnetising * flux.flux_freq);
     }
 
-    /// Compares the `current`, A, after it was [collected](PredictionState::collect); called in every fifth
+    /// Compares the `current`, A, after it was collected; called in every fifth
     /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five.
     ///
     /// # Errors

@@ -8,10 +8,8 @@
 //! stage has the direction of the carrier. At 45° a drop of 1.6 V per phase looks like a saliency of
 //! 0.0135.) Then the flux is built up again.
 
-use crate::io::periods;
 use crate::learned::Learned;
-use crate::math::angle::UnitVector;
-use crate::math::frames::SQRT_3;
+use crate::{SQRT_3, UnitVector, periods};
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +75,7 @@ fn seen_share(window: f32, tau_r: f32) -> f32 {
 
 impl SaliencyCheck {
     /// Check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
+    #[cold]
     pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
         let window = (AVERAGE_T * tau_r).clamp(AVERAGE_S.0, AVERAGE_S.1);
         let (average, seen_share) = (periods(window), seen_share(window, tau_r));
@@ -109,7 +108,7 @@ impl SaliencyCheck {
         1.0 / self.seen_share
     }
 
-    /// Injection axis in the flux frame during [`SaliencyCheckAction::Look`]: 60° ahead of the flux.
+    /// Injection axis in the flux frame during `SaliencyCheckAction::Look`: 60° ahead of the flux.
     pub const LOOK_AXIS: UnitVector = UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 };
 
     /// Processes control period `elapsed` of the check with its saliency `q`.

@@ -13,8 +13,7 @@
 //! From a load of 1 on the torque current falls back, and with it the load: the drive settles at the current that the body
 //! carries for ever, at most 2.5 % above it. The trip is for what that cannot hold, a direct current that is too large.
 
-use crate::dc_link::Limiting;
-use crate::fault::Fault;
+use crate::{Fault, Limiting};
 
 /// Load that trips: 5 % more current than allowed for ever, with margin for ripple.
 const TRIP: f32 = 1.1;
@@ -74,6 +73,9 @@ impl ThermalLoads {
 }
 
 impl Thermal {
+    /// Control periods between two steps.
+    pub const EVERY: u32 = 60;
+
     /// Advances by a period with the `square` of the current vector, A^2.
     ///
     /// # Errors

@@ -22,9 +22,7 @@
 //! twice the expected current, whatever the sensors report. With less inductance, a working sensor ends the pulse at
 //! the next sample, which keeps the current below 2.5 times the expected one down to a fifth.
 
-use crate::fault::Fault;
-use crate::io::PERIOD_S;
-use crate::math::frames::{Abc, AlphaBeta};
+use crate::{Abc, AlphaBeta, Fault, PERIOD_S};
 
 /// Peak current with half the inductance, relative to the expected one.
 const LARGEST: f32 = 2.0;
@@ -158,11 +156,12 @@ impl WiringCheck {
         Ok(WiringAction::Apply { voltage: AXES[leg] * volts, current: AXES[leg] * flowing })
     }
 
-    /// Evaluates the [answers](WiringCheckState::answers).
+    /// Evaluates the answers.
     ///
     /// # Errors
     /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
     /// [`Fault::WiringPolarityB`].
+    #[cold]
     pub fn judge(&self, answers: &[[f32; 2]; 3]) -> Result<(), Fault> {
         let [a, b, c] = *answers;
         let least = LEAST_SHARE * self.expected;

@@ -8,7 +8,7 @@ mod states;
 
 use core::f64::consts::{PI, TAU};
 
-use drive_core::filter::section::Section;
+use induction_drive_core::filter::Section;
 use num_complex::Complex64;
 
 const RATE: f64 = 6000.0;

@@ -2,9 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
-use drive_core::filter::section::Section;
-use drive_core::filter::sos::{Sos, SosState};
+use induction_drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos, SosState};
 
 use super::db;
 use super::printed::{Direct32, Direct64, Printed, TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};

@@ -1,6 +1,6 @@
 //! The filters as printed: Tables 7 and 8, and the difference equation C.1.
 
-use drive_core::tuning::roots;
+use induction_drive_settings::tuning::roots;
 use num_complex::Complex64;
 
 /// Table 7 and 8, Eq. C.1: numerator and denominator in falling powers of z, as printed.

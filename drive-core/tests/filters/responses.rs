@@ -2,9 +2,9 @@
 
 use core::f64::consts::PI;
 
-use drive_core::filter::dissertation::{BPF, LPF, LPF_AS_PRINTED, PP, lpf_lag_samples};
-use drive_core::filter::section::{Section, response};
-use drive_core::filter::sos::{Sos, SosState};
+use induction_drive_core::filter::{
+    BPF, LPF, LPF_AS_PRINTED, PP, Section, Sos, SosState, lpf_lag_samples, response,
+};
 use num_complex::Complex64;
 
 use super::db;
@@ -67,24 +67,24 @@ fn lpf_has_unit_gain_at_dc() {
     assert!((y - 3.0).abs() < 1e-5);
 }
 
+/// Group delay -d arg H / d(ωT) of a cascade, samples.
+fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
+    let h = 1e-5;
+    -(response(sections, omega_t + h) / response(sections, omega_t - h)).arg() / (2.0 * h)
+}
+
 #[test]
 fn group_delays() {
     for (name, delay, printed) in [
-        ("LPF at dc", LPF.group_delay(0.0), 1.53),
-        ("LPF at 200 Hz", LPF.group_delay(rad(200.0)), 2.46),
-        ("BPF at dc", BPF.group_delay(0.0), 0.80),
-        ("BPF at 600 Hz", BPF.group_delay(rad(600.0)), 8.83),
-        ("PP at dc", PP.group_delay(0.0), 24.46),
-        ("PP at 200 Hz", PP.group_delay(rad(200.0)), 4.0),
+        ("LPF at dc", group_delay(&LPF.sections, 0.0), 1.53),
+        ("LPF at 200 Hz", group_delay(&LPF.sections, rad(200.0)), 2.46),
+        ("BPF at dc", group_delay(&BPF.sections, 0.0), 0.80),
+        ("BPF at 600 Hz", group_delay(&BPF.sections, rad(600.0)), 8.83),
+        ("PP at dc", group_delay(&PP.sections, 0.0), 24.46),
+        ("PP at 200 Hz", group_delay(&PP.sections, rad(200.0)), 4.0),
     ] {
         println!("{name}: {delay:.4} samples");
         assert!((delay - printed).abs() < 0.006, "{name}: {delay}");
-    }
-    // The formula against the difference quotient of the phase.
-    for hz in [10.0, 100.0, 300.0, 700.0, 1500.0] {
-        let (w, h) = (rad(hz), 1e-5);
-        let turned = (BPF.response(w + h) / BPF.response(w - h)).arg();
-        assert!((BPF.group_delay(w) + turned / (2.0 * h)).abs() < 1e-6, "{hz} Hz");
     }
 }
 
@@ -111,7 +111,7 @@ fn responses_of_trivial_cascades() {
     assert_eq!(response(&[], 1.0), Complex64::ONE);
     let delay = Sos { sections: [Section { b0: 0.0, b1: 1.0, ..Section::IDENTITY }] };
     assert!((delay.response(0.3) - Complex64::cis(-0.3)).norm() < 1e-15);
-    assert!((delay.group_delay(0.3) - 1.0).abs() < 1e-15);
+    assert!((group_delay(&delay.sections, 0.3) - 1.0).abs() < 1e-9);
     let mut state = SosState::default();
     assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
 }

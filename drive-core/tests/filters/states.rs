@@ -1,8 +1,7 @@
 //! States: what a filter remembers is linear, bounded, and forgotten.
 
-use drive_core::AlphaBeta;
-use drive_core::filter::dissertation::{BPF, LPF, PP};
-use drive_core::filter::sos::{Sos, SosState};
+use induction_drive_core::AlphaBeta;
+use induction_drive_core::filter::{BPF, LPF, PP, Sos, SosState};
 use proptest::prelude::*;
 
 proptest! {

@@ -1,9 +1,7 @@
 //! A key of either table.
 
-use drive_core::Settings;
-use drive_core::settings::entry::Entry;
-use drive_core::settings::value as drive;
-use drive_core::settings::{SETTINGS, find};
+use drive_settings::entry::Entry;
+use drive_settings::{SETTINGS, Settings, find, value as drive};
 
 use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, Value};
 use crate::error::{Error, nearest};

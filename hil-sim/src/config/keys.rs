@@ -1,10 +1,10 @@
 //! The table of the keys of the bench: motor, inverter, sensors, load, and how much is simulated. The keys of the drive
-//! are those of [`drive_core::settings::SETTINGS`].
+//! are those of [`drive_settings::SETTINGS`].
 //!
 //! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from
 //! these two tables. To add a key, add a line.
 
-use drive_core::Settings;
+use drive_settings::Settings;
 
 use super::after::After;
 use super::value::{Allowed, Field, Value};

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::Line;
 use drive_core::io::CONVERTER_CODES;
-use drive_core::settings::Line;
 
 use super::{Config, FluxLevel, Key, LoadMode, PlantModel};
 use crate::config::value::Field as _;

@@ -1,7 +1,7 @@
 //! Effect of anti-windup in the example of Appendix B.
 
-use drive_core::current::pi::{Pi, PiState};
-use drive_core::tuning::roots;
+use drive_core::current::{Pi, PiState};
+use drive_settings::tuning::roots;
 
 use super::bode::largest_pole;
 use super::{Context, Experiment};

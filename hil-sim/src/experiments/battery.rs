@@ -22,9 +22,8 @@ pub use run::{learned, trial};
 pub use summary::Summary;
 pub use trial::Trial;
 
-use drive_core::Drive;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::settings::AngleSource;
+use drive_core::{AngleSource, Drive};
 
 use super::statistics::{Study, whole};
 use super::torque::assumptions;

@@ -4,12 +4,12 @@ pub mod machine;
 pub mod refusals;
 mod session;
 
-use drive_core::Settings;
-use drive_core::commission::{Commissioning, Step};
-use drive_core::filter::dissertation::LPF;
+use drive_commission::{Commissioning, Step};
+use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::value::Words as _;
-use drive_core::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_plant};
+use drive_settings::Settings;
+use drive_settings::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_plant};
+use drive_settings::value::Words as _;
 use serde::{Deserialize, Serialize};
 
 use super::statistics::{Study, whole};

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Figures 28 and 29.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -4,7 +4,7 @@ mod compared;
 mod direct;
 mod precision;
 
-use drive_core::filter::dissertation::LPF;
+use drive_core::filter::LPF;
 use num_complex::Complex64;
 
 use super::bode::{Bode, RATE, decibels, frequencies, omega_t};

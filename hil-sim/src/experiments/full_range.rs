@@ -10,9 +10,9 @@ mod trial;
 
 use std::sync::OnceLock;
 
-use drive_core::Drive;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::settings::{AngleSource, Flux};
+use drive_core::{AngleSource, Drive};
+use drive_settings::Flux;
 
 use case::Case;
 use trial::{Run, Trial};

@@ -2,7 +2,7 @@
 //! Ribeiro 1996.
 
 use drive_core::AlphaBeta;
-use drive_core::identify::rls::{Rls, RlsSettings};
+use rotor_id::rls::{Rls, RlsSettings};
 
 use super::{Context, Experiment};
 use crate::error::Error;

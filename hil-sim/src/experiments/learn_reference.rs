@@ -1,6 +1,6 @@
 //! The drive learns the reference of its angle tracking.
 
-use drive_core::identify::learning::Fitted;
+use drive_core::learned::Fitted;
 
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TURNING, learning};

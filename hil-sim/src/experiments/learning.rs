@@ -1,8 +1,8 @@
 //! A drive that learns its tracking reference on a simulated motor with the shaft locked.
 
 use drive_core::Command;
-use drive_core::identify::learning::Learned;
-use drive_core::settings::table::{Grid, ReferenceTable};
+use drive_core::learned::Learned;
+use drive_core::table::{Grid, ReferenceTable};
 
 use crate::config::{Config, LoadMode};
 use crate::error::Error;

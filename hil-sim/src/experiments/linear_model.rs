@@ -19,12 +19,12 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::filter::dissertation::{LPF, LpfState};
-use drive_core::flux::schedule::GainSchedule;
+use drive_core::filter::{LPF, LpfState};
+use drive_core::flux::GainSchedule;
 use drive_core::io::PERIOD_S;
-use drive_core::math::frames::AlphaBeta;
-use drive_core::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign};
-use drive_core::{Settings, motion};
+use drive_core::{AlphaBeta, FirstOrder, Motion};
+use drive_settings::Settings;
+use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign};
 
 use crate::error::Error;
 use crate::plant::{MachineSettings, MechanicsSettings};
@@ -131,11 +131,11 @@ impl LinearModel {
         for k in 0..(seconds / t).round() as usize {
             response.angle_deg.push(e * 360.0 / TAU);
             response.speed_rpm.push(w * 60.0 / TAU / self.pole_pairs);
-            if free && k % usize::from(motion::DIVIDER) == 0 {
+            if free && k % usize::from(Motion::DIVIDER) == 0 {
                 // turns/s, like the controller
-                let now = moved / (TAU * self.pole_pairs * self.speed.period_s);
-                speed += self.speed.smoothing * (now - speed);
-                reference -= self.speed.k_c * (speed - self.speed.z_c * speed_error);
+                let now = moved / (TAU * self.pole_pairs * self.speed.gains.period_s);
+                speed += self.speed.gains.smoothing * (now - speed);
+                reference -= self.speed.gains.k_c * (speed - self.speed.gains.z_c * speed_error);
                 (speed_error, moved) = (speed, 0.0);
             }
 
@@ -150,7 +150,7 @@ impl LinearModel {
             // Observed angle error, and the tracking loop.
             let x = e + self.apparent_angle * (r - current);
             let x = seen.iter_mut().fold(x, |x, average| average.step(x));
-            let (c, w_n) = (tuning::THIRD_POLE, self.w_n);
+            let (c, w_n) = (drive_core::flux::THIRD_POLE, self.w_n);
             acceleration += t * c * w_n.powi(3) * x;
             w_i += t * (acceleration + (1.0 + 2.0 * c) * w_n * w_n * x);
             let rotor = w_i + (2.0 + c) * w_n * self.share * x;
@@ -193,7 +193,7 @@ impl MovingAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_core::settings::table::{Grid, ReferenceTable};
+    use drive_core::table::{Grid, ReferenceTable};
 
     fn linear(i_q: f64, settings: &Settings) -> LinearModel {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());

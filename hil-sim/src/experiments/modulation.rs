@@ -4,9 +4,8 @@ mod carrier;
 
 use std::f64::consts::TAU;
 
-use drive_core::current::modulation::Modulator;
+use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
-use drive_core::settings;
 use drive_core::{Abc, AlphaBeta};
 
 use super::{Context, Experiment};
@@ -69,7 +68,7 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let settings = settings::Inverter::default();
+    let settings = drive_settings::Inverter::default();
     let inverter = Inverter {
         modulator: Modulator::new(settings.dead_time_s, false),
         top: f64::from(settings.top),

@@ -6,8 +6,8 @@ use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
 use crate::stats::Stats;
-use drive_core::identify::online::RotorEstimate;
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
+use rotor_id::online::RotorEstimate;
 
 /// Not in the sources: the recursive estimate in use.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::Rig;
 use crate::stats::Stats;
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Section 2.3.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -14,7 +14,7 @@ use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
 use crate::rig::{RATE_HZ, Rig};
 use crate::stats::Stats;
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Section 5.2 names it as work to be done.
 pub const EXPERIMENT: Experiment = Experiment {

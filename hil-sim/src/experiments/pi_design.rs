@@ -3,10 +3,10 @@
 
 mod differences;
 
-use drive_core::filter::dissertation::LPF;
-use drive_core::tuning::{
-    CurrentLoopDesign, DELAY, FirstOrder, RuleDesign, design_current_loop, motor_plant,
-    pi_response, rule_3_8,
+use drive_core::FirstOrder;
+use drive_core::filter::LPF;
+use drive_settings::tuning::{
+    CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
 use num_complex::Complex64;
 
@@ -59,7 +59,7 @@ const IDENTIFIED: [Identified; 3] = [
 ];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let motor = context.config.drive.motor.circuit();
+    let motor = context.config.drive.motor.into();
     let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
     let rules = IDENTIFIED.map(|i| rule_3_8(i.plant, PERIOD_S).map(|rule| (i, rule)));

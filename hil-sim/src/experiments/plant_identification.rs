@@ -1,9 +1,9 @@
 //! The plants of the current loop, identified through the drive's own loop, and the controllers that
 //! follow from them.
 
-use drive_core::filter::dissertation::{LPF, LpfState};
-use drive_core::tuning::{FirstOrder, design_current_loop, motor_plant, rule_3_8};
-use drive_core::{AlphaBeta, Command, Dq, Mode};
+use drive_core::filter::{LPF, LpfState};
+use drive_core::{AlphaBeta, Command, Dq, FirstOrder, Mode};
+use drive_settings::tuning::{design_current_loop, motor_plant, rule_3_8};
 
 use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TRACKING, TURNING};
 use crate::config::{Config, LoadMode};
@@ -12,7 +12,7 @@ use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{RATE_HZ, Rig};
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -187,7 +187,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {
-    motor_plant(&config.drive.motor.circuit(), 1.0 / RATE_HZ).map_err(Error::refused)
+    motor_plant(&config.drive.motor.into(), 1.0 / RATE_HZ).map_err(Error::refused)
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
 use crate::rig::{Point, Rig};
 use crate::stats::Stats;
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Figure 37.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use drive_core::carrier::injection::CARRIER_SAMPLES;
+use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};

@@ -1,6 +1,6 @@
 //! Steps and reversals of the torque current without a position sensor.
 
-use drive_core::carrier::injection::CARRIER_SAMPLES;
+use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};

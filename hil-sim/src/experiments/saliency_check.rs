@@ -9,8 +9,8 @@ use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::{RATE_HZ, Rig};
+use drive_core::AngleSource;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::settings::AngleSource;
 
 /// Not in the source: without saliency its method cannot work, and nothing would tell.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drive_core::Mode;
-use drive_core::carrier::injection::CARRIER_SAMPLES;
+use drive_core::carrier::CARRIER_SAMPLES;
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
@@ -15,7 +15,7 @@ use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
 use crate::rig::{Point, Rig, means_over};
 use crate::stats::{Stats, StraightLine};
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {

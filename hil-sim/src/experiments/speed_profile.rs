@@ -1,6 +1,6 @@
 //! The speed loop without a position sensor: a profile with a reversal and a load step.
 
-use drive_core::carrier::injection::CARRIER_SAMPLES;
+use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Fault, Mode, Settings};
+use drive_core::{Command, Fault, Mode};
+use drive_settings::Settings;
 use serde::{Deserialize, Serialize};
 
 use super::statistics::fault_code;

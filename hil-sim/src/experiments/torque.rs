@@ -1,7 +1,7 @@
 //! The torque experiments of section 4.2: steps (Figure 38) and ramp (Figure 39) of the current on
 //! the quadrature axis, shaft locked, without a position sensor.
 
-use drive_core::carrier::injection::CARRIER_SAMPLES;
+use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode};
 
 use crate::config::Config;

@@ -3,8 +3,8 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use drive_core::Drive;
-use drive_core::settings::Flux;
-use drive_core::settings::table::Grid;
+use drive_core::table::Grid;
+use drive_settings::Flux;
 
 use super::battery::{allowed_a, torque_nm};
 use super::full_range::learned_drive;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 use drive_core::{Command, Mode};
+use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
@@ -12,7 +12,7 @@ use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
 use crate::plant::Load;
 use crate::rig::{RATE_HZ, Rig};
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 
 /// Calls of `refine` per second.
 const REFINES_PER_S: f64 = 10.0;
@@ -59,7 +59,7 @@ pub struct WarmingMoment {
 /// # Errors
 /// [`Error::Refused`] when the plant or the drive refuses the case, or the drive stops.
 pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<WarmingMoment>, Error> {
-    let settings = drive_core::Settings { track_rotor: case.used, ..config.drive };
+    let settings = drive_settings::Settings { track_rotor: case.used, ..config.drive };
     let plant = plant_settings(config);
     let mut start = Config { drive: settings, ..config.clone() };
     start.load.mode = LoadMode::Locked;

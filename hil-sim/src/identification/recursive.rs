@@ -1,4 +1,4 @@
-//! Recursive least squares in `f64`, the reference of `drive_core::identify::rls`, and the plain recursion as
+//! Recursive least squares in `f64`, the reference of `rotor_id::rls`, and the plain recursion as
 //! it is printed in textbooks, which fails.
 
 use rustfft::num_complex::Complex as Of;
@@ -6,7 +6,7 @@ use rustfft::num_traits::Float;
 
 use super::{Complex, Delta};
 
-/// U D Uᴴ recursion in differences, the algorithm of `drive_core::identify::rls` without its guards.
+/// U D Uᴴ recursion in differences, the algorithm of `rotor_id::rls` without its guards.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
     lambda: f64,

@@ -33,8 +33,8 @@ const BLOCKS: [(&str, &str); 12] = [
     ("current loop", "current::pi"),
     ("modulation", "current::modulation current::dead_time"),
     ("frames, filters", "math::frames filter::sos math::angle idsp::"),
-    ("identification", "identify::online identify::rls"),
-    ("sequence", "drive_core::drive drive_core::motion"),
+    ("identification", "rotor_id::online rotor_id::rls"),
+    ("sequence", "induction_drive_core::drive induction_drive_core::motion"),
 ];
 /// The block of instructions outside all others: the timer.
 const REST: &str = "firmware";
@@ -47,7 +47,7 @@ const PERIOD: u32 = TICKS_PER_PERIOD as u32;
 const COLD: u32 = LONGEST_INTERRUPT_CYCLES;
 
 /// The function of the main loop that takes a control period into the identification.
-const IDENTIFICATION: &str = "drive_core::identify::online::Online::sample";
+const IDENTIFICATION: &str = "induction_drive_rotor_id::online::Online::sample";
 /// Control periods in which it is watched, three seconds: the filters settle within one.
 const WATCHED_PERIODS: u64 = 18_000;
 

@@ -9,8 +9,7 @@ pub mod driver;
 pub mod shunts;
 pub mod watch;
 
-use drive_core::Settings;
-use drive_core::settings::Ntc;
+use drive_settings::{Ntc, Settings};
 use hil_sim::input::Input;
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 use hil_sim::{Config, Error};

@@ -4,7 +4,8 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Drive, FrontEndState, Mode, Output, Settings, State};
+use drive_core::{Command, Drive, FrontEndState, Mode, Output, State};
+use drive_settings::Settings;
 
 use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
-use drive_core::io::Sample;
-use drive_core::settings::{SETTINGS, find};
+use drive_core::Sample;
+use drive_settings::{SETTINGS, find};
 use hil_sim::config::LoadMode;
 use induction_drive::board::ADC_FULL_SCALE;
 use virtual_board::board::Debugger;
@@ -267,7 +267,7 @@ impl Bench {
     }
 
     /// A laboratory supply at each sensor in turn.
-    fn step_14(&mut self, lines: &[drive_core::settings::Line; 3]) -> Result<()> {
+    fn step_14(&mut self, lines: &[drive_core::Line; 3]) -> Result<()> {
         let sensors = if self.stage.board().currents.c().is_some() { 3 } else { 2 };
         let typed = self.steps[&14].0[0].clone();
         let mut heard = String::new();

@@ -1,6 +1,6 @@
 //! The lines that a session prints for another motor fit the image to it and to the sensors of the board.
 
-use drive_core::settings::find;
+use drive_settings::find;
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::plant::Plant;

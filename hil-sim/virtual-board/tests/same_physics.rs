@@ -134,7 +134,7 @@ fn torque_steps() -> Result<()> {
 fn position_step() -> Result<()> {
     let mut config = quiet();
     config.load.mode = LoadMode::Free;
-    config.drive.angle_source = drive_core::settings::AngleSource::Encoder;
+    config.drive.angle_source = drive_core::AngleSource::Encoder;
     let steps = [("position 5", Command::Position(5.0), 30_000)];
     let [board, host] = both(&config, Mode::Position, &["angle encoder"], &steps, 22)?;
     let figures = [board, host].map(|points| {

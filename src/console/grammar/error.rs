@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use drive_core::settings::value::ValueError;
+use drive_settings::value::ValueError;
 use thiserror::Error;
 
 use crate::link::trace::SIGNALS;

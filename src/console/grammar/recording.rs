@@ -1,6 +1,6 @@
 //! What a trace is to record, and a stream to send.
 
-use drive_core::settings::value;
+use drive_settings::value;
 
 use super::{LARGEST_DIVIDER, LONGEST_TRACE, ParseError, Words, nearest, whole};
 use crate::board::PWM_HZ;

@@ -1,6 +1,6 @@
 //! What a valid line asks for.
 
-use drive_core::commission::Step;
+use drive_commission::Step;
 use drive_core::{Fault, Mode, Stop, homing};
 use heapless::Vec;
 

@@ -1,5 +1,5 @@
 use drive_core::homing;
-use drive_core::settings::value::{Value, ValueError};
+use drive_settings::value::{Value, ValueError};
 use proptest::prelude::*;
 
 use super::*;

@@ -1,6 +1,6 @@
 use std::rc::Rc;
 
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
 use hil_sim::rig::Rig;
 
 use super::*;

@@ -1,7 +1,7 @@
 //! The commissioning at the console: what is asked for, told, and accepted.
 
-use drive_core::Settings;
-use drive_core::commission::{Refusal, Step};
+use drive_commission::{Refusal, Step};
+use drive_settings::Settings;
 use hil_sim::Config;
 use hil_sim::config::{LoadMode, plant_settings};
 use hil_sim::rig::Rig;

@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
-use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::commission::Step;
-use drive_core::identify::learning::{Fitted, Learned, Verdict};
-use drive_core::settings::SettingsError;
-use drive_core::settings::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
-use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, Settings, State};
+use drive_commission::Step;
+use drive_core::carrier::Asymmetry;
+use drive_core::learned::{Fitted, Learned, Verdict};
+use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
+use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State};
+use drive_settings::{Settings, SettingsError};
 use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
 use induction_drive::commissioning::{News, Session};

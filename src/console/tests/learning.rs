@@ -1,8 +1,8 @@
 //! Learning at the console: when it is needed, anew, and again at another rotor position.
 
-use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::settings::AngleSource;
+use drive_core::AngleSource;
+use drive_core::carrier::Asymmetry;
+use drive_core::learned::{Fitted, Learned};
 
 use super::*;
 

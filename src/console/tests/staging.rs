@@ -1,6 +1,6 @@
-use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::identify::learning::Learned;
-use drive_core::settings::table::Grid;
+use drive_core::carrier::Asymmetry;
+use drive_core::learned::Learned;
+use drive_core::table::Grid;
 
 use super::*;
 use crate::settings::staging::UNCONFIRMED;

@@ -21,7 +21,7 @@ fn promised(status: &str) -> ([f64; 2], [f64; 2]) {
 /// direction of `sign`, after two seconds; and the mean torque of the motor, Nm.
 fn pushed(rpm: f64, volts: f64, sign: f32) -> (Rig, f64) {
     let mut config = for_the_range(&Config::default()).unwrap();
-    config.drive.angle_source = drive_core::settings::AngleSource::Encoder;
+    config.drive.angle_source = drive_core::AngleSource::Encoder;
     let mut rig = Rig::from_config(&config, 1).unwrap();
     rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
     rig.start(Mode::Torque).unwrap();
@@ -57,12 +57,12 @@ fn status_tells_the_torque_that_the_motor_then_gives() {
 #[test]
 fn a_drive_that_is_off_has_the_torque_of_a_shaft_at_rest_and_a_fault_has_none() {
     let mut talk = Talk::new();
-    let settings = drive_core::Settings::default();
+    let settings = drive_settings::Settings::default();
     let (i_d, all) = (settings.i_d(), settings.current_limit_a());
     let (i_q, per_a) = ((all * all - i_d * i_d).sqrt(), settings.motor.torque_per_ampere(i_d));
     let status = talk.ask("status");
     // What the sensors say is shown while nothing flows, by their calibration.
-    let at = |line: drive_core::settings::Line, code| format!("{:.2} A", line.at(code));
+    let at = |line: drive_core::Line, code| format!("{:.2} A", line.at(code));
     let a = at(settings.scales.current_a, talk.drive.sample.current_a);
     let b = at(settings.scales.current_b, talk.drive.sample.current_b);
     let begin = format!("off; switch on disabled; sensors a {a}, b {b}, torque now -");

@@ -1,8 +1,8 @@
 //! The signals that can be recorded.
 
 use drive_core::io::PERIOD_S;
-use drive_core::settings::{CurrentSensors, Line};
-use drive_core::{Settings, Telemetry};
+use drive_core::{Line, Telemetry};
+use drive_settings::{CurrentSensors, Settings};
 use heapless::Vec;
 
 /// A signal of a trace.

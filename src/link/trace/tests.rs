@@ -1,5 +1,5 @@
 use drive_core::Telemetry;
-use drive_core::settings::{CurrentSensors, Settings};
+use drive_settings::{CurrentSensors, Settings};
 
 use super::*;
 

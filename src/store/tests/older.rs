@@ -1,7 +1,6 @@
 //! Records that older firmware has saved.
 
-use drive_core::settings::AngleSource;
-use drive_core::{Command, Drive, Mode, Refused};
+use drive_core::{AngleSource, Command, Drive, Mode, Refused};
 
 use super::*;
 

@@ -3,7 +3,8 @@
 
 use super::Demodulate;
 use crate::carrier::CarrierSample;
-use crate::filter::dissertation::{BPF, BpfState, PP, PpState};
+use crate::filter::dissertation::{BpfState, PpState};
+use crate::filter::{BPF, PP};
 
 /// Demodulator with output `i_dm - i_qm`, A, as printed. The post-processing filter removes the 600 Hz
 /// (-76 dB); the rest is the fundamental that leaks through the band-pass (-40 dB at dc) and carries no

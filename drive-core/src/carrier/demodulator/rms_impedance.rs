@@ -15,9 +15,12 @@
 //! rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum of
 //! band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::{Demodulate, MAX_RMS_SAMPLES, MIN_RMS_SAMPLES, RotatedBandPass, rotated_carrier};
+use crate::carrier::DemodulatorKind;
+
+use super::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
-use crate::filter::dissertation::{PP, PpState};
+use crate::filter::PP;
+use crate::filter::dissertation::PpState;
 use crate::filter::moving_sum::MovingSum;
 
 /// Units per square ampere in the sums: 2^19.
@@ -33,19 +36,19 @@ const LEAST: i32 = 5;
 #[derive(Clone, Copy, Debug)]
 pub struct RmsImpedance {
     band_pass: RotatedBandPass,
-    squares: MovingSum<3, { MAX_RMS_SAMPLES as usize }>,
+    squares: MovingSum<3, { DemodulatorKind::RMS_SAMPLES.1 as usize }>,
     length: u8,
     index: u8,
     f3: PpState,
 }
 
 impl RmsImpedance {
-    /// At rest, with rms filters of `samples`, clamped to [`MIN_RMS_SAMPLES`] to [`MAX_RMS_SAMPLES`].
+    /// At rest, with rms filters of `samples`, clamped to [`DemodulatorKind::RMS_SAMPLES`].
     pub fn new(samples: u8) -> Self {
         Self {
             band_pass: RotatedBandPass::default(),
             squares: MovingSum::default(),
-            length: samples.clamp(MIN_RMS_SAMPLES, MAX_RMS_SAMPLES),
+            length: samples.clamp(DemodulatorKind::RMS_SAMPLES.0, DemodulatorKind::RMS_SAMPLES.1),
             index: 0,
             f3: PpState::default(),
         }

@@ -6,8 +6,7 @@ use core::f64::consts::{SQRT_2, TAU};
 use super::*;
 use crate::carrier::injection::CarrierPeriod;
 use crate::carrier::synchronous::tests::InTurn;
-use crate::math::angle::Angle;
-use crate::math::frames::AlphaBeta;
+use crate::{AlphaBeta, Angle};
 
 /// Gain (-0.490 dB) and phase of the band-pass at 600 Hz, and of the post-processing filter at dc.
 const BPF_GAIN: f64 = 0.9452;

@@ -2,12 +2,9 @@
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 use core::f32::consts::TAU;
 
-use super::estimator::carrier_lag;
 use super::*;
-use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::drive::axes::Axes;
-use crate::tuning::FirstOrder;
-use num_complex::Complex64;
+use crate::settings::Settings;
 
 fn near(value: f32, expected: f32) {
     assert!((value / expected - 1.0).abs() < 1e-4, "{value}, not {expected}");
@@ -33,18 +30,6 @@ fn limits_and_times_are_those_of_the_settings_in_periods() {
     let s = &c.sequence;
     assert_eq!((s.precharge, s.magnetise, s.verify), (60, 5583, 1800));
     near(s.stop_ramp, 30.0 / 6000.0);
-}
-
-#[test]
-fn the_carrier_lags_by_the_plant() {
-    // 0.053 samples, 0.9° at 600 rpm, for the motor of Table 5.
-    let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
-    assert!((carrier_lag(plant) - 0.053).abs() < 5e-4, "{}", carrier_lag(plant));
-    // -d arg(1/(z - p)) / d omega, less the half sample of the hold.
-    let arg = |omega: f64| -(Complex64::cis(omega) - plant.p).arg();
-    let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-    let lag = -(arg(w + 1e-5) - arg(w - 1e-5)) / 2e-5 - 0.5;
-    assert!((f64::from(carrier_lag(plant)) - lag).abs() < 1e-6);
 }
 
 /// A saliency s makes a current difference of sqrt2 I s, and an impedance difference of 2 s V/I.

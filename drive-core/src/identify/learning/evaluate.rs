@@ -1,14 +1,13 @@
 //! From the sums of a learning to its result.
 
 use super::{Fitted, Learned, Learning, LearningState};
-use crate::carrier::Saliency;
-use crate::carrier::asymmetry::Asymmetry;
+use crate::UnitVector;
+use crate::carrier::{Asymmetry, Saliency};
 use crate::learned::{
     CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, RIPPLE, SPREAD, Verdict,
 };
-use crate::math::angle::UnitVector;
-use crate::protect::saliency_check::SaliencyCheck;
-use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
+use crate::protect::SaliencyCheck;
+use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Limit of the asymmetry that a gain mismatch does not explain, for a mismatch to be corrected as one: absolute part, and
 /// share of the mismatch.

@@ -62,6 +62,7 @@ impl Learning {
 
     /// The point with this number. Pairs without lead come first, from the first current down, then from the largest down; then
     /// those in which the flux is ahead, from no current up, and those in which it is behind, down again.
+    #[cold]
     pub(super) fn point(&self, number: usize) -> Point {
         let (pair, mirrored) = (number / 2, !number.is_multiple_of(2));
         let (led, [step_t, turned_t]) = (self.led(), self.flux_t);

@@ -1,8 +1,8 @@
 //! The learning on signals and voltages of given motors and sensors.
 #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
 use super::*;
-use crate::carrier::asymmetry::Asymmetry;
-use crate::settings::table::{ReferenceTable, SlopeTable};
+use crate::carrier::Asymmetry;
+use crate::table::{ReferenceTable, SlopeTable};
 use core::f64::consts::TAU as TURN;
 
 /// Carrier current at no torque current, A.

@@ -139,3 +139,25 @@ fn no_carrier_and_no_number_are_faults() {
         assert!(steps.any(|result| result == Err(Fault::LostLock)), "{carrier}");
     }
 }
+
+#[test]
+fn the_carrier_of_a_lost_flux_ends_the_lock() {
+    let settings = LockMonitorSettings {
+        slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, -0.035),
+        smoothing_s: 0.12,
+        allowed: 0.55,
+        carrier_a: 0.26,
+        moved_a: 0.03,
+    };
+    let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
+    let mut state = LockMonitorState::default();
+    let carrier = |a: f32| Saliency { q: 0.0, carrier_squared: a * a, i_q: 0.0 };
+    for _ in 0..600 {
+        monitor.step(&mut state, &carrier(0.26), 1.0, true).unwrap(); // baseline while magnetising
+    }
+    // Without flux the carrier current falls by the saliency: 3.5 %.
+    let gone = carrier(0.26 * (1.0 - 0.035));
+    assert!(monitor.step(&mut state, &gone, 1.0, false).is_ok());
+    let mut after = (0..90).map(|_| monitor.step(&mut state, &gone, 1.0, false));
+    assert!(after.any(|result| result == Err(Fault::LostLock)));
+}

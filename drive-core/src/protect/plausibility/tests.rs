@@ -1,8 +1,7 @@
 //! Tests of the plausibility checks.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 use super::*;
-use crate::math::angle::Angle;
-use crate::math::frames::Abc;
+use crate::{Abc, Angle};
 
 /// Carrier of 0.26 A, 30° behind its voltage, as sensors of these gains see it on the axis.
 fn seen(axis: UnitVector, gain_a: f32, gain_b: f32) -> CarrierCurrent {

@@ -1,6 +1,6 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use drive_core::tuning::roots;
+use drive_settings::tuning::roots;
 use num_complex::Complex64;
 
 use super::measure::Record;

@@ -167,7 +167,7 @@ mod tests {
             settings.braking.flux_a = Some(0.0);
             if limit.is_some() {
                 // The tables of the injection hold for the usual limit.
-                settings.angle_source = drive_core::settings::AngleSource::Encoder;
+                settings.angle_source = drive_core::AngleSource::Encoder;
             }
             let drive = Drive::new(settings.build().unwrap());
             trial(&config, &plant_settings(&config), &drive, Kind::Constant(0), 5).unwrap()

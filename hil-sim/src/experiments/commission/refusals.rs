@@ -1,6 +1,6 @@
 //! Defects of motor, wiring, sensors and board: are they refused, by name?
 
-use drive_core::commission::{Commissioning, Meaning, Refusal, Step};
+use drive_commission::{Commissioning, Meaning, Refusal, Step};
 use drive_core::{Fault, Sample, State};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

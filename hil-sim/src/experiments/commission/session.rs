@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::settings::{Motor, Settings};
-use drive_core::{AlphaBeta, Command, Excitation, Mode, Sample, State, Stop};
+use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
+use drive_core::{AlphaBeta, Command, Excitation, Mode, Motor, Sample, State, Stop};
+use drive_settings::Settings;
 
 use crate::config::Config;
 use crate::error::Error;

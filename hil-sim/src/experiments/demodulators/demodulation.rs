@@ -1,8 +1,8 @@
 //! The demodulations that are compared, and the drives that use them.
 
 use crate::experiments::injection_map::PP;
-use drive_core::Settings;
-use drive_core::settings::table::ReferenceTable;
+use drive_core::table::ReferenceTable;
+use drive_settings::Settings;
 
 use crate::config::Config;
 use crate::error::Error;

@@ -1,7 +1,8 @@
 //! Angle error of a drive without a position sensor, with each demodulation.
 
-use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, Settings};
+use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::{Command, Mode};
+use drive_settings::Settings;
 
 use super::super::steady::{OperatingPoint, SteadyRun, steady_run_of};
 use super::super::torque::LOST_DEG;

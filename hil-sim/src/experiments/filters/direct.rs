@@ -1,7 +1,7 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 #![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
-use drive_core::tuning::roots;
+use drive_settings::tuning::roots;
 use num_complex::Complex64;
 
 use crate::experiments::bode::largest_pole;

@@ -1,6 +1,6 @@
 //! The verdict over the runs, per kind and region.
 
-use drive_core::fault::Fault;
+use drive_core::Fault;
 
 use super::case::Case;
 use super::trial::Run;

@@ -2,8 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::filter::dissertation::BPF;
-use drive_core::filter::sos::SosState;
+use drive_core::filter::{BPF, SosState};
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;

@@ -1,6 +1,7 @@
 //! Where the printed numbers do not follow from the printed parameters.
 
-use drive_core::tuning::{EquivalentCircuit, FirstOrder, IntegratorLag};
+use drive_core::FirstOrder;
+use drive_settings::tuning::{EquivalentCircuit, roots};
 
 use super::PERIOD_S;
 use crate::experiments::bode::{RATE, largest_pole};
@@ -14,8 +15,9 @@ pub fn table(motor: &EquivalentCircuit, physical: FirstOrder) -> Table {
     let resistance = motor.r_s + motor.r_r * ratio * ratio;
     let sigma = 1.0 - motor.l_m * motor.l_m / (l_s * l_r);
     let time_constant = sigma * l_s / resistance;
-    let position = IntegratorLag { k: 0.01716, p: 0.95782 };
-    let position_pole = largest_pole(position.closed_loop_poles(6.466, 0.974));
+    // Eq. 4.1 under Eq. 4.2: (z - 1)^2 (z - p) + k_c k (z - z_c).
+    let (p, gain) = (0.95782, 6.466 * 0.01716);
+    let position_pole = largest_pole(roots([-2.0 - p, 1.0 + 2.0 * p + gain, -p - gain * 0.974]));
     // A pole p in the w plane: v = 2/T (1 - p)/(1 + p), rad/s.
     let in_w = |p: f64| 2.0 * RATE * (1.0 - p) / (1.0 + p);
 

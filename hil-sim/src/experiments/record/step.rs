@@ -1,13 +1,10 @@
 //! How fast the torque follows a step, and what takes the time.
 
-use drive_core::Command;
-use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::filter::dissertation::{LPF, LpfState};
+use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::filter::{LPF, LpfState};
 use drive_core::io::PERIOD_S;
-use drive_core::math::frames::AlphaBeta;
-use drive_core::tuning::{
-    CurrentLoopDesign, DIRECT_SHARE, EquivalentCircuit, FirstOrder, motor_plant,
-};
+use drive_core::{AlphaBeta, Command, FirstOrder};
+use drive_settings::tuning::{CurrentLoopDesign, DIRECT_SHARE, EquivalentCircuit, motor_plant};
 
 use crate::config::{Config, built};
 use crate::error::Error;

@@ -1,8 +1,8 @@
 //! Options of a board.
 
 use anyhow::{Context, Result, anyhow};
-use drive_core::Settings;
-use drive_core::settings::{Line, SETTINGS, find};
+use drive_core::Line;
+use drive_settings::{SETTINGS, Settings, find};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 

@@ -10,8 +10,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::scene::Target;
 use crate::board::Board;
 use crate::memory::{FLASH, Region, STORED};
-use drive_core::Sample;
-use drive_core::settings::{CurrentSensors, Line};
+use drive_core::{Line, Sample};
+use drive_settings::CurrentSensors;
 
 /// The code of the current sensor of phase 0, 1 or 2.
 pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Context, Result, ensure};
-use drive_core::{Settings, State};
+use drive_core::State;
+use drive_settings::Settings;
 use hil_sim::Config;
 use hil_sim::experiments::full_range::for_the_range;
 use hil_sim::plant::Load;

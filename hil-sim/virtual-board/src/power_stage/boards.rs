@@ -1,6 +1,6 @@
 //! The boards, each with its sources. "Assumed" is a value that no source gives.
 
-use drive_core::settings::Ntc;
+use drive_settings::Ntc;
 
 use super::driver::{Driver, Input, Pull};
 use super::shunts::Shunts;

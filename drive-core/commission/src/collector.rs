@@ -1,0 +1,221 @@
+//! Sums over the samples of an excitation: small, of fixed size, so that memory can be lent for them.
+//!
+//! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: that of step `k-1` acts
+//! from `k` on, that of `k-2` ended at `k`.
+
+use super::motion::Motion;
+use super::plant_fit::PlantFit;
+use drive_core::carrier::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
+use drive_core::{Abc, AlphaBeta, PERIOD_S};
+
+/// Bins of a record.
+pub const BINS: usize = 57;
+/// Every bin is longer than the one before by this factor.
+const GROWTH: f32 = 1.09;
+/// The ends of all bins, in lengths of the first: (1.09^57 - 1) / 0.09.
+pub(super) const FIRST_BINS: f32 = 1501.0;
+
+/// Kind of record.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Record {
+    /// Nothing; the bins stay.
+    #[default]
+    Nothing,
+    /// Means in bins that grow by 9 %, in one half of the memory.
+    Bins {
+        /// The half, 0 or 1.
+        half: usize,
+        /// Length of the first bin, control periods.
+        first: f32,
+    },
+    /// Products of voltage and current with the carrier.
+    Carrier,
+    /// Means and squares of the phase currents and of the dc link.
+    Noise,
+    /// Fit of the plant of the current loop.
+    Plant {
+        /// Whether across phase a, or along it.
+        across: bool,
+        /// Amplitude of the voltage, V, and of the current that a sample of it makes, A: the bases of the fit.
+        bases: (f32, f32),
+    },
+    /// Torque current and speed, by [`push_motion`](Collector::push_motion).
+    Motion,
+}
+
+impl Record {
+    /// Bins that last so many seconds.
+    pub(super) fn bins(half: usize, seconds: f32) -> Self {
+        Self::Bins { half, first: seconds / PERIOD_S / FIRST_BINS }
+    }
+}
+
+/// Means over a bin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bin {
+    /// Its length, control periods.
+    pub periods: f32,
+    /// Mean voltage along phase a, V.
+    pub voltage: f32,
+    /// Mean current, A.
+    pub current: AlphaBeta,
+}
+
+/// The sums.
+///
+/// Call [`begin`](Self::begin) before the command that changes the excitation, and [`push`](Self::push) for every step of
+/// the drive while it [excites](drive_core::Drive::excites). 2 KiB.
+#[derive(Clone, Debug)]
+pub struct Collector {
+    pub(super) recorded: Recorded,
+    /// Voltages of the last two steps.
+    voltages: [AlphaBeta; 2],
+    /// Sums of length, voltage, current of each bin; they stay until a record takes their half.
+    bins: [[Bin; BINS]; 2],
+}
+
+/// Contents of a record since it began.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recorded {
+    record: Record,
+    samples: u32,
+    /// Whether samples are missing.
+    incomplete: bool,
+    /// Bin that is filled, its length, and the sample at which it ends.
+    bin: usize,
+    length: f32,
+    end: f32,
+    /// Products of the cosine and the sine of the carrier with voltage along phase a and across it, and with the current likewise.
+    carrier: [[f32; 2]; 4],
+    /// Phase currents a and b, their squares, dc link less its first value.
+    noise: [f32; 5],
+    first_dc_link: f32,
+    pub motion: Motion,
+    pub plant: PlantFit,
+}
+
+impl Default for Collector {
+    fn default() -> Self {
+        let bins = [[Bin::default(); BINS]; 2];
+        Self { recorded: Recorded::default(), voltages: [AlphaBeta::ZERO; 2], bins }
+    }
+}
+
+impl Collector {
+    /// Begins a record.
+    pub fn begin(&mut self, record: Record) {
+        self.recorded = Recorded { record, ..Recorded::default() };
+        if let Record::Bins { half, first } = record {
+            (self.recorded.end, self.recorded.length) = (first, first);
+            if let Some(bins) = self.bins.get_mut(half) {
+                *bins = [Bin::default(); BINS];
+            }
+        }
+    }
+
+    /// Samples since the record began.
+    pub fn samples(&self) -> u32 {
+        self.recorded.samples
+    }
+
+    /// Notes that steps of the drive are missing between the last and the next: a record that has begun is incomplete.
+    pub fn gap(&mut self) {
+        let sums = &mut self.recorded;
+        sums.incomplete |= sums.samples > 0 && sums.record != Record::Nothing;
+    }
+
+    /// Whether samples are missing in the record.
+    pub fn is_incomplete(&self) -> bool {
+        self.recorded.incomplete
+    }
+
+    /// Takes a step of the drive while it regulates torque: reference of the torque current, A, and `rotor_freq` of its
+    /// [telemetry](drive_core::Telemetry).
+    pub fn push_motion(&mut self, i_q: f32, rotor_freq: f32) {
+        let sums = &mut self.recorded;
+        if sums.record == Record::Motion {
+            sums.motion.push(i_q, rotor_freq);
+            sums.samples = sums.samples.wrapping_add(1);
+        }
+    }
+
+    /// Takes a step of the drive while it excites: `measured`, `realised` and `dc_link` of its [telemetry](drive_core::Telemetry).
+    pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta, dc_link: f32) {
+        let ([last, before], sums) = (self.voltages, &mut self.recorded);
+        match sums.record {
+            Record::Motion => return,
+            Record::Nothing => {}
+            Record::Bins { half, .. } => {
+                // The last bin lasts until the next record.
+                while sums.samples as f32 >= sums.end && sums.bin + 1 < BINS {
+                    sums.bin += 1;
+                    sums.length *= GROWTH;
+                    sums.end += sums.length;
+                }
+                let voltage = 0.5 * (last.alpha + before.alpha);
+                if let Some(bin) = self.bins.get_mut(half).and_then(|bins| bins.get_mut(sums.bin)) {
+                    bin.periods += 1.0;
+                    bin.voltage += voltage;
+                    bin.current += measured;
+                }
+            }
+            Record::Plant { across, bases } => {
+                let axis = |x: AlphaBeta| if across { x.beta } else { x.alpha };
+                sums.plant.push(axis(realised) / bases.0, axis(measured) / bases.1);
+            }
+            Record::Carrier => {
+                let at = sums.samples as usize % CARRIER_SAMPLES;
+                let seen = [realised.alpha, realised.beta, measured.alpha, measured.beta];
+                for ([re, im], x) in sums.carrier.iter_mut().zip(seen) {
+                    *re += CARRIER_COS[at] * x;
+                    *im += CARRIER_SIN[at] * x;
+                }
+            }
+            Record::Noise => {
+                if sums.samples == 0 {
+                    sums.first_dc_link = dc_link;
+                }
+                let Abc { a, b, .. } = measured.to_abc();
+                let terms = [a, b, a * a, b * b, dc_link - sums.first_dc_link];
+                sums.noise.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
+        }
+        self.voltages = [realised, last];
+        sums.samples = sums.samples.wrapping_add(1);
+    }
+
+    /// The bins of a half that have samples, in their order.
+    pub fn bins(&self, half: usize) -> impl Iterator<Item = Bin> + Clone + '_ {
+        let filled = self.bins.get(half).into_iter().flatten().filter(|bin| bin.periods > 0.0);
+        filled.map(|sum| {
+            let share = 1.0 / sum.periods;
+            Bin { voltage: sum.voltage * share, current: sum.current * share, ..*sum }
+        })
+    }
+
+    /// Mean over the bins of a half from the given one on.
+    pub(super) fn mean(&self, half: usize, from: usize) -> Bin {
+        let mut sum = Bin::default();
+        for bin in self.bins(half).skip(from) {
+            sum.periods += bin.periods;
+            sum.voltage += bin.voltage * bin.periods;
+            sum.current += bin.current * bin.periods;
+        }
+        let share = 1.0 / sum.periods;
+        Bin { voltage: sum.voltage * share, current: sum.current * share, ..sum }
+    }
+
+    /// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.
+    pub(super) fn phasors(&self) -> [[f32; 2]; 4] {
+        let share = 2.0 / self.recorded.samples as f32;
+        self.recorded.carrier.map(|parts| parts.map(|sum| share * sum))
+    }
+
+    /// Noise of the sensors a and b, A rms, and the dc link, V, without current.
+    pub(super) fn quiet(&self) -> ([f32; 2], f32) {
+        let share = 1.0 / self.recorded.samples as f32;
+        let [a, b, aa, bb, dc_link] = self.recorded.noise.map(|sum| share * sum);
+        let rms = |square: f32, mean: f32| fpu_sqrt::sqrtf(square - mean * mean);
+        ([rms(aa, a), rms(bb, b)], self.recorded.first_dc_link + dc_link)
+    }
+}

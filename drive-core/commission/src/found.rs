@@ -1,0 +1,126 @@
+//! What the steps have found, and the settings that follow from it.
+
+use super::fit::Fitted;
+use drive_core::{FirstOrder, Motor, PERIOD_S};
+use drive_settings::{CurrentPlant, Flux, IdentifiedPlant, PlantSource, Settings};
+
+/// What the steps have found; `None` for a step that has not been done or was refused.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Noise of the current sensors, A rms: the larger of both.
+    pub noise: Option<f32>,
+    /// Dc link, V.
+    pub dc_link: Option<f32>,
+    /// Transient inductance by the pulses, H: up to 60 % too large.
+    pub rough: Option<f32>,
+    /// Resistances and rotor.
+    pub levels: Option<Levels>,
+    /// Transient inductance and saliency.
+    pub leakage: Option<Leakage>,
+    /// Magnetising curve.
+    pub iron: Option<Iron>,
+    /// Plants of the current loop along the direct and the quadrature axis, A/V, from the pseudo-random voltage.
+    pub plants: Option<[FirstOrder; 2]>,
+    /// Inertia of rotor and load, kg m^2.
+    pub inertia: Option<f32>,
+}
+
+/// Result of the current levels: parameters of the inverse-Gamma circuit, inverter, sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Levels {
+    /// Stator resistance, ohm.
+    pub r_s: f32,
+    /// Rotor resistance as the stator sees it, (L_m/L_r)^2 r_r, ohm.
+    pub r_r: f32,
+    /// Rotor time constant, s.
+    pub tau_r: f32,
+    /// Voltage that a phase of the inverter loses, V: dead time and drop.
+    pub inverter_v: f32,
+    /// (gain of sensor a)/(gain of b) - 1.
+    pub mismatch: f32,
+    /// Whether the main flux saturates: `r_r` and `tau_r` are then those of no circuit.
+    pub saturates: bool,
+}
+
+/// Result of the carrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Leakage {
+    /// Transient inductance sigma L_s, H.
+    pub inductance: f32,
+    /// Saliency at standstill, (across - along)/(across + along), with half the test current along phase a.
+    pub saliency: f32,
+    /// Leakage inductance of the fundamental wave at no current, H.
+    pub fundamental: f32,
+    /// Its change per ampere, peak, H/A.
+    pub slope: f32,
+}
+
+/// Result of the staircase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iron {
+    /// The circuit, with the chord of the magnetising curve at the direct current.
+    pub motor: Motor,
+    /// Direct current, A peak.
+    pub i_d: f32,
+    /// Magnetising curve: currents, A peak, and main flux, Wb peak.
+    pub points: [(f32, f32); 7],
+}
+
+impl Levels {
+    /// Coupled magnetising inductance L_M = (L_m/L_r) L_m, H.
+    pub fn coupled(&self) -> f32 {
+        self.tau_r * self.r_r
+    }
+
+    pub(super) fn new(fit: &Fitted) -> Self {
+        // Impedances were divided by the current of sensor a.
+        let gain = 1.0 + 0.5 * fit.mismatch;
+        let (r_s, r_r, inverter_v) = (fit.r_s * gain, fit.r_r * gain, 0.75 * fit.e);
+        let Fitted { tau_r, mismatch, .. } = *fit;
+        Self { r_s, r_r, tau_r, inverter_v, mismatch, saturates: false }
+    }
+}
+
+impl Found {
+    /// The motor, as a T with equal leakages; inertia and pole pairs are the default ones. `None` until levels and leakage, and
+    /// with a main flux that saturates the staircase too, have found theirs.
+    pub fn motor(&self) -> Option<Motor> {
+        let (levels, leakage) = (self.levels?, self.leakage?);
+        if levels.saturates {
+            return self.iron.map(|iron| iron.motor);
+        }
+        let coupled = levels.coupled();
+        let k = 1.0 / fpu_sqrt::sqrtf(1.0 + leakage.inductance / coupled);
+        let l_ls = leakage.inductance / (1.0 + k);
+        let (r_s, r_r, l_m) = (levels.r_s, levels.r_r / (k * k), coupled / k);
+        Some(Motor { r_s, r_r, l_m, l_ls, l_lr: l_ls, ..Motor::default() })
+    }
+
+    /// These settings with what has been found.
+    pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
+        let mut new = *settings;
+        let inertia = self.inertia.unwrap_or(settings.motor.inertia);
+        new.motor.inertia = inertia;
+        let (Some(levels), Some(leakage)) = (self.levels, self.leakage) else { return new };
+        let Some(motor) = self.motor() else { return new };
+        new.motor = Motor { pole_pairs, inertia, ..motor };
+        let half = 0.5 * levels.mismatch;
+        new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
+        new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
+        new.current_plant.source = PlantSource::Motor;
+        if let Some(plants) = self.plants {
+            let set =
+                |FirstOrder { k, p }| IdentifiedPlant { k: Some(k as f32), p: Some(p as f32) };
+            let [d, q] = plants.map(set);
+            new.current_plant = CurrentPlant { source: PlantSource::Identified, d, q };
+        }
+        let per = 1.0 / new.motor.sigma_l_s();
+        new.observer.leakage_share = leakage.fundamental * per;
+        new.observer.leakage_slope = leakage.slope * per;
+        // The direct current of the rule for this motor.
+        (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
+        let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);
+        new.inverter.drop_v = Some(levels.inverter_v - of_dead_time);
+        new
+    }
+}

@@ -1,0 +1,87 @@
+//! Step 8: the inertia, with a free shaft, from what a torque does to the speed.
+//!
+//! The drive regulates torque: i_q = +i, -i, -i, +i for 0.8 s each. The speed rises, returns, falls, and returns. With x the
+//! integral of i_q and f that of the direction of the speed w,
+//!
+//! ```text
+//! w = K_t/J x - T_f/J f + c        K_t = 3/2 P (L_m^2/L_r) i_d
+//! ```
+//!
+//! The inertia J and the friction T_f follow from the slopes of least squares. The tracked speed rings after a change of the
+//! current, and is right while the acceleration is constant: only the second half of every quarter counts.
+
+use super::motion::Slope;
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
+use drive_core::{Excited, State, periods};
+
+/// Duration of a quarter, s, and the quarters of the measurement: three times + - - +.
+const QUARTER_S: f32 = 0.8;
+const QUARTERS: usize = 12;
+/// First current and least one, as shares of the rated peak: 0.15 and 0.1 A of 3.62 A.
+const FIRST: f32 = 0.0414;
+const LEAST: f32 = 0.0276;
+/// Largest current, as a share of the limit.
+const MOST: f32 = 0.8;
+/// Peak of the speed that is aimed at, electrical rad/s: 60 rpm of four poles.
+const PEAK_RAD_PER_S: f32 = 12.566;
+/// Least share of the variance of the speed that inertia and friction explain.
+const EXPLAINED: f32 = 0.9;
+impl Commissioning {
+    /// Part 0 starts the drive; every further part is a quarter.
+    pub(super) fn inertia(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+        let (rated, limit) = (self.plate.rated, self.plate.i_q_limit);
+        match self.state.part {
+            0 => {
+                self.state.part = 1;
+                self.found.inertia = None;
+                return Ok(Next::Start);
+            }
+            1 if drive.state != State::Torque => return Ok(Next::Wait),
+            1 => {
+                self.state.amperes = FIRST * rated;
+                sums.begin(Record::Motion);
+            }
+            _ => {}
+        }
+        let last = if self.state.measures { QUARTERS } else { 4 };
+        if self.state.part > last {
+            let slope = sums.recorded.motion.slope();
+            if self.state.measures {
+                return self.report_inertia(slope);
+            }
+            // Twice where it is too little to overcome the friction or to be seen; else as much as friction and the peak
+            // of the speed ask for.
+            let follows = slope.explained >= EXPLAINED && slope.value > 0.0;
+            let most = MOST * limit;
+            let needed = (PEAK_RAD_PER_S / QUARTER_S + slope.friction.abs()) / slope.value;
+            let next = if follows { needed } else { 2.0 * self.state.amperes };
+            self.state.amperes = next.clamp(LEAST * rated, most);
+            self.state.measures = follows || self.state.amperes >= most;
+            self.state.part = 1;
+            sums.begin(Record::Motion);
+        }
+        // + - - +, one after the other.
+        let ahead = matches!(self.state.part % 4, 0 | 1);
+        self.state.until = periods(QUARTER_S) * self.state.part as u32;
+        self.state.part += 1;
+        let amperes = self.state.amperes;
+        Ok(Next::Torque(if ahead { amperes } else { -amperes }))
+    }
+
+    fn report_inertia(&mut self, slope: Slope) -> Answer {
+        let (explained, free) = (slope.explained, [Meaning::NotFree; 2]);
+        let explained = Quantity::new("explained share of the speed", "", explained)
+            .checked((EXPLAINED, 1.0), free)?;
+        // Mechanical: the slopes are electrical.
+        let inertia = self.plate.torque_per_ampere * self.plate.pole_pairs_in_force / slope.value;
+        let friction = inertia * slope.friction / self.plate.pole_pairs_in_force;
+        let values = [
+            Quantity::new("inertia", "kg m2", inertia).checked((0.0, f32::INFINITY), free)?,
+            Quantity::new("friction", "Nm", friction),
+            Quantity::new("torque current", "A", self.state.amperes),
+            explained,
+        ];
+        self.found.inertia = Some(inertia);
+        self.report(&values)
+    }
+}

@@ -1,0 +1,182 @@
+//! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
+
+use super::{
+    Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
+    Record, Refusal, SIZE, Step, TAU_R, TIME,
+};
+use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
+
+/// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
+/// depends on the current.
+const LEVELS: [f32; 4] = [0.8, 0.2, 0.45, 0.3];
+const LEVEL_S: f32 = 1.5;
+/// Bins at the end of a level that count as steady.
+const STEADY: usize = BINS - 6;
+/// Largest deviation of the rotor resistance of a linear motor.
+const LINEAR: f32 = 0.017;
+/// Largest gain mismatch.
+const MISMATCH: f32 = 0.05;
+/// Largest current across phase a, as a share of that along it, and of the test current.
+const ACROSS: (f32, f32) = (0.015, 0.001);
+/// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
+const MISFIT_PER_NOISE: f32 = 105.0;
+const MISFIT_OF_BUS: f32 = 8e-5;
+/// A misfit up to this multiple of it is that of a main flux that saturates.
+const SATURATED: f32 = 30.0;
+/// Bins at the end of a level that give its resistance then.
+const ENDS: usize = BINS - 2;
+/// Largest error of the third level: share of the resistive voltage, and of the dc link.
+const THIRD: (f32, f32) = (0.01, 6.5e-5);
+/// Share of it from which on the inverter's voltage is taken to depend on the current.
+const BENT: f32 = 0.3;
+/// Least voltage of the inverter, as a share of that of the dead time: with less, nodes of much capacitance make it grow with the
+/// current up to the test current, like a resistance. (Transistors may turn off later than they turn on.)
+const DEAD_TIME: f32 = 0.7;
+/// Wait before the third level is measured, and time of its mean, in rotor time constants.
+const WAIT_T: f32 = 3.0;
+const MEAN_T: f32 = 0.5;
+
+impl Fitted {
+    /// With an inverter whose voltage is e - d/i, as that of nodes whose capacitance the current has to swing. The line through
+    /// the first two levels misses the third, of a test current `i`, by `error`.
+    fn bent(self, error: f32, i: f32) -> Self {
+        let [high, low, third, _] = LEVELS;
+        let slope = -1.0 / (high * low);
+        let missed = 1.0 / low + slope * (third - low) - 1.0 / third;
+        let bend = error * i / missed;
+        let r_s = self.r_s + slope * bend / (i * i);
+        let e = self.e + (self.r_s - r_s) * high * i + bend / (high * i);
+        Self { r_s, e, bend, ..self }
+    }
+}
+
+impl Commissioning {
+    pub(super) fn levels(&mut self, sums: &mut Collector) -> Answer {
+        let regulator = self.regulator()?;
+        let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
+        let limit = MISFIT_OF_BUS * self.plate.dc_link;
+        let limit = limit.max(MISFIT_PER_NOISE * self.rough()? * noise);
+        let part = self.state.part;
+        match part {
+            0 => self.found.levels = None,
+            // The first two levels have ended; or the third, or the fourth.
+            3 => {
+                let Some(fit) = self.search(sums, 0.0)? else { return Ok(Next::Wait) };
+                self.state.fitted = Fitted { mismatch: self.mismatch(sums, noise)?, ..fit };
+                if fit.misfit > limit || fit.deviations[2] > LINEAR * fit.r_r {
+                    return self.report_saturated(sums, limit);
+                }
+                self.level_values(limit)?;
+            }
+            5 | 7 if self.is_confirmed(sums)? => {
+                let values = self.level_values(limit)?;
+                self.found.levels = Some(Levels::new(&self.state.fitted));
+                return self.report(&values);
+            }
+            _ => {}
+        }
+        let tau_r = self.state.fitted.tau_r;
+        let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(QUIET_S));
+        let [high, low, third, fourth] = LEVELS.map(|share| self.along(share, regulator));
+        let parts = [
+            (Record::Nothing, QUIET_S, Excitation::Rest),
+            (Record::bins(0, LEVEL_S), LEVEL_S, high),
+            (Record::bins(1, LEVEL_S), LEVEL_S, low),
+            (Record::Nothing, wait, third),
+            (Record::bins(0, mean), mean, third),
+            (Record::Nothing, wait, fourth),
+            (Record::bins(0, mean), mean, fourth),
+        ];
+        self.begin(sums, parts[part % parts.len()])
+    }
+
+    /// The gain mismatch that the first two levels show. No current may flow across phase a, once the gains are corrected.
+    fn mismatch(&self, sums: &Collector, noise: f32) -> Result<f32, Refusal> {
+        let [high, low] = [0, 1].map(|half| sums.mean(half, STEADY).current);
+        let (da, db) = (high.alpha - low.alpha, on_b(high) - on_b(low));
+        let mismatch = -da / (2.0 * db) - 1.0;
+        Quantity::new("gain mismatch", "", mismatch).up_to(MISMATCH, Meaning::Mismatch)?;
+        for bin in sums.bins(0).chain(sums.bins(1)) {
+            let (a, b) = (bin.current.alpha, on_b(bin.current));
+            let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
+            let across = (a + 2.0 * b) * (1.0 / SQRT_3);
+            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * self.plate.amperes;
+            let allowed = allowed + 6.0 * noise / fpu_sqrt::sqrtf(bin.periods);
+            Quantity::new("current across phase a", "A", across)
+                .up_to(allowed, Meaning::Turning)?;
+        }
+        Ok(mismatch)
+    }
+
+    /// Whether the third level or the fourth confirms what the first two have shown. The third may show instead that the
+    /// voltage of the inverter depends on the current.
+    fn is_confirmed(&mut self, sums: &Collector) -> Result<bool, Refusal> {
+        let (fit, seen) = (self.state.fitted, sums.mean(0, 0));
+        let resistive = fit.r_s * seen.current.alpha;
+        let allowed = THIRD.0 * resistive + THIRD.1 * self.plate.dc_link;
+        // What is left of the transient from the level before.
+        let turned = seen.periods * PERIOD_S / fit.tau_r;
+        let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
+        let [_, before, now, last] = LEVELS.map(|share| share * self.plate.amperes);
+        let is_third = self.state.part == 5;
+        let stepped = if is_third { now - before } else { last - now };
+        let bent = fit.e - fit.bend / seen.current.alpha;
+        let error = seen.voltage - bent - resistive - fit.r_r * stepped * rest;
+        if is_third && error > BENT * allowed {
+            self.state.fitted = fit.bent(error, self.plate.amperes);
+            return Ok(false);
+        }
+        Quantity::new("error of the last level", "V", error).up_to(allowed, Meaning::Inverter)?;
+        Ok(true)
+    }
+
+    /// The main flux saturates: the ends of the levels give the resistance, the staircase is to give the rest.
+    fn report_saturated(&mut self, sums: &Collector, limit: f32) -> Answer {
+        let fit = self.state.fitted;
+        Quantity::new("misfit", "V", fit.misfit)
+            .checked((0.0, SATURATED * limit), [Meaning::Misfit; 2])?;
+        let [high, low] = [0, 1].map(|half| sums.mean(half, ENDS));
+        let r_s = (high.voltage - low.voltage) / (high.current.alpha - low.current.alpha);
+        let ends = Fitted { r_s, e: low.voltage - r_s * low.current.alpha, ..fit };
+        let levels = Levels { saturates: true, ..Levels::new(&ends) };
+        let values = [
+            Quantity::new("r_s", "ohm", levels.r_s).checked(self.plate.r_s, SIZE)?,
+            self.inverter_voltage(&levels)?,
+            Quantity::new("gain mismatch", "", levels.mismatch),
+            misfit(&fit, limit),
+        ];
+        self.found.levels = Some(levels);
+        self.report(&values)
+    }
+
+    fn inverter_voltage(&self, levels: &Levels) -> Result<Quantity, Refusal> {
+        let of_dead_time = self.plate.dead_time * self.found.dc_link.unwrap_or(0.0);
+        Quantity::new("inverter voltage", "V", levels.inverter_v)
+            .checked((DEAD_TIME * of_dead_time, f32::INFINITY), [Meaning::Inverter; 2])
+    }
+
+    fn level_values(&self, limit: f32) -> Result<[Quantity; 7], Refusal> {
+        let fit = &self.state.fitted;
+        let (plate, levels) = (&self.plate, Levels::new(fit));
+        let ([d_r_s, d_e, d_r_r], d_tau_r) = (fit.deviations, fit.tau_deviation);
+        Ok([
+            Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).checked(plate.r_s, SIZE)?,
+            Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).checked(plate.r_r, SIZE)?,
+            Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(TAU_R, TIME)?,
+            Quantity::new("L_M", "H", levels.coupled()),
+            self.inverter_voltage(&levels)?.within(0.75 * d_e),
+            Quantity::new("gain mismatch", "", fit.mismatch),
+            misfit(fit, limit),
+        ])
+    }
+}
+
+/// The misfit, beside that of a linear motor.
+fn misfit(fit: &Fitted, limit: f32) -> Quantity {
+    Quantity::new("misfit", "V", fit.misfit).allowing((0.0, limit))
+}
+
+/// Phase current b of a current vector, A.
+fn on_b(i: AlphaBeta) -> f32 {
+    0.5 * (SQRT_3 * i.beta - i.alpha)
+}

@@ -1,0 +1,76 @@
+//! Sums over the motion of a free shaft under a torque; [`inertia`](super::inertia) has the equation.
+
+use core::mem::replace;
+
+use drive_core::PERIOD_S;
+use drive_core::math::limited;
+
+/// Control periods from one pair of values to the next: 10 ms. The speed is a mean over as long, and smoothed over 5 ms: it
+/// belongs to the integrals one pair before.
+const EVERY: u16 = 60;
+/// Pairs after a change of the current that do not count, 0.35 s: the tracking of the angle settles.
+const SETTLING: u16 = 35;
+/// Speed from which on it counts as a direction in full, electrical rad/s: 10 rpm of four poles.
+const MOVES_RAD_PER_S: f32 = 2.094;
+
+/// Sums over integrals and speed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Motion {
+    /// Integral of i_q, A s, and of the direction, s; now, and at the last values.
+    x: f32,
+    f: f32,
+    earlier: (f32, f32),
+    /// Sum of the speed since the last values.
+    speed: f32,
+    periods: u16,
+    /// Torque current, A, and values since it changed.
+    i_q: f32,
+    settled: u16,
+    /// Sums of 1, w, x, f, w w, x x, f f, x w, f w, x f.
+    sums: [f32; 10],
+}
+
+/// What the sums say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slope {
+    /// Speed per integral of the current, electrical rad/s per A s.
+    pub value: f32,
+    /// Speed that friction takes, electrical rad/s^2.
+    pub friction: f32,
+    /// Share of the variance of the speed that is explained.
+    pub explained: f32,
+}
+
+impl Motion {
+    /// Takes a period: the reference of the torque current, A, and the speed, electrical turns per period.
+    pub fn push(&mut self, i_q: f32, rotor_freq: f32) {
+        self.x += PERIOD_S * i_q;
+        self.speed += rotor_freq;
+        self.periods += 1;
+        if self.periods < EVERY {
+            return;
+        }
+        let w = self.speed * (core::f32::consts::TAU / (PERIOD_S * f32::from(EVERY)));
+        (self.periods, self.speed) = (0, 0.0);
+        self.f += PERIOD_S * f32::from(EVERY) * limited(w * (1.0 / MOVES_RAD_PER_S), 1.0);
+        let (x, f) = replace(&mut self.earlier, (self.x, self.f));
+        let moved = (i_q - replace(&mut self.i_q, i_q)).abs() > 0.01 * i_q.abs();
+        self.settled = if moved { 0 } else { self.settled.saturating_add(1) };
+        if self.settled >= SETTLING {
+            let terms = [1.0, w, x, f, w * w, x * x, f * f, x * w, f * w, x * f];
+            self.sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+    }
+
+    /// The slopes.
+    pub fn slope(&self) -> Slope {
+        let [count, w, x, f, ww, xx, ff, xw, fw, xf] = self.sums;
+        let centred = |sum: f32, one: f32, other: f32| sum - one * other / count;
+        let (ww, xx, ff) = (centred(ww, w, w), centred(xx, x, x), centred(ff, f, f));
+        let (xw, fw, xf) = (centred(xw, x, w), centred(fw, f, w), centred(xf, x, f));
+        let per_determinant = 1.0 / (xx * ff - xf * xf);
+        let value = (xw * ff - fw * xf) * per_determinant;
+        let friction = (xw * xf - fw * xx) * per_determinant;
+        Slope { value, friction, explained: (value * xw - friction * fw) / ww }
+    }
+}

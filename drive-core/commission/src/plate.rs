@@ -1,0 +1,106 @@
+//! Step 1: what follows from the nameplate, and whether it is plausible.
+
+use core::f32::consts::{SQRT_2, TAU};
+
+use super::report::Quantity;
+use drive_core::{PERIOD_S, SQRT_3};
+use drive_settings::Settings;
+
+/// Plausible share of the shaft's power in the apparent power: efficiency times power factor.
+const POWER: (f32, f32) = (0.15, 0.95);
+/// Plausible slip at rated speed.
+const SLIP: (f32, f32) = (0.002, 0.15);
+/// Largest share of the sensors' range that is used.
+const OF_RANGE: f32 = 0.8;
+/// Least share of the rated peak current that the sensors have to reach.
+const LEAST_CURRENT: f32 = 0.3;
+
+/// Expected range of the rotor time constant, s.
+pub(super) const TAU_R: (f32, f32) = (0.02, 1.4);
+
+/// What follows from the nameplate, the board and the settings in force: safe currents and expected ranges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plate {
+    /// Current of the tests, A peak: the rated one, or less where the sensors do not reach it.
+    pub amperes: f32,
+    /// Base impedance, ohm.
+    pub z_b: f32,
+    /// Expected ranges: transient inductance, H, stator and rotor resistance, ohm.
+    pub leakage: (f32, f32),
+    pub r_s: (f32, f32),
+    pub r_r: (f32, f32),
+    /// Pairs of poles by the nameplate, and in force.
+    pub pole_pairs: u8,
+    pub pole_pairs_in_force: f32,
+    /// Peak of the rated voltage between lines, V.
+    pub peak_v: f32,
+    /// Rated current, and limit of the torque current, A peak.
+    pub rated: f32,
+    pub i_q_limit: f32,
+    /// Rated flux, Wb peak.
+    pub flux: f32,
+    /// Torque per torque current in force, Nm/A.
+    pub torque_per_ampere: f32,
+    /// Time constant of the analog filter of the currents, control periods.
+    pub filter: f32,
+    /// Margin for noise of the pulses, A, and their largest voltage, V.
+    pub pulse_noise: f32,
+    pub pulse_v: f32,
+    /// Dead time as a share of the control period.
+    pub dead_time: f32,
+    /// Nominal dc link, V.
+    pub dc_link: f32,
+    /// The first entry of the nameplate that cannot belong to the others.
+    pub implausible: Option<Quantity>,
+}
+
+impl Plate {
+    /// That of the settings.
+    pub fn new(settings: &Settings) -> Self {
+        let plate = &settings.nameplate;
+        let pairs = libm::roundf(60.0 * plate.frequency_hz / plate.speed_rpm).max(1.0);
+        let safe = OF_RANGE * settings.sensor_range_a();
+        let rated = settings.rated_a();
+        let z_b = plate.base_impedance();
+        let l_b = z_b / (TAU * plate.frequency_hz);
+        let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
+        let synchronous = 60.0 * plate.frequency_hz / pairs;
+        let power = (POWER.0 * apparent, POWER.1 * apparent);
+        let speed = ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous);
+        let current = (0.0, safe / (LEAST_CURRENT * SQRT_2));
+        let entries = [
+            Quantity::new("nameplate.power_w", "W", plate.power_w).allowing(power),
+            Quantity::new("nameplate.speed_rpm", "rpm", plate.speed_rpm).allowing(speed),
+            Quantity::new("nameplate.current_a", "A", plate.current_a).allowing(current),
+        ];
+        Self {
+            amperes: rated.min(safe).min(settings.trip_a() / 1.15),
+            z_b,
+            leakage: (0.08 * l_b, 0.8 * l_b),
+            r_s: (0.005 * z_b, 0.25 * z_b),
+            r_r: (0.001 * z_b, 0.1 * z_b),
+            pole_pairs: pairs as u8,
+            pole_pairs_in_force: f32::from(settings.motor.pole_pairs),
+            peak_v: SQRT_2 * plate.voltage_v,
+            rated,
+            i_q_limit: settings.i_q_limit_a(),
+            flux: SQRT_2 / SQRT_3 * plate.voltage_v / (TAU * plate.frequency_hz),
+            torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
+            filter: settings.scales.current_delay_s / PERIOD_S,
+            pulse_noise: settings.share_of_range(0.05),
+            pulse_v: settings.share_of_dc_link(60.0),
+            dead_time: settings.inverter.dead_time_s / PERIOD_S,
+            dc_link: settings.inverter.dc_link_v,
+            implausible: entries.into_iter().find(|entry| !entry.is_allowed()),
+        }
+    }
+
+    /// The values of the report.
+    pub fn values(&self) -> [Quantity; 3] {
+        [
+            Quantity::new("test current", "A", self.amperes),
+            Quantity::new("pole pairs", "", f32::from(self.pole_pairs)),
+            Quantity::new("base impedance", "ohm", self.z_b),
+        ]
+    }
+}

@@ -1,0 +1,77 @@
+//! The fits on a motor whose answer is computed here, in f64.
+#![allow(clippy::disallowed_methods)] // std functions are the reference here
+
+use super::collector::{Collector, Record};
+use super::fit::{Fitted, Search};
+use drive_core::{AlphaBeta, PERIOD_S};
+
+const T: f64 = PERIOD_S as f64;
+
+/// A motor at rest, one axis.
+#[derive(Clone, Copy)]
+struct Motor {
+    r_s: f64,
+    leakage: f64,
+    r_r: f64,
+    tau_r: f64,
+    /// Voltage of the inverter, V.
+    e: f64,
+}
+
+/// The sums of a current that approaches 2.9 A, then 0.72 A, within some 10 ms each.
+fn levels(motor: &Motor) -> Collector {
+    let mut sums = Collector::default();
+    let (mut i, mut i_m, mut last) = (0.0, 0.0, None);
+    for (half, level) in [2.9, 0.72].into_iter().enumerate() {
+        sums.begin(Record::bins(half, 1.5));
+        for _ in 0..9000 {
+            let measured = i;
+            // A period in parts: the current moves on a straight line, the flux as it does.
+            let next = i + (level - i) * T / 0.01;
+            let (parts, mut volts) = (20, 0.0);
+            for part in 0..parts {
+                let now = i + (next - i) * (f64::from(part) + 0.5) / f64::from(parts);
+                volts += motor.r_r * (now - i_m) / f64::from(parts);
+                i_m += (now - i_m) * T / f64::from(parts) / motor.tau_r;
+            }
+            volts += motor.r_s * 0.5 * (i + next) + motor.e + motor.leakage * (next - i) / T;
+            i = next;
+            // What acts from this sample to the next was realised in the step before.
+            if let Some((measured, _)) = last {
+                sums.push(measured, AlphaBeta::new(volts as f32, 0.0), 311.0);
+            }
+            last = Some((AlphaBeta::new(measured as f32, 0.0), volts));
+        }
+    }
+    sums
+}
+
+fn found(sums: &Collector) -> Fitted {
+    let mut search = Search::new(0.0);
+    loop {
+        if let Some(fit) = search.step(sums).unwrap() {
+            return fit;
+        }
+    }
+}
+
+#[test]
+fn the_levels_give_back_the_motor() {
+    // Table 5; a slow rotor; a fast one with much leakage.
+    for (r_s, leakage, r_r, tau_r, e) in [
+        (5.4, 0.0515, 0.823, 0.186, 7.0),
+        (2.7, 0.028, 0.45, 0.7, 12.0),
+        (10.8, 0.1, 1.6, 0.05, 4.0),
+    ] {
+        let fit = found(&levels(&Motor { r_s, leakage, r_r, tau_r, e }));
+        std::println!("{fit:?}");
+        let near = |found: f32, truth: f64, within: f64, name: &str| {
+            let error = f64::from(found) / truth - 1.0;
+            assert!(error.abs() < within, "{name}: {found}, not {truth}: {error}");
+        };
+        near(fit.r_s, r_s, 5e-4, "r_s");
+        near(fit.e, e, 1e-3, "e");
+        near(fit.r_r, r_r, 5e-3, "R_R");
+        near(fit.tau_r, tau_r, 5e-3, "tau_r");
+    }
+}

@@ -1,0 +1,270 @@
+//! The design of the coefficients of the control step.
+
+mod catching;
+mod estimator;
+mod scalar;
+
+use core::f32::consts::TAU;
+
+use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
+use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
+use drive_core::carrier::{DemodulatorKind, Injection};
+use drive_core::current::{
+    DeadTime, DqPi, InverterDrop, Modulator, Pi, ReferenceFilter, VoltageLimit,
+};
+use drive_core::filter::lpf_lag_samples;
+use drive_core::flux::{Indirect, Leakage, Observer};
+use drive_core::protect::{
+    Body, LockMonitor, LockMonitorSettings, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck,
+    Thermal, WiringCheck, WiringSettings,
+};
+use drive_core::{
+    Angle, AngleSource, Coefficients, DcLink, FirstOrder, FrontEnd, Learning, Motion, PERIOD_S,
+    Protection, Ramps, SequenceSteps, Shunts, UnitVector, periods,
+};
+
+/// Time for which the lock is verified, s: the tracking loop settles in a third of it.
+const VERIFY_S: f32 = 0.3;
+/// Time between two steps of the thermal loads, s.
+const THERMAL_S: f32 = Thermal::EVERY as f32 * PERIOD_S;
+/// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
+/// dissertation's motor, and 3 V beside the observer, which tracks the stator resistance.
+const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
+/// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
+/// 18 A/s.
+const MOVED_A: f32 = 0.03;
+/// Largest accepted offset of a current sensor with the dissertation's sensors, A.
+const LARGEST_OFFSET_A: f32 = 0.2;
+/// Largest mean sum of three phase currents with the dissertation's sensors, A: 7 % of the range.
+const LARGEST_SUM_A: f32 = 0.3;
+/// Sampling time of the converters, s, rounded up: the shunts are connected for so long before the sample, and as long
+/// after it for the third current.
+const SHUNT_SAMPLING_S: f32 = 1e-6;
+/// Peak current of the pulses of the wiring check with the dissertation's motor, A.
+const WIRING_A: f32 = 0.2;
+/// Its margin for noise with the dissertation's sensors, A.
+const WIRING_NOISE_A: f32 = 0.05;
+/// Largest voltage of its pulses, V, and largest test voltage of an axis, at 311 V.
+const LARGEST_TEST_V: f32 = 60.0;
+
+impl Settings {
+    /// Checks every value and runs the design rules.
+    ///
+    /// # Errors
+    /// The first value outside its range, by name, with the range; or why a design rule cannot be
+    /// met.
+    pub fn build(&self) -> Result<Coefficients, SettingsError> {
+        self.check()?;
+        let m = &self.motor;
+        let motor_plant = self.motor_plant()?;
+        let designs = self.current_loops()?;
+        let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
+
+        let injecting =
+            self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
+        let t = &self.injection.synchronous;
+        let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
+        let current_lag = self.scales.current_delay_s / PERIOD_S;
+        let inj = &self.injection;
+        let motion_design = self.motion_loops()?;
+        let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
+        let carrier_v = self.carrier_v();
+        let injection = Injection::new(carrier_v, motor_plant, current_lag);
+        let (injection_turn, injection_axis) = if inj.demodulator.is_along_flux() {
+            (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 })
+        } else {
+            (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
+        };
+
+        let lock_monitor = self.watches_lock().then(|| {
+            LockMonitor::new(
+                &self.carrier(),
+                &LockMonitorSettings {
+                    slope: self.slope(),
+                    moved_a: self.share_of_rated(MOVED_A),
+                    smoothing_s: t.loss_s,
+                    allowed: t.allowed_loss,
+                    carrier_a: injection.current_amplitude,
+                },
+            )
+        });
+        Ok(Coefficients {
+            front_end: FrontEnd {
+                current_a: self.scales.current_a,
+                current_b: self.scales.current_b,
+                shunts: self.shunts(),
+                dc_link: self.scales.dc_link,
+                full_scale: self.scales.full_scale,
+                heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
+                top: f32::from(self.inverter.top),
+            },
+            offsets: OffsetCheck {
+                samples: periods(self.sequence.calibrate_s) as u16,
+                largest: self.share_of_range(LARGEST_OFFSET_A),
+                shunts: self.scales.sensors == CurrentSensors::LowSide,
+            },
+            source: self.angle_source,
+            track_rotor: self.track_rotor,
+            indirect: Indirect::new(
+                m,
+                self.scales.encoder_counts,
+                i_d,
+                2.0 * self.speed_trip_rpm() / 60.0,
+            ),
+            inject: injecting && carrier_v > 0.0,
+            demodulate: injecting,
+            injection,
+            injection_turn,
+            injection_axis,
+            lock_monitor,
+            saliency_check: self.saliency_check(),
+            noise_watch: (self.angle_source == AngleSource::Injection)
+                .then(|| NoiseWatch::new(t.flux_saliency, injection.current_amplitude)),
+            wiring: WiringCheck::new(&WiringSettings {
+                sigma_ls: m.sigma_l_s(),
+                expected_a: self.share_of_rated(WIRING_A),
+                noise_a: self.share_of_range(WIRING_NOISE_A),
+                highest_v: self.share_of_dc_link(LARGEST_TEST_V),
+            }),
+            largest_test_v: self.share_of_dc_link(LARGEST_TEST_V),
+            estimator: self.estimator(
+                lag_share,
+                current_lag + estimator::carrier_lag(motor_plant),
+                self.freq_of_rpm(self.speed_trip_rpm()),
+                (carrier_v, injection.current_amplitude),
+            ),
+            current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
+            reference_filter: [
+                ReferenceFilter::new(designs[0].p_f).with_direct(tuning::DIRECT_SHARE),
+                ReferenceFilter::new(designs[1].p_f).with_direct(tuning::DIRECT_SHARE),
+            ],
+            current_lag,
+            lag_share,
+            modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
+                .readable(self.shunts().map(|shunts| shunts.readable)),
+            dead_time: if self.inverter.compensate {
+                DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
+            } else {
+                DeadTime::NONE
+            },
+            inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit)
+                .known(self.inverter.drop_v),
+            thermal: Thermal {
+                motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
+                inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
+            },
+            relay: self.relay(),
+            volts_per_hertz: self.volts_per_hertz(),
+            learning: self.learning(),
+            unlearned: self.tracks_synchronously() && !t.allow_unlearned,
+            prediction: {
+                let allowed_v = self.unexplained_v();
+                let mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
+                Prediction::new(m, motor_plant, allowed_v, mean_v)
+            },
+            catching: self.catching(designs.map(|design| design.k_c as f32)),
+            voltage_limit: VoltageLimit::new(m, i_d, current_limit),
+            dc_link: DcLink::new(&self.dc_link_limits()),
+            motion: self.motion(&motion_design),
+            freq_per_speed: self.freq_of_rpm(60.0),
+            protection: Protection {
+                trip_a: self.trip_a(),
+                dc_over: self.dc_over_v(),
+                dc_under: self.dc_under_v(),
+                rotor_freq: self.freq_of_rpm(self.highest_rpm()),
+                current_squared: current_limit * current_limit,
+                i_q: current_limit,
+            },
+            observer: self.uses_observer().then(|| {
+                let leakage = Leakage {
+                    flux_saliency: 0.5 * self.slope().at_rest(),
+                    current_saliency: self.current_saliency(),
+                    share: self.observer.leakage_share,
+                    slope: self.observer.leakage_slope,
+                };
+                let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
+                Observer::new(m, &leakage, i_d, ages)
+            }),
+            sequence: SequenceSteps {
+                precharge: periods(self.sequence.precharge_s),
+                magnetise: periods(self.magnetise_s()),
+                verify: periods(VERIFY_S),
+                i_d,
+                stop_ramp: self.stop_a_per_s() * PERIOD_S,
+            },
+        })
+    }
+
+    /// The learning with these settings; they must be [valid](Self::check).
+    pub fn learning(&self) -> Learning {
+        let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
+        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), synchronous)
+    }
+
+    /// The choice of the phases, with three shunts.
+    fn shunts(&self) -> Option<Shunts> {
+        let s = &self.scales;
+        let window_s = self.inverter.dead_time_s + s.shunt_settle_s + SHUNT_SAMPLING_S;
+        let largest_sum = self.share_of_range(LARGEST_SUM_A);
+        (s.sensors == CurrentSensors::LowSide)
+            .then(|| Shunts::new(s.current_c, window_s, largest_sum))
+    }
+
+    fn motor_plant(&self) -> Result<FirstOrder, TuningError> {
+        tuning::motor_plant(&self.motor.into(), f64::from(PERIOD_S))
+    }
+
+    /// The design of the current controllers, d and q, with valid settings.
+    ///
+    /// # Errors
+    /// The design rule that cannot be met.
+    pub fn current_loops(&self) -> Result<[CurrentLoopDesign; 2], TuningError> {
+        let motor_plant = self.motor_plant()?;
+        let (d, q) = match self.current_plant.source {
+            PlantSource::Identified => (self.identified_d(), self.identified_q()),
+            PlantSource::Motor => (motor_plant, motor_plant),
+        };
+        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
+        Ok([design(d)?, design(q)?])
+    }
+
+    /// The design of the speed and the position loop, with valid settings.
+    ///
+    /// # Errors
+    /// The design rule that cannot be met.
+    pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
+        let m = &self.motor;
+        let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
+        let tracking_hz = match self.angle_source {
+            AngleSource::Encoder => None,
+            AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
+        };
+        tuning::design_motion_loops(
+            f64::from(acceleration),
+            tracking_hz,
+            f64::from(self.speed.phase_margin_deg),
+            f64::from(PERIOD_S) * f64::from(Motion::DIVIDER),
+        )
+    }
+
+    fn motion(&self, design: &MotionDesign) -> Motion {
+        let counts = match self.angle_source {
+            AngleSource::Encoder => self.scales.encoder_counts,
+            AngleSource::Injection => Motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
+        };
+        let limit = self.speed_limit_rpm() / 60.0;
+        let ramps = Ramps {
+            usual: self.ramp_rpm_per_s() / 60.0,
+            quick: self.quick_rpm_per_s() / 60.0,
+            rise_s: self.speed.s_ramp_s,
+        };
+        Motion::new(&design.gains, counts, limit, &ramps, self.i_q_limit_a())
+    }
+
+    /// Only a sensorless start with the synchronous demodulation is checked.
+    fn saliency_check(&self) -> Option<SaliencyCheck> {
+        let t = &self.injection.synchronous;
+        let checked = t.check && self.tracks_synchronously();
+        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r()))
+    }
+}

@@ -1,0 +1,466 @@
+//! The settings: field, default, unit, range, rule, help, who may change it, whether learned values depend on it, and whether
+//! the power stage is at stake. To add one, add a row; [`declare`](super::declare) says what a row is.
+//!
+//! Structures, defaults, console, saved record, checks, keys of the simulator and documentation come from this table. It is one
+//! file although it is long, so that the settings stand in the order in which they are shown.
+//!
+//! A rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it depends on;
+//! see [`rules`](super::rules).
+
+use core::f32::consts::SQRT_2;
+
+use super::declare::{rule, settings};
+use super::entry::{Access, Change, Entry, entry};
+use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
+use super::value::Words;
+use super::{CurrentSensors, Flux, ONLY_DEMODULATOR, PlantSource};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::table::{CarrierTable, ReferenceTable};
+use drive_core::{AngleSource, Line, Motor, PERIOD_S};
+
+/// Rated current of the dissertation's motor, A peak (Table 3, star).
+pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
+settings! {
+    => [
+        /// stator resistance of a phase
+        "motor.r_s" [motor] r_s: f32, number("ohm").from_to(0.001, 1000.0).learned();
+        /// rotor resistance, referred to the stator
+        "motor.r_r" [motor] r_r: f32, number("ohm").from_to(0.001, 1000.0).learned();
+        /// leakage inductance of the stator
+        "motor.l_ls" [motor] l_ls: f32, number("H").from_to(1e-6, 10.0).learned();
+        /// leakage inductance of the rotor, referred to the stator
+        "motor.l_lr" [motor] l_lr: f32, number("H").from_to(1e-6, 10.0).learned();
+        /// magnetising inductance
+        "motor.l_m" [motor] l_m: f32, number("H").from_to(1e-5, 100.0).learned();
+        /// pairs of poles
+        "motor.pole_pairs" [motor] pole_pairs: u8, whole().from_to(1.0, 50.0).learned();
+        /// inertia of rotor and load; for the speed loop
+        "motor.inertia" [motor] inertia: f32, number("kg m2").from_to(1e-7, 1000.0);
+    ];
+
+    /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
+    /// drive from it; see [`rules`](super::rules). Defaults: the dissertation's motor, Table 3.
+    Nameplate "nameplate." [nameplate] {
+        /// rated power at the shaft
+        power_w: f32 = 1100.0, number("W").from_to(1.0, 1e6);
+        /// rated voltage between lines, rms
+        voltage_v: f32 = 380.0, number("V").from_to(5.0, 1000.0);
+        /// rated current of a line, rms; the rules take their currents from it
+        current_a: f32 = 2.56, number("A").from_to(0.01, 1000.0);
+        /// rated frequency
+        frequency_hz: f32 = 60.0, number("Hz").from_to(5.0, 400.0);
+        /// rated speed of the shaft
+        speed_rpm: f32 = 1720.0, number("rpm").from_to(1.0, 24_000.0);
+    }
+
+    /// The timer and the power stage. Defaults: section 3.9; 220 V rectified.
+    Inverter "inverter." [inverter] {
+        /// count at which the timer turns round
+        /// (14167 at 170 MHz and 6 kHz).
+        top: u16 = 14_167, whole().from_to(1000.0, 65_534.0).changed(Change::Board).learned();
+        /// Nominal voltage of the dc link, V. Its row is behind that of its sensor, which its range depends on.
+        dc_link_v: f32 = 311.0;
+        /// time with both switches of a leg off, at every change
+        dead_time_s: f32 = 2.2e-6, number("s").from_to(0.0, 6e-6).changed(Change::FromReset).learned().hardware();
+        /// whether the dead time is compensated
+        compensate: bool = true, word().learned();
+        /// phase current from which on the compensation is full
+        ///
+        /// The rule is three times the spread of noise and prediction.
+        full_compensation_a: Option<f32> = None, auto("A", full_compensation_a: |s| s.share_of_range(0.03))
+            .from_to(1e-4, 100.0).learned();
+        /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
+        drop_v: Option<f32> = None, auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
+    }
+
+    /// Scales of the converters and of the encoder. Defaults: Eq. 3.5; 0.11 V per code (451 V at full scale); the 5305 Hz
+    /// filter of Figure 16; 2500 lines.
+    Scales "scales." [scales] {
+        /// Current a, A.
+        current_a: Line = Line::CHANNEL_A => [
+            /// current a per code; negative if a current into the motor lowers the code
+            "scales.current_a.gain" [scales.current_a] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 1.0)).learned().hardware();
+            /// current a at code 0
+            "scales.current_a.offset" [scales.current_a] offset: f32, number("A")
+                .beside(|s| s.offset_range(s.scales.current_a)).learned().hardware();
+        ];
+        /// Current b, A.
+        current_b: Line = Line::CHANNEL_B => [
+            /// current b per code
+            "scales.current_b.gain" [scales.current_b] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 1.0)).learned().hardware();
+            /// current b at code 0
+            "scales.current_b.offset" [scales.current_b] offset: f32, number("A")
+                .beside(|s| s.offset_range(s.scales.current_b)).learned().hardware();
+        ];
+        /// Current c, A; for three shunts.
+        current_c: Line = Line::CHANNEL_B => [
+            /// current c per code; with three shunts
+            "scales.current_c.gain" [scales.current_c] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 1.0)).learned().hardware();
+            /// current c at code 0
+            "scales.current_c.offset" [scales.current_c] offset: f32, number("A").beside(|s| match s.scales.sensors {
+                CurrentSensors::InLine => (-1000.0, 1000.0),
+                CurrentSensors::LowSide => s.offset_range(s.scales.current_c),
+            }).learned().hardware();
+        ];
+        /// sensors of the currents: two in the lines a and b, or three shunts below the low sides
+        sensors: CurrentSensors = CurrentSensors::InLine, word().changed(Change::Board).learned();
+        /// time from the turn-on of a low side until its shunt can be sampled
+        ///
+        /// Without the dead time.
+        shunt_settle_s: f32 = 2e-6, number("s").from_to(0.0, 20e-6).changed(Change::Board).learned();
+        /// Dc-link voltage, V.
+        dc_link: Line = Line { gain: 0.11, offset: 0.0 } => [
+            /// dc link per code
+            "scales.dc_link.gain" [scales.dc_link] gain: f32, number("V").from_to(1e-4, 10.0).learned().hardware();
+            /// dc link at code 0
+            "scales.dc_link.offset" [scales.dc_link] offset: f32, number("V").from_to(-100.0, 100.0).learned().hardware();
+        ];
+        /// Code of the highest dc link that the power stage stands in operation. A code, so that no scale lifts it.
+        dc_link_highest: u16 = 4095 => [
+            /// code of the highest dc link that the power stage stands in operation
+            "scales.dc_link.highest" [scales] dc_link_highest: u16, whole().from_to(100.0, 4095.0).changed(Change::Board);
+            /// nominal voltage of the dc link
+            "inverter.dc_link_v" [inverter] dc_link_v: f32, number("V").beside(|s| (10.0, s.dc_link_max_v()));
+        ];
+        /// largest code of the currents
+        full_scale: u16 = 4095, whole().from_to(100.0, 65_535.0).changed(Change::Board);
+        /// Thermistor of the heat sink.
+        ntc: Ntc = Ntc::DEFAULT;
+        /// delay of the analog filters of the currents
+        current_delay_s: f32 = 30e-6, number("s").from_to(0.0, 5.0 * PERIOD_S).learned();
+        /// counts of the encoder a turn, four a line
+        encoder_counts: u32 = 10_000, whole().from_to(16.0, 1e7);
+    }
+
+    /// A thermistor with negative coefficient in a divider across the reference of the converter:
+    /// R = R_25 exp(B (1/T - 1/T_25)).
+    ///
+    /// Defaults, assumed: 10 kohm, B 3435 K, from the reference, with 4.7 kohm to ground. The dissertation describes none.
+    Ntc "scales.ntc." [scales.ntc] {
+        /// thermistor of the heat sink at 25 degC
+        ohm_25: f32 = 10_000.0, number("ohm").from_to(10.0, 1e6).hardware();
+        /// its B constant
+        beta_k: f32 = 3435.0, number("K").from_to(1000.0, 10_000.0).hardware();
+        /// resistor in series with it
+        divider_ohm: f32 = 4700.0, number("ohm").from_to(10.0, 1e6).hardware();
+        /// whether the thermistor is the one at ground
+        ///
+        /// The code falls with the temperature then.
+        to_ground: bool = false, word().hardware();
+    }
+
+    /// An identified plant k / (z - p) at 6 kHz. Unset values follow [`rules`](super::rules).
+    IdentifiedPlant "" [] {
+        /// Gain, A/V.
+        k: Option<f32> = None;
+        /// Pole.
+        p: Option<f32> = None;
+    }
+
+    /// The plants of the current controllers.
+    CurrentPlant "" [] {
+        /// The one in use.
+        source: PlantSource = PlantSource::Identified;
+        /// Identified plant of the direct axis.
+        d: IdentifiedPlant = IdentifiedPlant::DEFAULT;
+        /// Identified plant of the quadrature axis.
+        q: IdentifiedPlant = IdentifiedPlant::DEFAULT;
+    }
+
+    /// All settings of the drive.
+    Settings "" [] {
+        /// The motor.
+        motor: Motor = Motor::DEFAULT;
+        /// Its nameplate.
+        nameplate: Nameplate = Nameplate::DEFAULT;
+        /// The timer and the power stage.
+        inverter: Inverter = Inverter::DEFAULT;
+        /// Scales of converters and encoder.
+        scales: Scales = Scales::DEFAULT;
+        /// source of the flux angle
+        angle_source: AngleSource = AngleSource::Injection, word();
+        /// The plant that the current controllers are designed for.
+        current_plant: CurrentPlant = CurrentPlant::DEFAULT => [
+            /// plant that the current controllers are designed for
+            "current_plant" [current_plant] source: PlantSource, word();
+            /// identified plant k/(z - p) of the direct axis
+            "current_plant.d.k" [current_plant.d] k: Option<f32>, auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 10.0);
+            /// its pole
+            "current_plant.d.p" [current_plant.d] p: Option<f32>, auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
+            /// identified plant k/(z - p) of the quadrature axis
+            "current_plant.q.k" [current_plant.q] k: Option<f32>, auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 10.0);
+            /// its pole
+            "current_plant.q.p" [current_plant.q] p: Option<f32>, auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
+        ];
+        /// whether known delays are left uncompensated, as in the dissertation
+        ///
+        /// Those of the current measurement and of the demodulation, to show what they cost: with the encoder 4.7° at 1440 rpm,
+        /// with the injection some 9° at standstill already (the flux slips) and 35° at 150 rpm.
+        ignore_delays: bool = false, word().learned();
+        /// whether the rotor time constant is tracked while running
+        ///
+        /// The drive takes the one that `online` finds.
+        track_rotor: bool = false, word();
+        /// The injection.
+        injection: InjectionSettings = InjectionSettings::DEFAULT;
+        /// The observer.
+        observer: ObserverSettings = ObserverSettings::DEFAULT;
+        /// Limits and protections.
+        limits: Limits = Limits::DEFAULT;
+        /// Start and stop.
+        sequence: Sequence = Sequence::DEFAULT;
+        /// The speed and the position loop.
+        speed: SpeedSettings = SpeedSettings::DEFAULT;
+        /// The limits by the dc link.
+        braking: BrakingSettings = BrakingSettings::DEFAULT;
+        /// The supply of the dc link.
+        supply: SupplySettings = SupplySettings::DEFAULT;
+        /// The mode for a motor that nobody has identified.
+        vf: VoltsPerHertzMode = VoltsPerHertzMode::DEFAULT;
+    }
+
+    /// The injection and the tracking of the angle.
+    InjectionSettings "injection." [injection] {
+        /// peak of the injected voltage; 0 for none
+        ///
+        /// 50 V (28 % of the largest voltage) is an assumption; the dissertation gives no amplitude. The rule starts from the
+        /// reactance X = ω σL_s of the leakage at the carrier.
+        ///
+        /// The angle error is noise over saliency and carrier current, so the rule asks for a current: 0.368 of the direct
+        /// current, 0.26 A of the dissertation's motor at 0.7 A, and at most 0.46 A of it, which the trip leaves room for (family
+        /// R at 2 A: 2.9° rms with 0.26 A, 1.7° with 0.46 A). The remainder of the dead time asks for a voltage, 50 V at 311 V.
+        /// The larger of both is taken, but not more than the voltage that drives half the direct current: beyond, phases b and c
+        /// would cross zero at a start, where the drop of the inverter is uncertain; and not more than the trip leaves room for
+        /// beside the current limit. The voltage is between 20 and 110 V at 311 V.
+        amplitude_v: Option<f32> = None, auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
+        /// demodulation of the carrier current
+        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().only(ONLY_DEMODULATOR).learned();
+        /// Settings of the chain of the dissertation.
+        printed: PrintedChain = PrintedChain::DEFAULT;
+        /// Settings of the synchronous demodulation.
+        synchronous: SynchronousTracking = SynchronousTracking::DEFAULT;
+        /// Inject and demodulate also while the angle comes from the encoder. Its row is the last of the injection.
+        beside_encoder: bool = false;
+    }
+
+    /// Tracking loop of sections 3.4 and 3.11, for all demodulators but the synchronous one. Defaults: sections 3.3 and 3.11.
+    PrintedChain "injection." [injection.printed] {
+        /// reference of the current difference; not synchronous
+        ///
+        /// `ref_delta_i` (section 3.3) from [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it
+        /// follows the sign of i_q, and goes through zero linearly.
+        reference_a: f32 = 0.010, number("A").from_to(-1.0, 1.0).learned();
+        /// torque current from which on that reference is full
+        full_reference_iq_a: Option<f32> = None, auto("A", full_reference_iq_a: |s| s.share_of_rated(1.0))
+            .from_to(0.01, 1000.0).learned();
+        /// gain of the tracker (Eq. 3.44); not synchronous
+        k_s: f32 = 0.132_546, number("rad/A").from_to(0.0, 100.0);
+        /// its zero
+        z_s: f32 = 0.90, number().from_to(0.0, 1.0);
+        /// length of the filters of rms-impedance
+        ///
+        /// In samples of [`DemodulatorKind::RmsImpedance`]; the default is two carrier periods.
+        rms_samples: u8 = 20, whole().from_to(DemodulatorKind::RMS_SAMPLES.0 as f32, DemodulatorKind::RMS_SAMPLES.1 as f32).learned();
+        /// Reference of the current difference over the torque current, A, learned with the shaft locked;
+        /// replaces the constant one.
+        learned: Option<ReferenceTable> = None;
+    }
+
+    /// Synchronous demodulation and its loop.
+    SynchronousTracking "injection." [injection.synchronous] {
+        /// natural frequency of the tracking loop
+        bandwidth_hz: f32 = 3.5, number("Hz").from_to(0.1, 30.0);
+        /// saliency fixed to the flux, until its slope is learned
+        ///
+        /// At the nominal magnetising current. Negative: the inductance along the flux is the larger one. Near zero the loop would
+        /// have no gain.
+        flux_saliency: f32 = -0.035, number().beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
+        /// whether a drive that has not learned starts without an encoder
+        ///
+        /// For motors whose saliency is known from elsewhere, as that of a model.
+        allow_unlearned: bool = false, word();
+        /// saliency per ampere of stator current
+        ///
+        /// For the gain schedule until it is learned.
+        current_saliency: Option<f32> = None,
+            auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
+        /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
+        reference: Option<ReferenceTable> = None;
+        /// whether a start checks the saliency of the motor
+        ///
+        /// See `saliency_check`. Without the check a start assumes it, and a shaft at standstill.
+        check: bool = true, word();
+        /// whether the lock is verified and watched
+        ///
+        /// See `lock_monitor`.
+        monitor: bool = true, word();
+        /// Carrier current over the torque current, learned with the shaft locked, for the monitor; unset: guessed.
+        carrier: Option<CarrierTable> = None;
+        /// share of the flux-fixed saliency that may be missing
+        ///
+        /// 1 is zero flux.
+        allowed_loss: f32 = 0.55, number().from_to(0.3, 0.9);
+        /// time constant of the mean of that share
+        loss_s: f32 = 0.12, number("s").from_to(0.01, 1.0);
+        /// speed that trips without an encoder
+        ///
+        /// Mechanical: the end of the range in which the angle is tracked.
+        tracked_rpm: Option<f32> = None, auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0) => [
+            /// whether the carrier is injected beside an encoder
+            "injection.beside_encoder" [injection] beside_encoder: bool, word();
+        ];
+    }
+
+    /// The observer that takes the angle over from the injection at speed; see `drive_core::flux::observer`.
+    ObserverSettings "observer." [observer] {
+        /// whether the voltage of the motor gives the angle at speed, where the injection ends
+        ///
+        /// Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
+        enabled: bool = true, word();
+        /// leakage inductance of the fundamental wave at no current, as a share of that of motor.*
+        leakage_share: f32 = 1.0, number().from_to(0.5, 2.0);
+        /// change of that share per ampere of stator current, peak
+        leakage_slope: f32 = 0.0, number("1/A").from_to(-1.0, 1.0);
+    }
+
+    /// Limits and protections. Unset ones follow [`rules`](super::rules).
+    Limits "limits." [limits] {
+        /// phase current that trips
+        ///
+        /// A trip level beyond the sensors' range would never be reached.
+        trip_a: Option<f32> = None, auto("A", trip_a: |s| f32::min(s.share_of_rated(4.3), 0.962 * s.sensor_range_a()))
+            .beside(|s| (0.05, s.sensor_range_a())).hardware();
+        /// largest current that is regulated, peak
+        ///
+        /// The length of the current vector. The carrier and the noise stay clear of the trip.
+        current_a: Option<f32> = None, auto("A", current_limit_a: |s| f32::min(s.share_of_rated(3.5), 0.814 * s.trip_a()))
+            .beside(|s| (0.01, s.trip_a()));
+        /// dc link above which the drive trips
+        dc_over_v: Option<f32> = None, auto("V", dc_over_v: Settings::dc_over_rule).beside(Settings::dc_over_range).hardware();
+        /// dc link below which it trips while the outputs are on
+        dc_under_v: Option<f32> = None, auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
+        /// speed of the shaft that trips
+        speed_rpm: Option<f32> = None, auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
+            .from_to(1.0, 20_000.0);
+        /// largest voltage that the motor model does not explain at standstill
+        ///
+        /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
+        /// of the inverter.
+        unexplained_v: Option<f32> = None,
+            auto("V", unexplained_v: |s| 0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).from_to(0.01, 1000.0);
+        /// current that the motor carries for any time at standstill, peak
+        motor_a: Option<f32> = None, auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
+        /// thermal time constant of its windings
+        motor_s: f32 = 300.0, number("s").from_to(1.0, 10_000.0);
+        /// current that the inverter carries for any time, peak
+        inverter_a: Option<f32> = None, auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a()));
+        /// thermal time constant of its switches to the heat sink
+        inverter_s: f32 = 5.0, number("s").from_to(0.1, 1000.0);
+        /// temperature of the heat sink that trips
+        ///
+        /// The default suits most power modules.
+        heat_sink_c: f32 = 85.0, number("degC").from_to(0.0, 150.0).hardware();
+        /// temperature of the heat sink from which on the current limit falls, to nothing where it trips
+        derate_c: Option<f32> = None, auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
+    }
+
+    /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).
+    Sequence "sequence." [sequence] {
+        /// time of the offset calibration
+        calibrate_s: f32 = 0.1, number("s").from_to(0.001, 10.0);
+        /// time with the low sides on
+        precharge_s: f32 = 0.010, number("s").from_to(0.0, 10.0);
+        /// time with direct current alone
+        ///
+        /// The flux is within 1 % after five rotor time constants.
+        magnetise_s: Option<f32> = None, auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r())).beside(Settings::magnetise_range);
+        /// flux that the rule for the direct current aims at: low as in the dissertation, or high
+        flux: Flux = Flux::Low, word().learned();
+        /// direct (magnetising) current, peak
+        ///
+        /// 0.7 A is that of section 3.10. With high flux it is that of the rated flux or, where it is smaller, 0.55 times the rated
+        /// current; and where the current limit is small, 4/7 of that, which leaves 0.82 of it for the torque.
+        i_d: Option<f32> = None, auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
+        /// slope of the torque current at a stop
+        stop_a_per_s: Option<f32> = None, auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5);
+        /// whether a start with the observer looks for a turning shaft first
+        ///
+        /// For 0.25 s, without an encoder.
+        catch: bool = true, word();
+    }
+
+    /// The speed loop, and the position loop around it. Unset values follow [`rules`](super::rules).
+    SpeedSettings "speed." [speed] {
+        /// largest torque current of speed and position mode
+        i_q_limit_a: Option<f32> = None, auto("A", i_q_limit_a: |s| 3.0 / 3.5 * s.current_limit_a())
+            .beside(|s| (0.01, s.current_limit_a()));
+        /// largest speed that is asked for
+        ///
+        /// In either mode. By rule the rated speed with the observer. The injection alone is good to 300 rpm on four poles; with an
+        /// encoder it may be larger.
+        limit_rpm: Option<f32> = None, auto("rpm", speed_limit_rpm: Settings::speed_limit_rule).beside(|s| (1.0, s.speed_trip_rpm()));
+        /// largest acceleration that is asked for
+        ///
+        /// Without a sensor the angle lags by 5.7 degrees while the speed changes by 300 rpm/s (four poles, tracking loop of 4 Hz).
+        ramp_rpm_per_s: Option<f32> = None, auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
+        /// deceleration of a quick stop
+        quick_rpm_per_s: Option<f32> = None,
+            auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
+        /// time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once
+        s_ramp_s: f32 = 0.0, number("s").from_to(0.0, 10.0);
+        /// phase margin of the speed loop: more is calmer and slower
+        ///
+        /// Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
+        phase_margin_deg: f32 = 60.0, number("deg").from_to(45.0, 70.0);
+    }
+
+    /// Limits of the torque by the voltage of the dc link, and the brake resistor; see `drive_core::dc_link`. Unset values follow
+    /// [`rules`](super::rules). By default there is no brake resistor; where one is fitted, its energy and power stand on it.
+    BrakingSettings "braking." [braking] {
+        /// dc link without generating torque
+        high_v: Option<f32> = None, auto("V", dc_high_v: Settings::dc_high_rule).beside(Settings::dc_high_range);
+        /// dc link without motoring torque, below which the shaft feeds it
+        low_v: Option<f32> = None, auto("V", dc_low_v: |s| f32::max(s.share_of_dc_link(260.0), LOW_OF_TRIP * s.dc_under_v()))
+            .beside(|s| (s.dc_under_v() + MARGIN * s.dc_under_v(), s.inverter.dc_link_v - MARGIN * s.inverter.dc_link_v));
+        /// direct current that is added while generating torque is limited; 0 for none
+        flux_a: Option<f32> = None, auto("A", braking_flux_a: |s| f32::min(s.share_of_rated(1.0), WITHIN * s.current_limit_a()))
+            .beside(|s| (0.0, s.current_limit_a()));
+        /// brake resistor behind the chopper; 0 for none
+        ohm: f32 = 0.0, number("ohm").from_to(0.0, 1e5);
+        /// energy that the brake resistor takes from cold
+        energy_j: f32 = 1000.0, number("J").from_to(1.0, 1e7);
+        /// power that it takes for ever
+        power_w: f32 = 50.0, number("W").from_to(0.1, 1e5);
+    }
+
+    /// The supply of the dc link.
+    SupplySettings "supply." [supply] {
+        /// time that the dc link must be steady before the precharge relay closes; 0 without one
+        ///
+        /// See `drive_core::supply`.
+        relay_s: f32 = 0.0, number("s").from_to(0.0, 60.0);
+    }
+
+    /// The mode for a motor that nobody has identified; see `drive_core::flux::volts_per_hertz`. Unset values follow
+    /// [`rules`](super::rules).
+    VoltsPerHertzMode "vf." [vf] {
+        /// voltage between lines, rms, per frequency, of a motor that nobody has identified
+        volts_per_hz: Option<f32> = None,
+            auto("V/Hz", volts_per_hz: |s| s.nameplate.voltage_v / s.nameplate.frequency_hz).from_to(0.01, 200.0);
+        /// current of this motor at standstill, peak
+        ///
+        /// By rule the magnetising current of most motors, 0.45 times the rated current.
+        boost_a: Option<f32> = None, auto("A", boost_a: |s| f32::min(0.45 * s.rated_a(), 0.6 * s.current_limit_a()))
+            .beside(|s| (0.01, s.current_limit_a()));
+        /// share of its slip that is compensated
+        slip_share: f32 = 1.0, number().from_to(0.0, 1.5);
+    }
+}
+
+/// The setting with this name.
+pub fn find(name: &str) -> Option<&'static Entry<Settings>> {
+    SETTINGS.iter().find(|entry| entry.name == name)
+}

@@ -1,0 +1,146 @@
+//! Settings in SI units.
+//!
+//! [`Settings::build`] makes [`Coefficients`](drive_core::Coefficients) of them, outside the interrupt: it checks every
+//! value against its range and runs the design rules. [`Settings::default`] is the drive of the
+//! dissertation.
+
+mod declare;
+mod design;
+pub mod entry;
+mod list;
+mod ntc;
+mod numbers;
+pub mod rules;
+mod tracked;
+pub mod value;
+
+use core::fmt;
+
+use self::value::{Words, words};
+use crate::tuning::TuningError;
+use drive_core::AngleSource;
+use drive_core::carrier::DemodulatorKind;
+
+pub use list::{
+    BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Nameplate,
+    Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
+    SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
+};
+pub use tracked::{Tracked, TrackedLimit};
+
+/// Sensors of the phase currents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CurrentSensors {
+    /// Two, in the lines a and b.
+    InLine,
+    /// Three shunts below the low sides.
+    LowSide,
+}
+
+/// The plant that the current controllers are designed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlantSource {
+    /// First-order plants identified on the motor with the filters in place (section 3.7).
+    Identified,
+    /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
+    /// with it.
+    Motor,
+}
+
+/// The flux that the drive magnetises the motor with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flux {
+    /// That of the dissertation: 15 % of the rated flux of its motor.
+    Low,
+    /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
+    /// where it hardly has a saliency at the low one.
+    High,
+}
+
+words!(CurrentSensors { Self::InLine => CurrentSensors::InLine, "in-line"; Self::LowSide => CurrentSensors::LowSide, "low-side"; });
+words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
+words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
+words!(DemodulatorKind {
+    Self::Literal => DemodulatorKind::Literal, "literal";
+    Self::Rectified => DemodulatorKind::Rectified, "rectified";
+    Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
+    Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
+    Self::Envelope => DemodulatorKind::Envelope, "envelope";
+});
+/// The word of the only demodulation that this build has; `None`: it has all.
+const ONLY_DEMODULATOR: Option<&str> =
+    if DemodulatorKind::HAS_ALL { None } else { Some("synchronous") };
+
+words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });
+
+impl Settings {
+    /// Checks every value against its range, the scales first: the rules of others follow from the sensors' range.
+    ///
+    /// # Errors
+    /// [`SettingsError::Range`] with the first value outside its range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
+        scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
+    }
+
+    /// Whether results learned with the settings `other` are valid for these settings, too.
+    pub fn shares_learning_with(&self, other: &Self) -> bool {
+        SETTINGS.iter().all(|entry| !entry.learned || entry.same(self, other))
+    }
+}
+
+/// The reason why settings were refused.
+///
+/// Exhaustive on purpose: who translates a reason has to translate a new one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SettingsError {
+    /// A value outside its range.
+    Range {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its unit; empty if there is none.
+        unit: &'static str,
+        /// The value.
+        value: f32,
+        /// Smallest allowed.
+        min: f32,
+        /// Largest allowed.
+        max: f32,
+    },
+    /// A word for which this build has no code.
+    Absent {
+        /// Name of the setting.
+        name: &'static str,
+        /// The word.
+        word: &'static str,
+        /// The only one for which there is code.
+        only: &'static str,
+    },
+    /// The design of the controllers failed.
+    Tuning(TuningError),
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range { name, unit, value, min, max } => {
+                let space = if unit.is_empty() { "" } else { " " };
+                // NaN counts as none.
+                let beside = if min <= max { "" } else { "nothing beside other settings: " };
+                write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
+            }
+            Self::Absent { name, word, only } => {
+                write!(f, "{name} = {word}: this image is built with {only} alone")
+            }
+            Self::Tuning(error) => write!(f, "controllers: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}
+
+impl From<TuningError> for SettingsError {
+    fn from(error: TuningError) -> Self {
+        Self::Tuning(error)
+    }
+}

@@ -1,0 +1,335 @@
+//! The rules: settings that follow from the nameplate, the motor, the sensors' range and the dc link, unless they are
+//! set.
+//!
+//! Each rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it
+//! depends on. On that motor the rules give these numbers back.
+//!
+//! | setting | on the dissertation's motor | in proportion to |
+//! |---|---|---|
+//! | `limits.trip_a` | 4.3 A | rated current; at most 0.962 of the sensors' range |
+//! | `limits.current_a` | 3.5 A | rated current; at most 0.814 of the trip |
+//! | `speed.i_q_limit_a` | 3 A | `limits.current_a` |
+//! | `sequence.i_d` | 0.7 A | rated current; with `sequence.flux` high see [`Settings::i_d`]: 1.991 A |
+//! | `limits.motor_a` | 3.62 A | rated current |
+//! | `limits.inverter_a` | 3.5 A | `limits.current_a` |
+//! | `sequence.stop_a_per_s` | 30 A/s | rated current |
+//! | `sequence.magnetise_s` | 0.93 s | rotor time constant: five of them, 0.8 s at least |
+//! | `inverter.full_compensation_a` | 30 mA | the sensors' range |
+//! | `injection.amplitude_v` | 50 V | see [`Settings::carrier_v`] |
+//! | `injection.full_reference_iq_a` | 1 A | rated current |
+//! | `injection.current_saliency` | 0.0338 1/A | inverse of the rated current |
+//! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
+//! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed; at most 0.998 of `limits.speed_rpm` |
+//! | `speed.limit_rpm` without it, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
+//! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
+//! | `limits.speed_rpm` | 2000 rpm | rated speed |
+//! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
+//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range, and what the power stage stands |
+//! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the voltages that trip |
+//! | `braking.flux_a` | 1 A | rated current; at most 0.998 of `limits.current_a` |
+//! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
+//! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
+//! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
+
+pub mod dc_link;
+
+use core::f32::consts::{SQRT_2, TAU};
+
+use super::list::RATED_A;
+use super::numbers::{WITHIN, either_sign};
+use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
+use crate::tuning::motor_plant;
+use drive_core::carrier::DemodulatorKind;
+use drive_core::table::{CarrierTable, ReferenceTable, SlopeTable};
+use drive_core::{AngleSource, CONVERTER_CODES, FirstOrder, Line, Motor, PERIOD_S, SQRT_3};
+
+/// Carrier current per direct current.
+const CARRIER_OF_I_D: f32 = 0.368_07;
+/// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
+/// overshoot.
+const CARRIER_OF_ROOM: f32 = 0.75;
+/// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
+pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
+/// Frequency of the carrier, Hz.
+pub const CARRIER_HZ: f32 = 600.0;
+
+/// Quantities that the rules are in proportion to.
+impl Settings {
+    /// Rated current, A peak.
+    pub fn rated_a(&self) -> f32 {
+        SQRT_2 * self.nameplate.current_a
+    }
+
+    /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
+    pub fn share_of_rated(&self, on_reference: f32) -> f32 {
+        on_reference / RATED_A * self.rated_a()
+    }
+
+    /// A current that is `on_reference`, A, with the dissertation's sensors, in proportion to the sensors' range: for
+    /// thresholds above noise and steps of the converter.
+    pub fn share_of_range(&self, on_reference: f32) -> f32 {
+        on_reference / -Line::CHANNEL_A.offset * self.sensor_range_a()
+    }
+
+    /// A voltage that is `on_reference`, V, with the dissertation's inverter, in proportion to the dc link: for what
+    /// dead time and drop of the inverter cause.
+    pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
+        on_reference / Inverter::DEFAULT.dc_link_v * self.inverter.dc_link_v
+    }
+
+    /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
+    pub(super) fn share_of_poles(&self, on_reference: f32) -> f32 {
+        on_reference * f32::from(Motor::DEFAULT.pole_pairs) / f32::from(self.motor.pole_pairs)
+    }
+
+    /// Largest phase current that all sensors can measure in both directions, A.
+    pub fn sensor_range_a(&self) -> f32 {
+        let s = &self.scales;
+        let end = |line: Line| {
+            // A negative gain has the positive end at code 0.
+            let (zero, full) = (line.offset, line.at(s.full_scale));
+            if line.gain < 0.0 { f32::min(zero, -full) } else { f32::min(-zero, full) }
+        };
+        let both = f32::min(end(s.current_a), end(s.current_b));
+        match s.sensors {
+            CurrentSensors::InLine => both,
+            CurrentSensors::LowSide => f32::min(both, end(s.current_c)),
+        }
+    }
+
+    /// Largest dc link that the converter can measure, V.
+    pub fn dc_link_range_v(&self) -> f32 {
+        self.scales.dc_link.at(CONVERTER_CODES)
+    }
+
+    /// Speed above which the drive trips, rpm: that of the shaft's limit, or of the range in which the injection alone tracks
+    /// the angle.
+    pub fn highest_rpm(&self) -> f32 {
+        let alone = self.tracks_synchronously() && !self.uses_observer();
+        let tracked = if alone { self.tracked_rpm() } else { f32::INFINITY };
+        f32::min(tracked, self.speed_trip_rpm())
+    }
+
+    /// A mechanical speed, rpm, in electrical turns per control period.
+    pub(crate) fn freq_of_rpm(&self, rpm: f32) -> f32 {
+        rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
+    }
+
+    /// Whether the angle comes from the synchronous demodulation.
+    pub(crate) fn tracks_synchronously(&self) -> bool {
+        self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == DemodulatorKind::Synchronous
+    }
+
+    /// Whether the lock monitor runs.
+    pub(crate) fn watches_lock(&self) -> bool {
+        self.tracks_synchronously() && self.injection.synchronous.monitor
+    }
+
+    /// Whether the observer takes the angle over from the injection at speed.
+    pub(crate) fn uses_observer(&self) -> bool {
+        self.tracks_synchronously() && self.observer.enabled
+    }
+}
+
+impl Nameplate {
+    /// Base impedance of a phase, ohm.
+    pub fn base_impedance(&self) -> f32 {
+        self.voltage_v / (SQRT_3 * self.current_a)
+    }
+}
+
+/// Rules and ranges that take more than a line.
+impl Settings {
+    /// Currents of both signs are measured: zero current lies between 5 % and 95 % of the codes.
+    pub(super) fn offset_range(&self, line: Line) -> (f32, f32) {
+        let full = line.gain.abs() * f32::from(self.scales.full_scale);
+        either_sign(-line.gain, 0.05 * full, 0.95 * full)
+    }
+
+    /// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.
+    pub(super) fn carrier_range(&self) -> (f32, f32) {
+        let dc_link_v = self.inverter.dc_link_v;
+        (if self.watches_lock() { 0.003 * dc_link_v } else { 0.0 }, 0.55 * dc_link_v)
+    }
+
+    /// The lock monitor measures its baseline during magnetisation; with the saliency check also while the flux is
+    /// restored.
+    pub(super) fn magnetise_range(&self) -> (f32, f32) {
+        let needs_baseline = self.watches_lock() && !self.injection.synchronous.check;
+        (if needs_baseline { 0.5 } else { 0.0 }, 60.0)
+    }
+
+    /// Rule of `sequence.i_d`.
+    pub(super) fn i_d_rule(&self) -> f32 {
+        match self.sequence.flux {
+            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
+            Flux::High => {
+                let plate = &self.nameplate;
+                let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
+                let of_flux = rated_flux / self.motor.l_m;
+                f32::min(of_flux, 0.55 * self.rated_a()).min(4.0 / 7.0 * self.current_limit_a())
+            }
+        }
+    }
+
+    /// Rule of `injection.amplitude_v`; the setting says why.
+    pub(super) fn carrier_rule(&self) -> f32 {
+        let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
+        let of_i_d = CARRIER_OF_I_D * self.i_d();
+        let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
+        let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
+        let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
+        let most = f32::min(0.5 * self.i_d(), room) * reactance;
+        f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
+    }
+
+    /// Rule of `speed.limit_rpm`: it is below the speed that trips.
+    pub(super) fn speed_limit_rule(&self) -> f32 {
+        let alone = self.share_of_poles(300.0);
+        let rpm = if self.uses_observer() { self.nameplate.speed_rpm } else { alone };
+        f32::min(rpm, WITHIN * self.speed_trip_rpm())
+    }
+
+    /// Plant of the direct axis for the design of its current controller. The rule is the plant that was identified on the
+    /// dissertation's motor (Eq. 3.41), its gain and its distance from 1 in proportion to those of the plants computed
+    /// from the parameters.
+    pub fn identified_d(&self) -> FirstOrder {
+        self.identified(&self.current_plant.d, FirstOrder { k: 0.002_837, p: 0.9511 })
+    }
+
+    /// The same of the quadrature axis (Eq. 3.42).
+    pub fn identified_q(&self) -> FirstOrder {
+        self.identified(&self.current_plant.q, FirstOrder { k: 0.003_721, p: 0.9503 })
+    }
+
+    fn identified(&self, set: &IdentifiedPlant, on_reference: FirstOrder) -> FirstOrder {
+        let computed = |motor: &Motor| motor_plant(&(*motor).into(), f64::from(PERIOD_S));
+        let rule = match (computed(&self.motor), computed(&Motor::DEFAULT)) {
+            (Ok(own), Ok(reference)) => FirstOrder {
+                k: on_reference.k * (own.k / reference.k),
+                p: 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p)),
+            },
+            // The parameters are out of their ranges, which is reported of them.
+            _ => on_reference,
+        };
+        FirstOrder { k: set.k.map_or(rule.k, f64::from), p: set.p.map_or(rule.p, f64::from) }
+    }
+
+    /// Reference of the saliency over the torque current.
+    pub fn reference(&self) -> ReferenceTable {
+        let guess = || ReferenceTable::guessed(self.current_limit_a());
+        self.injection.synchronous.reference.unwrap_or_else(guess)
+    }
+
+    /// Slope of the saliency until it is learned: that of a saliency fixed to the flux alone.
+    pub fn slope(&self) -> SlopeTable {
+        let grid = self.reference().grid();
+        SlopeTable::of_flux_saliency(grid, self.injection.synchronous.flux_saliency)
+    }
+
+    /// Carrier current over the torque current.
+    pub fn carrier(&self) -> CarrierTable {
+        let guess = || CarrierTable::guessed(self.current_limit_a());
+        self.injection.synchronous.carrier.unwrap_or_else(guess)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(value: f32, expected: f32) {
+        assert!((value / expected - 1.0).abs() < 1e-3, "{value}, not {expected}");
+    }
+
+    /// The numbers that the drive had before it had rules.
+    #[test]
+    fn the_rules_give_the_numbers_of_the_dissertations_motor() {
+        let s = Settings::default();
+        for (value, expected) in [
+            (s.trip_a(), 4.3),
+            (s.current_limit_a(), 3.5),
+            (s.i_q_limit_a(), 3.0),
+            (s.i_d(), 0.7),
+            (s.stop_a_per_s(), 30.0),
+            (s.full_compensation_a(), 0.03),
+            (s.carrier_v(), 50.0),
+            (s.full_reference_iq_a(), 1.0),
+            (s.current_saliency(), 0.0338),
+            (s.tracked_rpm(), 700.0),
+            (s.speed_limit_rpm(), 1720.0),
+            (s.ramp_rpm_per_s(), 300.0),
+            (s.quick_rpm_per_s(), 900.0),
+            (s.speed_trip_rpm(), 2000.0),
+            (s.dc_over_v(), 400.0),
+            (s.dc_under_v(), 200.0),
+            (s.unexplained_v(), 12.0),
+        ] {
+            near(value, expected);
+        }
+        near(s.magnetise_s(), 5.0 * 0.186_09);
+    }
+
+    /// A motor of twice the voltage and half the current, and one of the same voltage and twice the current, have the
+    /// thresholds of the reference in proportion.
+    #[test]
+    fn the_rules_scale_with_the_motor() {
+        let mut s = Settings::default();
+        let scaled = |s: &mut Settings, volts: f32, amperes: f32| {
+            let impedance = volts / amperes;
+            for z in [&mut s.motor.r_s, &mut s.motor.r_r] {
+                *z *= impedance;
+            }
+            for z in [&mut s.motor.l_ls, &mut s.motor.l_lr, &mut s.motor.l_m] {
+                *z *= impedance;
+            }
+            s.nameplate.current_a *= amperes;
+            s.inverter.dc_link_v *= volts;
+            s.scales.dc_link = s.scales.dc_link.scaled(volts);
+            s.scales.current_a = s.scales.current_a.scaled(amperes);
+            s.scales.current_b = s.scales.current_b.scaled(amperes);
+        };
+        scaled(&mut s, 0.154, 20.0);
+        near(s.trip_a(), 86.0);
+        near(s.current_limit_a(), 70.0);
+        near(s.i_d(), 14.0);
+        near(s.carrier_v(), 7.7);
+        near(s.dc_over_v(), 61.6);
+        near(s.unexplained_v(), 1.848);
+        near(s.magnetise_s(), 5.0 * 0.186_09);
+        assert!(s.check().is_ok());
+    }
+
+    /// A limit that is set leaves room for the rules that follow from it, with any number of digits.
+    #[test]
+    fn rules_stay_within_the_limits_that_are_set() {
+        for amperes in [0.9, 0.123_456, 0.123_444] {
+            let mut s = Settings::default();
+            s.limits.current_a = Some(amperes);
+            assert_eq!(s.check(), Ok(()), "{amperes}");
+        }
+        for (rpm, observer) in [(1000.0, true), (1234.56, true), (200.0, false), (300.02, false)] {
+            let mut s = Settings::default();
+            (s.limits.speed_rpm, s.observer.enabled) = (Some(rpm), observer);
+            assert_eq!(s.check(), Ok(()), "{rpm}");
+        }
+    }
+
+    /// A rule whose value is zero has no digits to round to.
+    #[test]
+    fn a_rule_of_zero_is_zero() {
+        let mut s = Settings::default();
+        s.limits.heat_sink_c = 15.0;
+        assert_eq!(s.derate_c(), 0.0);
+        assert_eq!(s.check(), Ok(()));
+    }
+
+    #[test]
+    fn small_sensors_lower_the_limits() {
+        let mut s = Settings::default();
+        s.nameplate.current_a *= 10.0;
+        near(s.trip_a(), 0.962 * 4.472_713);
+        near(s.current_limit_a(), 0.814 * s.trip_a());
+    }
+}

@@ -1,0 +1,94 @@
+//! The rules for the voltages of the dc link.
+
+use crate::settings::Settings;
+use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
+use drive_core::{ChopperSettings, DcLinkSettings, Relay, periods};
+
+/// Highest dc link above which a drive trips, in relation to the highest in operation.
+pub const OVER_OF_HIGHEST: f32 = 1.05;
+/// Highest dc link in operation, in relation to the highest nominal one: generating torque has a band between them.
+pub const HIGHEST_OF_NOMINAL: f32 = 1.06;
+/// Band in which generating torque is limited, in relation to the distance from the nominal voltage: widened by 1.4 at
+/// speed it stays clear of that.
+const BAND: f32 = 0.64;
+/// Largest change of a dc link that counts as steady, with 311 V.
+const STEADY_V: f32 = 5.0;
+
+/// Largest dc link without generating torque, in relation to the voltage that trips.
+const HIGH_OF_TRIP: f32 = 0.975;
+impl Settings {
+    /// Highest dc link that the power stage stands in operation, V.
+    pub fn highest_dc_link_v(&self) -> f32 {
+        self.scales.dc_link.at(self.scales.dc_link_highest)
+    }
+
+    /// Largest nominal dc link, V.
+    pub(in crate::settings) fn dc_link_max_v(&self) -> f32 {
+        f32::min(self.highest_dc_link_v() / HIGHEST_OF_NOMINAL, 1000.0)
+    }
+
+    /// Largest dc link above which the drive may trip, V.
+    fn dc_over_max_v(&self) -> f32 {
+        f32::min(OVER_OF_HIGHEST * self.highest_dc_link_v(), self.dc_link_range_v())
+    }
+
+    /// Rule of `limits.dc_over_v`.
+    pub(in crate::settings) fn dc_over_rule(&self) -> f32 {
+        let board = f32::min(WITHIN * self.dc_over_max_v(), 0.95 * self.dc_link_range_v());
+        f32::min(self.share_of_dc_link(400.0), board)
+    }
+
+    /// Range of `limits.dc_over_v`: it leaves room for `braking.high_v`, which follows from it or is set.
+    pub(in crate::settings) fn dc_over_range(&self) -> (f32, f32) {
+        let high = self.braking.high_v.map_or(HIGH_OF_TRIP, |_| 1.0);
+        ((1.0 + MARGIN) / high * self.inverter.dc_link_v, self.dc_over_max_v())
+    }
+
+    /// Range of `limits.dc_under_v`: it leaves room for `braking.low_v`, likewise.
+    pub(in crate::settings) fn dc_under_range(&self) -> (f32, f32) {
+        let low = self.braking.low_v.map_or(LOW_OF_TRIP, |_| 1.0 + MARGIN);
+        (5.0, f32::min((1.0 - MARGIN) / low * self.inverter.dc_link_v, self.dc_over_v()))
+    }
+
+    /// Rule of `braking.high_v`.
+    pub(in crate::settings) fn dc_high_rule(&self) -> f32 {
+        let board = f32::min(HIGH_OF_TRIP * self.dc_over_v(), WITHIN * self.highest_dc_link_v());
+        f32::min(self.share_of_dc_link(390.0), board)
+    }
+
+    /// Range of `braking.high_v`.
+    pub(in crate::settings) fn dc_high_range(&self) -> (f32, f32) {
+        let nominal = self.inverter.dc_link_v;
+        (nominal + MARGIN * nominal, f32::min(self.dc_over_v(), self.highest_dc_link_v()))
+    }
+
+    /// The precharge relay, which opens where the drive trips.
+    pub(crate) fn relay(&self) -> Option<Relay> {
+        let (least_v, band_v) = (self.dc_under_v(), self.share_of_dc_link(STEADY_V));
+        let time = periods(self.supply.relay_s);
+        (time > 0).then(|| Relay::new(least_v, band_v, time))
+    }
+
+    /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and
+    /// throughout from 0.5 % below.
+    pub(crate) fn dc_link_limits(&self) -> DcLinkSettings {
+        let (high_v, low_v) = (self.dc_high_v(), self.dc_low_v());
+        let s = &self.braking;
+        let band_v =
+            f32::min(self.share_of_dc_link(50.0), BAND * (high_v - self.inverter.dc_link_v));
+        DcLinkSettings {
+            from_v: high_v - band_v,
+            high_v,
+            low_v,
+            floor_v: 0.25 * low_v + 0.75 * self.dc_under_v(),
+            flux_a: self.braking_flux_a(),
+            chopper: (s.ohm > 0.0).then_some(ChopperSettings {
+                on_v: 0.97 * high_v,
+                full_v: 0.995 * high_v,
+                resistance: s.ohm,
+                energy_j: s.energy_j,
+                power_w: s.power_w,
+            }),
+        }
+    }
+}

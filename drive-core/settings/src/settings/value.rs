@@ -1,0 +1,136 @@
+//! Values of settings and their text form.
+
+use core::fmt;
+
+use lexical_parse_float::FromLexical as _;
+
+/// A value of a setting.
+///
+/// Exhaustive on purpose: every kind of value has to be stored and shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A finite number.
+    Number(f32),
+    /// The number that the rule of the setting gives; see [`rules`](super::rules).
+    Auto,
+    /// A whole number.
+    Whole(u32),
+    /// One of the setting's words.
+    Word(&'static str),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) => value.fmt(f),
+            Self::Auto => f.write_str(AUTO),
+            Self::Whole(value) => value.fmt(f),
+            Self::Word(word) => f.write_str(word),
+        }
+    }
+}
+
+/// Text of [`Value::Auto`].
+pub const AUTO: &str = "auto";
+
+/// Reason why a text is not a value of a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ValueError {
+    /// Not a finite number.
+    Number,
+    /// Neither a finite number nor `auto`.
+    NumberOrAuto,
+    /// Not a whole number up to this one.
+    Whole(u32),
+    /// Not one of these words.
+    Word(&'static [&'static str]),
+}
+
+impl fmt::Display for ValueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number => f.write_str("not a number"),
+            Self::NumberOrAuto => write!(f, "neither a number nor `{AUTO}`"),
+            Self::Whole(max) => write!(f, "not a whole number from 0 to {max}"),
+            Self::Word(words) => {
+                f.write_str("not one of:")?;
+                words.iter().try_for_each(|word| write!(f, " {word}"))
+            }
+        }
+    }
+}
+
+/// The finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
+pub fn number(text: &str) -> Option<f32> {
+    f32::from_lexical(text.as_bytes()).ok().filter(|value| value.is_finite())
+}
+
+/// A type whose values are written as words.
+pub trait Words: Copy + 'static {
+    /// The words.
+    const WORDS: &'static [&'static str];
+    /// The place of this value in [`WORDS`](Self::WORDS).
+    fn place(self) -> usize;
+    /// The value at a place in [`WORDS`](Self::WORDS); the first behind their end.
+    fn at(place: usize) -> Self;
+
+    /// The word of this value.
+    fn word(self) -> &'static str {
+        Self::WORDS[self.place()]
+    }
+}
+
+/// Implements [`Words`], which must be in scope, for an enumeration or a `bool`.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! words {
+    ($type:ty { $($value:pat => $make:expr, $word:literal;)+ }) => {
+        impl Words for $type {
+            const WORDS: &'static [&'static str] = &[$($word),+];
+            fn place(self) -> usize {
+                let word = match self { $($value => $word),+ };
+                Self::WORDS.iter().position(|known| *known == word).unwrap_or(0)
+            }
+            fn at(place: usize) -> Self {
+                const VALUES: &[$type] = &[$($make),+];
+                VALUES.get(place).copied().unwrap_or(VALUES[0])
+            }
+        }
+    };
+}
+pub(crate) use crate::words;
+
+words!(bool { false => false, "no"; true => true, "yes"; });
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn only_finite_numbers_are_taken() {
+        let refused = [
+            "", ".", "-", "e5", "1e", "1e300", "1e99999", "1,5", "1A", "1 ", "0x1", "nan", "NaN",
+            "inf", "-inf", "infinity",
+        ];
+        for text in refused {
+            assert_eq!(number(text), None, "{text}");
+        }
+        for (text, value) in
+            [("000000000000000000000000001.5", 1.5), ("+.5", 0.5), ("-2e-3", -2e-3)]
+        {
+            assert_eq!(number(text), Some(value));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_printed_is_read_back(bits: u32) {
+            let value = f32::from_bits(bits);
+            prop_assume!(value.is_finite());
+            prop_assert_eq!(number(&Value::Number(value).to_string()), Some(value));
+            prop_assert_eq!(number(&format!("{value:e}")), Some(value));
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! Tables over the torque current: reference of the saliency, its slope over the angle, and carrier current.
+
+use core::fmt;
+
+/// Number of points of a table, from i_q = 0 on.
+pub const POINTS: usize = 16;
+/// The largest regulated current lies at this multiple of the distance of the points.
+const STEPS: f32 = 14.0;
+
+/// The torque currents of the points: 0, a step, two steps, and so on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    step_a: f32,
+    per_step: f32,
+}
+
+impl Grid {
+    /// The points of the dissertation's motor.
+    pub const REFERENCE: Self = Self { step_a: 0.25, per_step: 4.0 };
+
+    /// Points `step_a` apart, A; `None` unless that is a positive number.
+    pub fn of_step(step_a: f32) -> Option<Self> {
+        let per_step = 1.0 / step_a;
+        let usable = step_a > 0.0 && per_step > 0.0 && per_step.is_finite();
+        usable.then_some(Self { step_a, per_step })
+    }
+
+    /// Points for currents up to `largest_a`, A peak, a positive number.
+    pub fn for_current(largest_a: f32) -> Self {
+        Self { step_a: largest_a / STEPS, per_step: STEPS / largest_a }
+    }
+
+    /// Distance of the points, A.
+    pub fn step_a(self) -> f32 {
+        self.step_a
+    }
+
+    /// Torque current at point `n`, A.
+    pub fn current(self, n: usize) -> f32 {
+        n as f32 * self.step_a
+    }
+
+    /// Interval that contains |i_q|, A, and the position in it, 0 to 1. The last value is held beyond the end.
+    pub(crate) fn place(self, i_q: f32) -> (usize, f32) {
+        let x = i_q.abs() * self.per_step;
+        // Saturating cast.
+        let n = (x as usize).min(POINTS - 2);
+        let past = x - n as f32;
+        (n, if past < 1.0 { past } else { 1.0 })
+    }
+}
+
+/// Values over the torque current at the points of a grid, of one of three kinds: [`ReferenceTable`], [`CarrierTable`] or
+/// [`SlopeTable`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table<const KIND: u8> {
+    grid: Grid,
+    values: [f32; POINTS],
+}
+
+const REFERENCE: u8 = 0;
+const CARRIER: u8 = 1;
+const SLOPE: u8 = 2;
+
+/// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last. The first value is 0, and
+/// all are within ±0.3.
+///
+/// ```
+/// use induction_drive_core::table::{Grid, ReferenceTable};
+///
+/// let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.02), (2.0, 0.03)])?;
+/// assert!((table.at(0.5) - 0.01).abs() < 1e-6 && (table.at(-1.5) + 0.025).abs() < 1e-6);
+/// assert_eq!(table.at(3.5), 0.03);
+/// # Ok::<(), induction_drive_core::table::TableError>(())
+/// ```
+pub type ReferenceTable = Table<REFERENCE>;
+/// Carrier current over i_q as a ratio to that at i_q = 0; even. The first value is 1, and all are within 0.5 to 2.
+pub type CarrierTable = Table<CARRIER>;
+/// Slope dq/de of the saliency over the angle error over i_q, 1/rad: even, of one sign. All values are within ±(0.001 to 0.6).
+///
+/// The error e is the angle of the flux less that of the estimated frame, and the slope the slow one: current and flux have
+/// settled at every e. A saliency `a` that is fixed to the flux and to nothing else has the slope 2a; it is negative where
+/// the inductance along the flux is the larger one.
+pub type SlopeTable = Table<SLOPE>;
+
+/// Largest accepted saliency.
+const LARGEST: f32 = 0.3;
+
+impl<const KIND: u8> Table<KIND> {
+    /// Table from its values at the points of `grid`; `None` when the first or any is not what the type states.
+    pub fn from_points(grid: Grid, values: [f32; POINTS]) -> Option<Self> {
+        let first = values[0];
+        let believable = |value: &f32| match KIND {
+            REFERENCE => first == 0.0 && (-LARGEST..=LARGEST).contains(value),
+            CARRIER => first == 1.0 && (0.5..=2.0).contains(value),
+            _ => (0.001..=0.6).contains(&value.abs()) && value * first > 0.0,
+        };
+        values.iter().all(believable).then_some(Self { grid, values })
+    }
+
+    /// The torque currents of the points.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The values at the points.
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.values
+    }
+
+    /// The default in proportion to the largest regulated current, A peak: a beginning until the motor's own is
+    /// learned.
+    pub fn guessed(largest_a: f32) -> Self
+    where
+        Self: Default,
+    {
+        Self { grid: Grid::for_current(largest_a), ..Self::default() }
+    }
+}
+
+impl Default for ReferenceTable {
+    /// Learned on the simulated motor of Table 5 with a flux-fixed saliency of -3.5 % (experiment
+    /// `learn-reference`): it belongs to that motor.
+    fn default() -> Self {
+        let values = [
+            0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
+            0.04356, 0.04345, 0.04328, 0.04308, 0.04308, 0.04308,
+        ];
+        Self { grid: Grid::REFERENCE, values }
+    }
+}
+
+impl Default for CarrierTable {
+    /// Learned on the simulated motor of Table 5 together with the default
+    /// [`ReferenceTable`]: it belongs to that motor.
+    fn default() -> Self {
+        let values = [
+            1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,
+            1.11946, 1.13211, 1.14488, 1.15781, 1.15781, 1.15781,
+        ];
+        Self { grid: Grid::REFERENCE, values }
+    }
+}
+
+/// Why a table was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TableError {
+    /// Fewer than two points.
+    TooShort,
+    /// The first point is not 0 at i_q = 0: the table would not be odd.
+    NotOdd,
+    /// The current of this point is not above the previous one, or not finite.
+    NotIncreasing(usize),
+    /// The value of this point is beyond ±0.3, or not finite.
+    TooLarge(usize, f32),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooShort => write!(f, "a table needs two points at least"),
+            Self::NotOdd => write!(f, "point 0 must be 0 at 0 A: the table is odd"),
+            Self::NotIncreasing(n) => write!(f, "point {n}: the currents must increase strictly"),
+            Self::TooLarge(n, q) => write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}"),
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+impl ReferenceTable {
+    /// Table from points `(i_q in A, q)` with increasing i_q, (0, 0) first; linear between them, constant
+    /// beyond the last.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn new(grid: Grid, points: &[(f32, f32)]) -> Result<Self, TableError> {
+        let last = match points {
+            [first, ..] if *first != (0.0, 0.0) => return Err(TableError::NotOdd),
+            [] | [_] => return Err(TableError::TooShort),
+            [.., last] => last.1,
+        };
+        for (n, pair) in (1..).zip(points.windows(2)) {
+            let (before, (i_q, q)) = (pair[0].0, pair[1]);
+            // NaN fails the comparisons.
+            if !(i_q > before && i_q.is_finite()) {
+                return Err(TableError::NotIncreasing(n));
+            }
+            if !(-LARGEST..=LARGEST).contains(&q) {
+                return Err(TableError::TooLarge(n, q));
+            }
+        }
+        let values = core::array::from_fn(|n| {
+            let i_q = grid.current(n);
+            let pair = points.windows(2).find(|pair| i_q <= pair[1].0);
+            pair.map_or(last, |p| p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0))
+        });
+        Ok(Self { grid, values })
+    }
+
+    /// Reference at a quadrature current `i_q`, A.
+    pub fn at(&self, i_q: f32) -> f32 {
+        odd(i_q, between(&self.values, self.grid.place(i_q)))
+    }
+}
+
+/// Linear interpolation of a table at a [`place`](Grid::place).
+pub(crate) fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
+    table[n] + (table[n + 1] - table[n]) * past
+}
+
+/// Odd continuation: the sign of `i_q` on the value `q` at |i_q|.
+pub(crate) fn odd(i_q: f32, q: f32) -> f32 {
+    if i_q < 0.0 { -q } else { q }
+}
+
+impl SlopeTable {
+    /// The slope of a saliency `a` that is fixed to the flux.
+    pub fn of_flux_saliency(grid: Grid, a: f32) -> Self {
+        Self { grid, values: [2.0 * a; POINTS] }
+    }
+
+    /// The slope without torque current, 1/rad.
+    pub fn at_rest(&self) -> f32 {
+        self.values[0]
+    }
+
+    /// The inverses, rad, at most `most` times that without torque current.
+    #[cold]
+    pub(crate) fn inverses(&self, most: f32) -> [f32; POINTS] {
+        let first = self.at_rest();
+        self.values.map(|k| {
+            let ratio = first / k;
+            (if ratio < most { ratio } else { most }) / first
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_checked() {
+        let new = |points: &[(f32, f32)]| ReferenceTable::new(Grid::REFERENCE, points);
+        assert_eq!(new(&[]), Err(TableError::TooShort));
+        assert_eq!(new(&[(0.0, 0.0)]), Err(TableError::TooShort));
+        assert_eq!(new(&[(0.0, 0.01), (1.0, 0.02)]), Err(TableError::NotOdd));
+        assert_eq!(new(&[(0.0, 0.0), (1.0, 0.02), (1.0, 0.03)]), Err(TableError::NotIncreasing(2)));
+        assert_eq!(new(&[(0.0, 0.0), (f32::NAN, 0.02)]), Err(TableError::NotIncreasing(1)));
+        assert_eq!(new(&[(0.0, 0.0), (1.0, 0.31)]), Err(TableError::TooLarge(1, 0.31)));
+        assert!(matches!(new(&[(0.0, 0.0), (1.0, f32::NAN)]), Err(TableError::TooLarge(1, _))));
+    }
+
+    #[test]
+    fn a_carrier_table_begins_with_one_and_has_believable_ratios() {
+        let mut ratio = [1.1; POINTS];
+        assert_eq!(CarrierTable::from_points(Grid::REFERENCE, ratio), None);
+        ratio[0] = 1.0;
+        assert_eq!(
+            CarrierTable::from_points(Grid::REFERENCE, ratio).map(|t| *t.points()),
+            Some(ratio)
+        );
+        for wrong in [0.49, 2.1, f32::NAN] {
+            ratio[15] = wrong;
+            assert_eq!(CarrierTable::from_points(Grid::REFERENCE, ratio), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn slopes_have_one_sign_and_bounded_inverses() {
+        let mut k = [-0.04; POINTS];
+        (k[3], k[4]) = (-0.025, -0.01);
+        let inverses = SlopeTable::from_points(Grid::REFERENCE, k).unwrap().inverses(2.0);
+        for (n, inverse) in [(0, -25.0), (3, -40.0), (4, -50.0)] {
+            assert!((inverses[n] - inverse).abs() < 1e-3, "{n}: {inverses:?}");
+        }
+        for wrong in [0.01, 0.0, -0.0009, -0.61, f32::NAN] {
+            k[7] = wrong;
+            assert_eq!(SlopeTable::from_points(Grid::REFERENCE, k), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn errors_name_the_point() {
+        for (error, text) in [
+            (TableError::TooShort, "a table needs two points at least"),
+            (TableError::NotOdd, "point 0 must be 0 at 0 A: the table is odd"),
+            (TableError::NotIncreasing(2), "point 2: the currents must increase strictly"),
+            (TableError::TooLarge(1, 0.31), "point 1: 0.31 is outside -0.3 to 0.3"),
+        ] {
+            assert_eq!(error.to_string(), text);
+        }
+    }
+}
