@@ -9,7 +9,6 @@ use drive_settings::words;
 
 /// A step of the commissioning, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
 pub enum Step {
     /// The nameplate: is it plausible, and what follows from it.
     Nameplate,

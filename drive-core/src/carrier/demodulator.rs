@@ -50,11 +50,11 @@ pub use {
 #[cfg(not(feature = "printed"))]
 pub use absent::Demodulator;
 
-use crate::carrier::CarrierSample;
 #[cfg(feature = "printed")]
-use crate::{filter::BPF, filter::SosState, math::frames::DmQm};
+use crate::{carrier::CarrierSample, filter::BPF, filter::SosState, math::frames::DmQm};
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
+#[cfg(feature = "printed")]
 pub trait Demodulate {
     /// Demodulates one sample; returns the demodulated signal.
     fn step(&mut self, sample: &CarrierSample) -> f32;
