@@ -90,18 +90,19 @@ impl Modulator {
     /// at a dc link of `v_dc` > 0, V. The power stage loses the compensation again.
     ///
     /// A voltage outside the hexagon is shortened; its angle is kept.
+    #[inline(always)] // a part of every period, with its values in registers
     pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
         let mut shortened = span > usable;
         if shortened {
-            motor = motor * (usable / span);
+            motor = motor * ratio(usable, span);
         }
         if let Some(readable) = self.readable {
             let (span, usable) = (second(motor) - extremes(motor).0, readable.share * v_dc);
             if span > usable {
-                motor = motor * (usable / span);
+                motor = motor * ratio(usable, span);
                 shortened = true;
             }
         }
@@ -116,16 +117,20 @@ impl Modulator {
                 centre = highest;
             }
         }
-        let ideal = [leg.a, leg.b, leg.c].map(|volts| centre + volts * per_volt);
-        let [a, b, c] = ideal.map(|duty| self.drop_or_extend(duty));
+        let duty = |volts: f32| centre + volts * per_volt;
+        let ideal = [leg.a, leg.b, leg.c].map(duty);
+        // The lowest and the highest leg tell for all three. NaN fails the comparisons.
+        let is_whole = duty(low) >= self.shortest && 1.0 - duty(high) >= self.shortest;
+        let duties = if is_whole { ideal } else { ideal.map(|duty| self.drop_or_extend(duty)) };
         // NaN differs from itself and so counts as limited.
-        let limited = shortened || [a, b, c] != ideal;
+        let limited = shortened || (!is_whole && duties != ideal);
         let realised = if limited {
+            let [a, b, c] = duties;
             (Abc::new(a, b, c) * v_dc - compensation).to_alpha_beta()
         } else {
             wanted
         };
-        Modulated { duties: [a, b, c], realised, limited }
+        Modulated { duties, realised, limited }
     }
 
     /// Rounds a too short pulse of either switch to no pulse or to the shortest one, whichever is nearer.
@@ -139,6 +144,12 @@ impl Modulator {
             duty
         }
     }
+}
+
+/// `part` of `whole`: the compiler would divide in every period, wherever the voltage is.
+#[cold]
+fn ratio(part: f32, whole: f32) -> f32 {
+    part / whole
 }
 
 /// The second highest component.

@@ -21,6 +21,7 @@
 use core::f32::consts::TAU;
 
 use crate::carrier::CARRIER_SAMPLES;
+use crate::math::within;
 use crate::{Dq, Motor, PERIOD_S};
 
 /// Share of the voltage that is used: the rest is for the current controllers.
@@ -114,13 +115,8 @@ impl VoltageLimit {
         let rate = if excess < 0.0 && state.trim >= 1.0 { TRIM_UP } else { TRIM };
         let trim = state.trim - rate * excess;
         let most_trim = if state.most.d < self.i_d { MOST_TRIM } else { 1.0 };
-        state.trim = if trim < LEAST_TRIM {
-            LEAST_TRIM
-        } else if trim < most_trim {
-            trim
-        } else {
-            most_trim
-        };
+        let trim = if trim < most_trim { trim } else { most_trim };
+        state.trim = if trim < LEAST_TRIM { LEAST_TRIM } else { trim };
 
         let untrimmed = if available < whole { available } else { whole };
         let by_leakage = self.by_leakage(untrimmed, flux_freq);
@@ -146,13 +142,7 @@ impl VoltageLimit {
         let along = fpu_sqrt::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
         // NaN gives the setting; the step finds it.
-        if i_d.is_nan() || i_d >= self.i_d {
-            self.i_d
-        } else if i_d < LEAST * self.i_d {
-            LEAST * self.i_d
-        } else {
-            i_d
-        }
+        if i_d.is_nan() { self.i_d } else { within(i_d, (LEAST * self.i_d, self.i_d)) }
     }
 
     /// Torque current, A, whose leakage takes its share of the voltage.

@@ -91,7 +91,6 @@ impl Field {
         }
         let measured_current = measured.current();
         let wanted = self.wanted(c, k)?;
-        let trust = self.trust(c, k.elapsed);
         let counted = self.frame.is_counted();
         let s = self;
         let index = s.carrier.advance();
@@ -112,21 +111,48 @@ impl Field {
         };
         (k.seen.phi, k.seen.flux_freq) = (flux.phi, flux.freq);
         let phi = flux.phi.unit_vector();
-        let axes = &s.axes;
+        let axes = s.axes;
 
         // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
         // alone it would let the sidebands of a turning carrier through.)
-        let silent = !c.inject || s.hand_over.is_silent();
-        let carrier =
-            if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
+        let silent = s.hand_over.is_silent();
+        let carrier = if silent || !c.inject {
+            CarrierPeriod::default()
+        } else {
+            s.carrier.at(&c.injection, index)
+        };
         let carrier_axis = phi.turned_by(axes.carrier);
+        if c.demodulate {
+            let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
+            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
+            k.seen.delta_i = s.estimator.delta_i;
+        }
         let rest = measured_current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
-        let seen = if s.hand_over.is_silent() { measured_current } else { filtered };
-
-        // Current loop.
+        let seen = if silent { measured_current } else { filtered };
         let flux_axis = phi.turned_by(axes.seen);
         let current = seen.to_dq(flux_axis);
+
+        // Angles for the next sample.
+        let trust = s.trust(c, k.elapsed);
+        let (flux_current, rotor_freq) = if counted {
+            let flux_current = current.seen_from(s.lead_axis);
+            c.indirect.slip(&mut s.indirect, flux_current.q);
+            (flux_current, s.indirect.rotor_freq)
+        } else {
+            // By the reference: the measured current would feed the angle error back.
+            c.indirect.slip(&mut s.indirect, reference.q);
+            let slip_freq = s.indirect.slip_freq;
+            let seen = (seen, !silent);
+            let turning = c.observe_fundamental(s, index, &trust, flux.freq, seen, phi);
+            let (estimator, i_q) = (&mut s.estimator, reference.q);
+            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+                return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
+            }
+            (reference, s.estimator.rotor_freq)
+        };
+
+        // Current loop.
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
             + s.induced.at(reference) * s.induced_share
             + k.references.test_voltage;
@@ -142,9 +168,14 @@ impl Field {
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
         (k.seen.measured, k.seen.realised) = (measured_current, modulated.realised);
-        k.seen.dc_link = measured.dc_link;
+        (k.seen.dc_link, k.seen.rotor_freq) = (measured.dc_link, rotor_freq);
         if modulated.limited {
             s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
+        }
+        s.prediction.collect(measured_current, modulated.realised);
+        if !counted && c.observer.is_some() {
+            let carrier = AlphaBeta::along(applied.turned_by(axes.injection), carrier.voltage);
+            s.observer.put_out(modulated.realised - carrier);
         }
 
         if trust.drop {
@@ -160,34 +191,6 @@ impl Field {
             }
         }
 
-        // Angles for the next sample.
-        if c.demodulate {
-            let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
-            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
-            k.seen.delta_i = s.estimator.delta_i;
-        }
-        let flux_current = if counted { current.seen_from(s.lead_axis) } else { reference };
-        let rotor_freq = if counted {
-            c.indirect.slip(&mut s.indirect, flux_current.q);
-            s.indirect.rotor_freq
-        } else {
-            // By the reference: the measured current would feed the angle error back.
-            c.indirect.slip(&mut s.indirect, reference.q);
-            let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, &trust, flux.freq, seen, phi);
-            if c.observer.is_some() {
-                let carrier =
-                    AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
-                s.observer.put_out(modulated.realised - carrier);
-            }
-            let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
-                return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
-            }
-            s.estimator.rotor_freq
-        };
-        k.seen.rotor_freq = rotor_freq;
-
         // No output from a state that is not finite. (The voltage contains current and reference of the step
         // before, the speed contains the demodulated signal.)
         if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
@@ -195,7 +198,6 @@ impl Field {
         }
 
         // Checks and slow tasks, one a sample.
-        s.prediction.collect(measured_current, modulated.realised);
         let results = StepResults {
             measured,
             current: measured_current,
@@ -241,13 +243,11 @@ impl Field {
             Goal::Learn => self.learn(c, k)?,
             Goal::Release => {
                 let (i_q, ramp) = (&mut k.references.current.q, c.sequence.stop_ramp);
-                *i_q = if *i_q > ramp {
-                    *i_q - ramp
-                } else if *i_q < -ramp {
-                    *i_q + ramp
+                if i_q.abs() > ramp {
+                    *i_q -= limited(*i_q, ramp);
                 } else {
                     return Err(End::Stopped);
-                };
+                }
                 *i_q
             }
         };

@@ -238,6 +238,7 @@ impl Estimator {
     /// # Errors
     /// `TrackingLost` when the PII tracker has reached its speed limit, or the other loop turned by what is no number. (The
     /// drive itself checks the speed of the other loop.)
+    #[inline(always)] // a part of every period, with its values in registers
     pub fn track(
         &self,
         state: &mut EstimatorState,

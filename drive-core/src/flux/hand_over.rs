@@ -155,6 +155,7 @@ impl HandOver {
     /// The turn for the tracking loop from what the observer saw in the period of this `index` in the carrier period:
     /// `turned` and `slip`, electrical turns, of a current of this `age`, samples.
     pub fn turning(&mut self, index: usize, turned: f32, slip: f32, age: f32) -> Turning {
+        let silent = self.is_silent();
         self.fresh += turned;
         if let Some(oldest) = self.turns.get_mut(index) {
             self.sum += turned - *oldest;
@@ -164,11 +165,8 @@ impl HandOver {
             // Rounding does not accumulate.
             self.sum = core::mem::take(&mut self.fresh);
         }
-        let (turned, age) = if self.is_silent() {
-            (turned, age + 1.0)
-        } else {
-            (self.mean_turn(), age + 1.0 + MEAN_AGE)
-        };
+        let (turned, age) =
+            if silent { (turned, age + 1.0) } else { (self.mean_turn(), age + 1.0 + MEAN_AGE) };
         Turning { weight: self.weight, turned, slip, age }
     }
 }

@@ -24,7 +24,7 @@
 use core::f32::consts::TAU;
 
 use crate::learned::Learned;
-use crate::math::limited;
+use crate::math::{limited, within};
 use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
 
 /// Gains `s_0` and `c`. Values of `c` from 0.2 to 0.7 differ by 0.1 degrees.
@@ -66,8 +66,11 @@ pub struct Observer {
     rate: f32,
     /// L_M, H.
     coupled: f32,
-    /// Flux of the nominal direct current, V s.
+    /// Nominal direct current, A, and its flux, V s.
+    i_d: f32,
     nominal: f32,
+    /// Least flux, V s.
+    least: f32,
     /// Share of the resistance per V s of `eps` in a period.
     resistance_gain: f32,
     /// Age of the current in samples, without and behind the filter.
@@ -77,8 +80,9 @@ pub struct Observer {
 /// State of the observer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObserverState {
-    /// Voltages of the last periods, the latest first, V.
+    /// Voltages of the last periods, V, backwards from `latest` on, and around.
     voltages: [AlphaBeta; KEPT],
+    latest: usize,
     last: AlphaBeta,
     /// Length of the flux, V s.
     pub flux: f32,
@@ -134,11 +138,17 @@ pub struct Induced {
 impl ObserverState {
     /// Takes the voltage that a step puts out, without the carrier, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
-        let [first, second, third, _] = self.voltages;
-        self.voltages = [voltage, first, second, third];
+        self.latest = self.latest.wrapping_add(KEPT - 1) % KEPT;
+        self.voltages[self.latest] = voltage;
+    }
+
+    /// The voltage that was put out so many periods before the latest, fewer than [`KEPT`], V.
+    fn before(&self, periods: usize) -> AlphaBeta {
+        self.voltages[self.latest.wrapping_add(periods) % KEPT]
     }
 
     /// One period whose `current`, A, does not belong to the voltages.
+    #[cold] // its stores are not merged with those of a step
     pub fn skip(&mut self, current: AlphaBeta) {
         self.last = current;
     }
@@ -157,7 +167,9 @@ impl Observer {
             flux_saliency: leakage.flux_saliency,
             rate: PERIOD_S / motor.tau_r(),
             coupled,
+            i_d,
             nominal: coupled * i_d,
+            least: LEAST_FLUX * (coupled * i_d),
             resistance_gain: 1.0 / (RESISTANCE_S * motor.r_s * i_d),
             ages,
         }
@@ -182,27 +194,23 @@ impl Observer {
 
     /// Resets `state` to no flux, with the resistance as it was.
     pub fn start(&self, state: &mut ObserverState) {
-        let (flux, resistance) = (LEAST_FLUX * self.nominal, state.resistance);
+        let (flux, resistance) = (self.least, state.resistance);
         *state = ObserverState { flux, resistance, ..ObserverState::default() };
     }
 
     /// One period, from the `current` of a sample and the voltages that were put out before it. `frame` is the axis of the flux
-    /// when the current before flowed; `filtered` whether the current is that behind the filter; `weight` the share
-    /// of the observer in the angle.
+    /// when the current before flowed; `age` that of the current, samples; `weight` the share of the observer in the angle.
+    #[inline(always)] // a part of every period, with its values in registers
     pub fn step(
         &self,
         state: &mut ObserverState,
         current: AlphaBeta,
         frame: UnitVector,
-        filtered: bool,
+        age: f32,
         weight: f32,
     ) {
-        let age = self.ages[usize::from(filtered)];
         let whole = age as usize;
-        let [newer, older] = match state.voltages.get(whole + 1..) {
-            Some(&[newer, older, ..]) => [newer, older],
-            _ => [AlphaBeta::ZERO; 2],
-        };
+        let (newer, older) = (state.before(whole + 1), state.before(whole + 2));
         let voltage = (newer + (older - newer) * (age - whole as f32)).to_dq(frame);
         let change = (current - state.last).to_dq(frame);
         let mean = ((current + state.last) * 0.5).to_dq(frame);
@@ -223,8 +231,7 @@ impl Observer {
         let grown = self.rate * (self.coupled * mean.d - state.flux);
         state.deviation = grown - e.d;
         let flux = state.flux + e.d + slow.gain.d * state.deviation;
-        let least = LEAST_FLUX * self.nominal;
-        let flux = if flux < least { least } else { flux };
+        let flux = if flux < self.least { self.least } else { flux };
         let per_flux = 1.0 / flux;
         let x = limited((e.q + slow.gain.q * state.deviation) * per_flux, LARGEST_TANGENT);
         state.turned = x - x * x * x * (1.0 / 3.0);
@@ -242,10 +249,9 @@ impl Observer {
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
         let length = fpu_sqrt::sqrtf(state.current.length_squared());
         // A current that passes zero is large before the next update.
-        let least = self.nominal / self.coupled;
         state.slow = Slow {
             gain: Dq { d: gain * a, q: gain * w },
-            per_current: self.current_saliency / if length > least { length } else { least },
+            per_current: self.current_saliency / if length > self.i_d { length } else { self.i_d },
             flux_saliency: self.flux_saliency * (state.flux / self.nominal),
             leakage: self.leakage_share + self.leakage_slope * length,
         };
@@ -266,21 +272,14 @@ impl Observer {
         weight: f32,
         flux_freq: f32,
     ) {
-        let angle = self.r_s * (self.nominal / self.coupled) / (state.flux * flux_freq * TAU);
+        let angle = self.r_s * self.i_d / (state.flux * flux_freq * TAU);
         let share = FROM_INJECTION * weight * angle * limited(error, LARGEST_ERROR);
         self.turn_resistance(state, share);
     }
 
     fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
-        let resistance = state.resistance + change;
-        let (least, most) = (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0);
-        state.resistance = if resistance < least {
-            least
-        } else if resistance > most {
-            most
-        } else {
-            resistance
-        };
+        let range = (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0);
+        state.resistance = within(state.resistance + change, range);
     }
 
     /// Current that makes the flux, A, with the magnetising inductance of the settings.
@@ -333,7 +332,7 @@ mod tests {
             state.put_out(AlphaBeta { alpha, beta: 0.0 });
             state.put_out(AlphaBeta::ZERO);
             let current = AlphaBeta { alpha: after, beta: 0.0 };
-            observer.step(&mut state, current, UnitVector::default(), false, 1.0);
+            observer.step(&mut state, current, UnitVector::default(), 0.0, 1.0);
             let seen = fpu_sqrt::sqrtf(state.change.length_squared()) / (sigma * change);
             assert!(seen < 0.2, "{after} A: {seen}");
         }

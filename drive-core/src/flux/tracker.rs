@@ -111,6 +111,7 @@ impl Pll {
     /// Advances by one period with the latest correction and the slip, and with the `turning` that the observer sees by its
     /// weight. `rotor_freq` is the speed state; frequencies in electrical turns per period. Returns whether the turn is finite.
     /// (The drive checks that the speed is finite and within limits.)
+    #[inline(always)] // a part of every period, with its values in registers
     pub fn step(
         state: &mut TrackerState,
         rotor_freq: &mut f32,
