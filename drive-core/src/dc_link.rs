@@ -188,7 +188,7 @@ pub struct DcLink {
     room: f32,
     /// Change of the held voltage in a step.
     gives: f32,
-    rise: f32,
+    per_rise: f32,
     flux_a: f32,
     chopper: Option<Chopper>,
 }
@@ -212,7 +212,7 @@ impl DcLink {
             low: s.low_v,
             room: s.low_v - s.floor_v,
             gives: (s.low_v - s.floor_v) * (STEP_S / YIELD_S),
-            rise: (s.low_v - s.floor_v) * RISE,
+            per_rise: 1.0 / ((s.low_v - s.floor_v) * RISE),
             flux_a: s.flux_a,
             chopper: s.chopper.map(|c| {
                 let half = 0.5 * (c.full_v - c.on_v);
@@ -260,7 +260,7 @@ impl DcLink {
         let flux_a = if speed > FLUX { flux * self.flux_a } else { 0.0 };
 
         // 1 at the upper end of the band of motoring torque.
-        let above = gain * (v - self.low + state.given) / self.rise;
+        let above = gain * (v - self.low + state.given) * self.per_rise;
         self.give_way(state, above);
         let slope = if above < 0.0 { RISE_OF_DEPTH } else { 1.0 };
         let motoring = (slope * above).clamp(-1.0, 1.0);

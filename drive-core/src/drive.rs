@@ -48,7 +48,7 @@ use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::noise_watch::NoiseWatchState;
 use crate::protect::plausibility::{CarrierWatch, PredictionState};
 use crate::protect::saliency_check::SaliencyCheckState;
-use crate::protect::thermal::ThermalLoads;
+use crate::protect::thermal::{Thermal, ThermalLoads};
 use crate::supply::RelayState;
 
 use axes::Axes;
@@ -425,21 +425,20 @@ impl Drive {
     /// Never panics. Whatever is wrong with the input or with the state becomes a latched fault,
     /// with the outputs off in the same step.
     pub fn step(&mut self, measured: &Measured) -> Output {
+        let checked = self.c.protect(measured);
         let result = match &mut self.phase {
-            Phase::Off(_) | Phase::Fault(..) => Ok(None),
-            phase => match (self.c.protect(measured), phase) {
-                (Err(fault), _) => Err(End::Fault(fault)),
-                (Ok(()), Phase::Field(field)) => {
-                    // The drive is a static. With its address known the compiler computes the address of each field, instead of
-                    // taking it from one of three bases within reach.
-                    let (field, c, kept) = black_box((field, &self.c, &mut self.kept));
-                    field.step(c, kept, measured).map(Some)
+            Phase::Field(field) => {
+                // The drive is a static. With its address known the compiler computes the address of each field, instead of
+                // taking it from one of three bases within reach.
+                let (field, c, kept) = black_box((field, &self.c, &mut self.kept));
+                match checked {
+                    Ok(()) => field.step(c, kept, measured).map(Some),
+                    Err(fault) => Err(fault.into()),
                 }
-                (Ok(()), _) => self.step_without_flux(measured),
-            },
+            }
+            _ => self.step_without_flux(measured, checked),
         };
         self.kept.elapsed = self.kept.elapsed.wrapping_add(1);
-        let result = result.and_then(|duties| self.watch_load(measured).map(|()| duties));
         let duties = result.unwrap_or_else(|end| {
             self.end(end);
             None
@@ -453,8 +452,20 @@ impl Drive {
 
     /// A step without current control in a frame of the flux.
     #[cold]
-    fn step_without_flux(&mut self, measured: &Measured) -> Result<Option<[f32; 3]>, End> {
+    fn step_without_flux(
+        &mut self,
+        measured: &Measured,
+        checked: Result<(), Fault>,
+    ) -> Result<Option<[f32; 3]>, End> {
+        let (is_off, is_energised) = (self.is_off(), self.is_energised());
         let (c, k) = (&self.c, &mut self.kept);
+        if k.elapsed % Thermal::EVERY == Thermal::EVERY - 1 {
+            k.load(c, measured, is_energised)?;
+        }
+        if is_off {
+            return Ok(None);
+        }
+        checked?;
         match &mut self.phase {
             Phase::Prepare(_) => Ok(self.prepare(measured)?),
             Phase::Excite(excite) => Ok(Some(excite.step(c, k, measured)?)),

@@ -3,16 +3,16 @@
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
-//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
-//! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
-//! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
+//! | 0 | saliency from the averages, correction of the tracked angle; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
+//! | 1 | torque that the dc link bears; voltages for the prediction at 3 | - |
+//! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
 //! | 4 | lock monitor | saliency (0) |
 //! | 5 | reference current of the saliency; the slowly turning axes | - |
 //! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
-//! | 7 | torque that the dc link bears; rotor voltage for the prediction at 8 | magnetising current (0) |
+//! | 7 | currents that the voltage allows; rotor voltage for the prediction at 8 | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | currents that the voltage allows; averages of the demodulation; the sums begin anew | ten samples mixed |
+//! | 9 | averages of the demodulation; the sums begin anew | ten samples mixed |
 //!
 //! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
@@ -20,8 +20,10 @@
 
 use super::trust::{Judged, Lock, Trust};
 use super::{Field, Kept};
+use crate::carrier::CARRIER_SAMPLES;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};
+use crate::protect::Thermal;
 use crate::protect::plausibility::{Known, RotorFlux};
 use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
 
@@ -62,6 +64,8 @@ impl Coefficients {
         match index {
             0 => {
                 self.estimator.update_saliency(&mut s.estimator, step.carrier_axis, step.flux_freq);
+                let acceleration = self.freq_per_speed * s.motion.acceleration;
+                self.estimator.update_correction(&mut s.estimator, acceleration);
                 self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
                 if self.source == AngleSource::Injection {
                     k.rotor_count = s.count_by_flux();
@@ -70,12 +74,14 @@ impl Coefficients {
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {
-                let acceleration = self.freq_per_speed * s.motion.acceleration;
-                self.estimator.update_correction(&mut s.estimator, acceleration);
+                self.limit_torque(k, step);
                 s.prediction.latch_voltage();
                 self.watch_noise(s, 1, step.measured)
             }
             2 => {
+                if k.elapsed % Thermal::EVERY >= Thermal::EVERY - CARRIER_SAMPLES as u32 {
+                    k.load(self, step.measured, true)?;
+                }
                 self.predict(s, step);
                 self.watch_noise(s, 2, step.measured)
             }
@@ -99,7 +105,7 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
-                self.limit_torque(k, step);
+                self.limit_voltage(s, k, step);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.measured)
             }
@@ -112,7 +118,6 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.limit_voltage(s, k, step);
                 self.watch_noise(s, 5, step.measured)
             }
         }
