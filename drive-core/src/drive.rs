@@ -490,7 +490,7 @@ impl Drive {
         let fault = match (end, &self.phase) {
             (End::Stopped, _) => None,
             (End::Measured, _) => self.evaluate_learning(),
-            (End::Fault(fault), Phase::Field(field)) => Some(field.why_not_caught(fault)),
+            (End::Fault(fault), Phase::Field(field)) => Some(field.as_catch_failure(fault)),
             (End::Fault(fault), _) => Some(fault),
         };
         let left = self.left();

@@ -17,9 +17,9 @@
 use crate::{Dq, Motor, periods};
 
 /// Forcing current relative to the final direct current.
-const FORCED: f32 = 1.5;
+const FORCING_FACTOR: f32 = 1.5;
 /// Minimum relative forcing current for a measurement.
-const LEAST_FORCED: f32 = 1.2;
+const LEAST_FORCING_FACTOR: f32 = 1.2;
 /// Averaging time of the lower level, at the end of the magnetisation, s.
 const AVERAGE_S: f32 = 0.1;
 /// Accepted range of the measured stator resistance relative to the setting. Outside it the model does not
@@ -82,10 +82,10 @@ impl InverterDrop {
     /// Plans the magnetisation of a motor with the direct current `i_d`, A, in `magnetise_s`, s, with currents up to
     /// `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, magnetise_s: f32, largest_a: f32) -> Self {
-        let room = if FORCED * i_d < largest_a { FORCED } else { largest_a / i_d };
+        let room = if FORCING_FACTOR * i_d < largest_a { FORCING_FACTOR } else { largest_a / i_d };
         // The flux reaches the value of the lower level when 1 - e^(-t/tau_r) = 1/forced.
         let until_s = motor.tau_r() * libm::logf(room / (room - 1.0));
-        let fits = room >= LEAST_FORCED && magnetise_s >= 2.0 * (until_s + AVERAGE_S);
+        let fits = room >= LEAST_FORCING_FACTOR && magnetise_s >= 2.0 * (until_s + AVERAGE_S);
         Self {
             forced: if fits { room } else { 1.0 },
             until: if fits { periods(until_s) } else { 0 },

@@ -25,11 +25,11 @@ use crate::math::within;
 use crate::{Dq, Motor, PERIOD_S};
 
 /// Share of the voltage that is used: the rest is for the current controllers.
-const USED: f32 = 0.92;
+const USABLE_SHARE: f32 = 0.92;
 /// Share of the voltage that the leakage may take.
 const FOR_LEAKAGE: f32 = 0.6;
 /// Least direct current, as a share of the setting.
-const LEAST: f32 = 0.15;
+const LEAST_I_D_SHARE: f32 = 0.15;
 /// Change of the trim in a carrier period per relative excess of the voltage.
 const TRIM: f32 = 5.0 * CARRIER_SAMPLES as f32 * PERIOD_S;
 /// The same from 1 on upwards: slower than a flux that builds up.
@@ -65,7 +65,7 @@ pub struct VoltageLimitState {
 
 /// Operating point of a carrier period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Operation {
+pub struct OperatingPoint {
     /// Reference of the current, A.
     pub current: Dq,
     /// Voltage without the carrier, V.
@@ -106,9 +106,9 @@ impl VoltageLimit {
     }
 
     /// Updates the limits.
-    pub fn step(&self, state: &mut VoltageLimitState, now: &Operation) {
-        let &Operation { current, voltage, largest, flux_freq, kept, added } = now;
-        let whole = USED * largest;
+    pub fn step(&self, state: &mut VoltageLimitState, now: &OperatingPoint) {
+        let &OperatingPoint { current, voltage, largest, flux_freq, kept, added } = now;
+        let whole = USABLE_SHARE * largest;
         let available = whole * state.trim;
         // (|u| - U)/U near U, without the root.
         let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
@@ -142,7 +142,7 @@ impl VoltageLimit {
         let along = fpu_sqrt::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
         // NaN gives the setting; the step finds it.
-        if i_d.is_nan() { self.i_d } else { within(i_d, (LEAST * self.i_d, self.i_d)) }
+        if i_d.is_nan() { self.i_d } else { within(i_d, (LEAST_I_D_SHARE * self.i_d, self.i_d)) }
     }
 
     /// Torque current, A, whose leakage takes its share of the voltage.
@@ -168,13 +168,14 @@ mod tests {
             let i_d = state.most.d;
             flux_current += (i_d - flux_current) * CARRIER_SAMPLES as f32 * PERIOD_S / 0.19;
             let voltage = Dq { d: 0.0, q: per_a * flux_current };
-            most = most.max(voltage.q / (USED * largest));
+            most = most.max(voltage.q / (USABLE_SHARE * largest));
             let current = Dq { d: i_d, q: 0.0 };
             let flux_freq = freq * PERIOD_S;
-            let now = Operation { current, voltage, largest, flux_freq, kept: false, added: 0.0 };
+            let now =
+                OperatingPoint { current, voltage, largest, flux_freq, kept: false, added: 0.0 };
             limit.step(&mut state, &now);
         }
-        (state, per_a * flux_current / (USED * largest), most)
+        (state, per_a * flux_current / (USABLE_SHARE * largest), most)
     }
 
     /// The trim brings the voltage to the usable one, whether the motor takes more or less than the parameters say; a flux that
@@ -186,7 +187,7 @@ mod tests {
             assert!((voltage - 1.0).abs() < 0.02, "{share}: {voltage}");
             assert!(most < 1.06 * share.max(1.0), "{share}: {most}");
             let limit = VoltageLimit::new(&Motor::default(), 1.4, 3.5);
-            let untrimmed = limit.by_leakage(USED * 170.0, 120.0 * PERIOD_S);
+            let untrimmed = limit.by_leakage(USABLE_SHARE * 170.0, 120.0 * PERIOD_S);
             assert!(state.most.q <= untrimmed * 1.0001, "{share}: {} {untrimmed}", state.most.q);
         }
     }
@@ -200,7 +201,7 @@ mod tests {
         let current = Dq { d: 1.4, q: 0.0 };
         let flux_freq = 20.0 * PERIOD_S;
         let now =
-            Operation { current, voltage, largest: 170.0, flux_freq, kept: false, added: 0.0 };
+            OperatingPoint { current, voltage, largest: 170.0, flux_freq, kept: false, added: 0.0 };
         (0..6000).for_each(|_| limit.step(&mut state, &now));
         assert_eq!((state.trim, state.most.d), (1.0, 1.4));
     }

@@ -12,11 +12,11 @@ use crate::{Catching, Coefficients, Dq, Fault, PERIOD_S};
 
 /// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
-const AT_ONCE: f32 = 0.5;
+const INITIAL_SHARE: f32 = 0.5;
 /// Voltage of flux that was left which drives no current to speak of, V.
-const LITTLE_V: f32 = 1.0;
+const NEGLIGIBLE_EMF_V: f32 = 1.0;
 /// Current per missing magnetising current.
-const FORCED: f32 = 10.0;
+const FORCING_GAIN: f32 = 10.0;
 /// Highest frequency of a rotor that is caught, electrical turns per period: 2700 rpm of four poles, with the error of the
 /// search. Above it the voltage of the rotor drowns in the noise of the sensors.
 const HIGHEST: f32 = 91.0 * PERIOD_S;
@@ -75,9 +75,9 @@ impl Field {
         let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
-        let drives = self.residual.is_some_and(|residual| residual.volts > LITTLE_V);
+        let drives = self.residual.is_some_and(|residual| residual.volts > NEGLIGIBLE_EMF_V);
         if n == 0 && !drives {
-            self.reference[0] = ReferenceState::at_rest(AT_ONCE * catching.current);
+            self.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * catching.current);
         }
         let d = if drives { Catching::WITH_FLUX * catching.current } else { catching.current };
         if n > catch::FROM {
@@ -115,7 +115,7 @@ impl Field {
         let missing = most - c.observer.as_ref().map_or(most, |o| o.magnetising(&self.observer));
         let (current, built) =
             c.catching.map_or((most, 0), |catching| (catching.current, catching.built));
-        let d = within(most + FORCED * missing, (0.0, current));
+        let d = within(most + FORCING_GAIN * missing, (0.0, current));
         if k.elapsed.wrapping_sub(from) >= built {
             c.motion.start(&mut self.motion, k.rotor_count);
             self.enter(k, FluxPhase::Ready);
@@ -126,7 +126,7 @@ impl Field {
     /// The fault of a drive that ends with this one: where a turning shaft is looked for or magnetised, a wrong speed shows as a
     /// voltage or a current that it does not explain.
     #[cold]
-    pub(super) fn why_not_caught(&self, fault: Fault) -> Fault {
+    pub(super) fn as_catch_failure(&self, fault: Fault) -> Fault {
         use Fault::{CurrentNotAsPredicted, FluxNotAsPredicted, LostLock, NotCaught};
         match (fault, &self.flux) {
             (

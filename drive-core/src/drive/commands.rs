@@ -51,7 +51,7 @@ impl Drive {
                 finite(to)?;
                 let taken = limited(to, self.c.motion.position_limit);
                 if let Some(Goal::Position { press: Some(_), .. }) = self.goal() {
-                    self.rest_here();
+                    self.hold_present_position();
                 }
                 if let Some(Goal::Position { turns, .. }) = self.goal() {
                     *turns = Some(taken);
@@ -64,7 +64,7 @@ impl Drive {
                 if !(0.0..=max).contains(&i_q) {
                     return Err(Refused::OutOfRange { min: 0.0, max });
                 }
-                self.rest_here();
+                self.hold_present_position();
                 let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
                 if let Some(Goal::Position { press, .. }) = self.goal() {
                     *press = Some((taken / 60.0, i_q));
@@ -77,7 +77,7 @@ impl Drive {
                 if here.abs() > max {
                     return Err(Refused::OutOfRange { min: -max, max });
                 }
-                self.rest_here();
+                self.hold_present_position();
                 if let Phase::Field(field) = &mut self.phase {
                     let origin = self.c.motion.shift_origin(&mut field.motion, here);
                     field.goal = Goal::Position { turns: Some(0.0), press: None };
@@ -174,7 +174,7 @@ impl Drive {
     }
 
     /// Lets the position loop begin anew where the shaft is, without torque.
-    fn rest_here(&mut self) {
+    fn hold_present_position(&mut self) {
         if let Phase::Field(field) = &mut self.phase {
             let count = self.kept.rotor_count;
             self.c.motion.take_over(&mut field.motion, count, 0.0, 0.0);

@@ -115,8 +115,8 @@ impl Field {
 
         // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
         // alone it would let the sidebands of a turning carrier through.)
-        let silent = s.hand_over.is_silent();
-        let carrier = if silent || !c.inject {
+        let carrier_is_off = s.hand_over.is_carrier_off();
+        let carrier = if carrier_is_off || !c.inject {
             CarrierPeriod::default()
         } else {
             s.carrier.at(&c.injection, index)
@@ -129,7 +129,7 @@ impl Field {
         }
         let rest = measured_current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
-        let seen = if silent { measured_current } else { filtered };
+        let seen = if carrier_is_off { measured_current } else { filtered };
         let flux_axis = phi.turned_by(axes.seen);
         let current = seen.to_dq(flux_axis);
 
@@ -143,7 +143,7 @@ impl Field {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let seen = (seen, !silent);
+            let seen = (seen, !carrier_is_off);
             let turning = c.observe_fundamental(s, index, &trust, flux.freq, seen, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
             if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {

@@ -22,7 +22,7 @@ use super::trust::{Judged, Lock, Trust};
 use super::{Field, Kept};
 use crate::carrier::CARRIER_SAMPLES;
 use crate::carrier::synchronous::REFERENCE_AT;
-use crate::current::voltage_limit::{Operation, VoltageLimitState};
+use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
 use crate::protect::Thermal;
 use crate::protect::plausibility::{Known, RotorFlux};
 use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
@@ -95,7 +95,7 @@ impl Coefficients {
                 if self.observer.is_some() && step.trust.observes() {
                     s.hand_over.update(step.flux_freq, step.trust.source);
                 }
-                let silent = s.hand_over.is_silent();
+                let silent = s.hand_over.is_carrier_off();
                 self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
                 Ok(())
             }
@@ -126,7 +126,7 @@ impl Coefficients {
     /// Takes one of the six looks at the noise of the current sensors.
     fn watch_noise(&self, s: &mut Field, look: usize, measured: &Measured) -> Result<(), Fault> {
         match &self.noise_watch {
-            Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.is_quiet()),
+            Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.judges_noise()),
             None => Ok(()),
         }
     }
@@ -149,10 +149,10 @@ impl Coefficients {
 
     /// Limits the currents to those that the voltage of the dc link allows.
     fn limit_voltage(&self, s: &Field, k: &mut Kept, step: &StepResults) {
-        let carrier = self.inject && !s.hand_over.is_silent();
+        let carrier = self.inject && !s.hand_over.is_carrier_off();
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
-        let now = Operation {
+        let now = OperatingPoint {
             current: step.reference,
             voltage: step.voltage,
             largest,
@@ -227,7 +227,7 @@ impl Coefficients {
 
     /// Fits the carrier into the voltage that the fundamental leaves.
     fn check_carrier_headroom(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
-        if !self.inject || s.hand_over.is_silent() {
+        if !self.inject || s.hand_over.is_carrier_off() {
             return Ok(());
         }
         let largest = self.modulator.circle(step.measured.dc_link);

@@ -19,8 +19,8 @@ use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
 
 /// Frequencies of the stator between which the weight rises, turns per period.
-const FROM: f32 = 15.0 * PERIOD_S;
-const TO: f32 = 20.0 * PERIOD_S;
+const INJECTION_ALONE_BELOW: f32 = 15.0 * PERIOD_S;
+const OBSERVER_ALONE_ABOVE: f32 = 20.0 * PERIOD_S;
 /// Frequencies above which the carrier goes off, and below which it comes on, turns per period.
 const CARRIER_OFF: f32 = 26.0 * PERIOD_S;
 const CARRIER_ON: f32 = 24.0 * PERIOD_S;
@@ -29,7 +29,7 @@ const BLIND: u8 = 3;
 /// Carrier periods until the demodulation is filled.
 const FILLED: u8 = 8;
 /// Carrier periods with the injection alone until the noise is judged.
-const QUIET: u8 = 120;
+const NOISE_IS_JUDGED_AFTER: u8 = 120;
 /// Mean age of a turn that is averaged over a carrier period, samples.
 const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
 
@@ -65,7 +65,7 @@ pub struct HandOver {
     /// Periods for which the observer sees nothing, and one.
     blind: u8,
     /// Carrier periods until the noise of the sensors is judged.
-    unquiet: u8,
+    periods_until_noise_is_judged: u8,
     /// Turns of the last ten periods, their sum, and the sum of the present carrier period.
     turns: [f32; CARRIER_SAMPLES],
     sum: f32,
@@ -90,8 +90,9 @@ impl HandOver {
     /// `source` may turn; once a carrier period.
     pub fn update(&mut self, flux_freq: f32, source: Source) {
         let freq = flux_freq.abs();
-        let share = (freq - FROM) * (1.0 / (TO - FROM));
-        let goes_on = if self.is_silent() { CARRIER_ON } else { CARRIER_OFF };
+        let share =
+            (freq - INJECTION_ALONE_BELOW) * (1.0 / (OBSERVER_ALONE_ABOVE - INJECTION_ALONE_BELOW));
+        let goes_on = if self.is_carrier_off() { CARRIER_ON } else { CARRIER_OFF };
         self.switch(match self.carrier {
             _ if source == Source::Nothing || freq > goes_on => CarrierState::Off,
             CarrierState::Off => CarrierState::Filling(FILLED - 1),
@@ -105,7 +106,11 @@ impl HandOver {
         } else {
             0.0
         };
-        self.unquiet = if weight > 0.0 { QUIET } else { self.unquiet.saturating_sub(1) };
+        self.periods_until_noise_is_judged = if weight > 0.0 {
+            NOISE_IS_JUDGED_AFTER
+        } else {
+            self.periods_until_noise_is_judged.saturating_sub(1)
+        };
         self.weight = match source {
             Source::Both | Source::Slip => weight,
             Source::Injection | Source::Nothing => 0.0,
@@ -113,21 +118,21 @@ impl HandOver {
     }
 
     /// Turns the carrier off, and leaves the angle to itself.
-    pub fn silence(&mut self) {
+    pub fn switch_carrier_off(&mut self) {
         self.switch(CarrierState::Off);
         self.weight = 0.0;
     }
 
     fn switch(&mut self, carrier: CarrierState) {
-        let was_silent = self.is_silent();
+        let was_off = self.is_carrier_off();
         self.carrier = carrier;
-        if self.is_silent() != was_silent {
+        if self.is_carrier_off() != was_off {
             self.blind = BLIND + 1;
         }
     }
 
     /// Whether the carrier is off.
-    pub fn is_silent(&self) -> bool {
+    pub fn is_carrier_off(&self) -> bool {
         self.carrier == CarrierState::Off
     }
 
@@ -137,8 +142,8 @@ impl HandOver {
     }
 
     /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it has the angle alone.
-    pub fn is_quiet(&self) -> bool {
-        self.unquiet == 0
+    pub fn judges_noise(&self) -> bool {
+        self.periods_until_noise_is_judged == 0
     }
 
     /// Begins a period; whether the observer sees nothing in it.
@@ -155,7 +160,7 @@ impl HandOver {
     /// The turn for the tracking loop from what the observer saw in the period of this `index` in the carrier period:
     /// `turned` and `slip`, electrical turns, of a current of this `age`, samples.
     pub fn turning(&mut self, index: usize, turned: f32, slip: f32, age: f32) -> Turning {
-        let silent = self.is_silent();
+        let carrier_is_off = self.is_carrier_off();
         self.fresh += turned;
         if let Some(oldest) = self.turns.get_mut(index) {
             self.sum += turned - *oldest;
@@ -165,8 +170,11 @@ impl HandOver {
             // Rounding does not accumulate.
             self.sum = core::mem::take(&mut self.fresh);
         }
-        let (turned, age) =
-            if silent { (turned, age + 1.0) } else { (self.mean_turn(), age + 1.0 + MEAN_AGE) };
+        let (turned, age) = if carrier_is_off {
+            (turned, age + 1.0)
+        } else {
+            (self.mean_turn(), age + 1.0 + MEAN_AGE)
+        };
         Turning { weight: self.weight, turned, slip, age }
     }
 }

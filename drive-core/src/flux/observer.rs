@@ -48,7 +48,7 @@ const LARGEST_ERROR: f32 = 0.05;
 /// Share of the learned torque limit in the middle of the currents.
 const JUDGED_AT: f32 = 0.5;
 /// Voltages that are kept: the current behind the filter is older than three of them.
-const KEPT: usize = 4;
+const VOLTAGES: usize = 4;
 
 /// Coefficients of the observer, per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +81,7 @@ pub struct Observer {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObserverState {
     /// Voltages of the last periods, V, backwards from `latest` on, and around.
-    voltages: [AlphaBeta; KEPT],
+    voltages: [AlphaBeta; VOLTAGES],
     latest: usize,
     last: AlphaBeta,
     /// Length of the flux, V s.
@@ -138,13 +138,13 @@ pub struct Induced {
 impl ObserverState {
     /// Takes the voltage that a step puts out, without the carrier, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
-        self.latest = self.latest.wrapping_add(KEPT - 1) % KEPT;
+        self.latest = self.latest.wrapping_add(VOLTAGES - 1) % VOLTAGES;
         self.voltages[self.latest] = voltage;
     }
 
-    /// The voltage that was put out so many periods before the latest, fewer than [`KEPT`], V.
+    /// The voltage that was put out so many periods before the latest, fewer than [`VOLTAGES`], V.
     fn before(&self, periods: usize) -> AlphaBeta {
-        self.voltages[self.latest.wrapping_add(periods) % KEPT]
+        self.voltages[self.latest.wrapping_add(periods) % VOLTAGES]
     }
 
     /// One period whose `current`, A, does not belong to the voltages.
