@@ -11,7 +11,7 @@ use thiserror::Error;
 use super::grammar::Level;
 use crate::commissioning::News;
 use crate::link::Status;
-use crate::link::stream::Sample;
+use crate::link::ring::Record;
 use crate::link::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
@@ -75,10 +75,10 @@ pub trait DriveHandle {
     fn tracing(&self) -> bool;
     /// Record number `i` of the last trace, and its number from the record of the trigger.
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
-    /// Asks for a sample of the signals every `divider` control periods; 0 ends it.
+    /// Asks for a record of each control period whose number is a multiple of `divider`; 0 ends it.
     fn stream(&mut self, divider: u16);
-    /// The next sample of the stream.
-    fn sampled(&mut self) -> Option<Sample>;
+    /// The next record for the stream.
+    fn sampled(&mut self) -> Option<Record>;
     /// Resets the chip. Only while the outputs are off.
     fn reboot(&mut self);
     /// Calls `show` with the result of a learning that ended since the last call, accepted or not.

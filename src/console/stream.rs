@@ -11,7 +11,7 @@ use super::Console;
 use super::grammar::Stream;
 use super::handle::{DriveHandle, Port};
 use crate::board;
-use crate::link::stream::Sample;
+use crate::link::ring::Record;
 use crate::link::trace::{self, SIGNALS};
 
 const _: () = assert!(trace::MOST == MOST_SIGNALS);
@@ -24,8 +24,8 @@ pub(super) struct Wire {
     waiting: usize,
     sent: u32,
     dropped: u32,
-    /// Sequence number of the next frame; `None` before the first.
-    next: Option<u16>,
+    /// Control period and sequence number of the last frame; `None` before the first.
+    last: Option<(u32, u16)>,
     /// Bits per second in force, and those wanted.
     baud: u32,
     wanted: u32,
@@ -35,7 +35,7 @@ impl Wire {
     pub const fn new() -> Self {
         let baud = board::SERIAL_BAUD;
         let (frame, wanted) = ([0; LONGEST], baud);
-        Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, next: None, baud, wanted }
+        Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, last: None, baud, wanted }
     }
 
     /// Without a line for so long the drive stops, s; 0: never.
@@ -48,17 +48,20 @@ impl Wire {
         self.wanted = baud;
     }
 
-    /// Makes the frame of a sample, and counts those before it that were dropped.
-    fn make(&mut self, sample: &Sample, settings: &Settings) {
+    /// Makes the frame of a record, and counts those before it that were dropped.
+    fn make(&mut self, record: &Record, settings: &Settings) {
         let Some(stream) = &self.stream else { return };
         let mut values = trace::Record::default();
-        stream.choice.record(&mut values, &sample.telemetry, &sample.codes);
+        stream.choice.record(&mut values, &record.telemetry, &record.codes);
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
-        let Sample { sequence, period, .. } = *sample;
-        let missing = sequence.wrapping_sub(self.next.unwrap_or(sequence));
-        self.dropped = self.dropped.wrapping_add(missing.into());
-        self.next = Some(sequence.wrapping_add(1));
+        let period = record.period;
+        let (dropped, sequence) = self.last.map_or((0, 0), |(last, sequence)| {
+            let due = period.wrapping_sub(last) / u32::from(stream.divider).max(1);
+            (due.saturating_sub(1), sequence.wrapping_add(due as u16))
+        });
+        self.dropped = self.dropped.wrapping_add(dropped);
+        self.last = Some((period, sequence));
         self.waiting = Frame { sequence, period, values }.write(&mut self.frame);
     }
 }
@@ -124,11 +127,11 @@ impl Console {
     ) -> bool {
         let settings = &self.settings.in_force().drive;
         let wire = &mut self.wire;
-        // As many as the queue holds at most: the main loop goes on.
-        for _ in 0..=board::STREAM_SAMPLES {
+        // As many as the ring holds at most: the main loop goes on.
+        for _ in 0..=board::RECORDED_PERIODS {
             if wire.waiting == 0 {
-                let Some(sample) = drive.sampled() else { return true };
-                wire.make(&sample, settings);
+                let Some(record) = drive.sampled() else { return true };
+                wire.make(&record, settings);
             }
             if !port.write(wire.frame.get(..wire.waiting).unwrap_or_default()) {
                 return false;

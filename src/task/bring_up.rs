@@ -6,7 +6,6 @@ use cortex_m::{asm, singleton};
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Accepted, Coefficients, Command, Drive, Stop};
-use heapless::spsc::Queue;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
@@ -23,11 +22,12 @@ use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
 use induction_drive::link::mailbox::Mailbox;
+use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
-use induction_drive::link::{Answer, Status, stream};
+use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
-use induction_drive::rotor_tracking::{Observation, Tracking};
+use induction_drive::rotor_tracking::Tracking;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
@@ -257,11 +257,8 @@ fn start_control(
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
-    let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
-    let (send_observations, observations) = observations.ok_or(TWICE)?.split();
-    type Samples = stream::Queue<{ board::STREAM_SAMPLES }>;
-    let samples = singleton!(: Samples = Samples::new(stream::Sample::default())).ok_or(TWICE)?;
-    let (send_samples, stream) = samples.split();
+    let ring = singleton!(: Ring<{ board::RECORDED_PERIODS }> = Ring::new()).ok_or(TWICE)?;
+    let (signals, reported) = ring.split();
 
     pwm.start()?;
     let drive = Drive::new(coefficients);
@@ -277,8 +274,7 @@ fn start_control(
         answers: send_answers,
         learned: send_learned,
         trace: recorder,
-        stream: send_samples,
-        observations: send_observations,
+        signals,
     }
     .run();
     if !comes_at_its_rate() {
@@ -288,5 +284,16 @@ fn start_control(
     control::TOLD.store(control::WATCHED, Ordering::Relaxed);
     asm::delay(1000 * board::CYCLES_PER_US);
     Window::close();
-    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations, sources })
+    let (streamed, observed) = (reported.clone(), reported.clone());
+    Ok(ControlLink {
+        status,
+        commands,
+        answers,
+        learned,
+        trace,
+        streamed,
+        observed,
+        reported,
+        sources,
+    })
 }

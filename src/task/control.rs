@@ -14,7 +14,6 @@ use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::identify::learning::Learned;
 use drive_core::{Command, Drive, Hardware, Sample, State};
-use heapless::spsc::Producer;
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
@@ -26,11 +25,10 @@ use crate::chip::time;
 use crate::chip::window::Window;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::stream::Source;
+use induction_drive::link::ring::Writer;
 use induction_drive::link::trace::Recorder;
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
-use induction_drive::rotor_tracking::Observation;
 
 /// The drive and its surroundings, owned by the interrupt.
 pub struct Control {
@@ -56,10 +54,8 @@ pub struct Control {
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
-    /// The stream.
-    pub stream: Source<'static, { board::STREAM_SAMPLES }>,
-    /// Periods for the identification of the rotor time constant, and for the commissioning.
-    pub observations: Producer<'static, Observation, { board::OBSERVED_PERIODS }>,
+    /// Signals for the report, the stream, the identification of the rotor time constant, and the commissioning.
+    pub signals: Writer<'static, { board::RECORDED_PERIODS }>,
 }
 
 // It is copied at a start and by tools.
@@ -71,6 +67,8 @@ pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
 /// Whether the commissioning is to see what the drive does while it regulates.
 pub static OBSERVED: AtomicBool = AtomicBool::new(false);
+/// Control periods from one record of the stream to the next; 0: none.
+pub static STREAMED: AtomicU32 = AtomicU32::new(0);
 /// From the main loop: [`WATCHED`], and what it has found wrong, as bits of [`Hardware`].
 pub static TOLD: AtomicU8 = AtomicU8::new(0);
 /// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
@@ -96,8 +94,7 @@ impl Control {
             unreported: Hardware::empty(),
             began: 0,
             reported: None,
-            report_due: false,
-            report_late: 0,
+            report_age: 0,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -154,9 +151,8 @@ struct Running {
     began: u32,
     /// State in the last report.
     reported: Option<State>,
-    report_due: bool,
-    /// Periods for which a report has waited for the trace.
-    report_late: u8,
+    /// Periods for which a report has been due.
+    report_age: u8,
 }
 
 #[interrupt]
@@ -182,8 +178,7 @@ impl Running {
             commands,
             answers,
             trace,
-            observations,
-            stream,
+            signals,
             ..
         } = &mut self.control;
 
@@ -275,30 +270,33 @@ impl Running {
         let state = drive.state();
         let codes = [codes.current_a, codes.current_b, codes.current_c];
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
-        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
-        if drive.tracks_rotor() || drive.excites() || commissioned {
-            // Without room the period is missing, which the main loop detects by its number.
-            let _ = observations.enqueue(Observation::new(self.periods, drive.telemetry()));
-        }
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // A new state is reported at once, but not in the period of a command or, for two periods at most, of a record of
-        // the trace: these take long enough.
-        self.report_due |=
-            self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
-        let reports = self.report_due && !commanded && (!traced || self.report_late > 1);
-        self.report_late =
-            if self.report_due && !reports { self.report_late.saturating_add(1) } else { 0 };
-        let busy = reports || traced || commanded;
-        stream.step(self.periods, busy, &codes, drive.telemetry());
+        // The signals of a report are recorded when it is due, and it follows in the next period without a command and, if
+        // there is one within two, without a record of the trace: each of these takes long enough.
+        let due = self.report_age > 0
+            || self.reported != Some(state)
+            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        self.report_age = if due { self.report_age.saturating_add(1) } else { 0 };
+        let reports = self.report_age > 1 && !commanded && (!traced || self.report_age > 3);
+        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
+        let observed = drive.tracks_rotor() || drive.excites() || commissioned;
+        let streamed = self.periods.is_multiple_of(STREAMED.load(Ordering::Relaxed));
+        if observed || streamed || self.report_age == 1 {
+            signals.write(|record| {
+                record.period = self.periods;
+                record.telemetry = *drive.telemetry();
+                (record.codes, record.observed) = (codes, observed);
+            });
+        }
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;
         let worst = if commanded { with } else { without };
         *worst = cycles.max(*worst);
         if reports {
-            self.report_due = false;
+            self.report_age = 0;
             self.report(state, sample, cycles);
         }
     }
@@ -316,7 +314,6 @@ impl Running {
             report.periods = self.periods;
             report.state = state;
             report.sample = sample;
-            report.telemetry = *drive.telemetry();
             report.worst_cycles = self.worst_cycles;
             report.last_cycles = cycles;
             report.worst_latency = self.worst_latency;

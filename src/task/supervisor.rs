@@ -9,7 +9,6 @@ use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{Scales, Settings, SettingsError};
 use drive_core::{Accepted, Coefficients, Command, Fault, Hardware};
-use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
@@ -25,12 +24,12 @@ use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::stream::{Sample, Sink};
+use induction_drive::link::ring::{self, Record as Period};
 use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
-use induction_drive::rotor_tracking::{Observation, Report, Tracking};
+use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
@@ -38,6 +37,9 @@ use induction_drive::store::{FlashError, Saved};
 
 /// Version and commit of the firmware.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
+
+/// Signals of the control interrupt.
+pub type Signals = ring::Reader<'static, { board::RECORDED_PERIODS }>;
 
 /// The main loop's ends of the communication with the control interrupt.
 pub struct ControlLink {
@@ -51,10 +53,12 @@ pub struct ControlLink {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
-    /// The stream.
-    pub stream: Sink<'static, { board::STREAM_SAMPLES }>,
-    /// Periods for the identification of the rotor time constant, and for the commissioning.
-    pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
+    /// Signals for the stream.
+    pub streamed: Signals,
+    /// Signals for the identification of the rotor time constant, and for the commissioning.
+    pub observed: Signals,
+    /// Signals for the report.
+    pub reported: Signals,
     /// The second opinions on clock and reference.
     pub sources: Sources,
 }
@@ -143,8 +147,11 @@ impl Supervisor {
     /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
         self.track();
-        if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
-            self.log(status);
+        if let Some(link) = &mut self.link
+            && let Some(status) = link.status.take()
+        {
+            let newest = link.reported.by_ref().last().unwrap_or_default();
+            self.log(Status { telemetry: newest.telemetry, ..status });
         }
         self.commission();
         // It designs for seconds: the console needs the time behind it.
@@ -178,7 +185,8 @@ impl Supervisor {
 
     /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
     fn track(&mut self) {
-        while let Some(period) = self.link.as_mut().and_then(|link| link.observations.dequeue()) {
+        let next = |link: &mut ControlLink| link.observed.find(|period| period.observed);
+        while let Some(period) = self.link.as_mut().and_then(next) {
             if self.commissioning.is_running() {
                 self.commissioning.take(&period);
                 continue;
@@ -351,11 +359,13 @@ impl DriveHandle for Supervisor {
     }
 
     fn stream(&mut self, divider: u16) {
-        self.link.iter_mut().for_each(|link| link.stream.ask(divider));
+        control::STREAMED.store(divider.into(), Ordering::Relaxed);
+        self.link.iter_mut().for_each(|link| link.streamed.by_ref().for_each(drop));
     }
 
-    fn sampled(&mut self) -> Option<Sample> {
-        self.link.as_mut()?.stream.fetch()
+    fn sampled(&mut self) -> Option<Period> {
+        let divider = control::STREAMED.load(Ordering::Relaxed);
+        self.link.as_mut()?.streamed.find(|period| period.period.is_multiple_of(divider))
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {

@@ -8,7 +8,8 @@ use drive_core::{Command, Drive, Mode, Settings, State};
 
 use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::rotor_tracking::{Observation, Tracking};
+use induction_drive::link::ring::Record;
+use induction_drive::rotor_tracking::Tracking;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::staging::Staging;
 
@@ -174,7 +175,8 @@ impl Shadow {
         if self.drive.tracks_rotor()
             && let Some(tracking) = &mut self.tracking
         {
-            let seen = Observation::new(self.compared as u32, self.drive.telemetry());
+            let (period, telemetry) = (self.compared as u32, *self.drive.telemetry());
+            let seen = Record { period, telemetry, ..Record::default() };
             self.tau_r = tracking.take(&seen).or(self.tau_r);
         }
         Ok(())

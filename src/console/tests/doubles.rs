@@ -14,8 +14,9 @@ use induction_drive::board;
 use induction_drive::commissioning::{News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
+use induction_drive::link::Status;
+use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
-use induction_drive::link::{Status, stream};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
@@ -46,7 +47,7 @@ pub struct FakeDrive {
     /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
     /// Divider of the stream, and its samples that were not fetched.
-    pub streamed: (u16, VecDeque<stream::Sample>),
+    pub streamed: (u16, VecDeque<Record>),
     /// The commissioning.
     pub session: Session,
     /// Operating hours, starts and faults.
@@ -158,7 +159,7 @@ impl DriveHandle for FakeDrive {
     fn stream(&mut self, divider: u16) {
         self.streamed = (divider, VecDeque::new());
     }
-    fn sampled(&mut self) -> Option<stream::Sample> {
+    fn sampled(&mut self) -> Option<Record> {
         self.streamed.1.pop_front()
     }
     fn reboot(&mut self) {
