@@ -66,8 +66,8 @@ pub mod supply;
 pub mod tuning;
 
 pub use drive::{
-    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    Room, Stage, State, Stop, Telemetry,
+    Accepted, Coefficients, Command, Drive, Excitation, Excited, Mode, Refused, Regulator, Room,
+    Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};

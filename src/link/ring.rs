@@ -27,6 +27,25 @@ pub struct Record {
     pub observed: bool,
 }
 
+impl Record {
+    /// Sets the signals.
+    pub fn set(&mut self, telemetry: &Telemetry) {
+        /// In two parts: the compiler copies up to 64 bytes without a call, in a third of the cycles.
+        type Parts = ([u32; 11], [u32; 10]);
+        const _: () = assert!(size_of::<Parts>() == size_of::<Telemetry>());
+        const _: () = assert!(align_of::<Parts>() == align_of::<Telemetry>());
+        // SAFETY: both are words without padding, of which every value is valid.
+        let (to, from) = unsafe {
+            (
+                &mut *(&raw mut self.telemetry).cast::<Parts>(),
+                &*(&raw const *telemetry).cast::<Parts>(),
+            )
+        };
+        to.0 = from.0;
+        to.1 = from.1;
+    }
+}
+
 /// Memory for `N` records, a power of two.
 pub struct Ring<const N: usize> {
     slots: [Slot; N],

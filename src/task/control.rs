@@ -94,7 +94,8 @@ impl Control {
             unreported: Hardware::empty(),
             began: 0,
             reported: None,
-            report_age: 0,
+            report_left: 0,
+            report_late: 0,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -151,8 +152,10 @@ struct Running {
     began: u32,
     /// State in the last report.
     reported: Option<State>,
-    /// Periods for which a report has been due.
-    report_age: u8,
+    /// Parts of a report that are due.
+    report_left: u8,
+    /// Periods for which one has waited.
+    report_late: u8,
 }
 
 #[interrupt]
@@ -273,21 +276,24 @@ impl Running {
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // The signals of a report are recorded when it is due, and it follows in the next period without a command and, if
-        // there is one within two, without a record of the trace: each of these takes long enough.
-        let due = self.report_age > 0
-            || self.reported != Some(state)
-            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
-        self.report_age = if due { self.report_age.saturating_add(1) } else { 0 };
-        let reports = self.report_age > 1 && !commanded && (!traced || self.report_age > 3);
+        // A report is sent in two periods: its signals, then the rest. Neither in the period of a command or, for two periods
+        // at most, of a record of the trace: each of these takes long enough.
+        let due =
+            self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        if due && self.report_left == 0 {
+            self.report_left = 2;
+        }
+        let waits = self.report_left > 0 && (commanded || traced && self.report_late < 2);
+        self.report_late = if waits { self.report_late.saturating_add(1) } else { 0 };
+        let part = if waits { 0 } else { self.report_left };
+        self.report_left -= u8::from(part > 0);
         let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
         let observed = drive.tracks_rotor() || drive.excites() || commissioned;
         let streamed = self.periods.is_multiple_of(STREAMED.load(Ordering::Relaxed));
-        if observed || streamed || self.report_age == 1 {
+        if observed || streamed || part == 2 {
             signals.write(|record| {
-                record.period = self.periods;
-                record.telemetry = *drive.telemetry();
-                (record.codes, record.observed) = (codes, observed);
+                (record.period, record.codes, record.observed) = (self.periods, codes, observed);
+                record.set(drive.telemetry());
             });
         }
         PERIODS.store(self.periods, Ordering::Relaxed);
@@ -295,8 +301,7 @@ impl Running {
         let [without, with] = &mut self.worst_cycles;
         let worst = if commanded { with } else { without };
         *worst = cycles.max(*worst);
-        if reports {
-            self.report_age = 0;
+        if part == 1 {
             self.report(state, sample, cycles);
         }
     }
