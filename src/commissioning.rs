@@ -54,6 +54,7 @@ impl Session {
     }
 
     /// Forgets what was found: the drive has taken these settings.
+    #[inline(never)]
     pub fn configured(&mut self, settings: &Settings) {
         self.commissioning = Commissioning::new(settings);
     }

@@ -33,18 +33,23 @@ fn main() -> ! {
 
     chip::memory::paint_stack();
     defmt::info!("induction-drive {}", task::supervisor::VERSION);
-    let Ok(task::bring_up::Board { settings, mut port, mut bus, mut supervisor }) =
-        task::bring_up::bring_up()
-    else {
-        chip::stop::end(Reason::Panic, [line!(), 0, 0, 0])
-    };
-    let mut console = induction_drive::console::Console::new(settings);
-    console.greet(&supervisor);
+    let mut supervisor = core::mem::MaybeUninit::uninit();
+    match task::bring_up::bring_up(&mut supervisor) {
+        Ok(board) => run(board),
+        Err(_) => chip::stop::end(Reason::Panic, [line!(), 0, 0, 0]),
+    }
+}
 
+/// The main loop.
+#[cfg(target_os = "none")]
+#[inline(never)] // its stack comes in the place of that of the start
+fn run(board: task::bring_up::Board) -> ! {
+    let task::bring_up::Board { console, mut port, mut bus, supervisor } = board;
+    console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        console.poll(&mut port, &mut supervisor, now_ms);
-        console.serve(&mut bus, &mut supervisor, now_ms);
+        console.poll(&mut port, supervisor, now_ms);
+        console.serve(&mut bus, supervisor, now_ms);
         supervisor.check();
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the

@@ -6,7 +6,6 @@
 //!
 //! Own code: the queues of `heapless` and `bbqueue` keep the oldest items, and give each item to one reader.
 
-use core::array::from_fn;
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -74,6 +73,9 @@ pub struct Reader<'a, const N: usize> {
 }
 
 impl Slot {
+    // SAFETY: a record of zeros is valid: it has numbers and a `bool`.
+    const NEW: Self = unsafe { core::mem::zeroed() };
+
     /// Calls `with` with the record, unless somebody else holds it.
     fn hold<R>(&self, with: impl FnOnce(&mut Record) -> R) -> Option<R> {
         if self.held.swap(true, Ordering::Acquire) {
@@ -87,11 +89,10 @@ impl Slot {
 }
 
 impl<const N: usize> Ring<N> {
-    /// No records.
-    pub fn new() -> Self {
+    /// No records. A constant: none is made on the stack.
+    pub const fn new() -> Self {
         const { assert!(N.is_power_of_two(), "the number of a record wraps") };
-        let slot = |_| Slot { held: AtomicBool::new(false), record: UnsafeCell::default() };
-        Self { slots: from_fn(slot), written: AtomicU32::new(0) }
+        Self { slots: [const { Slot::NEW }; N], written: AtomicU32::new(0) }
     }
 
     /// Its two ends. A reader can be cloned.

@@ -1,5 +1,6 @@
 //! From reset to a running control interrupt.
 
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use cortex_m::{asm, singleton};
@@ -21,28 +22,28 @@ use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
+use induction_drive::console::Console;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
-use induction_drive::rotor_tracking::Tracking;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
 use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
-pub struct Board {
-    /// The saved settings, or the defaults.
-    pub settings: FirmwareSettings,
+pub struct Board<'a> {
+    /// The console, with the saved settings, or the defaults.
+    pub console: &'static mut Console,
     /// The serial port of the console.
     pub port: Port,
     /// The port of the field bus, if the board has one.
     pub bus: Option<rs485::Port>,
     /// The drive.
-    pub supervisor: Supervisor,
+    pub supervisor: &'a mut Supervisor,
 }
 
 const TWICE: StartError = "started twice";
@@ -54,7 +55,8 @@ const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to
 ///
 /// # Errors
 /// On a second call.
-pub fn bring_up() -> Result<Board, StartError> {
+#[inline(never)] // as the functions that it calls: their stacks come in each other's place
+pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, StartError> {
     let mut core = cortex_m::Peripherals::take().ok_or(TWICE)?;
     let chip = pac::Peripherals::take().ok_or(TWICE)?;
     let (cause, record, resets) = last_run(&chip.RCC);
@@ -98,8 +100,10 @@ pub fn bring_up() -> Result<Board, StartError> {
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
-    // Before the control runs: it is made with the interrupts masked.
-    let commissioning = singleton!(: Session = Session::new(&start.settings.drive)).ok_or(TWICE)?;
+    // Before the control runs: these are made with the interrupts masked.
+    let console = singleton!(: MaybeUninit<Console> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
     let link = || -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
@@ -109,6 +113,9 @@ pub fn bring_up() -> Result<Board, StartError> {
         }
         timed?;
         let coefficients = start.build(dead_time_s);
+        if let Some(why) = &start.rejected {
+            defmt::error!("{}", defmt::Display2Format(why));
+        }
         // After the design, which may have replaced refused settings by the defaults.
         let protection = board::protection(SELECTED, &start.settings.drive);
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
@@ -124,24 +131,24 @@ pub fn bring_up() -> Result<Board, StartError> {
     }
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
-    let Start { saved, history, mut settings, rejected } = start;
-    settings.boot_pin_counts = board::boot_pin_counts(options);
-    let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
-    *tracking = Tracking::new(&settings.drive);
+    start.settings.boot_pin_counts = board::boot_pin_counts(options);
+    let console = make(console, || Console::new(start.settings));
+    let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
-    let supervisor = Supervisor::new(
-        link.ok(),
-        watchdog,
-        chip,
-        history,
-        tracking,
-        commissioning,
-        &settings.drive,
-    );
-    Ok(Board { settings, port, bus, supervisor })
+    let link = link.ok();
+    let drive = &settings.drive;
+    let supervisor =
+        Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
+    Ok(Board { console, port, bus, supervisor })
+}
+
+/// Makes a value in its place, with a stack that comes in the place of those of other functions.
+#[inline(never)]
+fn make<T>(place: &'static mut MaybeUninit<T>, value: impl FnOnce() -> T) -> &'static mut T {
+    place.write(value())
 }
 
 /// The stored pages at start. All of them are read before an error of the flash becomes a break, for a power failure may
@@ -155,6 +162,7 @@ struct Start {
 }
 
 /// The saved settings, or the defaults.
+#[inline(never)]
 fn load(pages: Pages) -> Start {
     let defaults = FirmwareSettings::of_the_board();
     let (mut saved, loaded) = Saved::load(pages, &defaults);
@@ -174,16 +182,21 @@ fn load(pages: Pages) -> Start {
 impl Start {
     /// Computes the coefficients, which takes seconds, for the dead time of the timer, s. If the design rules refuse
     /// the saved settings, the defaults hold.
+    #[inline(never)]
     fn build(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
-        let built = self.settings.build_for(dead_time_s).or_else(|_| {
-            (self.settings, self.rejected) =
-                (FirmwareSettings::of_the_board(), Some(Rejected::Refused));
-            self.settings.build_for(dead_time_s)
-        });
-        if let Some(why) = self.rejected {
-            defmt::error!("{}", defmt::Display2Format(&why));
+        let built = self.settings.build_for(dead_time_s);
+        if built.is_ok() {
+            return built;
         }
-        built
+        self.refuse();
+        self.settings.build_for(dead_time_s)
+    }
+
+    /// Takes the defaults.
+    #[inline(never)]
+    fn refuse(&mut self) {
+        self.settings = FirmwareSettings::of_the_board();
+        self.rejected = Some(Rejected::Refused);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The main loop's side of the drive: commands of the console, tracking, log, and watchdog.
 
 use core::fmt;
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use defmt::Display2Format;
@@ -76,9 +77,9 @@ pub struct Supervisor {
     /// Whether it has run long enough to forget earlier resets.
     well: bool,
     chip: Chip,
-    /// Tracking of the rotor time constant, if the settings enable it. (Large, so not on the stack.)
-    tracking: &'static mut Option<Tracking>,
-    /// The commissioning. (Large, too.)
+    /// Tracking of the rotor time constant, if the settings enable it.
+    tracking: Option<Tracking>,
+    /// The commissioning. (Large, so not on the stack.)
     commissioning: &'static mut Session,
     hours: Hours,
     /// Scales and pole pairs of the settings in force, for the log.
@@ -106,23 +107,24 @@ pub struct Chip {
 }
 
 impl Supervisor {
-    /// A supervisor; without `link`, one whose control does not run.
-    pub fn new(
+    /// A supervisor, made in its place; without `link`, one whose control does not run.
+    #[inline(never)]
+    pub fn new<'a>(
+        place: &'a mut MaybeUninit<Self>,
         link: Option<ControlLink>,
         watchdog: Option<Watchdog>,
         chip: Chip,
         history: History,
-        tracking: &'static mut Option<Tracking>,
         commissioning: &'static mut Session,
         settings: &Settings,
-    ) -> Self {
+    ) -> &'a mut Self {
         let clock = Clock::new();
         let hours = Hours::new(history, chip.dual_bank);
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.as_ref().and_then(|_| Check::new());
         let (status, level, well) = (None, Level::Info, false);
-        Self {
+        place.write(Self {
             link,
             status,
             level,
@@ -131,11 +133,11 @@ impl Supervisor {
             check,
             well,
             chip,
-            tracking,
+            tracking: Tracking::new(settings),
             commissioning,
             hours,
             scales: (settings.scales, settings.motor.pole_pairs),
-        }
+        })
     }
 
     /// Checks a slice of the control's memory and of its registers.
@@ -145,6 +147,7 @@ impl Supervisor {
 
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
     /// since the start, ms, wrapping.
+    #[inline(never)]
     pub fn listen(&mut self) -> u32 {
         self.track();
         if let Some(link) = &mut self.link
@@ -184,6 +187,7 @@ impl Supervisor {
     }
 
     /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
+    #[inline(never)] // a command takes much stack
     fn track(&mut self) {
         let next = |link: &mut ControlLink| link.observed.find(|period| period.observed);
         while let Some(period) = self.link.as_mut().and_then(next) {
@@ -202,6 +206,7 @@ impl Supervisor {
     }
 
     /// Goes on with the commissioning.
+    #[inline(never)] // a command takes much stack
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
         control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
@@ -309,7 +314,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn configured(&mut self, settings: &FirmwareSettings) {
-        *self.tracking = Tracking::new(&settings.drive);
+        self.tracking = Tracking::new(&settings.drive);
         self.commissioning.configured(&settings.drive);
         self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
     }
