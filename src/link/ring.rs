@@ -105,10 +105,12 @@ impl<const N: usize> Writer<'_, N> {
     /// Adds a record, which `write` writes in place over the oldest one. It is missing if that one is being read just now.
     pub fn write(&mut self, write: impl FnOnce(&mut Record)) {
         let number = self.0.written.load(Ordering::Relaxed);
-        let slot = self.0.slots.get(number as usize % N);
-        if slot.and_then(|slot| slot.hold(write)).is_some() {
+        let Some(slot) = self.0.slots.get(number as usize % N) else { return };
+        let _ = slot.hold(|record| {
+            write(record);
+            // While the record is held: who holds it next knows that it is another one.
             self.0.written.store(number.wrapping_add(1), Ordering::Release);
-        }
+        });
     }
 }
 
