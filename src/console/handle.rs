@@ -49,7 +49,7 @@ pub trait DriveHandle {
     ///
     /// # Errors
     /// A value out of range, or a design rule that cannot be met.
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError>;
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
     /// State of the tracking of the rotor time constant, if it is enabled.

@@ -73,9 +73,6 @@ pub struct Reader<'a, const N: usize> {
 }
 
 impl Slot {
-    // SAFETY: a record of zeros is valid: it has numbers and a `bool`.
-    const NEW: Self = unsafe { core::mem::zeroed() };
-
     /// Calls `with` with the record, unless somebody else holds it.
     fn hold<R>(&self, with: impl FnOnce(&mut Record) -> R) -> Option<R> {
         if self.held.swap(true, Ordering::Acquire) {
@@ -89,10 +86,16 @@ impl Slot {
 }
 
 impl<const N: usize> Ring<N> {
+    // SAFETY: zeros are a record, which has numbers and a `bool`.
+    const EMPTY: Record = unsafe { core::mem::zeroed() };
+
     /// No records. A constant: none is made on the stack.
     pub const fn new() -> Self {
         const { assert!(N.is_power_of_two(), "the number of a record wraps") };
-        Self { slots: [const { Slot::NEW }; N], written: AtomicU32::new(0) }
+        let slots =
+            [const { Slot { held: AtomicBool::new(false), record: UnsafeCell::new(Self::EMPTY) } };
+                N];
+        Self { slots, written: AtomicU32::new(0) }
     }
 
     /// Its two ends. A reader can be cloned.

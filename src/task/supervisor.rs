@@ -309,7 +309,7 @@ impl DriveHandle for Supervisor {
         control::IS_OFF.load(Ordering::Relaxed)
     }
 
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
         extended(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
     }
 

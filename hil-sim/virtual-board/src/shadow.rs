@@ -122,7 +122,7 @@ impl Shadow {
     ///
     /// # Errors
     /// They make no drive.
-    pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
+    pub fn restart(&mut self, mut settings: FirmwareSettings) -> Result<()> {
         self.settings = Staging::new(settings);
         self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
         self.orders.clear();

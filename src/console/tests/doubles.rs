@@ -107,7 +107,7 @@ impl DriveHandle for FakeDrive {
     fn is_off(&self) -> bool {
         matches!(self.drive.state(), State::Off | State::Fault(_))
     }
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
         settings.build()
     }
     fn configured(&mut self, settings: &FirmwareSettings) {
