@@ -142,7 +142,7 @@ impl Console {
             self.ended = true;
         });
         if self.commissioned.is_none() {
-            self.commissioned = drive.commissioned().map(|news| (news, 0));
+            self.commissioned = drive.session().news().map(|news| (news, 0));
         }
         if self.homed.is_none() {
             self.homed = self.go_on_homing(drive);

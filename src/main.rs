@@ -61,16 +61,5 @@ fn run(board: task::bring_up::Board) -> ! {
 /// Explains how to flash.
 #[cfg(not(target_os = "none"))]
 fn main() {
-    println!(
-        "\
-This is the firmware of the drive; it runs on an STM32G474, not on this computer.
-
-    cargo firmware      builds the image for the board
-    cargo xtask flash   builds it, writes it through a debug probe and shows its log
-    cargo sim           runs the same drive against a simulated motor, here
-
-Flashing needs probe-rs: cargo install probe-rs-tools --locked
-Before flashing: mains off, and the driver inputs of the power stage checked: many drivers switch a low side on
-at a LOW input, where the outputs of another board's firmware would short the motor (docs/boards.md)."
-    );
+    print!("{}", include_str!("README.md"));
 }

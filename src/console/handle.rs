@@ -2,14 +2,13 @@
 
 use core::fmt::{self, Write};
 
-use drive_core::commission::Step;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
-use drive_core::{Accepted, Coefficients, Command, Refused, Settings};
+use drive_core::{Accepted, Coefficients, Command, Refused};
 use thiserror::Error;
 
 use super::grammar::Level;
-use crate::commissioning::News;
+use crate::commissioning::Session;
 use crate::link::Status;
 use crate::link::ring::Record;
 use crate::link::trace::{self, Plan};
@@ -54,12 +53,8 @@ pub trait DriveHandle {
     fn configured(&mut self, settings: &FirmwareSettings);
     /// State of the tracking of the rotor time constant, if it is enabled.
     fn tracking(&self) -> Option<Report>;
-    /// Begins the steps of the commissioning from `first` to `last`. Only while the outputs are off.
-    fn commission(&mut self, first: Step, last: Step);
-    /// The news of the commissioning since the last call.
-    fn commissioned(&mut self) -> Option<News>;
-    /// These settings with what the commissioning has found; `None` if that changes nothing.
-    fn found(&self, settings: &Settings) -> Option<Settings>;
+    /// The commissioning.
+    fn session(&mut self) -> &mut Session;
     /// Saves the settings. Takes up to two erasures: only while the outputs are off.
     ///
     /// # Errors

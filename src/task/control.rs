@@ -31,6 +31,7 @@ use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
 
 /// The drive and its surroundings, owned by the interrupt.
+#[repr(C)] // the references to the memory shared with the main loop follow each other
 pub struct Control {
     /// The drive.
     pub drive: Drive,
@@ -107,19 +108,17 @@ impl Control {
 
 /// The data that the interrupt reads and writes only when its drive counts a change, and the address of that count. The
 /// data are the coefficients and the references to the memory shared with the main loop.
-pub fn constants() -> ([MemoryRange; 5], u32) {
+pub fn constants() -> ([MemoryRange; 2], u32) {
     let control = RUNNING.0.get() as usize + offset_of!(Running, control);
     let range = |at: usize, bytes: usize| MemoryRange {
         address: (control + at) as u32,
         words: (bytes / size_of::<u32>()) as u32,
     };
     let drive = offset_of!(Control, drive);
+    let references = offset_of!(Control, status);
     let constants = [
         range(drive + Drive::COEFFICIENTS.start, Drive::COEFFICIENTS.len()),
-        range(offset_of!(Control, status), size_of::<Sender<'static, Status>>()),
-        range(offset_of!(Control, commands), size_of::<Receiver<'static, Command>>()),
-        range(offset_of!(Control, answers), size_of::<Sender<'static, Answer>>()),
-        range(offset_of!(Control, trace), size_of::<Recorder<'static, { board::TRACE_RECORDS }>>()),
+        range(references, size_of::<Control>() - references),
     ];
     (constants, (control + drive + Drive::CHANGES) as u32)
 }

@@ -5,7 +5,6 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use defmt::Display2Format;
-use drive_core::commission::Step;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{Scales, Settings, SettingsError};
@@ -21,7 +20,7 @@ use crate::task::guard::{Guard, extended};
 use crate::task::hours::Hours;
 use crate::task::sources::Sources;
 use induction_drive::board;
-use induction_drive::commissioning::{Action, News, Session};
+use induction_drive::commissioning::{Action, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
@@ -159,10 +158,10 @@ impl Supervisor {
         self.commission();
         // It designs for seconds: the console needs the time behind it.
         self.clock.update();
-        let (now, off, pages) = (self.clock.ms(), self.is_off(), self.chip.saved.flash());
+        let (now, off, pages) = (self.clock.ms, self.is_off(), self.chip.saved.flash());
         self.hours.count(now, off, &mut self.guard, pages);
         self.link.iter_mut().for_each(|link| link.sources.watch(now));
-        self.clock.ms()
+        self.clock.ms
     }
 
     /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
@@ -180,7 +179,7 @@ impl Supervisor {
                 stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
             }
         }
-        if self.clock.ms() > board::WELL_AFTER_MS && !self.well {
+        if self.clock.ms > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();
         }
@@ -323,16 +322,8 @@ impl DriveHandle for Supervisor {
         self.tracking.as_ref().map(Tracking::report)
     }
 
-    fn commission(&mut self, first: Step, last: Step) {
-        self.commissioning.begin(first, last);
-    }
-
-    fn commissioned(&mut self) -> Option<News> {
-        self.commissioning.news()
-    }
-
-    fn found(&self, settings: &Settings) -> Option<Settings> {
-        self.commissioning.found(settings)
+    fn session(&mut self) -> &mut Session {
+        self.commissioning
     }
 
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
@@ -342,7 +333,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn history(&self) -> &History {
-        self.hours.history()
+        &self.hours.history
     }
 
     fn begin_trace(&mut self, plan: &Plan) -> bool {

@@ -4,14 +4,13 @@ use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
 use drive_core::carrier::asymmetry::Asymmetry;
-use drive_core::commission::Step;
 use drive_core::identify::learning::{Fitted, Learned, Verdict};
 use drive_core::settings::SettingsError;
 use drive_core::settings::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, Settings, State};
 use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
-use induction_drive::commissioning::{News, Session};
+use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
 use induction_drive::link::Status;
@@ -117,14 +116,8 @@ impl DriveHandle for FakeDrive {
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
     }
-    fn commission(&mut self, first: Step, last: Step) {
-        self.session.begin(first, last);
-    }
-    fn commissioned(&mut self) -> Option<News> {
-        self.session.news()
-    }
-    fn found(&self, settings: &Settings) -> Option<Settings> {
-        self.session.found(settings)
+    fn session(&mut self) -> &mut Session {
+        &mut self.session
     }
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
         if self.worn_out {
