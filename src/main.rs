@@ -50,7 +50,6 @@ fn run(board: task::bring_up::Board) -> ! {
         let now_ms = supervisor.listen();
         console.poll(&mut port, supervisor, now_ms);
         console.serve(&mut bus, supervisor, now_ms);
-        supervisor.check();
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

@@ -43,11 +43,6 @@ impl Wire {
         self.stream.as_ref().map_or(0.0, |stream| stream.alive_s)
     }
 
-    /// Asks for a rate, bits per second.
-    pub fn want(&mut self, baud: u32) {
-        self.wanted = baud;
-    }
-
     /// Makes the frame of a record, and counts those before it that were dropped.
     fn make(&mut self, record: &Record, settings: &Settings) {
         let Some(stream) = &self.stream else { return };
@@ -103,7 +98,7 @@ impl Console {
     /// Asks for a rate; a stream ends.
     pub(super) fn baud(&mut self, baud: u32, drive: &mut impl DriveHandle) {
         self.stop_stream(drive);
-        self.wire.want(baud);
+        self.wire.wanted = baud;
         self.ok();
     }
 
@@ -165,7 +160,7 @@ impl Console {
                 .is_some_and(|heard| now_ms.wrapping_sub(heard) > board::SERIAL_FALL_BACK_MS)
         {
             self.stop_stream(drive);
-            self.wire.want(usual);
+            self.wire.wanted = usual;
         }
     }
 }

@@ -117,31 +117,23 @@ impl Supervisor {
         commissioning: &'static mut Session,
         settings: &Settings,
     ) -> &'a mut Self {
-        let clock = Clock::new();
-        let hours = Hours::new(history, chip.dual_bank);
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.as_ref().and_then(|_| Check::new());
-        let (status, level, well) = (None, Level::Info, false);
         place.write(Self {
             link,
-            status,
-            level,
-            clock,
+            status: None,
+            level: Level::Info,
+            clock: Clock::new(),
             guard,
             check,
-            well,
+            well: false,
+            hours: Hours::new(history, chip.dual_bank),
             chip,
             tracking: Tracking::new(settings),
             commissioning,
-            hours,
             scales: (settings.scales, settings.motor.pole_pairs),
         })
-    }
-
-    /// Checks a slice of the control's memory and of its registers.
-    pub fn check(&mut self) {
-        self.check.iter_mut().for_each(Check::slice);
     }
 
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
@@ -164,8 +156,10 @@ impl Supervisor {
         self.clock.ms
     }
 
-    /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
+    /// Checks a slice of the control's memory and of its registers, and feeds the watchdog if the rule allows it; called at
+    /// the end of each pass of the main loop.
     pub fn feed_watchdog(&mut self) {
+        self.check.iter_mut().for_each(Check::slice);
         let Some((watchdog, rule)) = &mut self.guard else { return };
         watchdog.run_in_halts();
         let missed = control::MISSED.load(Ordering::Relaxed);
