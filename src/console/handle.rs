@@ -70,7 +70,7 @@ pub trait DriveHandle {
     fn tracing(&self) -> bool;
     /// Record number `i` of the last trace, and its number from the record of the trigger.
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
-    /// Asks for a record of each control period whose number is a multiple of `divider`; 0 ends it.
+    /// Asks for a record of each control period whose number is a multiple of `divider`, or of one of the next two; 0 ends it.
     fn stream(&mut self, divider: u16);
     /// The next record for the stream.
     fn sampled(&mut self) -> Option<Record>;

@@ -24,7 +24,7 @@ pub(super) struct Wire {
     waiting: usize,
     sent: u32,
     dropped: u32,
-    /// Control period and sequence number of the last frame; `None` before the first.
+    /// Control period of the last frame, in dividers, and its sequence number; `None` before the first.
     last: Option<(u32, u16)>,
     /// Bits per second in force, and those wanted.
     baud: u32,
@@ -50,13 +50,13 @@ impl Wire {
         stream.choice.record(&mut values, &record.telemetry, &record.codes);
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
-        let period = record.period;
-        let (dropped, sequence) = self.last.map_or((0, 0), |(last, sequence)| {
-            let due = period.wrapping_sub(last) / u32::from(stream.divider).max(1);
-            (due.saturating_sub(1), sequence.wrapping_add(due as u16))
-        });
-        self.dropped = self.dropped.wrapping_add(dropped);
-        self.last = Some((period, sequence));
+        // It has waited for less than a divider.
+        let (period, now) = (record.period, record.period / u32::from(stream.divider).max(1));
+        let (last, before) = self.last.unwrap_or((now.wrapping_sub(1), u16::MAX));
+        let due = now.wrapping_sub(last);
+        let sequence = before.wrapping_add(due as u16);
+        self.dropped = self.dropped.wrapping_add(due.saturating_sub(1));
+        self.last = Some((now, sequence));
         self.waiting = Frame { sequence, period, values }.write(&mut self.frame);
     }
 }

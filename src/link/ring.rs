@@ -22,8 +22,10 @@ pub struct Record {
     pub telemetry: Telemetry,
     /// Codes of the current sensors.
     pub codes: CurrentCodes,
-    /// Whether every period is recorded, for tracking and commissioning.
+    /// Whether it is for tracking and commissioning, which every period is while they observe.
     pub observed: bool,
+    /// Whether it is for the stream.
+    pub streamed: bool,
 }
 
 impl Record {
@@ -117,11 +119,9 @@ impl<const N: usize> Writer<'_, N> {
     }
 }
 
-impl<const N: usize> Iterator for Reader<'_, N> {
-    type Item = Record;
-
-    /// The next record that is left; `None` if there is none yet, or if it is being overwritten just now.
-    fn next(&mut self) -> Option<Record> {
+impl<const N: usize> Reader<'_, N> {
+    /// Passes the next record that is left to `with`; `None` if there is none yet, or if it is being overwritten just now.
+    pub fn take_with<R>(&mut self, with: impl FnOnce(&Record) -> R) -> Option<R> {
         let left =
             |next: u32| self.ring.written.load(Ordering::Acquire).wrapping_sub(next) as usize;
         match left(self.next) {
@@ -131,9 +131,17 @@ impl<const N: usize> Iterator for Reader<'_, N> {
         }
         let slot = self.ring.slots.get(self.next as usize % N)?;
         // Overtaken before it was held?
-        let record = slot.hold(|record| (left(self.next) <= N).then_some(*record))??;
+        let result = slot.hold(|record| (left(self.next) <= N).then(|| with(record)))??;
         self.next = self.next.wrapping_add(1);
-        Some(record)
+        Some(result)
+    }
+}
+
+impl<const N: usize> Iterator for Reader<'_, N> {
+    type Item = Record;
+
+    fn next(&mut self) -> Option<Record> {
+        self.take_with(|record| *record)
     }
 }
 

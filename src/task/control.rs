@@ -97,6 +97,7 @@ impl Control {
             reported: None,
             report_left: 0,
             report_late: 0,
+            stream_due: false,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -155,6 +156,7 @@ struct Running {
     report_left: u8,
     /// Periods for which one has waited.
     report_late: u8,
+    stream_due: bool,
 }
 
 #[interrupt]
@@ -276,22 +278,30 @@ impl Running {
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
         // A report is sent in two periods: its signals, then the rest. Neither in the period of a command or, for two periods
-        // at most, of a record of the trace: each of these takes long enough.
+        // at most, of a record of trace or stream: each of these takes long enough.
         let due =
             self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
         if due && self.report_left == 0 {
             self.report_left = 2;
         }
-        let waits = self.report_left > 0 && (commanded || traced && self.report_late < 2);
+        // A sample of the stream waits as well, as long as it differs from the next one.
+        let every = STREAMED.load(Ordering::Relaxed);
+        let since = self.periods.checked_rem(every);
+        self.stream_due |= since == Some(0);
+        let hurries = every < 3 || since == Some(2);
+        let streamed = self.stream_due && (hurries || !(commanded || traced));
+        self.stream_due &= !streamed;
+        let busy = (traced || streamed) && self.report_late < 2;
+        let waits = self.report_left > 0 && (commanded || busy);
         self.report_late = if waits { self.report_late.saturating_add(1) } else { 0 };
         let part = if waits { 0 } else { self.report_left };
         self.report_left -= u8::from(part > 0);
         let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
         let observed = drive.tracks_rotor() || drive.excites() || commissioned;
-        let streamed = self.periods.is_multiple_of(STREAMED.load(Ordering::Relaxed));
         if observed || streamed || part == 2 {
             signals.write(|record| {
-                (record.period, record.codes, record.observed) = (self.periods, codes, observed);
+                (record.period, record.codes) = (self.periods, codes);
+                (record.observed, record.streamed) = (observed, streamed);
                 record.set(drive.telemetry());
             });
         }

@@ -182,13 +182,19 @@ impl Supervisor {
     /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
     #[inline(never)] // a command takes much stack
     fn track(&mut self) {
-        let next = |link: &mut ControlLink| link.observed.find(|period| period.observed);
-        while let Some(period) = self.link.as_mut().and_then(next) {
-            if self.commissioning.is_running() {
-                self.commissioning.take(&period);
-                continue;
-            }
-            let tau_r = self.tracking.as_mut().and_then(|tracking| tracking.take(&period));
+        while let Some(link) = &mut self.link {
+            // Where it lies: a copy of each would be most of the time.
+            let tau_r = link.observed.take_with(|period| {
+                if !period.observed {
+                    return None;
+                }
+                if self.commissioning.is_running() {
+                    self.commissioning.take(period);
+                    return None;
+                }
+                self.tracking.as_mut()?.take(period)
+            });
+            let Some(tau_r) = tau_r else { return };
             let Some(tau_r) = tau_r else { continue };
             // Refused when the drive has just stopped.
             let answer = self.command(Command::RotorTimeConstant(tau_r));
@@ -354,8 +360,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn sampled(&mut self) -> Option<Period> {
-        let divider = control::STREAMED.load(Ordering::Relaxed);
-        self.link.as_mut()?.streamed.find(|period| period.period.is_multiple_of(divider))
+        self.link.as_mut()?.streamed.find(|period| period.streamed)
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
