@@ -321,8 +321,6 @@ const _: () = {
 pub const SERIAL_FALL_BACK_MS: u32 = 1000;
 /// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
 pub const STREAM_SHARE: u32 = 80;
-/// Samples for the stream that can wait: 7.5 ms at 2000 a second, longer than the watchdog allows the main loop to be late.
-pub const STREAM_SAMPLES: usize = 15;
 /// Size of the receive queue, which holds one byte less: 22 ms at full rate; the main loop reads a thousand times
 /// as often.
 pub const SERIAL_RECEIVE: usize = 256;
@@ -330,10 +328,12 @@ pub const SERIAL_RECEIVE: usize = 256;
 pub const SERIAL_TRANSMIT: usize = 512;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
-/// Size of the queue of control periods for the identification in the main loop. It holds one less, 10.5 ms: longer
-/// than the watchdog allows the main loop to be late.
-pub const OBSERVED_PERIODS: usize = 64;
-const _: () = assert!((OBSERVED_PERIODS as u32 - 1) * 1_000_000 / PWM_HZ > 2 * WATCHDOG_US);
+/// Control periods that the ring holds for stream, identification and commissioning in the main loop: 5.3 ms if every
+/// period is recorded, longer than the watchdog allows the main loop to be late, with its slowest clock.
+pub const RECORDED_PERIODS: usize = 32;
+const _: () = assert!(
+    (RECORDED_PERIODS as u32 - 1) * WATCHDOG_HZ > (WATCHDOG_RELOAD as u32 + 1) * 4 * PWM_HZ
+);
 /// Longest wait for the answer to a command, us: the next period takes it, within 167 us.
 pub const ANSWER_TIMEOUT_US: u32 = 500;
 const _: () = assert!(ANSWER_TIMEOUT_US > 2 * 1_000_000 / PWM_HZ);

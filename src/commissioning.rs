@@ -4,7 +4,7 @@ use drive_commission::{Collector, Commissioning, Next, Record, Refusal, Report, 
 use drive_core::{Command, Excited, Mode, Refused, Stop};
 use drive_settings::Settings;
 
-use crate::rotor_tracking::Observation;
+use crate::link::ring::Record as Period;
 
 /// News of a commissioning.
 // Exists once at a time.
@@ -55,6 +55,7 @@ impl Session {
     }
 
     /// Forgets what was found: the drive has taken these settings.
+    #[inline(never)]
     pub fn configured(&mut self, settings: &Settings) {
         self.commissioning = Commissioning::new(settings);
     }
@@ -71,14 +72,15 @@ impl Session {
         self.commissioning.is_running()
     }
 
-    /// Takes the next period.
-    pub fn take(&mut self, seen: &Observation) {
-        if seen.number != self.next {
+    /// Takes the next period of those that are [observed](Period::observed).
+    pub fn take(&mut self, seen: &Period) {
+        if seen.period != self.next {
             self.sums.gap();
         }
-        self.next = seen.number.wrapping_add(1);
-        self.sums.push(seen.measured, seen.realised, seen.dc_link);
-        self.sums.push_motion(seen.reference.q, seen.rotor_freq);
+        self.next = seen.period.wrapping_add(1);
+        let signals = &seen.telemetry;
+        self.sums.push(signals.measured, signals.realised, signals.dc_link);
+        self.sums.push_motion(signals.reference.q, signals.rotor_freq);
     }
 
     /// Goes on; what is to be done now.

@@ -132,6 +132,7 @@ impl Console {
     }
 
     /// Reads received bytes and writes replies; never waits. `now_ms` wraps.
+    #[inline(never)] // its stack does not add to that of `serve`, which designs as well
     pub fn poll(&mut self, port: &mut impl Port, drive: &mut impl DriveHandle, now_ms: u32) {
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
@@ -141,7 +142,7 @@ impl Console {
             self.ended = true;
         });
         if self.commissioned.is_none() {
-            self.commissioned = drive.commissioned().map(|news| (news, 0));
+            self.commissioned = drive.session().news().map(|news| (news, 0));
         }
         if self.homed.is_none() {
             self.homed = self.go_on_homing(drive);
@@ -209,6 +210,7 @@ impl Console {
     }
 
     /// Writes the next announcement, if there is one, on a line of its own.
+    #[inline(never)]
     fn announce(&mut self, drive: &impl DriveHandle, now_ms: u32) {
         let Some(status) = drive.status() else { return };
         let typed = self.settings.in_force().command.echo && self.reader.begun();

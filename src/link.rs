@@ -1,7 +1,7 @@
 //! Communication between the main loop and the control interrupt.
 
 pub mod mailbox;
-pub mod stream;
+pub mod ring;
 pub mod trace;
 
 use drive_core::{Accepted, Excited, Hardware, Limiting, Refused, Room, Sample, State, Telemetry};
@@ -19,7 +19,7 @@ pub struct Status {
     pub state: State,
     /// Last input of the drive.
     pub sample: Sample,
-    /// Signals of the drive in the same period.
+    /// Signals of the drive, from the [ring](ring).
     pub telemetry: Telemetry,
     /// Core cycles of the longest control period so far.
     pub worst_cycles: [u32; 2],

@@ -33,19 +33,23 @@ fn main() -> ! {
 
     chip::memory::paint_stack();
     defmt::info!("induction-drive {}", task::supervisor::VERSION);
-    let Ok(task::bring_up::Board { settings, mut port, mut bus, mut supervisor }) =
-        task::bring_up::bring_up()
-    else {
-        chip::stop::end(Reason::Panic, [line!(), 0, 0, 0])
-    };
-    let mut console = induction_drive::console::Console::new(settings);
-    console.greet(&supervisor);
+    let mut supervisor = core::mem::MaybeUninit::uninit();
+    match task::bring_up::bring_up(&mut supervisor) {
+        Ok(board) => run(board),
+        Err(_) => chip::stop::end(Reason::Panic, [line!(), 0, 0, 0]),
+    }
+}
 
+/// The main loop.
+#[cfg(target_os = "none")]
+#[inline(never)] // its stack comes in the place of that of the start
+fn run(board: task::bring_up::Board) -> ! {
+    let task::bring_up::Board { console, mut port, mut bus, supervisor } = board;
+    console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        console.poll(&mut port, &mut supervisor, now_ms);
-        console.serve(&mut bus, &mut supervisor, now_ms);
-        supervisor.check();
+        console.poll(&mut port, supervisor, now_ms);
+        console.serve(&mut bus, supervisor, now_ms);
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.
@@ -56,16 +60,5 @@ fn main() -> ! {
 /// Explains how to flash.
 #[cfg(not(target_os = "none"))]
 fn main() {
-    println!(
-        "\
-This is the firmware of the drive; it runs on an STM32G474, not on this computer.
-
-    cargo firmware      builds the image for the board
-    cargo xtask flash   builds it, writes it through a debug probe and shows its log
-    cargo sim           runs the same drive against a simulated motor, here
-
-Flashing needs probe-rs: cargo install probe-rs-tools --locked
-Before flashing: mains off, and the driver inputs of the power stage checked: many drivers switch a low side on
-at a LOW input, where the outputs of another board's firmware would short the motor (docs/boards.md)."
-    );
+    print!("{}", include_str!("README.md"));
 }

@@ -5,33 +5,15 @@ use core::f32::consts::TAU;
 use core::fmt;
 
 use drive_core::io::PERIOD_S;
-use drive_core::{Accepted, AlphaBeta, AngleSource, Dq, Telemetry};
+use drive_core::{Accepted, AngleSource};
 use drive_settings::Settings;
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 
 use crate::board;
+use crate::link::ring::Record;
 
 /// Control periods from one fit of the machine to the next: ten a second.
 const PERIODS_PER_FIT: u32 = board::PWM_HZ / 10;
-
-/// Signals of one control period. The numbers count up while the drive regulates or excites the motor; a missing number is a gap.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
-    pub(crate) number: u32,
-    pub(crate) measured: AlphaBeta,
-    pub(crate) realised: AlphaBeta,
-    pub(crate) dc_link: f32,
-    pub(crate) reference: Dq,
-    pub(crate) rotor_freq: f32,
-}
-
-impl Observation {
-    /// The signals of control period `number`.
-    pub fn new(number: u32, t: &Telemetry) -> Self {
-        let Telemetry { measured, realised, dc_link, reference, rotor_freq, .. } = *t;
-        Self { number, measured, realised, dc_link, reference, rotor_freq }
-    }
-}
 
 /// The estimate, and the value that the drive uses.
 #[derive(Clone, Copy, Debug)]
@@ -69,28 +51,29 @@ impl Tracking {
         })
     }
 
-    /// Takes the next period. Ten times a second it returns the estimated rotor time constant, s, for
+    /// Takes the next period of those that are [observed](Record::observed). Ten times a second it returns the estimated rotor time constant, s, for
     /// [`Command::RotorTimeConstant`](drive_core::Command::RotorTimeConstant), if there is one.
-    pub fn take(&mut self, seen: &Observation) -> Option<f32> {
-        if seen.number != self.next {
+    pub fn take(&mut self, seen: &Record) -> Option<f32> {
+        if seen.period != self.next {
             // The drive did not regulate, or the main loop came too late.
             self.online.restart();
             self.wait = PERIODS_PER_FIT;
             self.report.estimate = Err(NoEstimate::Settling);
         }
-        self.next = seen.number.wrapping_add(1);
-        self.online.push(seen.measured, seen.realised);
+        self.next = seen.period.wrapping_add(1);
+        let signals = &seen.telemetry;
+        self.online.push(signals.measured, signals.realised);
         self.wait = self.wait.saturating_sub(1);
         if self.wait > 0 {
             return None;
         }
         self.wait = PERIODS_PER_FIT;
-        let omega_m = seen.rotor_freq * (TAU / PERIOD_S);
+        let omega_m = signals.rotor_freq * (TAU / PERIOD_S);
         let speed = match self.source {
             AngleSource::Encoder => SpeedInput::Known(omega_m),
             AngleSource::Injection => SpeedInput::Guess(omega_m),
         };
-        self.report.estimate = self.online.refine(seen.reference, speed);
+        self.report.estimate = self.online.refine(signals.reference, speed);
         self.report.estimate.ok().map(|tracked| tracked.tau_r)
     }
 
@@ -126,7 +109,7 @@ mod tests {
     use hil_sim::rig::Rig;
 
     use super::*;
-    use heapless::spsc::Queue;
+    use crate::link::ring::Ring;
 
     /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than it believes, and its
     /// tracking.
@@ -143,9 +126,9 @@ mod tests {
         (rig, Tracking::new(&settings).unwrap())
     }
 
-    fn observe(rig: &mut Rig, number: u32) -> Observation {
+    fn observe(rig: &mut Rig, period: u32) -> Record {
         rig.step();
-        Observation::new(number, rig.drive.telemetry())
+        Record { period, telemetry: *rig.drive.telemetry(), ..Record::default() }
     }
 
     #[test]
@@ -181,16 +164,16 @@ mod tests {
     #[test]
     fn a_main_loop_that_comes_too_late_begins_anew() {
         let (mut rig, mut tracking) = tracked();
-        let mut queue = Queue::<Observation, { board::OBSERVED_PERIODS }>::new();
-        let (mut write, mut read) = queue.split();
-        let (mut orders, mut lost) = (Vec::new(), 0);
+        let mut ring = Ring::<{ board::RECORDED_PERIODS }>::new();
+        let (mut writer, mut reader) = ring.split();
+        let (mut orders, mut taken) = (Vec::new(), 0);
         for n in 0..60_000_u32 {
-            if write.enqueue(observe(&mut rig, n)).is_err() {
-                lost += 1;
-            }
+            let seen = observe(&mut rig, n);
+            writer.write(|record| *record = seen);
             // It hangs for 100 periods once, and else comes every 20.
             if n % 20 == 19 && !(30_000..30_100).contains(&n) {
-                while let Some(seen) = read.dequeue() {
+                for seen in reader.by_ref() {
+                    taken += 1;
                     orders.extend(tracking.take(&seen).map(|_| n));
                 }
             }
@@ -198,7 +181,8 @@ mod tests {
                 assert_eq!(tracking.report().estimate, Err(NoEstimate::Settling));
             }
         }
-        assert!((30..60).contains(&lost), "{lost}");
+        // The rest of the pause, and of the pass before it, does not fit.
+        assert_eq!(taken, 60_000 - 120 + board::RECORDED_PERIODS);
         let (before, after): (Vec<u32>, Vec<u32>) = orders.iter().partition(|n| **n < 30_000);
         assert!(before.len() > 15 && after.len() > 15, "{orders:?}");
         // The memory of the least squares is filled again first.

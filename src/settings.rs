@@ -97,7 +97,8 @@ impl FirmwareSettings {
     /// # Errors
     /// The first value out of range, or the design rule that cannot be met.
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
-        self.build_for(board::dead_time(self.drive.inverter.dead_time_s).1)
+        let mut own = *self;
+        own.build_for(board::dead_time(self.drive.inverter.dead_time_s).1)
     }
 
     /// The same as [`build`](Self::build) for a timer whose dead time, s, differs from the setting: the timer takes
@@ -105,12 +106,12 @@ impl FirmwareSettings {
     ///
     /// # Errors
     /// As [`build`](Self::build).
-    pub fn build_for(&self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
+    pub fn build_for(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
         self.check()?;
-        let mut drive = self.drive;
-        drive.inverter.dead_time_s = dead_time_s;
-        // Changed in place: a copy would take 2 KiB more of the stack.
-        let mut built = drive.build();
+        // Changed in place and back, as the coefficients are: copies would take 2 KiB more of the stack.
+        let own = core::mem::replace(&mut self.drive.inverter.dead_time_s, dead_time_s);
+        let mut built = self.drive.build();
+        self.drive.inverter.dead_time_s = own;
         if let (Ok(coefficients), Some(learned)) = (&mut built, &self.learned) {
             coefficients.take(learned);
         }

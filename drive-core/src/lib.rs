@@ -67,8 +67,8 @@ pub mod table;
 
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode,
-    Protection, Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
+    Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode, Protection,
+    Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
 pub use flux::AngleSource;

@@ -29,7 +29,8 @@ fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bo
         rig.step();
         let seen = rig.drive.excites() || rig.drive.state().regulates();
         if seen && !lost(n, session) {
-            session.take(&Observation::new(n as u32, rig.drive.telemetry()));
+            let telemetry = *rig.drive.telemetry();
+            session.take(&Period { period: n as u32, telemetry, ..Period::default() });
         }
         if !n.is_multiple_of(PASS) {
             continue;

@@ -40,6 +40,7 @@ const REBOOT_MS: u32 = 100;
 const DIGITS: usize = 4;
 
 impl Console {
+    #[inline(never)]
     pub(super) fn answer(&mut self, request: Request, drive: &mut impl DriveHandle) {
         match request {
             Request::Help => self.begin(ListKind::Help),

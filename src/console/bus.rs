@@ -116,6 +116,7 @@ impl Bus {
 
 impl Console {
     /// Answers a frame of the bus, if there is one, and follows its orders; never waits. `now_ms` wraps.
+    #[inline(never)]
     pub fn serve(&mut self, port: &mut impl Port, drive: &mut impl DriveHandle, now_ms: u32) {
         let settings = self.settings.in_force().bus;
         port.set_line(settings.baud, settings.format);

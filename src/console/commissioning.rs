@@ -19,7 +19,7 @@ impl Console {
             None => self.error(&drive.no_control()),
             Some(State::Fault(fault)) => self.error(&Refused::Fault(fault)),
             Some(_) => {
-                drive.commission(first, last);
+                drive.session().begin(first, last);
                 if last < Step::Inertia {
                     self.ok();
                 } else {
@@ -36,7 +36,7 @@ impl Console {
         if !self.may_stage(drive) {
             return;
         }
-        match drive.found(&self.settings.latest().drive) {
+        match drive.session().found(&self.settings.latest().drive) {
             None => self.error(&"nothing new was found: `commission` first"),
             Some(found) => {
                 self.settings.stage(found);

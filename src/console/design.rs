@@ -20,7 +20,7 @@ pub(super) enum NotTaken {
 #[inline(never)]
 pub(super) fn configure(
     drive: &mut impl DriveHandle,
-    settings: &FirmwareSettings,
+    settings: &mut FirmwareSettings,
 ) -> Result<(), NotTaken> {
     let taken = match drive.build(settings) {
         Ok(coefficients) => drive.command(Command::Configure(coefficients)),

@@ -2,16 +2,15 @@
 
 use core::fmt::{self, Write};
 
-use drive_commission::Step;
 use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Refused};
-use drive_settings::{Settings, SettingsError};
+use drive_settings::SettingsError;
 use thiserror::Error;
 
 use super::grammar::Level;
-use crate::commissioning::News;
+use crate::commissioning::Session;
 use crate::link::Status;
-use crate::link::stream::Sample;
+use crate::link::ring::Record;
 use crate::link::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
@@ -49,17 +48,13 @@ pub trait DriveHandle {
     ///
     /// # Errors
     /// A value out of range, or a design rule that cannot be met.
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError>;
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
     /// State of the tracking of the rotor time constant, if it is enabled.
     fn tracking(&self) -> Option<Report>;
-    /// Begins the steps of the commissioning from `first` to `last`. Only while the outputs are off.
-    fn commission(&mut self, first: Step, last: Step);
-    /// The news of the commissioning since the last call.
-    fn commissioned(&mut self) -> Option<News>;
-    /// These settings with what the commissioning has found; `None` if that changes nothing.
-    fn found(&self, settings: &Settings) -> Option<Settings>;
+    /// The commissioning.
+    fn session(&mut self) -> &mut Session;
     /// Saves the settings. Takes up to two erasures: only while the outputs are off.
     ///
     /// # Errors
@@ -75,10 +70,10 @@ pub trait DriveHandle {
     fn tracing(&self) -> bool;
     /// Record number `i` of the last trace, and its number from the record of the trigger.
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
-    /// Asks for a sample of the signals every `divider` control periods; 0 ends it.
+    /// Asks for a record of each control period whose number is a multiple of `divider`, or of one of the next two; 0 ends it.
     fn stream(&mut self, divider: u16);
-    /// The next sample of the stream.
-    fn sampled(&mut self) -> Option<Sample>;
+    /// The next record for the stream.
+    fn sampled(&mut self) -> Option<Record>;
     /// Resets the chip. Only while the outputs are off.
     fn reboot(&mut self);
     /// Calls `show` with the result of a learning that ended since the last call, accepted or not.

@@ -11,7 +11,7 @@ use super::Console;
 use super::grammar::Stream;
 use super::handle::{DriveHandle, Port};
 use crate::board;
-use crate::link::stream::Sample;
+use crate::link::ring::Record;
 use crate::link::trace::{self, SIGNALS};
 
 const _: () = assert!(trace::MOST == MOST_SIGNALS);
@@ -24,8 +24,8 @@ pub(super) struct Wire {
     waiting: usize,
     sent: u32,
     dropped: u32,
-    /// Sequence number of the next frame; `None` before the first.
-    next: Option<u16>,
+    /// Control period of the last frame, in dividers, and its sequence number; `None` before the first.
+    last: Option<(u32, u16)>,
     /// Bits per second in force, and those wanted.
     baud: u32,
     wanted: u32,
@@ -35,7 +35,7 @@ impl Wire {
     pub const fn new() -> Self {
         let baud = board::SERIAL_BAUD;
         let (frame, wanted) = ([0; LONGEST], baud);
-        Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, next: None, baud, wanted }
+        Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, last: None, baud, wanted }
     }
 
     /// Without a line for so long the drive stops, s; 0: never.
@@ -43,22 +43,20 @@ impl Wire {
         self.stream.as_ref().map_or(0.0, |stream| stream.alive_s)
     }
 
-    /// Asks for a rate, bits per second.
-    pub fn want(&mut self, baud: u32) {
-        self.wanted = baud;
-    }
-
-    /// Makes the frame of a sample, and counts those before it that were dropped.
-    fn make(&mut self, sample: &Sample, settings: &Settings) {
+    /// Makes the frame of a record, and counts those before it that were dropped.
+    fn make(&mut self, record: &Record, settings: &Settings) {
         let Some(stream) = &self.stream else { return };
         let mut values = trace::Record::default();
-        stream.choice.record(&mut values, &sample.telemetry, &sample.codes);
+        stream.choice.record(&mut values, &record.telemetry, &record.codes);
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
-        let Sample { sequence, period, .. } = *sample;
-        let missing = sequence.wrapping_sub(self.next.unwrap_or(sequence));
-        self.dropped = self.dropped.wrapping_add(missing.into());
-        self.next = Some(sequence.wrapping_add(1));
+        // It has waited for less than a divider.
+        let (period, now) = (record.period, record.period / u32::from(stream.divider).max(1));
+        let (last, before) = self.last.unwrap_or((now.wrapping_sub(1), u16::MAX));
+        let due = now.wrapping_sub(last);
+        let sequence = before.wrapping_add(due as u16);
+        self.dropped = self.dropped.wrapping_add(due.saturating_sub(1));
+        self.last = Some((now, sequence));
         self.waiting = Frame { sequence, period, values }.write(&mut self.frame);
     }
 }
@@ -100,7 +98,7 @@ impl Console {
     /// Asks for a rate; a stream ends.
     pub(super) fn baud(&mut self, baud: u32, drive: &mut impl DriveHandle) {
         self.stop_stream(drive);
-        self.wire.want(baud);
+        self.wire.wanted = baud;
         self.ok();
     }
 
@@ -124,11 +122,11 @@ impl Console {
     ) -> bool {
         let settings = &self.settings.in_force().drive;
         let wire = &mut self.wire;
-        // As many as the queue holds at most: the main loop goes on.
-        for _ in 0..=board::STREAM_SAMPLES {
+        // As many as the ring holds at most: the main loop goes on.
+        for _ in 0..=board::RECORDED_PERIODS {
             if wire.waiting == 0 {
-                let Some(sample) = drive.sampled() else { return true };
-                wire.make(&sample, settings);
+                let Some(record) = drive.sampled() else { return true };
+                wire.make(&record, settings);
             }
             if !port.write(wire.frame.get(..wire.waiting).unwrap_or_default()) {
                 return false;
@@ -162,7 +160,7 @@ impl Console {
                 .is_some_and(|heard| now_ms.wrapping_sub(heard) > board::SERIAL_FALL_BACK_MS)
         {
             self.stop_stream(drive);
-            self.wire.want(usual);
+            self.wire.wanted = usual;
         }
     }
 }

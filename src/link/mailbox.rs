@@ -40,15 +40,6 @@ impl<T> Mailbox<T> {
     }
 }
 
-/// The ends of mailboxes that are used in turn.
-pub fn split_all<T, const N: usize>(
-    boxes: &mut [Mailbox<T>; N],
-) -> ([Sender<'_, T>; N], [Receiver<'_, T>; N]) {
-    // One end each, because they borrow the mailboxes mutably.
-    let boxes = &*boxes;
-    (boxes.each_ref().map(Sender), boxes.each_ref().map(Receiver))
-}
-
 impl<T> Sender<'_, T> {
     /// Sends `message`; `false`, and nothing sent, while the last one has not been received.
     pub fn send(&mut self, message: T) -> bool {

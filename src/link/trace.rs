@@ -129,7 +129,8 @@ impl<const N: usize> Inner<N> {
             Trigger::Now => Some(size.saturating_sub(1)),
             Trigger::Fault => fault.then_some(0),
             Trigger::Level { signal, level, above } => {
-                let value = signals::value(signal, t, codes);
+                let values = signals::values(t, codes);
+                let value = values.get(usize::from(signal)).copied().unwrap_or(0.0);
                 let beyond = if above { value > level } else { value < level };
                 let before = (size / 4).min(self.written.saturating_sub(1));
                 beyond.then_some(size.saturating_sub(before + 1))

@@ -191,9 +191,9 @@ impl Staging {
 
     /// The settings to be put in force: the staged ones with the learned values that hold for them, or those in force once the
     /// drive has learned; `None` if nothing is to be done.
-    pub fn prepare(&mut self) -> Option<&FirmwareSettings> {
+    pub fn prepare(&mut self) -> Option<&mut FirmwareSettings> {
         let Some(Staged { settings, learned }) = &mut self.staged else {
-            return self.outdated.then_some(&self.in_force);
+            return self.outdated.then_some(&mut self.in_force);
         };
         if !*learned {
             settings.learned = self.in_force.learned;
@@ -227,7 +227,7 @@ impl Staging {
     pub fn begin_learning<E>(
         &mut self,
         again: bool,
-        configure: impl FnOnce(&FirmwareSettings) -> Result<(), E>,
+        configure: impl FnOnce(&mut FirmwareSettings) -> Result<(), E>,
     ) -> Result<(), E> {
         self.again = again;
         let Some(learned) = self.in_force.learned else { return Ok(()) };
@@ -236,7 +236,7 @@ impl Staging {
             return Ok(());
         }
         self.in_force.learned = None;
-        let configured = configure(&self.in_force);
+        let configured = configure(&mut self.in_force);
         self.in_force.learned = Some(learned);
         configured
     }

@@ -1,12 +1,12 @@
 //! From reset to a running control interrupt.
 
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use cortex_m::{asm, singleton};
 use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Drive, Stop};
 use drive_settings::SettingsError;
-use heapless::spsc::Queue;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
@@ -22,27 +22,28 @@ use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
+use induction_drive::console::Console;
 use induction_drive::link::mailbox::Mailbox;
+use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
-use induction_drive::link::{Answer, Status, stream};
+use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
-use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
 use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
-pub struct Board {
-    /// The saved settings, or the defaults.
-    pub settings: FirmwareSettings,
+pub struct Board<'a> {
+    /// The console, with the saved settings, or the defaults.
+    pub console: &'static mut Console,
     /// The serial port of the console.
     pub port: Port,
     /// The port of the field bus, if the board has one.
     pub bus: Option<rs485::Port>,
     /// The drive.
-    pub supervisor: Supervisor,
+    pub supervisor: &'a mut Supervisor,
 }
 
 const TWICE: StartError = "started twice";
@@ -54,7 +55,8 @@ const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to
 ///
 /// # Errors
 /// On a second call.
-pub fn bring_up() -> Result<Board, StartError> {
+#[inline(never)] // as the functions that it calls: their stacks come in each other's place
+pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, StartError> {
     let mut core = cortex_m::Peripherals::take().ok_or(TWICE)?;
     let chip = pac::Peripherals::take().ok_or(TWICE)?;
     let (cause, record, resets) = last_run(&chip.RCC);
@@ -98,8 +100,10 @@ pub fn bring_up() -> Result<Board, StartError> {
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
-    // Before the control runs: it is made with the interrupts masked.
-    let commissioning = singleton!(: Session = Session::new(&start.settings.drive)).ok_or(TWICE)?;
+    // Before the control runs: these are made with the interrupts masked.
+    let console = singleton!(: MaybeUninit<Console> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
     let link = || -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
@@ -109,6 +113,9 @@ pub fn bring_up() -> Result<Board, StartError> {
         }
         timed?;
         let coefficients = start.build(dead_time_s);
+        if let Some(why) = &start.rejected {
+            defmt::error!("{}", defmt::Display2Format(why));
+        }
         // After the design, which may have replaced refused settings by the defaults.
         let protection = board::protection(SELECTED, &start.settings.drive);
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
@@ -124,24 +131,24 @@ pub fn bring_up() -> Result<Board, StartError> {
     }
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
-    let Start { saved, history, mut settings, rejected } = start;
-    settings.boot_pin_counts = board::boot_pin_counts(options);
-    let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
-    *tracking = Tracking::new(&settings.drive);
+    start.settings.boot_pin_counts = board::boot_pin_counts(options);
+    let console = make(console, || Console::new(start.settings));
+    let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
-    let supervisor = Supervisor::new(
-        link.ok(),
-        watchdog,
-        chip,
-        history,
-        tracking,
-        commissioning,
-        &settings.drive,
-    );
-    Ok(Board { settings, port, bus, supervisor })
+    let link = link.ok();
+    let drive = &settings.drive;
+    let supervisor =
+        Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
+    Ok(Board { console, port, bus, supervisor })
+}
+
+/// Makes a value in its place, with a stack that comes in the place of those of other functions.
+#[inline(never)]
+fn make<T>(place: &'static mut MaybeUninit<T>, value: impl FnOnce() -> T) -> &'static mut T {
+    place.write(value())
 }
 
 /// The stored pages at start. All of them are read before an error of the flash becomes a break, for a power failure may
@@ -155,6 +162,7 @@ struct Start {
 }
 
 /// The saved settings, or the defaults.
+#[inline(never)]
 fn load(pages: Pages) -> Start {
     let defaults = FirmwareSettings::of_the_board();
     let (mut saved, loaded) = Saved::load(pages, &defaults);
@@ -174,16 +182,21 @@ fn load(pages: Pages) -> Start {
 impl Start {
     /// Computes the coefficients, which takes seconds, for the dead time of the timer, s. If the design rules refuse
     /// the saved settings, the defaults hold.
+    #[inline(never)]
     fn build(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
-        let built = self.settings.build_for(dead_time_s).or_else(|_| {
-            (self.settings, self.rejected) =
-                (FirmwareSettings::of_the_board(), Some(Rejected::Refused));
-            self.settings.build_for(dead_time_s)
-        });
-        if let Some(why) = self.rejected {
-            defmt::error!("{}", defmt::Display2Format(&why));
+        let built = self.settings.build_for(dead_time_s);
+        if built.is_ok() {
+            return built;
         }
-        built
+        self.refuse();
+        self.settings.build_for(dead_time_s)
+    }
+
+    /// Takes the defaults.
+    #[inline(never)]
+    fn refuse(&mut self) {
+        self.settings = FirmwareSettings::of_the_board();
+        self.rejected = Some(Rejected::Refused);
     }
 }
 
@@ -257,11 +270,8 @@ fn start_control(
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
-    let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
-    let (send_observations, observations) = observations.ok_or(TWICE)?.split();
-    type Samples = stream::Queue<{ board::STREAM_SAMPLES }>;
-    let samples = singleton!(: Samples = Samples::new(stream::Sample::default())).ok_or(TWICE)?;
-    let (send_samples, stream) = samples.split();
+    let ring = singleton!(: Ring<{ board::RECORDED_PERIODS }> = Ring::new()).ok_or(TWICE)?;
+    let (signals, reported) = ring.split();
 
     pwm.start()?;
     let drive = Drive::new(coefficients);
@@ -277,8 +287,7 @@ fn start_control(
         answers: send_answers,
         learned: send_learned,
         trace: recorder,
-        stream: send_samples,
-        observations: send_observations,
+        signals,
     }
     .run();
     if !comes_at_its_rate() {
@@ -288,5 +297,16 @@ fn start_control(
     control::TOLD.store(control::WATCHED, Ordering::Relaxed);
     asm::delay(1000 * board::CYCLES_PER_US);
     Window::close();
-    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations, sources })
+    let (streamed, observed) = (reported.clone(), reported.clone());
+    Ok(ControlLink {
+        status,
+        commands,
+        answers,
+        learned,
+        trace,
+        streamed,
+        observed,
+        reported,
+        sources,
+    })
 }

@@ -10,7 +10,7 @@ use induction_drive::monitor::register_check::{COUNT, Changed, RegisterCheck};
 
 /// The check and its progress.
 pub struct Check {
-    memory: MemoryCheck<5>,
+    memory: MemoryCheck<2>,
     registers: RegisterCheck,
 }
 

@@ -7,18 +7,14 @@ use induction_drive::board;
 pub struct Clock {
     last: u32,
     cycles: u32,
-    ms: u32,
+    /// Since the start, wrapping.
+    pub ms: u32,
 }
 
 impl Clock {
     /// One that begins now.
     pub fn new() -> Self {
         Self { last: time::now(), cycles: 0, ms: 0 }
-    }
-
-    /// Milliseconds since it began, as of the last update; wraps.
-    pub fn ms(&self) -> u32 {
-        self.ms
     }
 
     /// Reads the time base.

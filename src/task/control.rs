@@ -14,7 +14,6 @@ use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::learned::Learned;
 use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State};
-use heapless::spsc::Producer;
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
@@ -26,13 +25,13 @@ use crate::chip::time;
 use crate::chip::window::Window;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::stream::Source;
+use induction_drive::link::ring::Writer;
 use induction_drive::link::trace::Recorder;
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
-use induction_drive::rotor_tracking::Observation;
 
 /// The drive and its surroundings, owned by the interrupt.
+#[repr(C)] // the references to the memory shared with the main loop follow each other
 pub struct Control {
     /// The drive.
     pub drive: Drive,
@@ -56,10 +55,8 @@ pub struct Control {
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
-    /// The stream.
-    pub stream: Source<'static, { board::STREAM_SAMPLES }>,
-    /// Periods for the identification of the rotor time constant, and for the commissioning.
-    pub observations: Producer<'static, Observation, { board::OBSERVED_PERIODS }>,
+    /// Signals for the report, the stream, the identification of the rotor time constant, and the commissioning.
+    pub signals: Writer<'static, { board::RECORDED_PERIODS }>,
 }
 
 // It is copied at a start and by tools.
@@ -71,6 +68,8 @@ pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
 /// Whether the commissioning is to see what the drive does while it regulates.
 pub static OBSERVED: AtomicBool = AtomicBool::new(false);
+/// Control periods from one record of the stream to the next; 0: none.
+pub static STREAMED: AtomicU32 = AtomicU32::new(0);
 /// From the main loop: [`WATCHED`], and what it has found wrong, as bits of [`Hardware`].
 pub static TOLD: AtomicU8 = AtomicU8::new(0);
 /// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
@@ -97,8 +96,9 @@ impl Control {
             unreported: Hardware::empty(),
             began: 0,
             reported: None,
-            report_due: false,
+            report_left: 0,
             report_late: 0,
+            stream_due: false,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -110,19 +110,17 @@ impl Control {
 
 /// The data that the interrupt reads and writes only when its drive counts a change, and the address of that count. The
 /// data are the coefficients and the references to the memory shared with the main loop.
-pub fn constants() -> ([MemoryRange; 5], u32) {
+pub fn constants() -> ([MemoryRange; 2], u32) {
     let control = RUNNING.0.get() as usize + offset_of!(Running, control);
     let range = |at: usize, bytes: usize| MemoryRange {
         address: (control + at) as u32,
         words: (bytes / size_of::<u32>()) as u32,
     };
     let drive = offset_of!(Control, drive);
+    let references = offset_of!(Control, status);
     let constants = [
         range(drive + Drive::COEFFICIENTS.start, Drive::COEFFICIENTS.len()),
-        range(offset_of!(Control, status), size_of::<Sender<'static, Status>>()),
-        range(offset_of!(Control, commands), size_of::<Receiver<'static, Command>>()),
-        range(offset_of!(Control, answers), size_of::<Sender<'static, Answer>>()),
-        range(offset_of!(Control, trace), size_of::<Recorder<'static, { board::TRACE_RECORDS }>>()),
+        range(references, size_of::<Control>() - references),
     ];
     (constants, (control + drive + Drive::CHANGES) as u32)
 }
@@ -156,9 +154,11 @@ struct Running {
     began: u32,
     /// State in the last report.
     reported: Option<State>,
-    report_due: bool,
-    /// Periods for which a report has waited for the trace.
+    /// Parts of a report that are due.
+    report_left: u8,
+    /// Periods for which one has waited.
     report_late: u8,
+    stream_due: bool,
 }
 
 #[interrupt]
@@ -184,8 +184,7 @@ impl Running {
             commands,
             answers,
             trace,
-            observations,
-            stream,
+            signals,
             ..
         } = &mut self.control;
 
@@ -277,30 +276,43 @@ impl Running {
         let state = drive.state();
         let codes = [codes.current_a, codes.current_b, codes.current_c];
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
-        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
-        if drive.tracks_rotor() || drive.excites() || commissioned {
-            // Without room the period is missing, which the main loop detects by its number.
-            let _ = observations.enqueue(Observation::new(self.periods, drive.telemetry()));
-        }
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // A new state is reported at once, but not in the period of a command or, for two periods at most, of a record of
-        // the trace: these take long enough.
-        self.report_due |=
+        // A report is sent in two periods: its signals, then the rest. Neither in the period of a command or, for two periods
+        // at most, of a record of trace or stream: each of these takes long enough.
+        let due =
             self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
-        let reports = self.report_due && !commanded && (!traced || self.report_late > 1);
-        self.report_late =
-            if self.report_due && !reports { self.report_late.saturating_add(1) } else { 0 };
-        let busy = reports || traced || commanded;
-        stream.step(self.periods, busy, &codes, drive.telemetry());
+        if due && self.report_left == 0 {
+            self.report_left = 2;
+        }
+        // A sample of the stream waits as well, as long as it differs from the next one.
+        let every = STREAMED.load(Ordering::Relaxed);
+        let since = self.periods.checked_rem(every);
+        self.stream_due |= since == Some(0);
+        let hurries = every < 3 || since == Some(2);
+        let streamed = self.stream_due && (hurries || !(commanded || traced));
+        self.stream_due &= !streamed;
+        let busy = (traced || streamed) && self.report_late < 2;
+        let waits = self.report_left > 0 && (commanded || busy);
+        self.report_late = if waits { self.report_late.saturating_add(1) } else { 0 };
+        let part = if waits { 0 } else { self.report_left };
+        self.report_left -= u8::from(part > 0);
+        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
+        let observed = drive.tracks_rotor() || drive.excites() || commissioned;
+        if observed || streamed || part == 2 {
+            signals.write(|record| {
+                (record.period, record.codes) = (self.periods, codes);
+                (record.observed, record.streamed) = (observed, streamed);
+                record.set(drive.telemetry());
+            });
+        }
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;
         let worst = if commanded { with } else { without };
         *worst = cycles.max(*worst);
-        if reports {
-            self.report_due = false;
+        if part == 1 {
             self.report(state, sample, cycles);
         }
     }
@@ -318,7 +330,6 @@ impl Running {
             report.periods = self.periods;
             report.state = state;
             report.sample = sample;
-            report.telemetry = *drive.telemetry();
             report.worst_cycles = self.worst_cycles;
             report.last_cycles = cycles;
             report.worst_latency = self.worst_latency;

@@ -10,7 +10,8 @@ use induction_drive::store::history::History;
 
 /// The history, and what is counted next.
 pub struct Hours {
-    history: History,
+    /// Operating hours, starts and faults.
+    pub history: History,
     /// Time up to which it is counted, ms.
     counted_ms: u32,
     /// Whether the drive was off in the last report.
@@ -23,11 +24,6 @@ impl Hours {
     /// Goes on with the history of the flash.
     pub const fn new(history: History, dual_bank: bool) -> Self {
         Self { history, counted_ms: 0, was_off: true, dual_bank }
-    }
-
-    /// All of them.
-    pub fn history(&self) -> &History {
-        &self.history
     }
 
     /// Counts up to this time, ms, and writes where that is due.

@@ -1,15 +1,14 @@
 //! The main loop's side of the drive: commands of the console, tracking, log, and watchdog.
 
 use core::fmt;
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use defmt::Display2Format;
-use drive_commission::Step;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Fault, Hardware};
 use drive_settings::{Scales, Settings, SettingsError};
-use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
@@ -21,16 +20,16 @@ use crate::task::guard::{Guard, extended};
 use crate::task::hours::Hours;
 use crate::task::sources::Sources;
 use induction_drive::board;
-use induction_drive::commissioning::{Action, News, Session};
+use induction_drive::commissioning::{Action, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::stream::{Sample, Sink};
+use induction_drive::link::ring::{self, Record as Period};
 use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
-use induction_drive::rotor_tracking::{Observation, Report, Tracking};
+use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
@@ -38,6 +37,9 @@ use induction_drive::store::{FlashError, Saved};
 
 /// Version and commit of the firmware.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
+
+/// Signals of the control interrupt.
+pub type Signals = ring::Reader<'static, { board::RECORDED_PERIODS }>;
 
 /// The main loop's ends of the communication with the control interrupt.
 pub struct ControlLink {
@@ -51,10 +53,12 @@ pub struct ControlLink {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
-    /// The stream.
-    pub stream: Sink<'static, { board::STREAM_SAMPLES }>,
-    /// Periods for the identification of the rotor time constant, and for the commissioning.
-    pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
+    /// Signals for the stream.
+    pub streamed: Signals,
+    /// Signals for the identification of the rotor time constant, and for the commissioning.
+    pub observed: Signals,
+    /// Signals for the report.
+    pub reported: Signals,
     /// The second opinions on clock and reference.
     pub sources: Sources,
 }
@@ -72,9 +76,9 @@ pub struct Supervisor {
     /// Whether it has run long enough to forget earlier resets.
     well: bool,
     chip: Chip,
-    /// Tracking of the rotor time constant, if the settings enable it. (Large, so not on the stack.)
-    tracking: &'static mut Option<Tracking>,
-    /// The commissioning. (Large, too.)
+    /// Tracking of the rotor time constant, if the settings enable it.
+    tracking: Option<Tracking>,
+    /// The commissioning. (Large, so not on the stack.)
     commissioning: &'static mut Session,
     hours: Hours,
     /// Scales and pole pairs of the settings in force, for the log.
@@ -102,61 +106,60 @@ pub struct Chip {
 }
 
 impl Supervisor {
-    /// A supervisor; without `link`, one whose control does not run.
-    pub fn new(
+    /// A supervisor, made in its place; without `link`, one whose control does not run.
+    #[inline(never)]
+    pub fn new<'a>(
+        place: &'a mut MaybeUninit<Self>,
         link: Option<ControlLink>,
         watchdog: Option<Watchdog>,
         chip: Chip,
         history: History,
-        tracking: &'static mut Option<Tracking>,
         commissioning: &'static mut Session,
         settings: &Settings,
-    ) -> Self {
-        let clock = Clock::new();
-        let hours = Hours::new(history, chip.dual_bank);
+    ) -> &'a mut Self {
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.as_ref().and_then(|_| Check::new());
-        let (status, level, well) = (None, Level::Info, false);
-        Self {
+        place.write(Self {
             link,
-            status,
-            level,
-            clock,
+            status: None,
+            level: Level::Info,
+            clock: Clock::new(),
             guard,
             check,
-            well,
+            well: false,
+            hours: Hours::new(history, chip.dual_bank),
             chip,
-            tracking,
+            tracking: Tracking::new(settings),
             commissioning,
-            hours,
             scales: (settings.scales, settings.motor.pole_pairs),
-        }
-    }
-
-    /// Checks a slice of the control's memory and of its registers.
-    pub fn check(&mut self) {
-        self.check.iter_mut().for_each(Check::slice);
+        })
     }
 
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
     /// since the start, ms, wrapping.
+    #[inline(never)]
     pub fn listen(&mut self) -> u32 {
         self.track();
-        if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
-            self.log(status);
+        if let Some(link) = &mut self.link
+            && let Some(status) = link.status.take()
+        {
+            let newest = link.reported.by_ref().last().unwrap_or_default();
+            self.log(Status { telemetry: newest.telemetry, ..status });
         }
         self.commission();
         // It designs for seconds: the console needs the time behind it.
         self.clock.update();
-        let (now, off, pages) = (self.clock.ms(), self.is_off(), self.chip.saved.flash());
+        let (now, off, pages) = (self.clock.ms, self.is_off(), self.chip.saved.flash());
         self.hours.count(now, off, &mut self.guard, pages);
         self.link.iter_mut().for_each(|link| link.sources.watch(now));
-        self.clock.ms()
+        self.clock.ms
     }
 
-    /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
+    /// Checks a slice of the control's memory and of its registers, and feeds the watchdog if the rule allows it; called at
+    /// the end of each pass of the main loop.
     pub fn feed_watchdog(&mut self) {
+        self.check.iter_mut().for_each(Check::slice);
         let Some((watchdog, rule)) = &mut self.guard else { return };
         watchdog.run_in_halts();
         let missed = control::MISSED.load(Ordering::Relaxed);
@@ -170,20 +173,28 @@ impl Supervisor {
                 stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
             }
         }
-        if self.clock.ms() > board::WELL_AFTER_MS && !self.well {
+        if self.clock.ms > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();
         }
     }
 
     /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
+    #[inline(never)] // a command takes much stack
     fn track(&mut self) {
-        while let Some(period) = self.link.as_mut().and_then(|link| link.observations.dequeue()) {
-            if self.commissioning.is_running() {
-                self.commissioning.take(&period);
-                continue;
-            }
-            let tau_r = self.tracking.as_mut().and_then(|tracking| tracking.take(&period));
+        while let Some(link) = &mut self.link {
+            // Where it lies: a copy of each would be most of the time.
+            let tau_r = link.observed.take_with(|period| {
+                if !period.observed {
+                    return None;
+                }
+                if self.commissioning.is_running() {
+                    self.commissioning.take(period);
+                    return None;
+                }
+                self.tracking.as_mut()?.take(period)
+            });
+            let Some(tau_r) = tau_r else { return };
             let Some(tau_r) = tau_r else { continue };
             // Refused when the drive has just stopped.
             let answer = self.command(Command::RotorTimeConstant(tau_r));
@@ -194,6 +205,7 @@ impl Supervisor {
     }
 
     /// Goes on with the commissioning.
+    #[inline(never)] // a command takes much stack
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
         control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
@@ -296,12 +308,12 @@ impl DriveHandle for Supervisor {
         control::IS_OFF.load(Ordering::Relaxed)
     }
 
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
         extended(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
     }
 
     fn configured(&mut self, settings: &FirmwareSettings) {
-        *self.tracking = Tracking::new(&settings.drive);
+        self.tracking = Tracking::new(&settings.drive);
         self.commissioning.configured(&settings.drive);
         self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
     }
@@ -310,16 +322,8 @@ impl DriveHandle for Supervisor {
         self.tracking.as_ref().map(Tracking::report)
     }
 
-    fn commission(&mut self, first: Step, last: Step) {
-        self.commissioning.begin(first, last);
-    }
-
-    fn commissioned(&mut self) -> Option<News> {
-        self.commissioning.news()
-    }
-
-    fn found(&self, settings: &Settings) -> Option<Settings> {
-        self.commissioning.found(settings)
+    fn session(&mut self) -> &mut Session {
+        self.commissioning
     }
 
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
@@ -329,7 +333,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn history(&self) -> &History {
-        self.hours.history()
+        &self.hours.history
     }
 
     fn begin_trace(&mut self, plan: &Plan) -> bool {
@@ -351,11 +355,12 @@ impl DriveHandle for Supervisor {
     }
 
     fn stream(&mut self, divider: u16) {
-        self.link.iter_mut().for_each(|link| link.stream.ask(divider));
+        control::STREAMED.store(divider.into(), Ordering::Relaxed);
+        self.link.iter_mut().for_each(|link| link.streamed.by_ref().for_each(drop));
     }
 
-    fn sampled(&mut self) -> Option<Sample> {
-        self.link.as_mut()?.stream.fetch()
+    fn sampled(&mut self) -> Option<Period> {
+        self.link.as_mut()?.streamed.find(|period| period.streamed)
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {

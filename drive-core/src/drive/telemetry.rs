@@ -1,10 +1,14 @@
 //! The quantities of a step that the drive shows.
 
+use core::mem::offset_of;
+
 use super::{Drive, Phase};
 use crate::{AlphaBeta, Angle, Dq};
 
-/// Measured, estimated and applied quantities of the last step.
+/// Measured, estimated and applied quantities of the last step, as 32-bit words in this order: a debugger reads them from
+/// memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
 pub struct Telemetry {
     /// Estimated rotor-flux angle at the sample.
     pub phi: Angle,
@@ -62,6 +66,9 @@ pub struct Room {
 }
 
 impl Drive {
+    /// Where in a drive its [telemetry](Self::telemetry) is, bytes.
+    pub const TELEMETRY: usize = offset_of!(Self, kept.seen);
+
     /// Limits of the present torque.
     pub fn room(&self) -> Room {
         let limits = &self.kept.limits;

@@ -22,6 +22,7 @@ macro_rules! frame {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[repr(C)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f32,)+
         }

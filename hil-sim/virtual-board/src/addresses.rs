@@ -9,7 +9,7 @@ use crate::memory::Region;
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";
 /// Version of its layout that this crate reads.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// The table.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,16 +24,8 @@ pub struct Addresses {
     pub orders: u32,
     /// Offset in it of a byte that is 1 while an order waits.
     pub order_waits: u32,
-    /// Estimated flux angle, a fraction of an electrical turn.
-    pub phi: u32,
-    /// Electrical speed of the rotor, turns per period.
-    pub rotor_freq: u32,
-    /// Filtered reference on the quadrature axis, A.
-    pub reference_q: u32,
-    /// Current on the quadrature axis, A.
-    pub current_q: u32,
-    /// Dc-link voltage, V.
-    pub dc_link: u32,
+    /// The telemetry of the drive.
+    pub telemetry: u32,
 }
 
 impl Addresses {
@@ -49,7 +41,7 @@ impl Addresses {
         if words.first() != Some(&VERSION) {
             bail!("{SYMBOL} has version {:?}, not {VERSION}", words.first());
         }
-        let table: [u32; 14] = words.try_into().ok().context("a table of another size")?;
+        let table: [u32; 10] = words.try_into().ok().context("a table of another size")?;
         let region = |at: usize| Region { address: table[at], size: table[at + 1] };
         Ok(Some(Self {
             control: region(1),
@@ -57,11 +49,7 @@ impl Addresses {
             state: region(5),
             orders: table[7],
             order_waits: table[8],
-            phi: table[9],
-            rotor_freq: table[10],
-            reference_q: table[11],
-            current_q: table[12],
-            dc_link: table[13],
+            telemetry: table[9],
         }))
     }
 }

@@ -14,7 +14,7 @@ pub mod snapshot;
 use std::collections::VecDeque;
 
 use anyhow::{Result, anyhow, bail, ensure};
-use drive_core::Sample;
+use drive_core::{Sample, Telemetry};
 use hil_sim::plant::Plant;
 
 pub use control::{LongestPath, Period};
@@ -176,9 +176,12 @@ impl Board {
         self.chip().rules.collecting = true;
     }
 
-    /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
-    pub fn flux_angle(&self) -> f64 {
-        f64::from(self.word(self.addresses().phi).unwrap_or(0)) / 2_f64.powi(32)
+    /// Telemetry of the drive after its last control interrupt with the outputs on.
+    pub fn telemetry(&self) -> Telemetry {
+        let mut bytes = [0; size_of::<Telemetry>()];
+        self.read(self.addresses().telemetry, &mut bytes);
+        // SAFETY: 32-bit integers and floating-point numbers, of which every value is valid, and laid out as on the chip.
+        unsafe { bytes.as_ptr().cast::<Telemetry>().read_unaligned() }
     }
 
     /// The chip.

@@ -14,7 +14,7 @@ use hil_sim::Config;
 use hil_sim::config::LoadMode;
 use induction_drive::board::LONGEST_INTERRUPT_CYCLES;
 
-use crate::board::{Board, LongestPath, Options};
+use crate::board::{Board, LongestPath, Options, Period};
 use crate::chip::{TICKS_PER_PERIOD, Watched};
 use crate::cost::{self, BUS, TAKEN, instructions};
 use crate::image::Image;
@@ -113,12 +113,17 @@ fn cold(image: Image, (name, lines, load): (&'static str, &[&str], LoadMode)) ->
         board.type_line(line);
         board.run_periods(COLD_PERIODS)?;
         while let Some(period) = board.next_period() {
-            cycles.push(period.to_compares);
+            cycles.push(in_turn(&period));
         }
     }
     ensure!(board.chip().tim1.outputs_on(), "{name}: the outputs are off");
     let path = std::mem::take(&mut board.longest);
     row(name, &board, &path, cost::ENTRY + cost::EXIT, cycles, path.cycles)
+}
+
+/// The number of a control period and its cycles to the last compare value. Periods between those that are measured count.
+fn in_turn(period: &Period) -> (usize, u32) {
+    ((period.began / TICKS_PER_PERIOD) as usize, period.to_compares)
 }
 
 /// Checks that each path of the blocks matches a function.
@@ -151,7 +156,8 @@ fn identification(image: Image) -> Result<Row> {
     let watched = pair.board.chip().watched.take().context("not watched")?;
     let cycles = watched.calls.iter().max().copied().unwrap_or(0);
     let path = LongestPath { cycles, accesses: 0, blocks: watched.longest };
-    row("identification", &pair.board, &path, 0, watched.calls, cycles)
+    let calls = watched.calls.into_iter().enumerate().collect();
+    row("identification", &pair.board, &path, 0, calls, cycles)
 }
 
 fn sensorless(image: Image) -> Result<Row> {
@@ -182,7 +188,7 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Row>
         // Accepted, or taken as far as the limits allow.
         pair.say(line)?;
         pair.board.type_line("trace 500 2");
-        pair.run(6000, |_, period| cycles.push(period.to_compares))?;
+        pair.run(6000, |_, period| cycles.push(in_turn(period)))?;
     }
     pair.board.send(b"\n");
     pair.run(60, |_, _| {})?;
@@ -199,13 +205,14 @@ fn row(
     board: &Board,
     path: &LongestPath,
     entry: u32,
-    mut all: Vec<u32>,
+    all: Vec<(usize, u32)>,
     whole: u32,
 ) -> Result<Row> {
     let mut by_turn = [0; 10];
-    for (n, cycles) in all.iter().enumerate() {
+    for (n, cycles) in &all {
         by_turn[n % 10] = by_turn[n % 10].max(*cycles);
     }
+    let mut all: Vec<u32> = all.into_iter().map(|(_, cycles)| cycles).collect();
     all.sort_unstable();
     let median = *all.get(all.len() / 2).context("nothing was counted")?;
     let mut row = Row {

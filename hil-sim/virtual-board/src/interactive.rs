@@ -6,7 +6,6 @@ pub mod flash_file;
 pub mod own;
 pub mod page;
 pub mod pty;
-pub mod readings;
 pub mod record;
 pub mod script;
 pub mod session;

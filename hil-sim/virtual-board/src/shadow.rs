@@ -9,7 +9,8 @@ use drive_settings::Settings;
 
 use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::rotor_tracking::{Observation, Tracking};
+use induction_drive::link::ring::Record;
+use induction_drive::rotor_tracking::Tracking;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::staging::Staging;
 
@@ -137,7 +138,7 @@ impl Shadow {
     ///
     /// # Errors
     /// They make no drive.
-    pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
+    pub fn restart(&mut self, mut settings: FirmwareSettings) -> Result<()> {
         self.settings = Staging::new(settings);
         self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
         self.front_end = FrontEndState::default();
@@ -191,7 +192,8 @@ impl Shadow {
         if self.drive.tracks_rotor()
             && let Some(tracking) = &mut self.tracking
         {
-            let seen = Observation::new(self.compared as u32, self.drive.telemetry());
+            let (period, telemetry) = (self.compared as u32, *self.drive.telemetry());
+            let seen = Record { period, telemetry, ..Record::default() };
             self.tau_r = tracking.take(&seen).or(self.tau_r);
         }
         Ok(())

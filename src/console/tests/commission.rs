@@ -8,7 +8,7 @@ use hil_sim::rig::Rig;
 
 use super::*;
 use crate::commissioning::{Action, News, Session};
-use crate::rotor_tracking::Observation;
+use crate::link::ring::Record;
 
 /// A session on a simulated motor of 6 ohm, which a drive with these settings has found.
 fn found_on_a_motor(settings: &Settings) -> Session {
@@ -22,7 +22,8 @@ fn found_on_a_motor(settings: &Settings) -> Session {
     for n in 0.. {
         rig.step();
         if rig.drive.excites() {
-            session.take(&Observation::new(n, rig.drive.telemetry()));
+            let telemetry = *rig.drive.telemetry();
+            session.take(&Record { period: n, telemetry, ..Record::default() });
         }
         if let Some(Action::Command(command)) = session.poll(&rig.drive.excited()) {
             rig.drive.command(&command).unwrap();

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
-use drive_commission::Step;
 use drive_core::carrier::Asymmetry;
 use drive_core::learned::{Fitted, Learned, Verdict};
 use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
@@ -11,11 +10,12 @@ use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State
 use drive_settings::{Settings, SettingsError};
 use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
-use induction_drive::commissioning::{News, Session};
+use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
+use induction_drive::link::Status;
+use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
-use induction_drive::link::{Status, stream};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
@@ -46,7 +46,7 @@ pub struct FakeDrive {
     /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
     /// Divider of the stream, and its samples that were not fetched.
-    pub streamed: (u16, VecDeque<stream::Sample>),
+    pub streamed: (u16, VecDeque<Record>),
     /// The commissioning.
     pub session: Session,
     /// Operating hours, starts and faults.
@@ -106,7 +106,7 @@ impl DriveHandle for FakeDrive {
     fn is_off(&self) -> bool {
         matches!(self.drive.state(), State::Off | State::Fault(_))
     }
-    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
         settings.build()
     }
     fn configured(&mut self, settings: &FirmwareSettings) {
@@ -116,14 +116,8 @@ impl DriveHandle for FakeDrive {
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
     }
-    fn commission(&mut self, first: Step, last: Step) {
-        self.session.begin(first, last);
-    }
-    fn commissioned(&mut self) -> Option<News> {
-        self.session.news()
-    }
-    fn found(&self, settings: &Settings) -> Option<Settings> {
-        self.session.found(settings)
+    fn session(&mut self) -> &mut Session {
+        &mut self.session
     }
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
         if self.worn_out {
@@ -158,7 +152,7 @@ impl DriveHandle for FakeDrive {
     fn stream(&mut self, divider: u16) {
         self.streamed = (divider, VecDeque::new());
     }
-    fn sampled(&mut self) -> Option<stream::Sample> {
+    fn sampled(&mut self) -> Option<Record> {
         self.streamed.1.pop_front()
     }
     fn reboot(&mut self) {

@@ -2,17 +2,17 @@
 
 use super::*;
 use crate::board;
-use crate::link::stream::Sample as Due;
+use crate::link::ring::Record;
 use drive_core::Telemetry;
 
 impl Talk {
-    /// A sample of the stream, with this current.
-    fn sample(&mut self, sequence: u16, i_q: f32) {
+    /// A record of this period for the stream, with this current.
+    fn sample(&mut self, period: u32, i_q: f32) {
         let mut telemetry = Telemetry { turns: 0.5, ..Telemetry::default() };
         telemetry.current.q = i_q;
         telemetry.rotor_freq = 10.0 * PERIOD_S;
-        let sample = Due { sequence, period: 7 * u32::from(sequence), telemetry, codes: [0; 3] };
-        self.drive.streamed.1.push_back(sample);
+        let record = Record { period, telemetry, ..Record::default() };
+        self.drive.streamed.1.push_back(record);
     }
 
     fn pass(&mut self, ms: u32) {
@@ -28,15 +28,15 @@ fn frames_have_the_signals_asked_for_in_their_units_and_count_what_is_lost() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("stream i_q_a speed_rpm turns 100"), "ok: every 60 periods");
     assert_eq!(talk.drive.streamed.0, 60);
-    for sequence in [0, 1, 4] {
-        talk.sample(sequence, 1.5);
+    for period in [60, 120, 300] {
+        talk.sample(period, 1.5);
     }
     let status = talk.ask("status");
     assert!(status.starts_with("off"), "{status}");
     let frames = &talk.port.frames;
     assert_eq!(
         frames.iter().map(|f| (f.sequence, f.period)).collect::<Vec<_>>(),
-        [(0, 0), (1, 7), (4, 28)]
+        [(0, 60), (1, 120), (4, 300)]
     );
     // 10 Hz electrical at two pole pairs are 300 rpm; to f32's rounding.
     assert_eq!(frames[0].values[0], 1.5);
@@ -73,7 +73,7 @@ fn text_goes_first_and_a_list_last() {
     let mut talk = Talk::new();
     talk.ask("stream i_q_a 100");
     talk.port.room = 60;
-    (0..6).for_each(|sequence| talk.sample(sequence, 1.0));
+    (0..6).for_each(|n| talk.sample(60 * n, 1.0));
     talk.port.sent.extend(b"help\n");
     talk.poll();
     // Frames of 15 bytes fill the room; the list waits.

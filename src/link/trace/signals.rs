@@ -125,28 +125,21 @@ impl SignalChoice {
 
     /// Writes the values of the signals.
     pub fn record(&self, record: &mut Record, t: &Telemetry, codes: &CurrentCodes) {
+        let values = values(t, codes);
         for (place, signal) in record.iter_mut().zip(&self.signals) {
-            *place = value(*signal, t, codes);
+            *place = values.get(usize::from(*signal)).copied().unwrap_or(0.0);
         }
     }
 }
 
-/// The value of a signal as it is recorded.
-pub(super) fn value(signal: u8, t: &Telemetry, codes: &CurrentCodes) -> f32 {
-    match signal {
-        0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
-        1 => t.flux_freq,
-        2 => t.rotor_freq,
-        3 => t.reference.d,
-        4 => t.reference.q,
-        5 => t.current.d,
-        6 => t.current.q,
-        7 => t.voltage.d,
-        8 => t.voltage.q,
-        9 => t.delta_i,
-        10 => t.saliency,
-        11 => t.dc_link,
-        12 => t.turns,
-        _ => codes.get(usize::from(signal) - 13).map_or(0.0, |code| f32::from(*code)),
-    }
+/// The values of all signals as they are recorded. All at once: the choice of one by its index costs more than its value.
+pub(super) fn values(t: &Telemetry, codes: &CurrentCodes) -> [f32; SIGNALS.len()] {
+    let (phi, [a, b, c]) =
+        (t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0), codes.map(f32::from));
+    let (r, i, v) = (t.reference, t.current, t.voltage);
+    let (flux, rotor) = (t.flux_freq, t.rotor_freq);
+    [
+        phi, flux, rotor, r.d, r.q, i.d, i.q, v.d, v.q, t.delta_i, t.saliency, t.dc_link, t.turns,
+        a, b, c,
+    ]
 }

@@ -6,13 +6,13 @@
 
 use core::mem::{offset_of, size_of};
 
-use drive_core::{Command, Drive};
+use drive_core::{Coefficients, Command, Drive};
 use induction_drive::link::mailbox::Mailbox;
 
 use super::{Control, RUNNING, Running};
 
 /// Version of the layout of [`Table`].
-const VERSION: usize = 2;
+const VERSION: usize = 3;
 
 /// The layout of the table. Sizes and offsets are in bytes.
 #[repr(C)]
@@ -28,20 +28,15 @@ struct Table {
     commands: *const u8,
     /// Offset in that mailbox of a byte that is 1 while a command waits for the interrupt.
     command_waits: usize,
-    /// Estimated rotor-flux angle at the last sample, a `u32` fraction of an electrical turn.
-    phi: *const u8,
-    /// Electrical speed of the rotor, turns per period, `f32`.
-    rotor_freq: *const u8,
-    /// Filtered reference of the quadrature current, A, `f32`.
-    reference_q: *const u8,
-    /// Filtered quadrature current, A, `f32`.
-    current_q: *const u8,
-    /// Dc-link voltage, V, `f32`.
-    dc_link: *const u8,
+    /// The [`Telemetry`](drive_core::Telemetry) of the last step with the outputs on.
+    telemetry: *const u8,
 }
 
 // SAFETY: only addresses, which the firmware itself never follows.
 unsafe impl Sync for Table {}
+
+/// Offset in the drive of its state, behind the count of changes.
+const STATE: usize = Drive::CHANGES + size_of::<u32>();
 
 /// The address at this offset in the drive.
 const fn in_drive(offset: usize) -> *const u8 {
@@ -59,19 +54,9 @@ const fn in_control(offset: usize) -> *const u8 {
 static INDUCTION_DRIVE_ADDRESSES: Table = Table {
     version: VERSION,
     control: (RUNNING.0.get().cast::<u8>().cast_const(), size_of::<Running>()),
-    coefficients: (
-        in_drive(Drive::COEFFICIENTS.start),
-        Drive::COEFFICIENTS.end - Drive::COEFFICIENTS.start,
-    ),
-    state: (
-        in_drive(Drive::LAYOUT.state.start),
-        Drive::LAYOUT.state.end - Drive::LAYOUT.state.start,
-    ),
+    coefficients: (in_drive(Drive::COEFFICIENTS.start), size_of::<Coefficients>()),
+    state: (in_drive(STATE), size_of::<Drive>() - STATE),
     commands: in_control(offset_of!(Control, commands)),
     command_waits: Mailbox::<Command>::FULL,
-    phi: in_drive(Drive::LAYOUT.phi),
-    rotor_freq: in_drive(Drive::LAYOUT.rotor_freq),
-    reference_q: in_drive(Drive::LAYOUT.reference_q),
-    current_q: in_drive(Drive::LAYOUT.current_q),
-    dc_link: in_drive(Drive::LAYOUT.dc_link),
+    telemetry: in_drive(Drive::TELEMETRY),
 };

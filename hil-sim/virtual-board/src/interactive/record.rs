@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::Telemetry;
 use drive_core::carrier::CARRIER_SAMPLES;
 use hil_sim::plant::Plant;
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 
-use super::readings::Readings;
 use crate::board::Period;
 
 /// A quantity that is recorded, in the order of `Means`.
@@ -86,21 +86,21 @@ pub struct Record {
 }
 
 impl Record {
-    /// Takes a control interrupt: the plant at its sample, and the readings of the drive after it.
-    pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, readings: &Readings) {
+    /// Takes a control interrupt: the plant at its sample, and the telemetry of the drive after it.
+    pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, drive: &Telemetry) {
         let rpm = 60.0 / TAU;
         let turns_to_rpm = RATE_HZ * 60.0 / plant.pole_pairs();
         let on = period.compare.enabled;
         let flux = plant.rotor_flux().norm();
         let mut bucket = Bucket { periods: 1.0, time, ..Bucket::default() };
         for (quantity, value) in [
-            (Quantity::ReferenceQ, readings.reference_q),
-            (Quantity::CurrentQ, readings.current_q),
+            (Quantity::ReferenceQ, drive.reference.q.into()),
+            (Quantity::CurrentQ, drive.current.q.into()),
             (Quantity::Torque, plant.torque()),
             (Quantity::Flux, flux),
             (Quantity::Speed, plant.mechanical_speed() * rpm),
-            (Quantity::SpeedEstimate, readings.rotor_freq * turns_to_rpm),
-            (Quantity::DcLinkSeen, readings.dc_link),
+            (Quantity::SpeedEstimate, f64::from(drive.rotor_freq) * turns_to_rpm),
+            (Quantity::DcLinkSeen, drive.dc_link.into()),
             (Quantity::DcLink, plant.dc_link()),
             (Quantity::Outputs, f64::from(u8::from(on))),
         ] {
@@ -112,7 +112,7 @@ impl Record {
         let currents = plant.phase_currents();
         self.peak_current = currents.into_iter().fold(self.peak_current, |m, i| m.max(i.abs()));
         if on && flux > FLUX_WB {
-            let error = plant.rotor_flux_angle() - readings.phi * TAU;
+            let error = plant.rotor_flux_angle() - f64::from(drive.phi.to_turns()) * TAU;
             bucket.error = [error.cos(), error.sin()];
             let degrees = wrapped_degrees(error);
             self.judged += 1;

@@ -15,7 +15,6 @@ use hil_sim::rig::RATE_HZ;
 use super::flash_file::FlashFile;
 use super::own::Own;
 use super::pty::Pty;
-use super::readings::Readings;
 use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
@@ -258,12 +257,12 @@ impl Session {
         let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
         self.board.run_ticks(end - now)?;
         while let Some(period) = self.board.next_period() {
-            let readings = Readings::new(&self.board);
+            let drive = self.board.telemetry();
             let time = period.began as f64 / TICKS_PER_S as f64;
             let truth =
                 [self.board.plant.rotor_flux_angle() / TAU, self.board.plant.rotor_flux().norm()];
-            self.flux = Some([readings.phi, truth[0], truth[1]]);
-            self.record.take(time, &self.board.plant, &period, &readings);
+            self.flux = Some([f64::from(drive.phi.to_turns()).rem_euclid(1.0), truth[0], truth[1]]);
+            self.record.take(time, &self.board.plant, &period, &drive);
             self.last = Some(period);
         }
         Ok(())

@@ -1,0 +1,244 @@
+//! The ring: signals of control periods, from the control interrupt to its readers in the main loop.
+//!
+//! The interrupt writes a record in a period for which somebody asks, and nothing in others. It never waits: the newest record
+//! replaces the oldest. Each reader sees every record, at its own pace, from the oldest one that is left on; one that
+//! was overtaken misses the records between, which the numbers of the periods show.
+//!
+//! Own code: the queues of `heapless` and `bbqueue` keep the oldest items, and give each item to one reader.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use drive_core::Telemetry;
+
+use super::trace::CurrentCodes;
+
+/// Signals of the drive in one control period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Record {
+    /// Control periods since the start, wrapping.
+    pub period: u32,
+    /// The signals.
+    pub telemetry: Telemetry,
+    /// Codes of the current sensors.
+    pub codes: CurrentCodes,
+    /// Whether it is for tracking and commissioning, which every period is while they observe.
+    pub observed: bool,
+    /// Whether it is for the stream.
+    pub streamed: bool,
+}
+
+impl Record {
+    /// Sets the signals.
+    pub fn set(&mut self, telemetry: &Telemetry) {
+        /// In two parts: the compiler copies up to 64 bytes without a call, in a third of the cycles.
+        type Parts = ([u32; 11], [u32; 10]);
+        const _: () = assert!(size_of::<Parts>() == size_of::<Telemetry>());
+        const _: () = assert!(align_of::<Parts>() == align_of::<Telemetry>());
+        // SAFETY: both are words without padding, of which every value is valid.
+        let (to, from) = unsafe {
+            (
+                &mut *(&raw mut self.telemetry).cast::<Parts>(),
+                &*(&raw const *telemetry).cast::<Parts>(),
+            )
+        };
+        to.0 = from.0;
+        to.1 = from.1;
+    }
+}
+
+/// Memory for `N` records, a power of two.
+pub struct Ring<const N: usize> {
+    slots: [Slot; N],
+    /// Records so far, wrapping.
+    written: AtomicU32,
+}
+
+struct Slot {
+    /// Whether somebody reads or writes the record.
+    held: AtomicBool,
+    record: UnsafeCell<Record>,
+}
+
+// SAFETY: only who has set `held`, which was not set before, touches the record.
+unsafe impl Sync for Slot {}
+
+/// The control interrupt's end.
+pub struct Writer<'a, const N: usize>(&'a Ring<N>);
+
+/// A reader in the main loop.
+#[derive(Clone)]
+pub struct Reader<'a, const N: usize> {
+    ring: &'a Ring<N>,
+    /// Number of the next record, wrapping.
+    next: u32,
+}
+
+impl Slot {
+    /// Calls `with` with the record, unless somebody else holds it.
+    fn hold<R>(&self, with: impl FnOnce(&mut Record) -> R) -> Option<R> {
+        if self.held.swap(true, Ordering::Acquire) {
+            return None;
+        }
+        // SAFETY: see `Sync`.
+        let result = with(unsafe { &mut *self.record.get() });
+        self.held.store(false, Ordering::Release);
+        Some(result)
+    }
+}
+
+impl<const N: usize> Ring<N> {
+    // SAFETY: zeros are a record, which has numbers and a `bool`.
+    const EMPTY: Record = unsafe { core::mem::zeroed() };
+
+    /// No records. A constant: none is made on the stack.
+    pub const fn new() -> Self {
+        const { assert!(N.is_power_of_two(), "the number of a record wraps") };
+        let slots =
+            [const { Slot { held: AtomicBool::new(false), record: UnsafeCell::new(Self::EMPTY) } };
+                N];
+        Self { slots, written: AtomicU32::new(0) }
+    }
+
+    /// Its two ends. A reader can be cloned.
+    pub fn split(&mut self) -> (Writer<'_, N>, Reader<'_, N>) {
+        (Writer(self), Reader { ring: self, next: 0 })
+    }
+}
+
+impl<const N: usize> Writer<'_, N> {
+    /// Adds a record, which `write` writes in place over the oldest one. It is missing if that one is being read just now.
+    pub fn write(&mut self, write: impl FnOnce(&mut Record)) {
+        let number = self.0.written.load(Ordering::Relaxed);
+        let Some(slot) = self.0.slots.get(number as usize % N) else { return };
+        let _ = slot.hold(|record| {
+            write(record);
+            // While the record is held: who holds it next knows that it is another one.
+            self.0.written.store(number.wrapping_add(1), Ordering::Release);
+        });
+    }
+}
+
+impl<const N: usize> Reader<'_, N> {
+    /// Passes the next record that is left to `with`; `None` if there is none yet, or if it is being overwritten just now.
+    pub fn take_with<R>(&mut self, with: impl FnOnce(&Record) -> R) -> Option<R> {
+        let left =
+            |next: u32| self.ring.written.load(Ordering::Acquire).wrapping_sub(next) as usize;
+        match left(self.next) {
+            0 => return None,
+            more if more > N => self.next = self.next.wrapping_add((more - N) as u32),
+            _ => {}
+        }
+        let slot = self.ring.slots.get(self.next as usize % N)?;
+        // Overtaken before it was held?
+        let result = slot.hold(|record| (left(self.next) <= N).then(|| with(record)))??;
+        self.next = self.next.wrapping_add(1);
+        Some(result)
+    }
+}
+
+impl<const N: usize> Iterator for Reader<'_, N> {
+    type Item = Record;
+
+    fn next(&mut self) -> Option<Record> {
+        self.take_with(|record| *record)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write<const N: usize>(writer: &mut Writer<'_, N>, periods: core::ops::Range<u32>) {
+        for period in periods {
+            writer.write(|record| record.period = period);
+        }
+    }
+
+    fn read<const N: usize>(reader: &mut Reader<'_, N>) -> Vec<u32> {
+        reader.map(|record| record.period).collect()
+    }
+
+    #[test]
+    fn every_reader_sees_every_record_and_the_newest_are_kept() {
+        let mut ring = Ring::<4>::new();
+        let (mut writer, mut first) = ring.split();
+        let mut second = first.clone();
+        assert_eq!(first.next(), None);
+        write(&mut writer, 0..3);
+        assert_eq!(read(&mut first), [0, 1, 2]);
+        write(&mut writer, 3..5);
+        assert_eq!(read(&mut first), [3, 4]);
+        assert_eq!(read(&mut second), [1, 2, 3, 4], "the oldest is overwritten");
+        write(&mut writer, 5..100);
+        assert_eq!(second.by_ref().last().map(|record| record.period), Some(99));
+        assert_eq!(read(&mut first), [96, 97, 98, 99]);
+        assert_eq!((first.next(), second.next()), (None, None));
+    }
+
+    #[test]
+    fn the_numbers_of_the_records_wrap() {
+        let mut ring = Ring::<4>::new();
+        ring.written = AtomicU32::new(u32::MAX - 1);
+        let (mut writer, mut reader) = ring.split();
+        reader.next = u32::MAX - 1;
+        write(&mut writer, 0..3);
+        assert_eq!(read(&mut reader), [0, 1, 2]);
+        write(&mut writer, 3..9);
+        assert_eq!(read(&mut reader), [5, 6, 7, 8]);
+    }
+
+    #[test]
+    fn a_record_that_is_being_read_is_not_overwritten() {
+        let mut ring = Ring::<2>::new();
+        let (mut writer, mut reader) = ring.split();
+        write(&mut writer, 0..2);
+        reader.ring.slots[0].hold(|record| {
+            write(&mut writer, 2..3);
+            assert_eq!(record.period, 0);
+        });
+        write(&mut writer, 3..4);
+        assert_eq!(read(&mut reader), [1, 3], "period 2 is missing");
+    }
+
+    /// Two readers, of which one hardly keeps up: no record is torn, each comes once and in order.
+    #[test]
+    fn records_arrive_whole_and_in_order_across_threads() {
+        const LAST: u32 = 300_000;
+        let mut ring = Ring::<8>::new();
+        let (mut writer, reader) = ring.split();
+        let follow = |mut reader: Reader<'_, 8>, pause: u32| {
+            let (mut before, mut read) = (0, 0);
+            while before < LAST {
+                (0..pause).for_each(|_| core::hint::spin_loop());
+                for Record { period, telemetry, codes, .. } in reader.by_ref() {
+                    assert!(period > before, "{period} after {before}");
+                    let value = period as f32;
+                    assert_eq!((telemetry.flux_freq, telemetry.turns), (value, value));
+                    assert_eq!(codes, [period as u16; 3]);
+                    (before, read) = (period, read + 1);
+                }
+            }
+            read
+        };
+        std::thread::scope(|scope| {
+            let fast = reader.clone();
+            let readers =
+                [scope.spawn(move || follow(fast, 0)), scope.spawn(move || follow(reader, 500))];
+            // Until the last record has arrived: one that is being read is left out.
+            let mut period = 0;
+            while readers.iter().any(|reader| !reader.is_finished()) {
+                period += 1;
+                writer.write(|record| {
+                    record.period = period;
+                    record.telemetry.flux_freq = period as f32;
+                    record.telemetry.turns = period as f32;
+                    record.codes = [period as u16; 3];
+                });
+            }
+            for reader in readers {
+                assert!(reader.join().unwrap() > 0);
+            }
+        });
+    }
+}
