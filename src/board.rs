@@ -328,7 +328,7 @@ pub const SERIAL_RECEIVE: usize = 256;
 pub const SERIAL_TRANSMIT: usize = 512;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
-/// Control periods that the ring holds for stream, identification and commissioning in the main loop: 5.3 ms if every
+/// Control periods in the ring for stream, identification and commissioning in the main loop. It keeps one less: 5.2 ms if every
 /// period is recorded, longer than the watchdog allows the main loop to be late, with its slowest clock.
 pub const RECORDED_PERIODS: usize = 32;
 const _: () = assert!(

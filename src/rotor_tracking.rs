@@ -182,7 +182,7 @@ mod tests {
             }
         }
         // The rest of the pause, and of the pass before it, does not fit.
-        assert_eq!(taken, 60_000 - 120 + board::RECORDED_PERIODS);
+        assert_eq!(taken, 60_000 - 120 + board::RECORDED_PERIODS - 1);
         let (before, after): (Vec<u32>, Vec<u32>) = orders.iter().partition(|n| **n < 30_000);
         assert!(before.len() > 15 && after.len() > 15, "{orders:?}");
         // The memory of the least squares is filled again first.

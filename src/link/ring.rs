@@ -47,7 +47,7 @@ impl Record {
     }
 }
 
-/// Memory for `N` records, a power of two.
+/// Memory for `N` records, a power of two; one less is read.
 pub struct Ring<const N: usize> {
     slots: [Slot; N],
     /// Records so far, wrapping.
@@ -126,12 +126,13 @@ impl<const N: usize> Reader<'_, N> {
             |next: u32| self.ring.written.load(Ordering::Acquire).wrapping_sub(next) as usize;
         match left(self.next) {
             0 => return None,
-            more if more > N => self.next = self.next.wrapping_add((more - N) as u32),
+            // Not the oldest: the writer needs its place next, and would lose a period.
+            more if more >= N => self.next = self.next.wrapping_add((more - N + 1) as u32),
             _ => {}
         }
         let slot = self.ring.slots.get(self.next as usize % N)?;
         // Overtaken before it was held?
-        let result = slot.hold(|record| (left(self.next) <= N).then(|| with(record)))??;
+        let result = slot.hold(|record| (left(self.next) < N).then(|| with(record)))??;
         self.next = self.next.wrapping_add(1);
         Some(result)
     }
@@ -169,10 +170,14 @@ mod tests {
         assert_eq!(read(&mut first), [0, 1, 2]);
         write(&mut writer, 3..5);
         assert_eq!(read(&mut first), [3, 4]);
-        assert_eq!(read(&mut second), [1, 2, 3, 4], "the oldest is overwritten");
+        assert_eq!(
+            read(&mut second),
+            [2, 3, 4],
+            "the oldest is overwritten, the next one about to be"
+        );
         write(&mut writer, 5..100);
         assert_eq!(second.by_ref().last().map(|record| record.period), Some(99));
-        assert_eq!(read(&mut first), [96, 97, 98, 99]);
+        assert_eq!(read(&mut first), [97, 98, 99]);
         assert_eq!((first.next(), second.next()), (None, None));
     }
 
@@ -185,20 +190,34 @@ mod tests {
         write(&mut writer, 0..3);
         assert_eq!(read(&mut reader), [0, 1, 2]);
         write(&mut writer, 3..9);
-        assert_eq!(read(&mut reader), [5, 6, 7, 8]);
+        assert_eq!(read(&mut reader), [6, 7, 8]);
     }
 
     #[test]
     fn a_record_that_is_being_read_is_not_overwritten() {
         let mut ring = Ring::<2>::new();
         let (mut writer, mut reader) = ring.split();
-        write(&mut writer, 0..2);
-        reader.ring.slots[0].hold(|record| {
-            write(&mut writer, 2..3);
+        write(&mut writer, 0..1);
+        reader.take_with(|record| {
+            write(&mut writer, 1..4);
             assert_eq!(record.period, 0);
         });
-        write(&mut writer, 3..4);
-        assert_eq!(read(&mut reader), [1, 3], "period 2 is missing");
+        write(&mut writer, 4..5);
+        assert_eq!(read(&mut reader), [4], "periods 2 and 3 are missing");
+    }
+
+    /// However far behind it is, a reader takes no period from the others.
+    #[test]
+    fn a_late_reader_is_not_in_the_way_of_the_writer() {
+        let mut ring = Ring::<4>::new();
+        let (mut writer, mut late) = ring.split();
+        let mut prompt = late.clone();
+        for period in 0..20 {
+            write(&mut writer, period..period + 1);
+            assert_eq!(read(&mut prompt), [period]);
+        }
+        late.take_with(|_| write(&mut writer, 20..21));
+        assert_eq!(read(&mut prompt), [20]);
     }
 
     /// Two readers, of which one hardly keeps up: no record is torn, each comes once and in order.
