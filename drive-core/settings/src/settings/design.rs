@@ -135,8 +135,8 @@ impl Settings {
             ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
-                ReferenceFilter::new(designs[0].p_f).with_direct(tuning::DIRECT_SHARE),
-                ReferenceFilter::new(designs[1].p_f).with_direct(tuning::DIRECT_SHARE),
+                ReferenceFilter::new(designs[0].z_c).with_direct(tuning::DIRECT_SHARE),
+                ReferenceFilter::new(designs[1].z_c).with_direct(tuning::DIRECT_SHARE),
             ],
             current_lag,
             lag_share,

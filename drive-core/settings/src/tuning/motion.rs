@@ -2,7 +2,6 @@
 
 use core::f64::consts::{PI, TAU};
 
-use super::margins::{Margins, scan};
 use super::{TuningError, bisected, check, check_period, pi_response, zero_at};
 use drive_core::MotionGains;
 use drive_core::flux::THIRD_POLE;
@@ -39,7 +38,7 @@ const CORNER: f64 = 2.0;
 /// ([`THIRD_POLE`]) and a low-pass of the speed with its corner at 2 w_n are included.
 ///
 /// The position gain is a quarter of the crossover. Opened at the current, the position loop then has some
-/// 8° less phase margin; see [`MotionDesign::margins`].
+/// 8° less phase margin.
 ///
 /// | | crossover | margin, speed | margin, position |
 /// |---|---|---|---|
@@ -47,7 +46,7 @@ const CORNER: f64 = 2.0;
 /// | 4 Hz tracking loop, 60°, 10 ms | 1.4 Hz | 60.0° | 52.2° |
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`].
+/// An argument is out of its range.
 pub fn design_motion_loops(
     acceleration: f64,
     tracking_hz: Option<f64>,
@@ -121,23 +120,5 @@ impl MotionDesign {
         pi_response(self.gains.k_c, self.gains.z_c, omega_t)
             * self.rotor(omega_t)
             * self.slope(omega_t)
-    }
-
-    /// Open loop of the position mode at `omega_t` rad/sample, opened at the current. The position acts on
-    /// the speed reference, and through it on the feed-forward current.
-    pub fn open_position_loop(&self, omega_t: f64) -> Complex64 {
-        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.gains.period_s);
-        let pi = pi_response(self.gains.k_c, self.gains.z_c, omega_t);
-        let forward = difference * (self.gains.k_x / self.gains.acceleration);
-        self.rotor(omega_t)
-            * (pi * (self.slope(omega_t) + Complex64::new(self.gains.k_x, 0.0)) + forward)
-    }
-
-    /// Margins of the speed mode and of the position mode; `None` without a crossover.
-    pub fn margins(&self) -> Option<[Margins; 2]> {
-        Some([
-            scan(&|w| self.open_loop(w), 2, self.gains.period_s)?,
-            scan(&|w| self.open_position_loop(w), 3, self.gains.period_s)?,
-        ])
     }
 }
