@@ -7,37 +7,30 @@ use drive_settings::tuning::TuningError;
 use drive_settings::value::Words;
 use drive_settings::words;
 
-/// A step of the commissioning, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Step {
-    /// The nameplate: is it plausible, and what follows from it.
-    Nameplate,
-    /// Offsets and noise of the current sensors, dc link.
-    Sensors,
-    /// Volt-second pulses: wiring, open phases, rough transient inductance.
-    Wiring,
-    /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter, gain
-    /// mismatch.
-    Levels,
-    /// The carrier along and across a bias: transient inductance, saliency at standstill.
-    Leakage,
-    /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
-    Staircase,
-    /// The current loop, designed from the values found and checked by a step.
-    CurrentLoop,
-    /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
-    Plant,
-    /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
-    Inertia,
+words! {
+    /// A step of the commissioning, in their order.
+    pub enum Step {
+        /// The nameplate: is it plausible, and what follows from it.
+        Nameplate = "nameplate",
+        /// Offsets and noise of the current sensors, dc link.
+        Sensors = "sensors",
+        /// Volt-second pulses: wiring, open phases, rough transient inductance.
+        Wiring = "wiring",
+        /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter, gain
+        /// mismatch.
+        Levels = "levels",
+        /// The carrier along and across a bias: transient inductance, saliency at standstill.
+        Leakage = "leakage",
+        /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
+        Staircase = "staircase",
+        /// The current loop, designed from the values found and checked by a step.
+        CurrentLoop = "current-loop",
+        /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
+        Plant = "plant",
+        /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
+        Inertia = "inertia",
+    }
 }
-
-words!(Step {
-    Self::Nameplate => Step::Nameplate, "nameplate"; Self::Sensors => Step::Sensors, "sensors";
-    Self::Wiring => Step::Wiring, "wiring"; Self::Levels => Step::Levels, "levels";
-    Self::Leakage => Step::Leakage, "leakage"; Self::Staircase => Step::Staircase, "staircase";
-    Self::CurrentLoop => Step::CurrentLoop, "current-loop"; Self::Plant => Step::Plant, "plant";
-    Self::Inertia => Step::Inertia, "inertia";
-});
 
 impl Step {
     /// The last one at standstill.

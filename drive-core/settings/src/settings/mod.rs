@@ -26,52 +26,52 @@ pub use list::{
     Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
     SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
 };
-pub use tracked::{Tracked, TrackedLimit};
+pub use tracked::Tracked;
 
-/// Sensors of the phase currents.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CurrentSensors {
-    /// Two, in the lines a and b.
-    InLine,
-    /// Three shunts below the low sides.
-    LowSide,
+words! {
+    /// Sensors of the phase currents.
+    pub enum CurrentSensors {
+        /// Two, in the lines a and b.
+        InLine = "in-line",
+        /// Three shunts below the low sides.
+        LowSide = "low-side",
+    }
 }
 
-/// The plant that the current controllers are designed for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlantSource {
-    /// First-order plants identified on the motor with the filters in place (section 3.7).
-    Identified,
-    /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
-    /// with it.
-    Motor,
+words! {
+    /// The plant that the current controllers are designed for.
+    pub enum PlantSource {
+        /// First-order plants identified on the motor with the filters in place (section 3.7).
+        Identified = "identified",
+        /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
+        /// with it.
+        Motor = "motor",
+    }
 }
 
-/// The flux that the drive magnetises the motor with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flux {
-    /// That of the dissertation: 15 % of the rated flux of its motor.
-    Low,
-    /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
-    /// where it hardly has a saliency at the low one.
-    High,
+words! {
+    /// The flux that the drive magnetises the motor with.
+    pub enum Flux {
+        /// That of the dissertation: 15 % of the rated flux of its motor.
+        Low = "low",
+        /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
+        /// where it hardly has a saliency at the low one.
+        High = "high",
+    }
 }
 
-words!(CurrentSensors { Self::InLine => CurrentSensors::InLine, "in-line"; Self::LowSide => CurrentSensors::LowSide, "low-side"; });
-words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
-words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
+words!(AngleSource { Encoder = "encoder", Injection = "injection", });
 words!(DemodulatorKind {
-    Self::Literal => DemodulatorKind::Literal, "literal";
-    Self::Rectified => DemodulatorKind::Rectified, "rectified";
-    Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
-    Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
-    Self::Envelope => DemodulatorKind::Envelope, "envelope";
+    Literal = "literal",
+    Rectified = "rectified",
+    Synchronous = "synchronous",
+    RmsImpedance = "rms-impedance",
+    Envelope = "envelope",
 });
+
 /// The word of the only demodulation that this build has; `None`: it has all.
 const ONLY_DEMODULATOR: Option<&str> =
     if DemodulatorKind::HAS_ALL { None } else { Some("synchronous") };
-
-words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });
 
 impl Settings {
     /// Checks every value against its range, the scales first: the rules of others follow from the sensors' range.

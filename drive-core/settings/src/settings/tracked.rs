@@ -17,26 +17,13 @@ pub struct Tracked {
     pub i_d: f32,
     /// See `i_d`.
     pub flux: f32,
-    /// The reason of the limit.
-    pub limit: TrackedLimit,
-}
-
-/// Reason of the limit of the torque current of a drive that tracks the saliency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrackedLimit {
-    /// The slope is lost beyond.
-    Slope,
-    /// The current limit beside the direct current: the slope is there as far as it was learned.
-    Current,
+    /// The reason of the limit of the torque current.
+    pub limit: &'static str,
 }
 
 impl fmt::Display for Tracked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { i_q, torque, i_d, flux, limit } = self;
-        let limit = match limit {
-            TrackedLimit::Slope => "the slope, which is lost beyond",
-            TrackedLimit::Current => "the current limit",
-        };
         write!(
             f,
             "trackable from -{torque:.2} to {torque:.2} Nm (-{i_q:.2} to {i_q:.2} A) at {flux:.3} Wb ({i_d:.2} A); the limit is {limit}"
@@ -57,7 +44,7 @@ impl Settings {
             torque: i_q * motor.torque_per_ampere(i_d),
             i_d,
             flux: i_d * motor.l_m,
-            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
+            limit: if lost { "the slope, which is lost beyond" } else { "the current limit" },
         })
     }
 }
