@@ -26,7 +26,6 @@ pub use list::{
     Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
     SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
 };
-pub use tracked::Tracked;
 
 words! {
     /// Sensors of the phase currents.
