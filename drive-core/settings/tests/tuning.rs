@@ -255,7 +255,7 @@ fn motion_loops_have_the_margins_asked_for() {
             println!("{tracking:?} {margin}: {c:?}\n  {speed:?}\n  {position:?}");
             assert!(speed.stable && position.stable);
             assert!((speed.phase_margin_deg - margin).abs() < 1e-3);
-            assert_close("crossover", speed.crossover_hz, c.crossover / TAU, 1e-6);
+            assert_close("crossover", speed.crossover_hz, 4.0 * c.gains.k_x / TAU, 1e-6);
             // The position's share takes atan 1/4 = 14° at an unchanged crossover; the current that
             // is fed forward moves the crossover up a little.
             assert!(position.phase_margin_deg > margin - 16.0);

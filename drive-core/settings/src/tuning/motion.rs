@@ -12,8 +12,6 @@ use num_complex::Complex64;
 pub struct MotionDesign {
     /// The controllers.
     pub gains: MotionGains,
-    /// Crossover of the speed loop, rad/s.
-    pub crossover: f64,
     /// Natural frequency of the tracking loop, rad/s; `None` with an encoder.
     pub tracking: Option<f64>,
 }
@@ -68,18 +66,16 @@ pub fn design_motion_loops(
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
     let (low, _) = bisected((0.0, PI), 50, &|omega_t| lag(omega_t) < spare);
-    let crossover = low / period_s;
     let (sin, cos) = libm::sincos(0.5 * low);
     let mut design = MotionDesign {
         gains: MotionGains {
             k_c: 1.0,
             z_c: zero_at(sin / cos / SPREAD),
-            k_x: crossover / SPREAD,
+            k_x: low / period_s / SPREAD,
             acceleration,
             smoothing,
             period_s,
         },
-        crossover,
         tracking,
     };
     design.gains.k_c = 1.0 / design.open_loop(low).norm();
@@ -101,24 +97,16 @@ fn low_pass(share: f64, omega_t: f64) -> Complex64 {
 }
 
 impl MotionDesign {
-    /// Response of the filtered speed to the position, 1/s.
-    fn slope(&self, omega_t: f64) -> Complex64 {
-        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.gains.period_s);
-        difference * low_pass(self.gains.smoothing, omega_t)
-    }
-
-    /// Response of the observed position to the current, turns/A.
-    fn rotor(&self, omega_t: f64) -> Complex64 {
-        let (z, t) = (Complex64::cis(omega_t), self.gains.period_s);
-        let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.gains.acceleration)
-            / ((z - Complex64::ONE) * (z - Complex64::ONE));
-        self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)))
-    }
-
     /// Open loop of the speed mode at `omega_t` rad/sample.
     pub fn open_loop(&self, omega_t: f64) -> Complex64 {
-        pi_response(self.gains.k_c, self.gains.z_c, omega_t)
-            * self.rotor(omega_t)
-            * self.slope(omega_t)
+        let MotionGains { k_c, z_c, acceleration, smoothing, period_s: t, .. } = self.gains;
+        let z = Complex64::cis(omega_t);
+        // The observed position over the current, turns/A.
+        let rigid = (z + Complex64::ONE) * (0.5 * t * t * acceleration)
+            / ((z - Complex64::ONE) * (z - Complex64::ONE));
+        let rotor = self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)));
+        // The filtered speed over the position, 1/s.
+        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / t);
+        pi_response(k_c, z_c, omega_t) * rotor * (difference * low_pass(smoothing, omega_t))
     }
 }
