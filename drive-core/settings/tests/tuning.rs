@@ -5,7 +5,7 @@ use core::f64::consts::{PI, TAU};
 use induction_drive_core::FirstOrder;
 use induction_drive_core::filter::{LPF, LPF_AS_PRINTED, Section, SosState};
 use induction_drive_settings::tuning::{
-    DELAY, EquivalentCircuit, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, MotionDesign, TuningError,
+    EquivalentCircuit, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, MotionDesign, TuningError,
     current_loop_margins, design_current_loop, design_motion_loops, motor_plant, pi_response,
     rule_3_8,
 };
@@ -105,7 +105,7 @@ fn poles_of_3_39() {
 }
 
 fn on_the_motor(k_c: f64, z_c: f64, filter: &[Section]) -> Margins {
-    current_loop_margins(k_c, z_c, table_5(), filter, DELAY, T).expect("margins")
+    current_loop_margins(k_c, z_c, table_5(), filter, T).expect("margins")
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn errors_name_the_value_and_its_range() {
             "phase margin of the speed loop in degrees = 90: must be above 20 and below 75",
         ),
         (
-            current_loop_margins(50.0, 1.5, EQ_3_34, &[], 1.0, T).map(drop),
+            current_loop_margins(50.0, 1.5, EQ_3_34, &[], T).map(drop),
             "zero z_c = 1.5: must be above -1 and below 1",
         ),
     ] {

@@ -68,18 +68,23 @@ words!(DemodulatorKind {
     Envelope = "envelope",
 });
 
-/// The word of the only demodulation that this build has; `None`: it has all.
-const ONLY_DEMODULATOR: Option<&str> =
-    if DemodulatorKind::HAS_ALL { None } else { Some("synchronous") };
-
 impl Settings {
-    /// Checks every value against its range, the scales first: the rules of others follow from the sensors' range.
+    /// Checks the demodulation, and every value against its range, the scales first: the rules of others follow from the
+    /// sensors' range.
     ///
     /// # Errors
-    /// [`SettingsError::Range`] with the first value outside its range.
+    /// [`SettingsError::Absent`], or [`SettingsError::Range`] with the first value outside its range.
     pub fn check(&self) -> Result<(), SettingsError> {
+        self.check_demodulator(DemodulatorKind::HAS_ALL)?;
         let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
         scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
+    }
+
+    /// Checks that there is code of the demodulation in a build that has that of all, or of the synchronous one alone.
+    pub(crate) fn check_demodulator(&self, has_all: bool) -> Result<(), SettingsError> {
+        let kind = self.injection.demodulator;
+        let present = has_all || kind == DemodulatorKind::Synchronous;
+        present.then_some(()).ok_or(SettingsError::Absent(kind.word()))
     }
 
     /// Whether results learned with the settings `other` are valid for these settings, too.
@@ -106,15 +111,8 @@ pub enum SettingsError {
         /// Largest allowed.
         max: f32,
     },
-    /// A word for which this build has no code.
-    Absent {
-        /// Name of the setting.
-        name: &'static str,
-        /// The word.
-        word: &'static str,
-        /// The only one for which there is code.
-        only: &'static str,
-    },
+    /// A demodulation, by its word, for which this build has no code.
+    Absent(&'static str),
     /// The design of the controllers failed.
     Tuning(TuningError),
 }
@@ -128,9 +126,10 @@ impl fmt::Display for SettingsError {
                 let beside = if min <= max { "" } else { "nothing beside other settings: " };
                 write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
             }
-            Self::Absent { name, word, only } => {
-                write!(f, "{name} = {word}: this image is built with {only} alone")
-            }
+            Self::Absent(word) => write!(
+                f,
+                "injection.demodulator = {word}: this image is built with synchronous alone"
+            ),
             Self::Tuning(error) => write!(f, "controllers: {error}"),
         }
     }

@@ -227,40 +227,33 @@ pub fn pi_response(k_c: f64, z_c: f64, omega_t: f64) -> Complex64 {
     (z - Complex64::new(z_c, 0.0)) * k_c / (z - Complex64::ONE)
 }
 
-/// Margins of the loop of k_c (z - z_c)/(z - 1), `plant`, the cascade `filter` and `delay` periods.
+/// Margins of the loop of k_c (z - z_c)/(z - 1), `plant`, the cascade `filter` and [`DELAY`].
 ///
 /// # Errors
-/// A plant, gain, zero, delay or period is out of range, or there is no crossover above 1.6e-6 of the sampling rate.
+/// A plant, gain, zero or period is out of range, or there is no crossover above 1.6e-6 of the sampling rate.
 pub fn current_loop_margins(
     k_c: f64,
     z_c: f64,
     plant: FirstOrder,
     filter: &[Section],
-    delay: f64,
     period_s: f64,
 ) -> Result<Margins, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
     check("gain k_c", k_c, 0.0, 1e9)?;
     check("zero z_c", z_c, -1.0, 1.0)?;
-    check("delay in periods", delay, -1e-9, 100.0)?;
-    let unit = current_loop(z_c, plant, filter, delay);
+    let unit = current_loop(z_c, plant, filter);
     let margins = Margins::of(&|w| unit(w) * k_c, 1, period_s);
     margins.ok_or_else(|| no_crossover(f64::NAN, z_c, period_s))
 }
 
 /// Open current loop for k_c = 1.
-fn current_loop(
-    z_c: f64,
-    plant: FirstOrder,
-    filter: &[Section],
-    delay: f64,
-) -> impl Fn(f64) -> Complex64 {
+fn current_loop(z_c: f64, plant: FirstOrder, filter: &[Section]) -> impl Fn(f64) -> Complex64 {
     move |omega_t| {
         pi_response(1.0, z_c, omega_t)
             * plant.response(omega_t)
             * response(filter, omega_t)
-            * Complex64::cis(-delay * omega_t)
+            * Complex64::cis(-DELAY * omega_t)
     }
 }
 
@@ -280,8 +273,7 @@ pub fn design_current_loop(
     period_s: f64,
 ) -> Result<CurrentLoopDesign, TuningError> {
     let RuleDesign { k_c: rule_k_c, z_c, .. } = rule_3_8(identified, period_s)?;
-    let margins_with =
-        |k_c| current_loop_margins(k_c, z_c, physical, &LPF.sections, DELAY, period_s);
+    let margins_with = |k_c| current_loop_margins(k_c, z_c, physical, &LPF.sections, period_s);
     let rule_margins = margins_with(rule_k_c)?;
     let (k_c, margins) = if rule_margins.stable
         && rule_margins.phase_margin_deg >= MIN_PHASE_MARGIN_DEG
@@ -289,7 +281,7 @@ pub fn design_current_loop(
     {
         (rule_k_c, rule_margins)
     } else {
-        let open_loop = current_loop(z_c, physical, &LPF.sections, DELAY);
+        let open_loop = current_loop(z_c, physical, &LPF.sections);
         let limit = gain_limit(&open_loop, MIN_PHASE_MARGIN_DEG, MAX_MS);
         let k_c = if limit < rule_k_c { limit } else { rule_k_c } * 0.999;
         (k_c, margins_with(k_c)?)
