@@ -172,10 +172,9 @@ impl<S> Entry<S> {
             return Ok(());
         };
         // NaN fails the comparison.
-        if value >= min && value <= max {
-            return Ok(());
-        }
-        Err(SettingsError::Range { name: self.name, unit: self.unit, value, min, max })
+        let holds = value >= min && value <= max;
+        let outside = SettingsError::Range { name: self.name, unit: self.unit, value, min, max };
+        holds.then_some(()).ok_or(outside)
     }
 
     /// The range beside the present settings, `(min, max)`; `None` for a word.
