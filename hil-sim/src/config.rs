@@ -191,7 +191,7 @@ pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
             SettingsError::Range { name, .. } => {
                 find(name).is_some_and(|entry| entry.get(settings) == drive::Value::Auto)
             }
-            SettingsError::Absent { .. } | SettingsError::Tuning(_) => false,
+            SettingsError::Absent(..) | SettingsError::Tuning(_) => false,
         };
         let rule = "; it was not set: its rule follows from nameplate, motor, measurement.range_a and inverter.dc_link_v";
         Error::Refused(format!("{error}{}", if by_rule { rule } else { "" }))

@@ -1,58 +1,32 @@
 //! The settings of the field bus, and what the USART makes of rate and format.
 
 use drive_settings::value::Words;
+use drive_settings::words;
 
 use crate::board::CLOCK_HZ;
 
-/// Bits per second.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)] // the names say it
-pub enum Baud {
-    B4800,
-    B9600,
-    B19200,
-    B38400,
-    B57600,
-    B115200,
-}
-
-const RATES: [(Baud, u32); 6] = [
-    (Baud::B4800, 4800),
-    (Baud::B9600, 9600),
-    (Baud::B19200, 19_200),
-    (Baud::B38400, 38_400),
-    (Baud::B57600, 57_600),
-    (Baud::B115200, 115_200),
-];
-
-impl Words for Baud {
-    const WORDS: &'static [&'static str] = &["4800", "9600", "19200", "38400", "57600", "115200"];
-    fn place(self) -> usize {
-        self as usize
-    }
-    fn at(place: usize) -> Self {
-        RATES.get(place).map_or(Self::B4800, |rate| rate.0)
+words! {
+    /// Bits per second.
+    #[allow(missing_docs)] // the names say it
+    pub enum Baud {
+        B4800 = "4800",
+        B9600 = "9600",
+        B19200 = "19200",
+        B38400 = "38400",
+        B57600 = "57600",
+        B115200 = "115200",
     }
 }
 
-/// Parity and stop bits beside eight data bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// No parity, one stop bit.
-    None,
-    /// Even parity, one stop bit.
-    Even,
-    /// No parity, two stop bits: as long as with parity, as the specification asks for.
-    TwoStops,
-}
-
-impl Words for Format {
-    const WORDS: &'static [&'static str] = &["8n1", "8e1", "8n2"];
-    fn place(self) -> usize {
-        self as usize
-    }
-    fn at(place: usize) -> Self {
-        [Self::None, Self::Even, Self::TwoStops].get(place).copied().unwrap_or(Self::None)
+words! {
+    /// Parity and stop bits beside eight data bits.
+    pub enum Format {
+        /// No parity, one stop bit.
+        None = "8n1",
+        /// Even parity, one stop bit.
+        Even = "8e1",
+        /// No parity, two stop bits: as long as with parity, as the specification asks for.
+        TwoStops = "8n2",
     }
 }
 
@@ -62,7 +36,7 @@ const SILENCE_US: u32 = 1750;
 impl Baud {
     /// Bits per second.
     pub fn bits_per_s(self) -> u32 {
-        RATES[self.place()].1
+        [4800, 9600, 19_200, 38_400, 57_600, 115_200][self.place()]
     }
 
     /// Ticks of [`CLOCK_HZ`] per bit, rounded: the BRR register (RM0440, USART baud rate generation; 16 to 65535).
@@ -88,23 +62,15 @@ impl Format {
     }
 }
 
-/// Who starts the drive and gives it references. Anybody may stop it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Commander {
-    /// The console.
-    #[default]
-    Console,
-    /// The bus.
-    Bus,
-}
-
-impl Words for Commander {
-    const WORDS: &'static [&'static str] = &["console", "bus"];
-    fn place(self) -> usize {
-        self as usize
-    }
-    fn at(place: usize) -> Self {
-        if place == 1 { Self::Bus } else { Self::Console }
+words! {
+    /// Who starts the drive and gives it references. Anybody may stop it.
+    #[derive(Default)]
+    pub enum Commander {
+        /// The console.
+        #[default]
+        Console = "console",
+        /// The bus.
+        Bus = "bus",
     }
 }
 

@@ -78,9 +78,9 @@ pub struct Collector {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recorded {
     record: Record,
-    samples: u32,
+    pub samples: u32,
     /// Whether samples are missing.
-    incomplete: bool,
+    pub incomplete: bool,
     /// Bin that is filled, its length, and the sample at which it ends.
     bin: usize,
     length: f32,
@@ -113,20 +113,10 @@ impl Collector {
         }
     }
 
-    /// Samples since the record began.
-    pub fn samples(&self) -> u32 {
-        self.recorded.samples
-    }
-
     /// Notes that steps of the drive are missing between the last and the next: a record that has begun is incomplete.
     pub fn gap(&mut self) {
         let sums = &mut self.recorded;
         sums.incomplete |= sums.samples > 0 && sums.record != Record::Nothing;
-    }
-
-    /// Whether samples are missing in the record.
-    pub fn is_incomplete(&self) -> bool {
-        self.recorded.incomplete
     }
 
     /// Takes a step of the drive while it regulates torque: reference of the torque current, A, and `rotor_freq` of its

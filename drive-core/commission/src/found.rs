@@ -17,8 +17,8 @@ pub struct Found {
     pub levels: Option<Levels>,
     /// Transient inductance and saliency.
     pub leakage: Option<Leakage>,
-    /// Magnetising curve.
-    pub iron: Option<Iron>,
+    /// The motor whose main flux saturates, by the staircase: `l_m` is the chord of the magnetising curve at the direct current.
+    pub iron: Option<Motor>,
     /// Plants of the current loop along the direct and the quadrature axis, A/V, from the pseudo-random voltage.
     pub plants: Option<[FirstOrder; 2]>,
     /// Inertia of rotor and load, kg m^2.
@@ -47,23 +47,10 @@ pub struct Levels {
 pub struct Leakage {
     /// Transient inductance sigma L_s, H.
     pub inductance: f32,
-    /// Saliency at standstill, (across - along)/(across + along), with half the test current along phase a.
-    pub saliency: f32,
     /// Leakage inductance of the fundamental wave at no current, H.
     pub fundamental: f32,
     /// Its change per ampere, peak, H/A.
     pub slope: f32,
-}
-
-/// Result of the staircase.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Iron {
-    /// The circuit, with the chord of the magnetising curve at the direct current.
-    pub motor: Motor,
-    /// Direct current, A peak.
-    pub i_d: f32,
-    /// Magnetising curve: currents, A peak, and main flux, Wb peak.
-    pub points: [(f32, f32); 7],
 }
 
 impl Levels {
@@ -87,7 +74,7 @@ impl Found {
     pub fn motor(&self) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
         if levels.saturates {
-            return self.iron.map(|iron| iron.motor);
+            return self.iron;
         }
         let coupled = levels.coupled();
         let k = 1.0 / fpu_sqrt::sqrtf(1.0 + leakage.inductance / coupled);

@@ -111,6 +111,7 @@ impl Commissioning {
     }
 
     fn report_leakage(&mut self) -> Answer {
+        // With the bias along phase a.
         let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
         let [high, low] = self.inductances;
         let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);
@@ -124,8 +125,7 @@ impl Commissioning {
             Quantity::new("fundamental wave, no current", "H", fundamental),
             Quantity::new("its change per ampere", "H/A", slope),
         ];
-        let saliency = saliency(high);
-        self.found.leakage = Some(Leakage { inductance, saliency, fundamental, slope });
+        self.found.leakage = Some(Leakage { inductance, fundamental, slope });
         self.report(&values)
     }
 }

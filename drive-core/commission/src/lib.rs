@@ -67,7 +67,7 @@ use drive_settings::tuning::{CurrentLoopDesign, TuningError, design_current_loop
 use drive_settings::value::Words as _;
 
 pub use collector::{BINS, Bin, Collector, Record};
-pub use found::{Found, Iron, Leakage, Levels};
+pub use found::{Found, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
@@ -274,8 +274,8 @@ impl Commissioning {
         };
         match self.step {
             _ if !excites => Err(Refusal::Drive(drive.state)),
-            _ if sums.is_incomplete() => Err(Refusal::SamplesLost),
-            _ if sums.samples() < self.state.until => Ok(Next::Wait),
+            _ if sums.recorded.incomplete => Err(Refusal::SamplesLost),
+            _ if sums.recorded.samples < self.state.until => Ok(Next::Wait),
             _ if let Some(entry) = self.plate.implausible => Err(Refusal::Plate(entry)),
             Step::Nameplate => self.report(&self.plate.values()),
             Step::Sensors => self.sensors(drive, sums),

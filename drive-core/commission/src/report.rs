@@ -7,37 +7,30 @@ use drive_settings::tuning::TuningError;
 use drive_settings::value::Words;
 use drive_settings::words;
 
-/// A step of the commissioning, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Step {
-    /// The nameplate: is it plausible, and what follows from it.
-    Nameplate,
-    /// Offsets and noise of the current sensors, dc link.
-    Sensors,
-    /// Volt-second pulses: wiring, open phases, rough transient inductance.
-    Wiring,
-    /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter, gain
-    /// mismatch.
-    Levels,
-    /// The carrier along and across a bias: transient inductance, saliency at standstill.
-    Leakage,
-    /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
-    Staircase,
-    /// The current loop, designed from the values found and checked by a step.
-    CurrentLoop,
-    /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
-    Plant,
-    /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
-    Inertia,
+words! {
+    /// A step of the commissioning, in their order.
+    pub enum Step {
+        /// The nameplate: is it plausible, and what follows from it.
+        Nameplate = "nameplate",
+        /// Offsets and noise of the current sensors, dc link.
+        Sensors = "sensors",
+        /// Volt-second pulses: wiring, open phases, rough transient inductance.
+        Wiring = "wiring",
+        /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter, gain
+        /// mismatch.
+        Levels = "levels",
+        /// The carrier along and across a bias: transient inductance, saliency at standstill.
+        Leakage = "leakage",
+        /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
+        Staircase = "staircase",
+        /// The current loop, designed from the values found and checked by a step.
+        CurrentLoop = "current-loop",
+        /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
+        Plant = "plant",
+        /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
+        Inertia = "inertia",
+    }
 }
-
-words!(Step {
-    Self::Nameplate => Step::Nameplate, "nameplate"; Self::Sensors => Step::Sensors, "sensors";
-    Self::Wiring => Step::Wiring, "wiring"; Self::Levels => Step::Levels, "levels";
-    Self::Leakage => Step::Leakage, "leakage"; Self::Staircase => Step::Staircase, "staircase";
-    Self::CurrentLoop => Step::CurrentLoop, "current-loop"; Self::Plant => Step::Plant, "plant";
-    Self::Inertia => Step::Inertia, "inertia";
-});
 
 impl Step {
     /// The last one at standstill.
@@ -62,9 +55,6 @@ pub struct Quantity {
     pub allowed: (f32, f32),
 }
 
-/// Values of a report at most.
-pub const VALUES: usize = 8;
-
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -72,7 +62,7 @@ pub struct Report {
     /// The step.
     pub step: Step,
     /// The values that it has found, in their order.
-    pub values: [Option<Quantity>; VALUES],
+    pub values: [Option<Quantity>; 8],
     /// Why it is refused; none where it is sound.
     pub refusal: Option<Refusal>,
 }
@@ -110,48 +100,34 @@ pub enum Refusal {
     SamplesLost,
 }
 
-macro_rules! meanings {
-    ($($(#[$doc:meta])* $name:ident => $text:literal;)+) => {
-        /// What a value out of its range means.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Meaning {
-            $($(#[$doc])* $name,)+
-        }
-
-        impl Meaning {
-            /// In words.
-            pub const fn text(self) -> &'static str {
-                match self { $(Self::$name => $text,)+ }
-            }
-        }
-    };
-}
-
-meanings! {
-    /// Larger motor than the nameplate says.
-    TooLarge => "the motor is larger than its nameplate says, or its windings are shorted";
-    /// Smaller motor than the nameplate says.
-    TooSmall => "the motor is smaller than its nameplate says, or connected in another way";
-    /// The sensor's offset.
-    Offset => "correct the offset in scales.current_*, and let the motor come to rest";
-    /// The sensors' noise.
-    Noise => "shield and ground the lines of the sensors";
-    /// The dc link.
-    BusTooLow => "raise the dc link, or compare scales.dc_link with a voltmeter";
-    /// The model of a linear motor does not fit.
-    Misfit => "the motor is not linear at these currents, or something has moved";
-    /// Gains that differ.
-    Mismatch => "compare scales.current_a and scales.current_b with an ammeter; was the shaft at rest?";
-    /// Current across the axis of the voltage.
-    Turning => "the shaft turns, or the gains of the sensors differ";
-    /// Inverter voltage that depends on the current.
-    Inverter => "the voltage that the inverter loses still grows with the current";
-    /// Value too uncertain.
-    Uncertain => "too much noise for this motor";
-    /// The step response of the current loop.
-    Loop => "the motor is not as it was measured";
-    /// The speed does not follow the torque.
-    NotFree => "the shaft must be free to turn; friction, a load or a coupling hides the inertia";
+words! {
+    /// Meaning of a value out of its range; its word is the advice.
+    pub enum Meaning {
+        /// Larger motor than the nameplate says.
+        TooLarge = "the motor is larger than its nameplate says, or its windings are shorted",
+        /// Smaller motor than the nameplate says.
+        TooSmall = "the motor is smaller than its nameplate says, or connected in another way",
+        /// The sensor's offset.
+        Offset = "correct the offset in scales.current_*, and let the motor come to rest",
+        /// The sensors' noise.
+        Noise = "shield and ground the lines of the sensors",
+        /// The dc link.
+        BusTooLow = "raise the dc link, or compare scales.dc_link with a voltmeter",
+        /// The model of a linear motor does not fit.
+        Misfit = "the motor is not linear at these currents, or something has moved",
+        /// Gains that differ.
+        Mismatch = "compare scales.current_a and scales.current_b with an ammeter; was the shaft at rest?",
+        /// Current across the axis of the voltage.
+        Turning = "the shaft turns, or the gains of the sensors differ",
+        /// Inverter voltage that depends on the current.
+        Inverter = "the voltage that the inverter loses still grows with the current",
+        /// Value too uncertain.
+        Uncertain = "too much noise for this motor",
+        /// The step response of the current loop.
+        Loop = "the motor is not as it was measured",
+        /// The speed does not follow the torque.
+        NotFree = "the shaft must be free to turn; friction, a load or a coupling hides the inertia",
+    }
 }
 
 /// What a value below its range means, and one above: of a resistance or an inductance, and of a time constant.
@@ -248,7 +224,7 @@ impl fmt::Display for Refusal {
             ),
             Self::Value { found, meaning } => {
                 let Quantity { name, unit, value, allowed: (min, max), .. } = found;
-                let why = meaning.text();
+                let why = meaning.word();
                 write!(f, "{name} = {value:.5} {unit}: allowed is {min:.5} to {max:.5}; {why}")
             }
             Self::Drive(state) => write!(f, "the drive is {state}"),

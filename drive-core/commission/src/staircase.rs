@@ -16,8 +16,8 @@
 //! ```
 
 use super::{
-    Answer, BINS, Collector, Commissioning, Fitted, Iron, Meaning, Next, Quantity, Record, Refusal,
-    SIZE, Step, TAU_R, TIME,
+    Answer, BINS, Collector, Commissioning, Fitted, Meaning, Next, Quantity, Record, Refusal, SIZE,
+    Step, TAU_R, TIME,
 };
 use drive_core::{Motor, PERIOD_S};
 
@@ -42,11 +42,13 @@ const UNCERTAIN: f32 = 0.05;
 
 /// A level of the staircase.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stair {
+struct Stair {
     /// Current, A, and voltage, V, at the end.
-    end: (f32, f32),
-    /// Sums of what voltage, V s, and current, A s, differ from it.
-    areas: (f32, f32),
+    i: f32,
+    v: f32,
+    /// Sums of what current, A s, and voltage, V s, differ from it.
+    charge: f32,
+    area: f32,
 }
 
 /// State of the step.
@@ -64,41 +66,36 @@ pub(super) struct Staircase {
 impl Stair {
     fn new(sums: &Collector) -> Self {
         let end = sums.mean(0, END);
-        let (i, v) = (end.current.alpha, end.voltage);
-        let mut areas = (0.0, 0.0);
+        let mut stair = Self { i: end.current.alpha, v: end.voltage, charge: 0.0, area: 0.0 };
         for bin in sums.bins(0) {
             let seconds = bin.periods * PERIOD_S;
-            areas.0 += (bin.voltage - v) * seconds;
-            areas.1 += (bin.current.alpha - i) * seconds;
+            stair.charge += (bin.current.alpha - stair.i) * seconds;
+            stair.area += (bin.voltage - stair.v) * seconds;
         }
-        Self { end: (i, v), areas }
+        stair
     }
 }
 
 impl Staircase {
     /// The line through the ends, and the flux of the levels. Currents are those of sensor a over its `gain`.
     fn evaluate(&mut self, gain: f32, dc_link: f32) -> Result<(), Refusal> {
-        let count = (STEPS - 1) as f32;
-        let ends = || self.stairs.iter().skip(1).map(|stair| stair.end);
-        let (i, v) = ends().fold((0.0, 0.0), |(i, v), end| (i + end.0 / count, v + end.1 / count));
-        let (mut ii, mut iv) = (0.0, 0.0);
-        for end in ends() {
-            ii += (end.0 - i) * (end.0 - i);
-            iv += (end.0 - i) * (end.1 - v);
-        }
-        let r_s = iv / ii;
-        for end in ends() {
-            let allowed = LINE.0 * r_s * end.0 + LINE.1 * dc_link;
-            Quantity::new("distance from the resistive line", "V", end.1 - v - r_s * (end.0 - i))
+        let [first, rest @ ..] = &self.stairs;
+        let count = rest.len() as f32;
+        let mean = |of: fn(&Stair) -> f32| rest.iter().fold(0.0, |sum, s| sum + of(s) / count);
+        let (i, v) = (mean(|s| s.i), mean(|s| s.v));
+        let sum = |of: &dyn Fn(&Stair) -> f32| rest.iter().fold(0.0, |sum, s| sum + of(s));
+        let r_s = sum(&|s| (s.i - i) * (s.v - v)) / sum(&|s| (s.i - i) * (s.i - i));
+        for s in rest {
+            let allowed = LINE.0 * r_s * s.i + LINE.1 * dc_link;
+            Quantity::new("distance from the resistive line", "V", s.v - v - r_s * (s.i - i))
                 .up_to(allowed, Meaning::Inverter)?;
         }
-        let growth = |stair: &Stair| stair.areas.0 - r_s * stair.areas.1;
-        let [first, second, ..] = &self.stairs;
-        let mut flux = growth(second) / (second.end.0 - first.end.0) * first.end.0;
-        self.flux[0] = (first.end.0 / gain, flux);
-        for (place, stair) in self.flux.iter_mut().zip(&self.stairs).skip(1) {
-            flux += growth(stair);
-            *place = (stair.end.0 / gain, flux);
+        let growth = |s: &Stair| s.area - r_s * s.charge;
+        let mut flux = growth(&rest[0]) / (rest[0].i - first.i) * first.i;
+        self.flux[0] = (first.i / gain, flux);
+        for (place, s) in self.flux.iter_mut().skip(1).zip(rest) {
+            flux += growth(s);
+            *place = (s.i / gain, flux);
         }
         (self.r_s, self.e) = (r_s * gain, v - r_s * i);
         Ok(())
@@ -191,9 +188,9 @@ impl Commissioning {
         let l = along / (1.0 + k);
         let r_r = r_r / (k * k);
         stairs.complete(seconds, r_r, l);
-        let points = stairs.flux.map(|(i, flux)| (i, flux - l * i));
         let l_m = stairs.flux_at(i_d) / i_d - l;
-        let straight = points[0].1 / points[0].0 / l_m;
+        let (i, flux) = stairs.flux[0];
+        let straight = (flux - l * i) / i / l_m;
         let motor = Motor { r_s: stairs.r_s, r_r, l_ls: l, l_lr: l, l_m, ..Motor::default() };
         let deviation = fit.deviations[2] / fit.r_r;
         Quantity::new("deviation of r_r", "", deviation)
@@ -208,7 +205,7 @@ impl Commissioning {
             Quantity::new("chord of the straight beginning over it", "", straight)
                 .checked((0.95, 5.0), [Meaning::Misfit; 2])?,
         ];
-        self.found.iron = Some(Iron { motor, i_d, points });
+        self.found.iron = Some(motor);
         if let Some(levels) = &mut self.found.levels {
             (levels.r_s, levels.inverter_v) = (motor.r_s, 0.75 * stairs.e);
         }

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
-use super::entry::{Access, Change, Entry};
-use super::value::{Value, Words};
+use super::entry::{Change, Entry};
+use super::value::Value;
 use super::*;
 use drive_core::carrier::DemodulatorKind;
 use drive_core::{AngleSource, Line};
@@ -213,22 +213,11 @@ fn a_range_without_a_value_says_so() {
 /// places.
 #[test]
 fn a_word_without_code_is_refused_by_name() {
-    let demodulator = Entry::<Settings>::new(
-        "injection.demodulator",
-        "",
-        Access::Word(
-            |s| s.injection.demodulator.place(),
-            |s, place| s.injection.demodulator = DemodulatorKind::at(place),
-            DemodulatorKind::WORDS,
-        ),
-        "",
-    );
     let mut settings = Settings::default();
+    assert_eq!(settings.check_demodulator(false), Ok(()));
     settings.injection.demodulator = DemodulatorKind::Envelope;
-    assert_eq!(demodulator.check(&settings), Ok(()));
-    let only = demodulator.only(Some("synchronous"));
-    let error = only.check(&settings).unwrap_err().to_string();
+    assert_eq!(settings.check_demodulator(true), Ok(()));
+    let error = settings.check_demodulator(false).unwrap_err().to_string();
     let text = "injection.demodulator = envelope: this image is built with synchronous alone";
     assert_eq!(error, text);
-    assert_eq!(only.check(&Settings::default()), Ok(()));
 }

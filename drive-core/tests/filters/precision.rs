@@ -128,8 +128,8 @@ fn rounding_the_printed_coefficients() {
     assert!((pp_dc - 0.93942).abs() < 1e-5);
 
     // Stable all the same; only the response is lost.
-    let lpf = [TABLE_7_LPF.largest_pole::<8>(), single.largest_pole::<8>()];
-    let pp = [TABLE_8_PP.largest_pole::<4>(), TABLE_8_PP.rounded().largest_pole::<4>()];
+    let lpf = [TABLE_7_LPF.largest_pole(), single.largest_pole()];
+    let pp = [TABLE_8_PP.largest_pole(), TABLE_8_PP.rounded().largest_pole()];
     println!("largest pole, exact and f32: LPF {lpf:.6?}, PP {pp:.6?}");
     assert!((lpf[0] - 0.988814).abs() < 2e-6 && (lpf[1] - 0.988863).abs() < 2e-6);
     assert!((pp[0] - 0.983195).abs() < 2e-6 && (pp[1] - 0.983254).abs() < 2e-6);
@@ -137,8 +137,8 @@ fn rounding_the_printed_coefficients() {
     let decimals = |scale: f64| move |c: f64| libm::round(c * scale) / scale;
     for (scale, lpf, pp) in [(1e3, 1.0758, 1.085), (1e4, 0.98072, 1.0)] {
         let found = (
-            TABLE_7_LPF.map(decimals(scale)).largest_pole::<8>(),
-            TABLE_8_PP.map(decimals(scale)).largest_pole::<4>(),
+            TABLE_7_LPF.map(decimals(scale)).largest_pole(),
+            TABLE_8_PP.map(decimals(scale)).largest_pole(),
         );
         println!("rounded to 1/{scale}: LPF {:.5}, PP {:.5}", found.0, found.1);
         assert!((found.0 - lpf).abs() < 2e-4 && (found.1 - pp).abs() < 5e-4);

@@ -1,6 +1,6 @@
 //! The filters as printed: Tables 7 and 8, and the difference equation C.1.
 
-use induction_drive_settings::tuning::roots;
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 /// Table 7 and 8, Eq. C.1: numerator and denominator in falling powers of z, as printed.
@@ -86,10 +86,13 @@ impl<const N: usize> Printed<N> {
         self.map(|c| f64::from(c as f32))
     }
 
-    pub fn largest_pole<const M: usize>(&self) -> f64 {
-        let mut monic = [0.0; M];
-        monic.copy_from_slice(&self.a[1..]);
-        roots(monic).expect("finite").iter().fold(0.0, |m, p| m.max(p.norm()))
+    /// By the eigenvalues of the companion matrix.
+    pub fn largest_pole(&self) -> f64 {
+        let companion = |row: usize, column: usize| {
+            if row == 0 { -self.a[column + 1] } else { f64::from(row == column + 1) }
+        };
+        let poles = DMatrix::from_fn(N - 1, N - 1, companion).complex_eigenvalues();
+        poles.iter().fold(0.0, |m, p| m.max(p.norm()))
     }
 }
 

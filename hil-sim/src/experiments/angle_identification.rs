@@ -4,7 +4,7 @@
 mod measure;
 mod model;
 
-use super::bode::{Bode, frequencies, largest_pole};
+use super::bode::{Bode, frequencies, largest_pole, roots};
 use super::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use super::injection_map::PP;
 use super::torque::assumptions;
@@ -105,9 +105,8 @@ fn complex(pole: Complex64) -> String {
 
 fn poles_text(model: &Model) -> String {
     match model.poles() {
-        Some([p, _]) if p.im != 0.0 => format!("{:.4} ± j{:.4}", p.re, p.im.abs()),
-        Some([p, q]) => format!("{}, {}", complex(p), complex(q)),
-        None => "-".into(),
+        [p, _] if p.im != 0.0 => format!("{:.4} ± j{:.4}", p.re, p.im.abs()),
+        [p, q] => format!("{}, {}", complex(p), complex(q)),
     }
 }
 
@@ -203,9 +202,9 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
     let mut rows = |name: &str, plants: &[Model], in_amperes: bool| {
         let design = plants[DESIGN_ROW].design();
         for ((iq, ..), plant) in TABLE_6.iter().zip(plants) {
-            let with = |pii: Pii| Cell::fixed(largest_pole(plant.closed_loop(pii)), 5);
+            let with = |pii: Pii| Cell::fixed(largest_pole(&plant.closed_loop(pii)), 5);
             let here = design.filter(|_| *iq == TABLE_6[DESIGN_ROW].0);
-            let poles = here.and_then(|(pii, _)| plant.closed_loop(pii)).map(|poles| {
+            let poles = here.map(|(pii, _)| roots(&plant.closed_loop(pii))).map(|poles| {
                 let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
                 upper.collect::<Vec<_>>().join(", ")
             });
@@ -303,7 +302,7 @@ fn poles_figure(points: &[IdentifiedPoint]) -> Figure {
     let arc = turns.map(|x| (x.cos(), x.sin())).collect();
     let mut panel = Panel::new("real part", "imaginary part").equal_axes();
     let mut add = |name: &str, plant: Model, pii: Option<Pii>| {
-        let poles = pii.and_then(|pii| plant.closed_loop(pii));
+        let poles = pii.map(|pii| roots(&plant.closed_loop(pii)));
         let points = poles.iter().flatten().map(|p| (p.re, p.im)).collect();
         panel.series.push(Series::points(name, points));
     };
@@ -326,10 +325,10 @@ fn fits(points: &[IdentifiedPoint]) -> (f64, f64) {
 fn distance(points: &[IdentifiedPoint]) -> f64 {
     let of = |(row, p): (usize, &IdentifiedPoint)| {
         let [ours, printed] = [&p.models[1], &Model::printed(row)].map(Model::poles);
-        let apart = ours?[0] - printed?[0];
-        Some(apart.re.abs().max(apart.im.abs()))
+        let apart = ours[0] - printed[0];
+        apart.re.abs().max(apart.im.abs())
     };
-    points.iter().enumerate().filter_map(of).fold(0.0, f64::max)
+    points.iter().enumerate().map(of).fold(0.0, f64::max)
 }
 
 fn remarks(points: &[IdentifiedPoint]) -> Vec<String> {

@@ -1,7 +1,6 @@
 //! Effect of anti-windup in the example of Appendix B.
 
 use drive_core::current::{Pi, PiState};
-use drive_settings::tuning::roots;
 
 use super::bode::largest_pole;
 use super::{Context, Experiment};
@@ -97,8 +96,8 @@ fn highest(values: &[f64]) -> f64 {
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     // (z - 1)^2 + k_c (z - z_c), and z (z - 1)^2 + k_c (z - z_c) with the delayed index.
-    let immediate = largest_pole(roots([K_C - 2.0, 1.0 - K_C * Z_C]));
-    let delayed = largest_pole(roots([-2.0, 1.0 + K_C, -K_C * Z_C]));
+    let immediate = largest_pole(&[K_C - 2.0, 1.0 - K_C * Z_C]);
+    let delayed = largest_pole(&[-2.0, 1.0 + K_C, -K_C * Z_C]);
 
     let mut table = Table::new("Unit step, limit 0.15", &[]);
     let cases = [
@@ -170,7 +169,7 @@ mod tests {
 
     #[test]
     fn the_printed_index_is_unstable_without_a_limit() {
-        assert!((largest_pole(roots([-2.0, 1.0 + K_C, -K_C * Z_C])) - 1.0996).abs() < 1e-4);
+        assert!((largest_pole(&[-2.0, 1.0 + K_C, -K_C * Z_C]) - 1.0996).abs() < 1e-4);
         let unlimited = Response::of(literal(), f64::INFINITY);
         assert!(highest(&unlimited.y) > 1e6);
     }

@@ -8,7 +8,7 @@ use drive_commission::{Commissioning, Step};
 use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
-use drive_settings::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_plant};
+use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
 use drive_settings::value::Words as _;
 use serde::{Deserialize, Serialize};
 
@@ -353,7 +353,7 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     let period = f64::from(PERIOD_S);
     let plant = motor_plant(&circuit, period).map_err(Error::refused)?;
     let (k_c, z_c) = (design.k_c, design.z_c);
-    let margins = current_loop_margins(k_c, z_c, plant, &LPF.sections, DELAY, period);
+    let margins = current_loop_margins(k_c, z_c, plant, &LPF.sections, period);
     Ok(margins.map_err(Error::refused)?.phase_margin_deg)
 }
 

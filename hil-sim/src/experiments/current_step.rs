@@ -1,8 +1,8 @@
 //! Step of the current loop on the identified plant.
 
 use drive_core::FirstOrder;
-use drive_settings::tuning::roots;
 
+use super::bode::roots;
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -65,16 +65,13 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     for (name, key, plant) in plants {
         // (z - 1)(z - p) + k_c k (z - z_c)
         let gain = K_C * plant.k;
-        let poles =
-            roots([gain - 1.0 - plant.p, plant.p - gain * Z_C]).map_or("-".to_owned(), |poles| {
-                let mut real: Vec<f64> = poles.iter().map(|p| p.re).collect();
-                real.sort_by(f64::total_cmp);
-                if poles.iter().all(|p| p.im.abs() < 1e-9) {
-                    format!("{:.4}, {:.4}", real[1], real[0])
-                } else {
-                    format!("{:.4} ± j{:.4}", poles[0].re, poles[0].im.abs())
-                }
-            });
+        let mut poles = roots(&[gain - 1.0 - plant.p, plant.p - gain * Z_C]);
+        poles.sort_by(|p, q| q.re.total_cmp(&p.re));
+        let [p, q] = [poles[0], poles[1]];
+        let poles = match p.im.abs() {
+            0.0 => format!("{:.4}, {:.4}", p.re, q.re),
+            im => format!("{:.4} ± j{im:.4}", p.re),
+        };
         let end = PERIOD_MS * (SAMPLES - 1) as f64;
         let mut panel = Panel::new("time (ms)", "current (A)");
         for (label, filter_key, filtered) in

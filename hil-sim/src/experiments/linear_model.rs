@@ -141,7 +141,7 @@ impl LinearModel {
 
             // Current loop.
             let r = filtered;
-            filtered += (1.0 - self.current.p_f) * (reference - r);
+            filtered += (1.0 - self.current.z_c) * (reference - r);
             let measured = LPF.step(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha;
             let now = r - f64::from(measured);
             voltage += self.current.k_c * (now - self.current.z_c * error);

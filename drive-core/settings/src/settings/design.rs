@@ -58,41 +58,37 @@ impl Settings {
         let m = &self.motor;
         let motor_plant = self.motor_plant()?;
         let designs = self.current_loops()?;
-        let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
-
-        let injecting =
-            self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
-        let t = &self.injection.synchronous;
-        let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
-        let current_lag = self.scales.current_delay_s / PERIOD_S;
-        let inj = &self.injection;
+        let [d, q] = designs.map(|d| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 });
         let motion_design = self.motion_loops()?;
+
+        let (inj, t) = (&self.injection, &self.injection.synchronous);
+        let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
+        let (carrier_v, allowed_v) = (self.carrier_v(), self.unexplained_v());
+        let injecting = self.angle_source == AngleSource::Injection || inj.beside_encoder;
+        let current_lag = self.scales.current_delay_s / PERIOD_S;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
-        let carrier_v = self.carrier_v();
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
+        let carrier_a = injection.current_amplitude;
         let (injection_turn, injection_axis) = if inj.demodulator.is_along_flux() {
             (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 })
         } else {
             (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
         };
-
-        let lock_monitor = self.watches_lock().then(|| {
-            LockMonitor::new(
-                &self.carrier(),
-                &LockMonitorSettings {
-                    slope: self.slope(),
-                    moved_a: self.share_of_rated(MOVED_A),
-                    smoothing_s: t.loss_s,
-                    allowed: t.allowed_loss,
-                    carrier_a: injection.current_amplitude,
-                },
-            )
-        });
+        let shunts = self.shunts();
+        let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
+        let dead_time = DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a());
+        let leakage = Leakage {
+            flux_saliency: 0.5 * self.slope().at_rest(),
+            current_saliency: self.current_saliency(),
+            share: self.observer.leakage_share,
+            slope: self.observer.leakage_slope,
+        };
+        let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
         Ok(Coefficients {
             front_end: FrontEnd {
                 current_a: self.scales.current_a,
                 current_b: self.scales.current_b,
-                shunts: self.shunts(),
+                shunts,
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
                 heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
@@ -116,37 +112,31 @@ impl Settings {
             injection,
             injection_turn,
             injection_axis,
-            lock_monitor,
+            lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
             saliency_check: self.saliency_check(),
             noise_watch: (self.angle_source == AngleSource::Injection)
-                .then(|| NoiseWatch::new(t.flux_saliency, injection.current_amplitude)),
+                .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
                 expected_a: self.share_of_rated(WIRING_A),
                 noise_a: self.share_of_range(WIRING_NOISE_A),
-                highest_v: self.share_of_dc_link(LARGEST_TEST_V),
+                highest_v: largest_test_v,
             }),
-            largest_test_v: self.share_of_dc_link(LARGEST_TEST_V),
+            largest_test_v,
             estimator: self.estimator(
                 lag_share,
                 current_lag + estimator::carrier_lag(motor_plant),
                 self.freq_of_rpm(self.speed_trip_rpm()),
-                (carrier_v, injection.current_amplitude),
+                (carrier_v, carrier_a),
             ),
-            current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
-            reference_filter: [
-                ReferenceFilter::new(designs[0].p_f).with_direct(tuning::DIRECT_SHARE),
-                ReferenceFilter::new(designs[1].p_f).with_direct(tuning::DIRECT_SHARE),
-            ],
+            current_loop: DqPi { d, q },
+            reference_filter: designs
+                .map(|d| ReferenceFilter::new(d.z_c).with_direct(tuning::DIRECT_SHARE)),
             current_lag,
             lag_share,
             modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
-                .readable(self.shunts().map(|shunts| shunts.readable)),
-            dead_time: if self.inverter.compensate {
-                DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
-            } else {
-                DeadTime::NONE
-            },
+                .readable(shunts.map(|shunts| shunts.readable)),
+            dead_time: if self.inverter.compensate { dead_time } else { DeadTime::NONE },
             inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit)
                 .known(self.inverter.drop_v),
             thermal: Thermal {
@@ -157,12 +147,13 @@ impl Settings {
             volts_per_hertz: self.volts_per_hertz(),
             learning: self.learning(),
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
-            prediction: {
-                let allowed_v = self.unexplained_v();
-                let mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
-                Prediction::new(m, motor_plant, allowed_v, mean_v)
-            },
-            catching: self.catching(designs.map(|design| design.k_c as f32)),
+            prediction: Prediction::new(
+                m,
+                motor_plant,
+                allowed_v,
+                UNEXPLAINED_MEAN.map(|share| share * allowed_v),
+            ),
+            catching: self.catching([d.k_c, q.k_c]),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
             dc_link: DcLink::new(&self.dc_link_limits()),
             motion: self.motion(&motion_design),
@@ -175,16 +166,7 @@ impl Settings {
                 current_squared: current_limit * current_limit,
                 i_q: current_limit,
             },
-            observer: self.uses_observer().then(|| {
-                let leakage = Leakage {
-                    flux_saliency: 0.5 * self.slope().at_rest(),
-                    current_saliency: self.current_saliency(),
-                    share: self.observer.leakage_share,
-                    slope: self.observer.leakage_slope,
-                };
-                let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
-                Observer::new(m, &leakage, i_d, ages)
-            }),
+            observer: self.uses_observer().then(|| Observer::new(m, &leakage, i_d, ages)),
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),
@@ -208,6 +190,19 @@ impl Settings {
         let largest_sum = self.share_of_range(LARGEST_SUM_A);
         (s.sensors == CurrentSensors::LowSide)
             .then(|| Shunts::new(s.current_c, window_s, largest_sum))
+    }
+
+    /// `carrier_a` is the expected carrier current along the injection axis, A peak.
+    fn lock_monitor(&self, carrier_a: f32) -> LockMonitor {
+        let t = &self.injection.synchronous;
+        let settings = LockMonitorSettings {
+            slope: self.slope(),
+            moved_a: self.share_of_rated(MOVED_A),
+            smoothing_s: t.loss_s,
+            allowed: t.allowed_loss,
+            carrier_a,
+        };
+        LockMonitor::new(&self.carrier(), &settings)
     }
 
     fn motor_plant(&self) -> Result<FirstOrder, TuningError> {

@@ -48,8 +48,6 @@ enum Range<S> {
     Fixed(f32, f32),
     /// The range depends on other settings.
     Beside(fn(&S) -> (f32, f32)),
-    /// Of the words, this build has the code of one.
-    Only(&'static str),
 }
 
 impl<S> Entry<S> {
@@ -74,14 +72,6 @@ impl<S> Entry<S> {
     /// Accepted in a range that depends on other settings.
     pub const fn beside(mut self, range: fn(&S) -> (f32, f32)) -> Self {
         self.range = Range::Beside(range);
-        self
-    }
-
-    /// Of the words, this build has the code of one, if it is named.
-    pub const fn only(mut self, word: Option<&'static str>) -> Self {
-        if let Some(word) = word {
-            self.range = Range::Only(word);
-        }
         self
     }
 
@@ -168,13 +158,8 @@ impl<S> Entry<S> {
     /// Checks the value in effect against its range.
     ///
     /// # Errors
-    /// [`SettingsError::Range`], or [`SettingsError::Absent`].
+    /// [`SettingsError::Range`].
     pub fn check(&self, settings: &S) -> Result<(), SettingsError> {
-        if let (&Range::Only(only), Value::Word(word)) = (&self.range, self.get(settings))
-            && word != only
-        {
-            return Err(SettingsError::Absent { name: self.name, word, only });
-        }
         self.check_in(self.range(settings), settings)
     }
 
@@ -187,16 +172,15 @@ impl<S> Entry<S> {
             return Ok(());
         };
         // NaN fails the comparison.
-        if value >= min && value <= max {
-            return Ok(());
-        }
-        Err(SettingsError::Range { name: self.name, unit: self.unit, value, min, max })
+        let holds = value >= min && value <= max;
+        let outside = SettingsError::Range { name: self.name, unit: self.unit, value, min, max };
+        holds.then_some(()).ok_or(outside)
     }
 
     /// The range beside the present settings, `(min, max)`; `None` for a word.
     pub fn range(&self, settings: &S) -> Option<(f32, f32)> {
         match (&self.access, &self.range) {
-            (Access::Word(..), _) | (_, Range::Only(_)) => None,
+            (Access::Word(..), _) => None,
             (_, Range::Fixed(min, max)) => Some((*min, *max)),
             (_, Range::Beside(range)) => Some(range(settings)),
         }

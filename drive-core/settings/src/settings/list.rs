@@ -13,7 +13,7 @@ use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
-use super::{CurrentSensors, Flux, ONLY_DEMODULATOR, PlantSource};
+use super::{CurrentSensors, Flux, PlantSource};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
 use drive_core::{AngleSource, Line, Motor, PERIOD_S};
@@ -237,7 +237,7 @@ settings! {
         /// beside the current limit. The voltage is between 20 and 110 V at 311 V.
         amplitude_v: Option<f32> = None, auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
         /// demodulation of the carrier current
-        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().only(ONLY_DEMODULATOR).learned();
+        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().learned();
         /// Settings of the chain of the dissertation.
         printed: PrintedChain = PrintedChain::DEFAULT;
         /// Settings of the synchronous demodulation.

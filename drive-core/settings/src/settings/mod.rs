@@ -26,61 +26,65 @@ pub use list::{
     Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
     SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
 };
-pub use tracked::{Tracked, TrackedLimit};
 
-/// Sensors of the phase currents.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CurrentSensors {
-    /// Two, in the lines a and b.
-    InLine,
-    /// Three shunts below the low sides.
-    LowSide,
+words! {
+    /// Sensors of the phase currents.
+    pub enum CurrentSensors {
+        /// Two, in the lines a and b.
+        InLine = "in-line",
+        /// Three shunts below the low sides.
+        LowSide = "low-side",
+    }
 }
 
-/// The plant that the current controllers are designed for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlantSource {
-    /// First-order plants identified on the motor with the filters in place (section 3.7).
-    Identified,
-    /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
-    /// with it.
-    Motor,
+words! {
+    /// The plant that the current controllers are designed for.
+    pub enum PlantSource {
+        /// First-order plants identified on the motor with the filters in place (section 3.7).
+        Identified = "identified",
+        /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
+        /// with it.
+        Motor = "motor",
+    }
 }
 
-/// The flux that the drive magnetises the motor with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flux {
-    /// That of the dissertation: 15 % of the rated flux of its motor.
-    Low,
-    /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
-    /// where it hardly has a saliency at the low one.
-    High,
+words! {
+    /// The flux that the drive magnetises the motor with.
+    pub enum Flux {
+        /// That of the dissertation: 15 % of the rated flux of its motor.
+        Low = "low",
+        /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
+        /// where it hardly has a saliency at the low one.
+        High = "high",
+    }
 }
 
-words!(CurrentSensors { Self::InLine => CurrentSensors::InLine, "in-line"; Self::LowSide => CurrentSensors::LowSide, "low-side"; });
-words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
-words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
+words!(AngleSource { Encoder = "encoder", Injection = "injection", });
 words!(DemodulatorKind {
-    Self::Literal => DemodulatorKind::Literal, "literal";
-    Self::Rectified => DemodulatorKind::Rectified, "rectified";
-    Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
-    Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
-    Self::Envelope => DemodulatorKind::Envelope, "envelope";
+    Literal = "literal",
+    Rectified = "rectified",
+    Synchronous = "synchronous",
+    RmsImpedance = "rms-impedance",
+    Envelope = "envelope",
 });
-/// The word of the only demodulation that this build has; `None`: it has all.
-const ONLY_DEMODULATOR: Option<&str> =
-    if DemodulatorKind::HAS_ALL { None } else { Some("synchronous") };
-
-words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });
 
 impl Settings {
-    /// Checks every value against its range, the scales first: the rules of others follow from the sensors' range.
+    /// Checks the demodulation, and every value against its range, the scales first: the rules of others follow from the
+    /// sensors' range.
     ///
     /// # Errors
-    /// [`SettingsError::Range`] with the first value outside its range.
+    /// [`SettingsError::Absent`], or [`SettingsError::Range`] with the first value outside its range.
     pub fn check(&self) -> Result<(), SettingsError> {
+        self.check_demodulator(DemodulatorKind::HAS_ALL)?;
         let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
         scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
+    }
+
+    /// Checks that there is code of the demodulation in a build that has that of all, or of the synchronous one alone.
+    pub(crate) fn check_demodulator(&self, has_all: bool) -> Result<(), SettingsError> {
+        let kind = self.injection.demodulator;
+        let present = has_all || kind == DemodulatorKind::Synchronous;
+        present.then_some(()).ok_or(SettingsError::Absent(kind.word()))
     }
 
     /// Whether results learned with the settings `other` are valid for these settings, too.
@@ -107,15 +111,8 @@ pub enum SettingsError {
         /// Largest allowed.
         max: f32,
     },
-    /// A word for which this build has no code.
-    Absent {
-        /// Name of the setting.
-        name: &'static str,
-        /// The word.
-        word: &'static str,
-        /// The only one for which there is code.
-        only: &'static str,
-    },
+    /// A demodulation, by its word, for which this build has no code.
+    Absent(&'static str),
     /// The design of the controllers failed.
     Tuning(TuningError),
 }
@@ -129,9 +126,10 @@ impl fmt::Display for SettingsError {
                 let beside = if min <= max { "" } else { "nothing beside other settings: " };
                 write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
             }
-            Self::Absent { name, word, only } => {
-                write!(f, "{name} = {word}: this image is built with {only} alone")
-            }
+            Self::Absent(word) => write!(
+                f,
+                "injection.demodulator = {word}: this image is built with synchronous alone"
+            ),
             Self::Tuning(error) => write!(f, "controllers: {error}"),
         }
     }

@@ -5,59 +5,21 @@ use core::fmt;
 use super::Settings;
 use drive_core::learned::Learned;
 
-/// Range of torque that a drive tracks with a [result](Learned).
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Tracked {
-    /// Largest torque current, A, and torque, Nm; both signs.
-    pub i_q: f32,
-    /// See `i_q`.
-    pub torque: f32,
-    /// Direct current, A, and rotor flux L_m i_d, Wb peak.
-    pub i_d: f32,
-    /// See `i_d`.
-    pub flux: f32,
-    /// The reason of the limit.
-    pub limit: TrackedLimit,
-}
-
-/// Reason of the limit of the torque current of a drive that tracks the saliency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TrackedLimit {
-    /// The slope is lost beyond.
-    Slope,
-    /// The current limit beside the direct current: the slope is there as far as it was learned.
-    Current,
-}
-
-impl fmt::Display for Tracked {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { i_q, torque, i_d, flux, limit } = self;
-        let limit = match limit {
-            TrackedLimit::Slope => "the slope, which is lost beyond",
-            TrackedLimit::Current => "the current limit",
-        };
-        write!(
-            f,
-            "trackable from -{torque:.2} to {torque:.2} Nm (-{i_q:.2} to {i_q:.2} A) at {flux:.3} Wb ({i_d:.2} A); the limit is {limit}"
-        )
-    }
-}
-
 impl Settings {
-    /// Range of torque that a drive with these settings tracks with a result; `None` if it is not accepted, or has no slope.
-    pub fn tracked(&self, learned: &Learned) -> Option<Tracked> {
+    /// Range of torque, Nm, and of torque current, A peak, that a drive with these settings tracks with a result, and what limits
+    /// it, in words: the slope, where it is lost beyond, or the current limit as far as it was learned; with the rotor flux
+    /// L_m i_d, Wb peak, and its direct current, A. `None` if the result is not accepted, or has no slope.
+    pub fn tracked(&self, learned: &Learned) -> Option<impl fmt::Display + use<>> {
         learned.slope.filter(|_| learned.verdict.is_accepted())?;
-        let (i_d, motor) = (self.i_d(), &self.motor);
-        let last = learned.reference.grid().current(learned.points);
-        let lost = learned.limit_a < last;
-        let i_q = learned.limit_a.min(self.i_q_limit_a());
-        Some(Tracked {
-            i_q,
-            torque: i_q * motor.torque_per_ampere(i_d),
-            i_d,
-            flux: i_d * motor.l_m,
-            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
-        })
+        let (i_d, i_q) = (self.i_d(), learned.limit_a.min(self.i_q_limit_a()));
+        let (torque, flux) = (i_q * self.motor.torque_per_ampere(i_d), i_d * self.motor.l_m);
+        let lost = learned.limit_a < learned.reference.grid().current(learned.points);
+        let limit = if lost { "the slope, which is lost beyond" } else { "the current limit" };
+        Some(fmt::from_fn(move |f| {
+            write!(
+                f,
+                "trackable from -{torque:.2} to {torque:.2} Nm (-{i_q:.2} to {i_q:.2} A) at {flux:.3} Wb ({i_d:.2} A); the limit is {limit}"
+            )
+        }))
     }
 }

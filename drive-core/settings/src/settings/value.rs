@@ -66,13 +66,21 @@ pub fn number(text: &str) -> Option<f32> {
 }
 
 /// A type whose values are written as words.
-pub trait Words: Copy + 'static {
+pub trait Words: Copy + PartialEq + 'static {
     /// The words.
     const WORDS: &'static [&'static str];
-    /// The place of this value in [`WORDS`](Self::WORDS).
-    fn place(self) -> usize;
-    /// The value at a place in [`WORDS`](Self::WORDS); the first behind their end.
-    fn at(place: usize) -> Self;
+    /// The values, in the order of their words.
+    const VALUES: &'static [Self];
+
+    /// The place of this value among them.
+    fn place(self) -> usize {
+        Self::VALUES.iter().position(|value| *value == self).unwrap_or(0)
+    }
+
+    /// The value at a place; the first behind their end.
+    fn at(place: usize) -> Self {
+        Self::VALUES.get(place).copied().unwrap_or(Self::VALUES[0])
+    }
 
     /// The word of this value.
     fn word(self) -> &'static str {
@@ -80,27 +88,33 @@ pub trait Words: Copy + 'static {
     }
 }
 
-/// Implements [`Words`], which must be in scope, for an enumeration or a `bool`.
+/// Declares an enumeration and its [`Words`], which must be in scope; or the words of one that stands elsewhere.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! words {
-    ($type:ty { $($value:pat => $make:expr, $word:literal;)+ }) => {
+    ($(#[$about:meta])* pub enum $type:ident { $($(#[$more:meta])* $variant:ident = $word:literal,)+ }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum $type { $($(#[$more])* $variant,)+ }
+
+        $crate::words!($type { $($variant = $word,)+ });
+    };
+    ($type:ident { $($variant:ident = $word:literal,)+ }) => {
         impl Words for $type {
             const WORDS: &'static [&'static str] = &[$($word),+];
-            fn place(self) -> usize {
-                let word = match self { $($value => $word),+ };
-                Self::WORDS.iter().position(|known| *known == word).unwrap_or(0)
-            }
-            fn at(place: usize) -> Self {
-                const VALUES: &[$type] = &[$($make),+];
-                VALUES.get(place).copied().unwrap_or(VALUES[0])
-            }
+            const VALUES: &'static [Self] = &[$(Self::$variant),+];
         }
+
+        // None is missing.
+        const _: fn($type) = |value| match value { $($type::$variant => {})+ };
     };
 }
 pub(crate) use crate::words;
 
-words!(bool { false => false, "no"; true => true, "yes"; });
+impl Words for bool {
+    const WORDS: &'static [&'static str] = &["no", "yes"];
+    const VALUES: &'static [Self] = &[false, true];
+}
 
 #[cfg(test)]
 mod tests {

@@ -45,62 +45,64 @@ fn grid(n: u32) -> f64 {
     }
 }
 
-/// Margins of `open_loop`, a function of ωT in rad/sample, with `integrators` poles at z = 1 and no pole
-/// outside the unit circle. `None` if its gain never crosses 1 on the grid.
-pub(super) fn scan(
-    open_loop: &dyn Fn(f64) -> Complex64,
-    integrators: u8,
-    period_s: f64,
-) -> Option<Margins> {
-    let hz = |omega_t: f64| omega_t / (TAU * period_s);
-    let distance = |w: f64| (Complex64::ONE + open_loop(w)).norm();
+impl Margins {
+    /// Margins of `open_loop`, a function of ωT in rad/sample, with `integrators` poles at z = 1 and no pole
+    /// outside the unit circle. `None` if its gain never crosses 1 on the grid.
+    pub fn of(
+        open_loop: &dyn Fn(f64) -> Complex64,
+        integrators: u8,
+        period_s: f64,
+    ) -> Option<Self> {
+        let hz = |omega_t: f64| omega_t / (TAU * period_s);
+        let distance = |w: f64| (Complex64::ONE + open_loop(w)).norm();
 
-    let mut nearest = (grid(0), f64::INFINITY, 0);
-    let mut phase_margin: Option<(f64, f64)> = None;
-    let mut gain_margin = f64::INFINITY;
-    let mut turned = 0.0;
+        let mut nearest = (grid(0), f64::INFINITY, 0);
+        let mut phase_margin: Option<(f64, f64)> = None;
+        let mut gain_margin = f64::INFINITY;
+        let mut turned = 0.0;
 
-    let mut w_before = grid(0);
-    let mut before = open_loop(w_before);
-    for n in 1..=LOW + HIGH {
-        let w = grid(n);
-        let l = open_loop(w);
-        // Argument of 1 + L, summed over the small steps.
-        turned += ((Complex64::ONE + l) / (Complex64::ONE + before)).arg();
-        let d = (Complex64::ONE + l).norm();
-        if d < nearest.1 {
-            nearest = (w, d, n);
-        }
-        if (before.norm() >= 1.0) != (l.norm() >= 1.0) {
-            let w = crossing(&|w| open_loop(w).norm() - 1.0, w_before, w);
-            let angle = 180.0 - open_loop(w).arg().to_degrees().abs();
-            if phase_margin.is_none_or(|(smallest, _)| angle < smallest) {
-                phase_margin = Some((angle, w));
+        let mut w_before = grid(0);
+        let mut before = open_loop(w_before);
+        for n in 1..=LOW + HIGH {
+            let w = grid(n);
+            let l = open_loop(w);
+            // Argument of 1 + L, summed over the small steps.
+            turned += ((Complex64::ONE + l) / (Complex64::ONE + before)).arg();
+            let d = (Complex64::ONE + l).norm();
+            if d < nearest.1 {
+                nearest = (w, d, n);
             }
-        }
-        if (before.im < 0.0) != (l.im < 0.0) && before.re < 0.0 && l.re < 0.0 {
-            let gain = open_loop(crossing(&|w| open_loop(w).im, w_before, w)).norm();
-            if gain < 1.0 && 1.0 / gain < gain_margin {
-                gain_margin = 1.0 / gain;
+            if (before.norm() >= 1.0) != (l.norm() >= 1.0) {
+                let w = crossing(&|w| open_loop(w).norm() - 1.0, w_before, w);
+                let angle = 180.0 - open_loop(w).arg().to_degrees().abs();
+                if phase_margin.is_none_or(|(smallest, _)| angle < smallest) {
+                    phase_margin = Some((angle, w));
+                }
             }
+            if (before.im < 0.0) != (l.im < 0.0) && before.re < 0.0 && l.re < 0.0 {
+                let gain = open_loop(crossing(&|w| open_loop(w).im, w_before, w)).norm();
+                if gain < 1.0 && 1.0 / gain < gain_margin {
+                    gain_margin = 1.0 / gain;
+                }
+            }
+            (w_before, before) = (w, l);
         }
-        (w_before, before) = (w, l);
+
+        let (phase_margin, crossover) = phase_margin?;
+        let (w, d, n) = nearest;
+        let (ms_w, least) = if n == 0 { (w, d) } else { minimum_near(&distance, n) };
+        // Argument principle: with all closed-loop poles inside, the phase of 1 + L changes by +90° per
+        // integrator along the upper half circle, and by 180° less per pole outside.
+        let stable = 0.5 * PI * f64::from(integrators) - turned < 0.5 * PI;
+        Some(Self {
+            phase_margin_deg: if stable { phase_margin } else { -phase_margin },
+            crossover_hz: hz(crossover),
+            ms: 1.0 / least,
+            ms_hz: hz(ms_w),
+            gain_margin,
+            stable,
+        })
     }
-
-    let (phase_margin, crossover) = phase_margin?;
-    let (w, d, n) = nearest;
-    let (ms_w, least) = if n == 0 { (w, d) } else { minimum_near(&distance, n) };
-    // Argument principle: with all closed-loop poles inside, the phase of 1 + L changes by +90° per
-    // integrator along the upper half circle, and by 180° less per pole outside.
-    let stable = 0.5 * PI * f64::from(integrators) - turned < 0.5 * PI;
-    Some(Margins {
-        phase_margin_deg: if stable { phase_margin } else { -phase_margin },
-        crossover_hz: hz(crossover),
-        ms: 1.0 / least,
-        ms_hz: hz(ms_w),
-        gain_margin,
-        stable,
-    })
 }
 
 /// Largest gain up to which, from zero on, an open loop keeps a phase margin, degrees, and a sensitivity
@@ -195,7 +197,7 @@ mod tests {
             [(45.0, 2.2), (55.0, 2.2), (50.0, 5.0), (20.0, 1.5), (1.0, 50.0)]
         {
             let holds = |gain: f64| {
-                let m = scan(&|w| open_loop(w) * gain, 1, 1.0 / 6000.0).expect("crosses");
+                let m = Margins::of(&|w| open_loop(w) * gain, 1, 1.0 / 6000.0).expect("crosses");
                 m.stable && m.phase_margin_deg >= phase_margin_deg && m.ms <= ms
             };
             let (mut low, mut high) = (20.0, 200.0);

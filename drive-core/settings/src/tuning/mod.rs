@@ -39,13 +39,11 @@ use num_complex::Complex64;
 
 mod margins;
 mod motion;
-mod roots;
 
 pub use margins::Margins;
 pub use motion::{MotionDesign, design_motion_loops};
-pub use roots::roots;
 
-use margins::{gain_limit, scan};
+use margins::gain_limit;
 
 /// Phase margin below which [`design_current_loop`] lowers the gain, degrees.
 pub const MIN_PHASE_MARGIN_DEG: f64 = 45.0;
@@ -98,10 +96,8 @@ pub const DIRECT_SHARE: f32 = 0.6;
 pub struct CurrentLoopDesign {
     /// Gain of the controller, V/A.
     pub k_c: f64,
-    /// Zero of the controller.
+    /// Zero of the controller and pole of the reference filter.
     pub z_c: f64,
-    /// Pole of the reference filter.
-    pub p_f: f64,
     /// Margins on the physical plant with `k_c`.
     pub margins: Margins,
     /// Gain by the rule of section 3.8, V/A; `k_c` is never larger.
@@ -110,45 +106,24 @@ pub struct CurrentLoopDesign {
     pub rule_margins: Margins,
 }
 
-/// Reason why a controller could not be designed.
+/// Reason why a controller could not be designed: a value is NaN or not strictly between its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum TuningError {
-    /// A value is NaN or not strictly between its bounds.
-    OutOfRange {
-        /// Name of the value, with its unit.
-        name: &'static str,
-        /// The value.
-        value: f64,
-        /// Lower bound, excluded.
-        min: f64,
-        /// Upper bound, excluded.
-        max: f64,
-    },
-    /// The loop on the physical plant crosses unit gain below the zero of its controller, where the rule
-    /// does not apply, or nowhere: the identified plant does not belong to this motor.
-    NoCrossover {
-        /// Frequency of the crossover, Hz; NaN if there is none.
-        crossover_hz: f64,
-        /// Frequency of the zero, Hz.
-        zero_hz: f64,
-    },
+pub struct TuningError {
+    /// Name of the value, with its unit.
+    pub name: &'static str,
+    /// The value.
+    pub value: f64,
+    /// Lower bound, excluded.
+    pub min: f64,
+    /// Upper bound, excluded.
+    pub max: f64,
 }
 
 impl fmt::Display for TuningError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::OutOfRange { name, value, min, max } => {
-                // Settings are f32: their digits, not those of the f64 they became.
-                let [value, min, max] = [value, min, max].map(|x| *x as f32);
-                write!(f, "{name} = {value}: must be above {min} and below {max}")
-            }
-            Self::NoCrossover { crossover_hz, zero_hz } => write!(
-                f,
-                "crossover on the motor's plant = {crossover_hz:.2} Hz: must be above the controller's zero at \
-                 {zero_hz:.2} Hz; does the identified plant belong to this motor?",
-            ),
-        }
+        // Settings are f32: their digits, not those of the f64 they became.
+        let [value, min, max] = [self.value, self.min, self.max].map(|x| x as f32);
+        write!(f, "{} = {value}: must be above {min} and below {max}", self.name)
     }
 }
 
@@ -156,11 +131,18 @@ impl core::error::Error for TuningError {}
 
 fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), TuningError> {
     // NaN fails the comparison.
-    if value > min && value < max {
-        Ok(())
-    } else {
-        Err(TuningError::OutOfRange { name, value, min, max })
-    }
+    let holds = value > min && value < max;
+    holds.then_some(()).ok_or(TuningError { name, value, min, max })
+}
+
+/// The error of a loop that crosses unit gain on the motor's plant below the zero of its controller, where the rule does not
+/// apply, or nowhere (not a number): the identified plant does not belong to this motor.
+fn no_crossover(crossover_hz: f64, z_c: f64, period_s: f64) -> TuningError {
+    // Fictitious frequency of the zero.
+    let zero_hz = 2.0 / period_s * (1.0 - z_c) / (1.0 + z_c) / TAU;
+    let name =
+        "crossover in Hz on the motor's plant (does the identified plant belong to this motor?)";
+    TuningError { name, value: crossover_hz, min: zero_hz, max: 0.5 / period_s }
 }
 
 fn check_period(period_s: f64) -> Result<(), TuningError> {
@@ -179,7 +161,7 @@ fn check_plant(k: f64, p: f64) -> Result<(), TuningError> {
 /// to 3.22 contain an error of a factor 8.14, and Eq. 3.25 is the forward difference.)
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`]: a parameter is not positive and finite, or the period is out of range.
+/// A parameter is not positive and finite, or the period is out of range.
 pub fn motor_plant(motor: &EquivalentCircuit, period_s: f64) -> Result<FirstOrder, TuningError> {
     check_period(period_s)?;
     check("r_s in ohm", motor.r_s, 0.0, 1e9)?;
@@ -200,8 +182,7 @@ pub fn motor_plant(motor: &EquivalentCircuit, period_s: f64) -> Result<FirstOrde
 /// Applies the rule of section 3.8 to `plant`; see the [module](self).
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`]: the gain is not positive and finite, the pole is outside (0, 1), or the
-/// period is out of range.
+/// The gain is not positive and finite, the pole is outside (0, 1), or the period is out of range.
 pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
@@ -246,56 +227,34 @@ pub fn pi_response(k_c: f64, z_c: f64, omega_t: f64) -> Complex64 {
     (z - Complex64::new(z_c, 0.0)) * k_c / (z - Complex64::ONE)
 }
 
-/// Margins of the loop of k_c (z - z_c)/(z - 1), `plant`, the cascade `filter` and `delay` periods.
+/// Margins of the loop of k_c (z - z_c)/(z - 1), `plant`, the cascade `filter` and [`DELAY`].
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`]: a plant, gain, zero, delay or period is out of range.
-/// [`TuningError::NoCrossover`]: no crossover above 1.6e-6 of the sampling rate.
+/// A plant, gain, zero or period is out of range, or there is no crossover above 1.6e-6 of the sampling rate.
 pub fn current_loop_margins(
     k_c: f64,
     z_c: f64,
     plant: FirstOrder,
     filter: &[Section],
-    delay: f64,
     period_s: f64,
 ) -> Result<Margins, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
     check("gain k_c", k_c, 0.0, 1e9)?;
     check("zero z_c", z_c, -1.0, 1.0)?;
-    check("delay in periods", delay, -1e-9, 100.0)?;
-    let unit = current_loop(z_c, plant, filter, delay);
-    margins_or_error(&|w| unit(w) * k_c, 1, z_c, period_s)
+    let unit = current_loop(z_c, plant, filter);
+    let margins = Margins::of(&|w| unit(w) * k_c, 1, period_s);
+    margins.ok_or_else(|| no_crossover(f64::NAN, z_c, period_s))
 }
 
 /// Open current loop for k_c = 1.
-fn current_loop(
-    z_c: f64,
-    plant: FirstOrder,
-    filter: &[Section],
-    delay: f64,
-) -> impl Fn(f64) -> Complex64 {
+fn current_loop(z_c: f64, plant: FirstOrder, filter: &[Section]) -> impl Fn(f64) -> Complex64 {
     move |omega_t| {
         pi_response(1.0, z_c, omega_t)
             * plant.response(omega_t)
             * response(filter, omega_t)
-            * Complex64::cis(-delay * omega_t)
+            * Complex64::cis(-DELAY * omega_t)
     }
-}
-
-fn margins_or_error(
-    open_loop: &dyn Fn(f64) -> Complex64,
-    integrators: u8,
-    z_c: f64,
-    period_s: f64,
-) -> Result<Margins, TuningError> {
-    scan(open_loop, integrators, period_s)
-        .ok_or(TuningError::NoCrossover { crossover_hz: f64::NAN, zero_hz: zero_hz(z_c, period_s) })
-}
-
-/// Fictitious frequency of the zero z_c, Hz.
-fn zero_hz(z_c: f64, period_s: f64) -> f64 {
-    2.0 / period_s * (1.0 - z_c) / (1.0 + z_c) / TAU
 }
 
 /// Designs a current controller by section 3.8 for the `identified` plant and checks it on the `physical`
@@ -307,18 +266,14 @@ fn zero_hz(z_c: f64, period_s: f64) -> f64 {
 /// 51.2 V/A with 50.1° and 2.03.
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`]: a plant or the period is out of range. [`TuningError::NoCrossover`]: the
-/// crossover lies below the zero of the controller.
+/// A plant or the period is out of range, or the crossover lies below the zero of the controller.
 pub fn design_current_loop(
     identified: FirstOrder,
     physical: FirstOrder,
     period_s: f64,
 ) -> Result<CurrentLoopDesign, TuningError> {
     let RuleDesign { k_c: rule_k_c, z_c, .. } = rule_3_8(identified, period_s)?;
-    check_plant(physical.k, physical.p)?;
-    let open_loop = current_loop(z_c, physical, &LPF.sections, DELAY);
-    let margins_with = |k_c: f64| margins_or_error(&|w| open_loop(w) * k_c, 1, z_c, period_s);
-
+    let margins_with = |k_c| current_loop_margins(k_c, z_c, physical, &LPF.sections, period_s);
     let rule_margins = margins_with(rule_k_c)?;
     let (k_c, margins) = if rule_margins.stable
         && rule_margins.phase_margin_deg >= MIN_PHASE_MARGIN_DEG
@@ -326,14 +281,15 @@ pub fn design_current_loop(
     {
         (rule_k_c, rule_margins)
     } else {
+        let open_loop = current_loop(z_c, physical, &LPF.sections);
         let limit = gain_limit(&open_loop, MIN_PHASE_MARGIN_DEG, MAX_MS);
         let k_c = if limit < rule_k_c { limit } else { rule_k_c } * 0.999;
         (k_c, margins_with(k_c)?)
     };
-    let zero_hz = zero_hz(z_c, period_s);
-    if margins.crossover_hz > zero_hz {
-        Ok(CurrentLoopDesign { k_c, z_c, p_f: z_c, margins, rule_k_c, rule_margins })
+    let below_zero = no_crossover(margins.crossover_hz, z_c, period_s);
+    if margins.crossover_hz > below_zero.min {
+        Ok(CurrentLoopDesign { k_c, z_c, margins, rule_k_c, rule_margins })
     } else {
-        Err(TuningError::NoCrossover { crossover_hz: margins.crossover_hz, zero_hz })
+        Err(below_zero)
     }
 }

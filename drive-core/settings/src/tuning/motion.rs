@@ -2,7 +2,6 @@
 
 use core::f64::consts::{PI, TAU};
 
-use super::margins::{Margins, scan};
 use super::{TuningError, bisected, check, check_period, pi_response, zero_at};
 use drive_core::MotionGains;
 use drive_core::flux::THIRD_POLE;
@@ -13,8 +12,6 @@ use num_complex::Complex64;
 pub struct MotionDesign {
     /// The controllers.
     pub gains: MotionGains,
-    /// Crossover of the speed loop, rad/s.
-    pub crossover: f64,
     /// Natural frequency of the tracking loop, rad/s; `None` with an encoder.
     pub tracking: Option<f64>,
 }
@@ -39,7 +36,7 @@ const CORNER: f64 = 2.0;
 /// ([`THIRD_POLE`]) and a low-pass of the speed with its corner at 2 w_n are included.
 ///
 /// The position gain is a quarter of the crossover. Opened at the current, the position loop then has some
-/// 8° less phase margin; see [`MotionDesign::margins`].
+/// 8° less phase margin.
 ///
 /// | | crossover | margin, speed | margin, position |
 /// |---|---|---|---|
@@ -47,7 +44,7 @@ const CORNER: f64 = 2.0;
 /// | 4 Hz tracking loop, 60°, 10 ms | 1.4 Hz | 60.0° | 52.2° |
 ///
 /// # Errors
-/// [`TuningError::OutOfRange`].
+/// An argument is out of its range.
 pub fn design_motion_loops(
     acceleration: f64,
     tracking_hz: Option<f64>,
@@ -69,18 +66,16 @@ pub fn design_motion_loops(
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
     let (low, _) = bisected((0.0, PI), 50, &|omega_t| lag(omega_t) < spare);
-    let crossover = low / period_s;
     let (sin, cos) = libm::sincos(0.5 * low);
     let mut design = MotionDesign {
         gains: MotionGains {
             k_c: 1.0,
             z_c: zero_at(sin / cos / SPREAD),
-            k_x: crossover / SPREAD,
+            k_x: low / period_s / SPREAD,
             acceleration,
             smoothing,
             period_s,
         },
-        crossover,
         tracking,
     };
     design.gains.k_c = 1.0 / design.open_loop(low).norm();
@@ -102,42 +97,16 @@ fn low_pass(share: f64, omega_t: f64) -> Complex64 {
 }
 
 impl MotionDesign {
-    /// Response of the filtered speed to the position, 1/s.
-    fn slope(&self, omega_t: f64) -> Complex64 {
-        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.gains.period_s);
-        difference * low_pass(self.gains.smoothing, omega_t)
-    }
-
-    /// Response of the observed position to the current, turns/A.
-    fn rotor(&self, omega_t: f64) -> Complex64 {
-        let (z, t) = (Complex64::cis(omega_t), self.gains.period_s);
-        let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.gains.acceleration)
-            / ((z - Complex64::ONE) * (z - Complex64::ONE));
-        self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)))
-    }
-
     /// Open loop of the speed mode at `omega_t` rad/sample.
     pub fn open_loop(&self, omega_t: f64) -> Complex64 {
-        pi_response(self.gains.k_c, self.gains.z_c, omega_t)
-            * self.rotor(omega_t)
-            * self.slope(omega_t)
-    }
-
-    /// Open loop of the position mode at `omega_t` rad/sample, opened at the current. The position acts on
-    /// the speed reference, and through it on the feed-forward current.
-    pub fn open_position_loop(&self, omega_t: f64) -> Complex64 {
-        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.gains.period_s);
-        let pi = pi_response(self.gains.k_c, self.gains.z_c, omega_t);
-        let forward = difference * (self.gains.k_x / self.gains.acceleration);
-        self.rotor(omega_t)
-            * (pi * (self.slope(omega_t) + Complex64::new(self.gains.k_x, 0.0)) + forward)
-    }
-
-    /// Margins of the speed mode and of the position mode; `None` without a crossover.
-    pub fn margins(&self) -> Option<[Margins; 2]> {
-        Some([
-            scan(&|w| self.open_loop(w), 2, self.gains.period_s)?,
-            scan(&|w| self.open_position_loop(w), 3, self.gains.period_s)?,
-        ])
+        let MotionGains { k_c, z_c, acceleration, smoothing, period_s: t, .. } = self.gains;
+        let z = Complex64::cis(omega_t);
+        // The observed position over the current, turns/A.
+        let rigid = (z + Complex64::ONE) * (0.5 * t * t * acceleration)
+            / ((z - Complex64::ONE) * (z - Complex64::ONE));
+        let rotor = self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)));
+        // The filtered speed over the position, 1/s.
+        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / t);
+        pi_response(k_c, z_c, omega_t) * rotor * (difference * low_pass(smoothing, omega_t))
     }
 }

@@ -1,11 +1,10 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use drive_settings::tuning::roots;
 use num_complex::Complex64;
 
 use super::measure::Record;
 use crate::error::Error;
-use crate::experiments::bode::largest_pole;
+use crate::experiments::bode::{largest_pole, roots};
 use crate::identification::arx::{Orders, fit};
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
@@ -106,8 +105,10 @@ impl Model {
     }
 
     /// Both poles, the one with the larger imaginary part (or the larger one) first.
-    pub fn poles(&self) -> Option<[Complex64; 2]> {
-        roots(self.a).map(|[p, q]| if (p.im, p.re) < (q.im, q.re) { [q, p] } else { [p, q] })
+    pub fn poles(&self) -> [Complex64; 2] {
+        let poles = roots(&self.a);
+        let [p, q] = [poles[0], poles[1]];
+        if (p.im, p.re) < (q.im, q.re) { [q, p] } else { [p, q] }
     }
 
     fn is_stable(&self) -> bool {
@@ -122,12 +123,12 @@ impl Model {
         Complex64::new(self.k, 0.0) / (z * z + a1 * z + a2)
     }
 
-    /// Poles of the loop of this plant and a controller:
+    /// Coefficients of the loop of this plant and a controller, without the first:
     /// (z - 1)^2 (z^2 + a1 z + a2) + k_s k (z - z_s).
-    pub fn closed_loop(&self, pii: Pii) -> Option<[Complex64; 4]> {
+    pub fn closed_loop(&self, pii: Pii) -> [f64; 4] {
         let [a1, a2] = self.a;
         let gain = pii.k_s * self.k;
-        roots([a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s])
+        [a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s]
     }
 
     /// The fastest controller with its zero a factor [`LEAD`] below the crossover that is stable and
@@ -140,7 +141,7 @@ impl Model {
             (Pii { k_s: sign / open.norm(), z_s: 1.0 - crossover / LEAD }, crossover)
         });
         let fits = |pii: Pii| {
-            largest_pole(self.closed_loop(pii)) < 1.0
+            largest_pole(&self.closed_loop(pii)) < 1.0
                 && (1..300).all(|n| {
                     let w = std::f64::consts::PI * 0.97_f64.powi(n);
                     (Complex64::ONE + self.open_loop(pii, w)).norm() > 1.0 / MS
@@ -181,11 +182,11 @@ mod tests {
             assert!(model.fit(&record).1 > 99.99);
         }
         let (pii, crossover) = plant.design().unwrap();
-        assert!(largest_pole(plant.closed_loop(pii)) < 0.9999);
+        assert!(largest_pole(&plant.closed_loop(pii)) < 0.9999);
         assert!((plant.open_loop(pii, crossover).norm() - 1.0).abs() < 1e-9);
         // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
         let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
-        assert!(largest_pole(plant.closed_loop(more)) < 1.0);
+        assert!(largest_pole(&plant.closed_loop(more)) < 1.0);
     }
 
     #[test]
@@ -193,7 +194,7 @@ mod tests {
         // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
         let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
         for (row, expected) in expected.into_iter().enumerate() {
-            let found = largest_pole(Model::printed(row).closed_loop(PRINTED_PII));
+            let found = largest_pole(&Model::printed(row).closed_loop(PRINTED_PII));
             assert!((found - expected).abs() < 2e-5, "{row}: {found}");
         }
     }

@@ -4,6 +4,7 @@ use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
 use num_complex::Complex64;
 
 use super::direct;
+use crate::experiments::bode::largest_pole;
 use crate::stats::Stats;
 
 /// A filter whose forms are compared: responses, and the error of each form.
@@ -28,7 +29,6 @@ struct Filter<const SECTIONS: usize, const TAPS: usize> {
     name: &'static str,
     sections: Sos<SECTIONS>,
     direct: [[f64; TAPS]; 2],
-    largest_pole: fn(&[[f64; TAPS]; 2]) -> f64,
 }
 
 impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTIONS, TAPS> {
@@ -45,7 +45,7 @@ impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTION
         direct::response(&direct::rounded(&self.direct), omega_t)
     }
     fn largest_poles(&self) -> [f64; 2] {
-        [self.direct, direct::rounded(&self.direct)].map(|filter| (self.largest_pole)(&filter))
+        [self.direct, direct::rounded(&self.direct)].map(|[_, a]| largest_pole(&a[1..]))
     }
     fn group_delay(&self, omega_t: f64) -> f64 {
         let (h, at) = (1e-5, |w| self.sections.response(w));
@@ -76,23 +76,8 @@ pub const SECTIONS_F32: &str = "sections, f32 (the drive)";
 /// The three filters.
 pub fn filters() -> [Box<dyn ComparedFilter + Send>; 3] {
     [
-        Box::new(Filter {
-            name: "LPF",
-            sections: LPF_AS_PRINTED,
-            direct: direct::LPF,
-            largest_pole: direct::largest_pole_8,
-        }),
-        Box::new(Filter {
-            name: "BPF",
-            sections: BPF,
-            direct: direct::BPF,
-            largest_pole: direct::largest_pole_4,
-        }),
-        Box::new(Filter {
-            name: "PP",
-            sections: PP,
-            direct: direct::PP,
-            largest_pole: direct::largest_pole_4,
-        }),
+        Box::new(Filter { name: "LPF", sections: LPF_AS_PRINTED, direct: direct::LPF }),
+        Box::new(Filter { name: "BPF", sections: BPF, direct: direct::BPF }),
+        Box::new(Filter { name: "PP", sections: PP, direct: direct::PP }),
     ]
 }

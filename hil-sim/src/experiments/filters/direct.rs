@@ -1,10 +1,7 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 #![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
-use drive_settings::tuning::roots;
 use num_complex::Complex64;
-
-use crate::experiments::bode::largest_pole;
 
 /// Table 7: numerator, denominator.
 #[rustfmt::skip] // a table
@@ -60,18 +57,6 @@ pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex
         part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex64::new(c, 0.0))
     };
     value(&filter[0]) / value(&filter[1])
-}
-
-/// Largest magnitude of the poles of an 8th-order filter.
-pub fn largest_pole_8(filter: &[[f64; 9]; 2]) -> f64 {
-    let [_, a1, a2, a3, a4, a5, a6, a7, a8] = filter[1];
-    largest_pole(roots([a1, a2, a3, a4, a5, a6, a7, a8]))
-}
-
-/// Largest magnitude of the poles of a 4th-order filter.
-pub fn largest_pole_4(filter: &[[f64; 5]; 2]) -> f64 {
-    let [_, a1, a2, a3, a4] = filter[1];
-    largest_pole(roots([a1, a2, a3, a4]))
 }
 
 /// The reference: the filter in `f64`, direct form I.

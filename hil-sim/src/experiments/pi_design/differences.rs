@@ -1,7 +1,7 @@
 //! Where the printed numbers do not follow from the printed parameters.
 
 use drive_core::FirstOrder;
-use drive_settings::tuning::{EquivalentCircuit, roots};
+use drive_settings::tuning::EquivalentCircuit;
 
 use super::PERIOD_S;
 use crate::experiments::bode::{RATE, largest_pole};
@@ -17,7 +17,7 @@ pub fn table(motor: &EquivalentCircuit, physical: FirstOrder) -> Table {
     let time_constant = sigma * l_s / resistance;
     // Eq. 4.1 under Eq. 4.2: (z - 1)^2 (z - p) + k_c k (z - z_c).
     let (p, gain) = (0.95782, 6.466 * 0.01716);
-    let position_pole = largest_pole(roots([-2.0 - p, 1.0 + 2.0 * p + gain, -p - gain * 0.974]));
+    let position_pole = largest_pole(&[-2.0 - p, 1.0 + 2.0 * p + gain, -p - gain * 0.974]);
     // A pole p in the w plane: v = 2/T (1 - p)/(1 + p), rad/s.
     let in_w = |p: f64| 2.0 * RATE * (1.0 - p) / (1.0 + p);
 

@@ -119,7 +119,7 @@ impl CurrentLoop {
             let seen = current;
             let share = if direct { f64::from(DIRECT_SHARE) } else { 0.0 };
             let reference = if filters { share + (1.0 - share) * filtered } else { 1.0 };
-            filtered += (1.0 - design.p_f) * (1.0 - filtered);
+            filtered += (1.0 - design.z_c) * (1.0 - filtered);
             let measured = match low_passes {
                 true => LPF.step(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha.into(),
                 false => current,
