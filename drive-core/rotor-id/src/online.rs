@@ -36,7 +36,6 @@
 mod fit;
 
 use core::f32::consts::TAU;
-use core::fmt;
 
 use crate::rls::filter::Filter;
 use crate::rls::{Rls, RlsSettings};
@@ -108,29 +107,22 @@ pub struct RotorEstimate {
 }
 
 /// Reason why there is no estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoEstimate {
     /// The memory is not full yet since the start, or since samples were missing.
+    #[error("settling")]
     Settling,
     /// Speed or current changed; the estimation restarts.
+    #[error("speed or torque change")]
     Transient,
     /// The signals do not determine tau_r (and the speed).
+    #[error("the excitation is too poor")]
     PoorExcitation,
     /// tau_r outside [`TAU_R_LIMITS`] times the setting, or a stator resistance below zero or above three
     /// times the setting.
+    #[error("out of range")]
     OutOfRange,
-}
-
-impl fmt::Display for NoEstimate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Settling => "settling",
-            Self::Transient => "speed or torque change",
-            Self::PoorExcitation => "the excitation is too poor",
-            Self::OutOfRange => "out of range",
-        })
-    }
 }
 
 /// Estimator of the rotor time constant, for the idle loop.
