@@ -10,27 +10,20 @@
 use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use induction_drive_core::learned::Learned;
 use induction_drive_core::{
     Accepted, Command, Compare, Drive, FrontEndState, Hardware, Line, Mode, Refused, Sample,
 };
 use induction_drive_settings::{Ntc, Scales, Settings};
 
-/// Hardware access of the interrupt.
-trait Board {
-    /// The readings of this period. The currents were sampled in the middle of the low sides' on-time.
-    fn sample(&mut self) -> Sample;
-    /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.
-    fn output(&mut self, compare: &Compare);
-    /// Sets the switches of the dc link: the duty of the brake chopper, and whether the precharge relay is closed. A board
-    /// that has neither leaves it empty.
-    fn dc_link(&mut self, chopper: f32, relay: bool);
+/// Hardware access of the interrupt. The board of this example: no current flows, 48 V, 25 °C.
+#[derive(Default)]
+struct Board {
+    /// Whether the precharge relay is closed.
+    relay: bool,
 }
 
-/// The board of this example: no current flows, 48 V, 25 °C.
-struct Idle;
-
-impl Board for Idle {
+impl Board {
+    /// The readings of this period. The currents were sampled in the middle of the low sides' on-time.
     fn sample(&mut self) -> Sample {
         Sample {
             current_a: 2048,
@@ -43,9 +36,14 @@ impl Board for Idle {
         }
     }
 
+    /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.
     fn output(&mut self, _: &Compare) {}
 
-    fn dc_link(&mut self, _: f32, _: bool) {}
+    /// Sets the switches of the dc link: the duty of the brake chopper, and whether the precharge relay is closed. A board
+    /// that has neither leaves it empty.
+    fn dc_link(&mut self, _chopper: f32, relay: bool) {
+        self.relay = relay;
+    }
 }
 
 /// Converter codes: 12 bits.
@@ -83,15 +81,15 @@ fn settings() -> Settings {
 
 /// The control interrupt owns the drive. The task reaches it through two queues only, so that a command is never taken
 /// while a step runs.
-struct Interrupt<B> {
-    board: B,
+struct Interrupt {
+    board: Board,
     drive: Drive,
     front_end: FrontEndState,
     commands: Receiver<Command>,
     answers: SyncSender<Result<Accepted, Refused>>,
 }
 
-impl<B: Board> Interrupt<B> {
+impl Interrupt {
     /// Called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
         let sample = self.board.sample();
@@ -105,38 +103,22 @@ impl<B: Board> Interrupt<B> {
     }
 }
 
-/// The result of the last learning with these settings, from the flash. This example has none.
-fn read_learned() -> Option<Learned> {
-    None
-}
-
-/// Writes the result of a learning to the flash, beside the settings it belongs to.
-fn write_learned(learned: &Learned) {
-    println!("learned {} points", learned.points);
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = settings();
     // Takes a second on a chip: with the outputs off.
-    let mut coefficients = settings.build()?;
-    if let Some(learned) = read_learned() {
-        coefficients.take(&learned);
-    }
+    let coefficients = settings.build()?;
+    // Here `coefficients.take` the result of the last learning with these settings, from the flash.
 
     let (order, commands) = sync_channel(1);
     let (answers, answer) = sync_channel(1);
     let drive = Drive::new(coefficients);
     let front_end = FrontEndState::default();
-    let mut interrupt = Interrupt { board: Idle, drive, front_end, commands, answers };
+    let mut interrupt = Interrupt { board: Board::default(), drive, front_end, commands, answers };
 
     // The task: one command, one answer.
     order.send(Command::Start(Mode::Torque))?;
     interrupt.on_period();
-    match answer.recv()? {
-        Ok(Accepted::AsGiven) => println!("start: accepted"),
-        Ok(Accepted::Limited(value)) => println!("start: limited to {value}"),
-        Err(why) => println!("start: {why}"),
-    }
+    println!("start: {:?}", answer.recv()?);
 
     // A second of the interrupt. Without a motor the drive finds that no current flows.
     for _ in 0..6000 {
@@ -144,10 +126,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("the drive is {}", interrupt.drive.state());
 
-    // Whenever a learning has ended.
-    if let Some(learned) = interrupt.drive.learned().filter(|learned| learned.verdict.is_accepted())
-    {
-        write_learned(learned);
+    // Whenever a learning has ended: to the flash, beside the settings it belongs to.
+    if let Some(learned) = interrupt.drive.learned().filter(|found| found.verdict.is_accepted()) {
+        println!("learned {} points", learned.points);
     }
     Ok(())
 }
@@ -156,19 +137,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 mod tests {
     use super::*;
 
-    /// The idle board, which notes its relay.
-    struct Watched(bool);
-
-    impl Board for Watched {
-        fn sample(&mut self) -> Sample {
-            Idle.sample()
-        }
-        fn output(&mut self, _: &Compare) {}
-        fn dc_link(&mut self, _: f32, relay: bool) {
-            self.0 = relay;
-        }
-    }
-
     /// The dc link of the board is steady from the beginning: the relay closes once it has been so for its time.
     #[test]
     fn the_precharge_relay_closes() {
@@ -176,11 +144,11 @@ mod tests {
         settings.supply.relay_s = 0.1;
         let drive = Drive::new(settings.build().unwrap());
         let (commands, answers) = (sync_channel(1).1, sync_channel(1).0);
-        let (board, front_end) = (Watched(false), FrontEndState::default());
+        let (board, front_end) = (Board::default(), FrontEndState::default());
         let mut interrupt = Interrupt { board, drive, front_end, commands, answers };
         let mut closed = |periods: u32| {
             (0..periods).for_each(|_| interrupt.on_period());
-            interrupt.board.0
+            interrupt.board.relay
         };
         assert_eq!((closed(300), closed(3000)), (false, true));
     }

@@ -83,20 +83,6 @@ pub struct DcLinkSettings {
     pub chopper: Option<ChopperSettings>,
 }
 
-impl Default for DcLinkSettings {
-    /// For 311 V, without resistor.
-    fn default() -> Self {
-        Self {
-            from_v: 340.0,
-            high_v: 390.0,
-            low_v: 260.0,
-            floor_v: 215.0,
-            flux_a: 1.0,
-            chopper: None,
-        }
-    }
-}
-
 /// Why torque is limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]

@@ -10,7 +10,6 @@
 //! without, and within 0.01 turns where an inertia of 0.06 kg m² swings at the stop. From 100 rpm on, the impact can turn
 //! the flux away from an angle that is tracked without an encoder: hence the limit of the speed.
 
-use core::fmt;
 use core::ops::RangeInclusive;
 
 use crate::motion::LARGEST_POSITION;
@@ -45,7 +44,8 @@ pub struct Plan {
 }
 
 /// A value of the plan that is out of range.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{name} = {value}: outside {min} to {max} {unit}")]
 pub struct OutOfRange {
     name: &'static str,
     value: f32,
@@ -84,16 +84,20 @@ pub enum Next {
 }
 
 /// Why there is no position 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failure {
     /// The drive does not regulate the position any more.
+    #[error("ended, the drive is {0}")]
     Left(State),
     /// No stop within this way, turns.
+    #[error("no stop within {0} turns")]
     NoStop(f32),
     /// The shaft does not turn back from where it stood.
+    #[error("the shaft does not turn with this current")]
     Held,
     /// It does not stand at the same place twice.
+    #[error("the shaft never stood at the same place twice")]
     Unsteady,
 }
 
@@ -234,24 +238,4 @@ fn check(
 ) -> Result<(), OutOfRange> {
     let (min, max) = (*range.start(), *range.end());
     if range.contains(&value) { Ok(()) } else { Err(OutOfRange { name, value, min, max, unit }) }
-}
-
-impl fmt::Display for OutOfRange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, value, min, max, unit } = self;
-        write!(f, "{name} = {value}: outside {min} to {max} {unit}")
-    }
-}
-
-impl core::error::Error for OutOfRange {}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Left(state) => write!(f, "ended, the drive is {state}"),
-            Self::NoStop(turns) => write!(f, "no stop within {turns} turns"),
-            Self::Held => write!(f, "the shaft does not turn with this current"),
-            Self::Unsteady => write!(f, "the shaft never stood at the same place twice"),
-        }
-    }
 }

@@ -34,11 +34,6 @@ use crate::math::{limited, within};
 
 use ramp::{Ramp, RampState};
 
-/// Control periods per step of the loops: 100 Hz.
-pub const DIVIDER: u8 = 60;
-/// Counts of [`RotorCount`] per electrical turn.
-pub const COUNTS_PER_TURN: u32 = 1 << 16;
-
 /// Largest position reference, mechanical turns: f32 resolves 0.02° there.
 pub const LARGEST_POSITION: f32 = 1000.0;
 /// Speed below which the shaft counts as at rest, mechanical turns/s (12 rpm: clear of the noise without an encoder), and for
@@ -142,10 +137,10 @@ pub struct MotionState {
 }
 
 impl Motion {
-    /// Control periods per step of the loops.
-    pub const DIVIDER: u8 = DIVIDER;
+    /// Control periods per step of the loops: 100 Hz.
+    pub const DIVIDER: u8 = 60;
     /// Counts of a rotor position that no encoder counts, per electrical turn.
-    pub const COUNTS_PER_TURN: u32 = COUNTS_PER_TURN;
+    pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
     /// Loops with the controllers `design` and `counts` of the position per mechanical turn.
     ///
@@ -190,10 +185,10 @@ impl Motion {
     /// Takes over from whatever gave the torque current `i_q`, A, with the rotor at `count` and `speed`, turns/s: the speed
     /// loop goes on from both, with the acceleration that it had.
     pub fn take_over(&self, state: &mut MotionState, count: u32, speed: f32, i_q: f32) {
-        let step = state.acceleration * f32::from(DIVIDER);
+        let step = state.acceleration * f32::from(Self::DIVIDER);
         *state = MotionState {
             pi: PiState::at_rest(i_q - self.forward * step),
-            ramp: RampState::at(speed, step),
+            ramp: RampState { reference: speed, change: step },
             speed,
             wanted: speed,
             // The speed is known to the last period.
@@ -268,13 +263,13 @@ impl Motion {
                     }
                 }
                 state.pi.back_calculate(state.output - wanted);
-                state.acceleration = step * (1.0 / DIVIDER as f32);
+                state.acceleration = step * (1.0 / Self::DIVIDER as f32);
                 let moves = state.ramp.reference != 0.0 || state.speed.abs() >= REST;
                 state.rest = if moves { 0 } else { REST_STEPS.min(state.rest.saturating_add(1)) };
             }
             _ => {}
         }
-        state.phase = if state.phase < DIVIDER - 1 { state.phase + 1 } else { 0 };
+        state.phase = if state.phase < Self::DIVIDER - 1 { state.phase + 1 } else { 0 };
         state.output
     }
 
@@ -287,7 +282,7 @@ impl Motion {
     }
 }
 
-/// Counter of the estimated rotor angle in place of an encoder: [`COUNTS_PER_TURN`] per electrical turn,
+/// Counter of the estimated rotor angle in place of an encoder: [`Motion::COUNTS_PER_TURN`] per electrical turn,
 /// wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RotorCount {

@@ -36,10 +36,9 @@
 mod fit;
 
 use core::f32::consts::TAU;
-use core::fmt;
 
 use crate::rls::filter::Filter;
-use crate::rls::{Rls, RlsError, RlsSettings};
+use crate::rls::{Rls, RlsSettings};
 use drive_core::flux::TAU_R_LIMITS;
 use drive_core::math::within;
 use drive_core::{AlphaBeta, Dq, PERIOD_S};
@@ -108,29 +107,22 @@ pub struct RotorEstimate {
 }
 
 /// Reason why there is no estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoEstimate {
     /// The memory is not full yet since the start, or since samples were missing.
+    #[error("settling")]
     Settling,
     /// Speed or current changed; the estimation restarts.
+    #[error("speed or torque change")]
     Transient,
     /// The signals do not determine tau_r (and the speed).
+    #[error("the excitation is too poor")]
     PoorExcitation,
     /// tau_r outside [`TAU_R_LIMITS`] times the setting, or a stator resistance below zero or above three
     /// times the setting.
+    #[error("out of range")]
     OutOfRange,
-}
-
-impl fmt::Display for NoEstimate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Settling => "settling",
-            Self::Transient => "speed or torque change",
-            Self::PoorExcitation => "the excitation is too poor",
-            Self::OutOfRange => "out of range",
-        })
-    }
 }
 
 /// Estimator of the rotor time constant, for the idle loop.
@@ -197,11 +189,9 @@ impl MotorModel {
 }
 
 impl Online {
-    /// Estimator for the motor and the sensors of the settings.
-    ///
-    /// # Errors
-    /// [`RlsError`] of the recursive least squares; never with settings that [`Settings::build`] accepts.
-    pub fn new(settings: &Settings) -> Result<Self, RlsError> {
+    /// Estimator for the motor and the sensors of the settings. None where they do not suit the recursive least squares;
+    /// never with settings that [`Settings::build`] accepts.
+    pub fn new(settings: &Settings) -> Option<Self> {
         let m = &settings.motor;
         let (i_d, trip_a, dc_over_v) = (settings.i_d(), settings.trip_a(), settings.dc_over_v());
         let synchronous = &settings.injection.synchronous;
@@ -242,7 +232,7 @@ impl Online {
             calls: 0,
         };
         online.restart();
-        Ok(online)
+        Some(online)
     }
 
     /// Processes one control period, in order and without gaps: the `measured` current, A, and the

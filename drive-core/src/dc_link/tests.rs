@@ -15,6 +15,16 @@ const CHOPPER: ChopperSettings = ChopperSettings {
     power_w: 50.0,
 };
 
+/// For 311 V, without resistor.
+const SETTINGS: DcLinkSettings = DcLinkSettings {
+    from_v: 340.0,
+    high_v: 390.0,
+    low_v: 260.0,
+    floor_v: 215.0,
+    flux_a: 1.0,
+    chopper: None,
+};
+
 /// Motor, shaft and link as energies.
 struct Bench {
     limits: DcLink,
@@ -109,8 +119,8 @@ impl Bench {
 /// 0.11 s.
 #[test]
 fn a_stop_keeps_the_link_below_the_trip() {
-    let plain = DcLinkSettings { flux_a: 0.0, ..DcLinkSettings::default() };
-    let with_flux = DcLinkSettings::default();
+    let plain = DcLinkSettings { flux_a: 0.0, ..SETTINGS };
+    let with_flux = SETTINGS;
     let resistor = DcLinkSettings { chopper: Some(CHOPPER), ..plain };
     for sign in [1.0, -1.0] {
         let stop = |settings, rpm: f64, inertia: f64| {
@@ -144,7 +154,7 @@ fn the_shaft_holds_the_link_in_an_outage() {
     for (rpm, load_nm, seconds, least_rpm) in
         [(1800.0, 0.0, 1.0, 1300.0), (1800.0, 1.0, 0.5, 1150.0), (-3600.0, 0.5, 1.0, 2500.0)]
     {
-        let mut bench = Bench::new(DcLinkSettings::default(), rpm);
+        let mut bench = Bench::new(SETTINGS, rpm);
         bench.load_nm = load_nm;
         bench.run(1.0, |_| rpm);
         assert_eq!(bench.why, Limiting::No);
@@ -163,7 +173,7 @@ fn the_shaft_holds_the_link_in_an_outage() {
 /// Without the limits 1 Nm at 1800 rpm takes the link below the trip within 80 ms of an outage.
 #[test]
 fn without_limits_the_link_is_lost() {
-    let mut bench = Bench::new(DcLinkSettings::default(), 1800.0);
+    let mut bench = Bench::new(SETTINGS, 1800.0);
     bench.mains = 0.0;
     bench.load_nm = 1.0;
     for _ in 0..48 {
@@ -176,7 +186,7 @@ fn without_limits_the_link_is_lost() {
 #[test]
 fn a_sagging_mains_carries_torque_again() {
     for rpm in [900.0, 1800.0, 3000.0] {
-        let mut bench = Bench::new(DcLinkSettings::default(), rpm);
+        let mut bench = Bench::new(SETTINGS, rpm);
         bench.load_nm = 1.0;
         bench.run(1.0, |_| rpm);
         bench.mains = 230.0;
@@ -194,7 +204,7 @@ fn a_sagging_mains_carries_torque_again() {
 #[test]
 fn a_resistor_takes_what_it_may() {
     let chopper = ChopperSettings { energy_j: 500.0, power_w: 10.0, ..CHOPPER };
-    let settings = DcLinkSettings { chopper: Some(chopper), ..DcLinkSettings::default() };
+    let settings = DcLinkSettings { chopper: Some(chopper), ..SETTINGS };
     let mut bench = Bench::new(settings, 3600.0);
     let (mut reasons, mut hottest) = (Vec::new(), 0.0_f32);
     for n in 0..8 {
@@ -229,7 +239,7 @@ fn a_resistor_takes_what_it_may() {
 /// At nominal voltage and near standstill nothing is limited, whatever the direction; a number that is none gives none.
 #[test]
 fn nothing_is_limited_where_nothing_has_to_be() {
-    let limits = DcLink::new(&DcLinkSettings::default());
+    let limits = DcLink::new(&SETTINGS);
     let step = |v: f32, rpm: f32| {
         limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, (I_Q, Limiting::No))
     };

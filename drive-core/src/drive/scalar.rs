@@ -42,7 +42,7 @@ impl Scalar {
     ) -> Result<[f32; 3], End> {
         let (s, current) = (&mut self.turning, measured.current());
         let Some(turning) = &c.volts_per_hertz else { return Err(End::Stopped) };
-        let rotor_freq = s.rotor_freq();
+        let rotor_freq = s.rotor_freq;
         let stops = self.stop.is_some();
         if stops && rotor_freq.abs() < STANDS {
             return Err(End::Stopped);
@@ -78,7 +78,7 @@ impl Scalar {
         k.seen = Telemetry {
             phi: turned.angle,
             flux_freq: s.freq,
-            rotor_freq: s.rotor_freq(),
+            rotor_freq: s.rotor_freq,
             current: turned.current,
             voltage: turned.voltage,
             measured: current,

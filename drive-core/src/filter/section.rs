@@ -48,14 +48,6 @@ impl Section {
             ..self
         }
     }
-
-    fn numerator(&self) -> [f64; 3] {
-        [self.b0.into(), self.b1.into(), self.b2.into()]
-    }
-
-    fn denominator(&self) -> [f64; 3] {
-        [1.0, self.a1.into(), self.a2.into()]
-    }
 }
 
 /// Frequency response H(e^(j ωT)) of a cascade with its rounded coefficients; `omega_t` in rad/sample.
@@ -64,12 +56,13 @@ impl Section {
 pub fn response(sections: &[Section], omega_t: f64) -> Complex64 {
     let delay = Complex64::cis(-omega_t);
     sections.iter().fold(Complex64::ONE, |h, s| {
-        h * polynomial(s.numerator(), delay) / polynomial(s.denominator(), delay)
+        h * polynomial([s.b0, s.b1, s.b2], delay) / polynomial([1.0, s.a1, s.a2], delay)
     })
 }
 
 /// c0 + c1 x + c2 x².
 #[cold]
-fn polynomial([c0, c1, c2]: [f64; 3], x: Complex64) -> Complex64 {
+fn polynomial(c: [f32; 3], x: Complex64) -> Complex64 {
+    let [c0, c1, c2] = c.map(f64::from);
     Complex64::new(c0, 0.0) + x * (Complex64::new(c1, 0.0) + x * Complex64::new(c2, 0.0))
 }

@@ -109,10 +109,16 @@ mod tests {
         SlopeTable::of_flux_saliency(Grid::REFERENCE, a)
     }
 
+    /// The reference with these values over the torque current, A.
+    fn reference(q: impl Fn(f32) -> f32) -> ReferenceTable {
+        let values = core::array::from_fn(|n| q(Grid::REFERENCE.current(n)));
+        ReferenceTable::from_points(Grid::REFERENCE, values).unwrap()
+    }
+
     #[test]
     fn lookup_is_odd_linear_and_held() {
         let table =
-            ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
+            reference(|i_q| if i_q < 1.0 { 0.04 * i_q } else { 0.035 + 0.005 * i_q.min(3.0) });
         let schedule = GainSchedule::new(&table, &fixed(-0.035), 0.034, 0.7);
         let reference = |i_q| schedule.at(i_q).reference;
         for (i_q, q) in
@@ -139,7 +145,7 @@ mod tests {
 
     #[test]
     fn the_saliency_tells_the_angle() {
-        let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (2.0, 0.04)]).unwrap();
+        let table = reference(|i_q| 0.02 * i_q.min(2.0));
         for k in [-0.07_f32, 0.1] {
             // Beyond 1 A the slope is 0.7 of that without current, beyond 2 A a fifth: the gain is held to twice.
             let points = core::array::from_fn(|n| {
@@ -161,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_was_not_learned_stays() {
-        let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (2.0, 0.04)]).unwrap();
+        let table = reference(|i_q| 0.02 * i_q.min(2.0));
         let schedule = GainSchedule::new(&ReferenceTable::default(), &fixed(-0.035), 0.034, 0.7);
         assert_eq!(
             schedule.with_learned(&table, None, None),

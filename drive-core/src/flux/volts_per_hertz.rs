@@ -143,8 +143,8 @@ pub struct VoltsPerHertz {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VoltsPerHertzState {
     angle: Angle,
-    /// Ramped frequency, without the slip.
-    ramp: f32,
+    /// Speed of the rotor, electrical turns per period: the ramped frequency, without the slip.
+    pub rotor_freq: f32,
     /// Frequency of the stator.
     pub freq: f32,
     /// Slip of the rotor.
@@ -192,13 +192,6 @@ pub struct Turned {
     pub current: Dq,
     /// Voltage, V.
     pub voltage: Dq,
-}
-
-impl VoltsPerHertzState {
-    /// Speed of the rotor, electrical turns per period.
-    pub fn rotor_freq(&self) -> f32 {
-        self.ramp
-    }
 }
 
 impl VoltsPerHertz {
@@ -292,7 +285,7 @@ impl VoltsPerHertz {
         let range = (within(-most, demand.i_q), within(most, demand.i_q));
         let excess = i_q - within(i_q, range);
         let ramp = if demand.quick { self.quick_ramp } else { self.ramp };
-        let step = limited(demand.freq - state.ramp, ramp);
+        let step = limited(demand.freq - state.rotor_freq, ramp);
         // Less acceleration, the less torque current is left for it.
         let room = if step < 0.0 { i_q - range.0 } else { range.1 - i_q };
         let share = within(room * self.per_room, (0.0, 1.0));
@@ -300,14 +293,14 @@ impl VoltsPerHertz {
         state.beyond = if square > limit { state.beyond + 1 } else { 0 };
         state.recovers |= state.beyond > PULLED_OUT;
         state.recovers &= square > RECOVERED * RECOVERED * limit;
-        state.ramp += if state.recovers {
-            -limited(state.ramp, self.recovery)
+        state.rotor_freq += if state.recovers {
+            -limited(state.rotor_freq, self.recovery)
         } else {
             share * step - self.per_excess * excess
         };
 
         let at_limit = state.recovers || excess != 0.0 || share < 0.25;
-        let stands = at_limit && state.ramp.abs() < STALLED_BELOW;
+        let stands = at_limit && state.rotor_freq.abs() < STALLED_BELOW;
         state.stalled = if stands { state.stalled + 4 } else { state.stalled.saturating_sub(1) };
         Fault::Stalled.unless(state.stalled <= STALLED)
     }
@@ -328,10 +321,10 @@ impl VoltsPerHertz {
         let flux = if state.by_voltage { state.flux * left / wanted } else { state.flux };
         let flux = within(flux, (LEAST_FLUX, 1.0));
 
-        let fades = within(state.ramp.abs() * (1.0 / SLIP_WHOLE_FROM), (0.0, 1.0));
+        let fades = within(state.rotor_freq.abs() * (1.0 / SLIP_WHOLE_FROM), (0.0, 1.0));
         let slip = fades * self.slip * state.slow.q / flux;
         state.slip += SLIP * (slip - state.slip);
-        state.freq = state.ramp + state.slip - self.damping * (state.fast.q - state.slow.q);
+        state.freq = state.rotor_freq + state.slip - self.damping * (state.fast.q - state.slow.q);
         Ok(Dq { d: state.boost, q: flux * whole + drop })
     }
 

@@ -1,8 +1,8 @@
 //! Angles as wrapping binary fractions of a turn, with sine and cosine.
 
 use core::f32::consts::{PI, TAU};
-use core::ops::{Add, AddAssign, Neg, Sub, SubAssign};
 
+use derive_more::{Add, AddAssign, Neg, Sub, SubAssign};
 use fixed::Wrapping;
 use fixed::types::I0F32;
 
@@ -20,7 +20,7 @@ use fixed::types::I0F32;
 /// let axis = Angle::QUARTER.unit_vector();
 /// assert!(axis.cos.abs() < 2e-5 && (axis.sin - 1.0).abs() < 2e-5);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Add, AddAssign, Clone, Copy, Debug, Default, Eq, Neg, PartialEq, Sub, SubAssign)]
 pub struct Angle(pub Wrapping<I0F32>);
 
 /// 2^32: units in the last place of an [`Angle`] per turn.
@@ -101,39 +101,6 @@ impl Angle {
         const SCALE: f32 = 1.0 / (2_147_483_648.0 - 0.85 * 32_768.0);
         let (cos, sin) = idsp::cossin(self.to_bits());
         UnitVector { cos: cos as f32 * SCALE, sin: sin as f32 * SCALE }
-    }
-}
-
-impl Add for Angle {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0)
-    }
-}
-
-impl Sub for Angle {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0)
-    }
-}
-
-impl Neg for Angle {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self(-self.0)
-    }
-}
-
-impl AddAssign for Angle {
-    fn add_assign(&mut self, other: Self) {
-        self.0 += other.0;
-    }
-}
-
-impl SubAssign for Angle {
-    fn sub_assign(&mut self, other: Self) {
-        self.0 -= other.0;
     }
 }
 

@@ -12,8 +12,7 @@
 //! assert!((dq.d - 1.732).abs() < 1e-3 && (dq.q + 1.0).abs() < 1e-3);
 //! ```
 
-use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
-
+use derive_more::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 use num_complex::Complex32;
 
 use crate::math::angle::UnitVector;
@@ -21,7 +20,7 @@ use crate::math::angle::UnitVector;
 macro_rules! frame {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[derive(Add, AddAssign, Clone, Copy, Debug, Default, Mul, Neg, PartialEq, Sub, SubAssign)]
         #[repr(C)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f32,)+
@@ -39,46 +38,6 @@ macro_rules! frame {
             /// Whether every component is finite.
             pub fn is_finite(self) -> bool {
                 $(self.$field.is_finite() &)+ true
-            }
-        }
-
-        impl Add for $name {
-            type Output = Self;
-            fn add(self, o: Self) -> Self {
-                Self { $($field: self.$field + o.$field,)+ }
-            }
-        }
-
-        impl Sub for $name {
-            type Output = Self;
-            fn sub(self, o: Self) -> Self {
-                Self { $($field: self.$field - o.$field,)+ }
-            }
-        }
-
-        impl Neg for $name {
-            type Output = Self;
-            fn neg(self) -> Self {
-                Self { $($field: -self.$field,)+ }
-            }
-        }
-
-        impl Mul<f32> for $name {
-            type Output = Self;
-            fn mul(self, k: f32) -> Self {
-                Self { $($field: self.$field * k,)+ }
-            }
-        }
-
-        impl AddAssign for $name {
-            fn add_assign(&mut self, o: Self) {
-                *self = *self + o;
-            }
-        }
-
-        impl SubAssign for $name {
-            fn sub_assign(&mut self, o: Self) {
-                *self = *self - o;
             }
         }
     };
@@ -182,7 +141,7 @@ impl AlphaBeta {
     }
 }
 
-impl Mul<f32> for UnitVector {
+impl core::ops::Mul<f32> for UnitVector {
     type Output = Dq;
     /// Vector of this length along an axis given in the flux frame.
     fn mul(self, length: f32) -> Dq {

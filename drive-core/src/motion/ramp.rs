@@ -61,11 +61,6 @@ impl Ramp {
 }
 
 impl RampState {
-    /// A reference that changes so.
-    pub fn at(reference: f32, change: f32) -> Self {
-        Self { reference, change }
-    }
-
     /// Moves the reference on by `more` in the same step.
     pub fn shift(&mut self, more: f32) {
         self.reference += more;

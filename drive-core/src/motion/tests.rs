@@ -114,11 +114,11 @@ fn the_rotor_is_counted_over_turns_both_ways() {
         // 0.47 turns a step, the most there is: 4700 turns.
         rotor.follow(Angle::from_turns((f64::from(k) * 0.47 % 1.0) as f32));
     }
-    assert!(rotor.count.abs_diff(4700 * COUNTS_PER_TURN) <= 1, "{rotor:?}");
+    assert!(rotor.count.abs_diff(4700 * Motion::COUNTS_PER_TURN) <= 1, "{rotor:?}");
     for k in (0..=20_000).rev() {
         rotor.follow(Angle::from_turns(((f64::from(k) - 10_000.0) * 0.47 % 1.0) as f32));
     }
-    assert!((rotor.count as i32 + 4700 * COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
+    assert!((rotor.count as i32 + 4700 * Motion::COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
 }
 
 /// v^2 / 2 a turns are needed from v on with the deceleration a; near the goal k_x e is slower.
@@ -142,5 +142,5 @@ fn turns_are_counted() {
     let mut rotor = RotorCount::default();
     let turns = [0.25, 0.5, 0.75, 0.0, 0.25];
     let counts = turns.map(|turns| rotor.follow(Angle::from_turns(turns)));
-    assert_eq!(counts[4], 5 * COUNTS_PER_TURN / 4);
+    assert_eq!(counts[4], 5 * Motion::COUNTS_PER_TURN / 4);
 }

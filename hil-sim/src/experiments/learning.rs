@@ -2,7 +2,7 @@
 
 use drive_core::Command;
 use drive_core::learned::Learned;
-use drive_core::table::{Grid, ReferenceTable};
+use drive_core::table::{Grid, POINTS, ReferenceTable};
 
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -21,10 +21,8 @@ pub fn learned(config: &Config, seed: u64) -> Result<Learned, Error> {
     Rig::from_config(&config, seed)?.learn()
 }
 
-/// Distance of the points of [`reference_of`], A.
-const STEP_A: f64 = 0.25;
-/// Last point, A: the largest torque current that the drive allows beside the magnetising current.
-const LAST_A: f64 = 3.25;
+/// Last point of [`reference_of`]: 3.25 A, the largest torque current that the drive allows beside the magnetising current.
+const LAST: usize = 13;
 /// Time for flux and averages to settle at each point, and to average, s.
 const SETTLE_S: f64 = 0.6;
 const AVERAGE_S: f64 = 0.5;
@@ -44,16 +42,16 @@ pub fn reference_of(
     config.drive.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed)?;
     // The table is odd.
-    let mut points = vec![(0.0, 0.0)];
-    for n in 0..=(LAST_A / STEP_A).round() as usize {
-        let i_q = (n as f64 * STEP_A) as f32;
-        rig.command(&Command::Torque(i_q))?;
+    let mut values = [0.0; POINTS];
+    for n in 0..=LAST {
+        rig.command(&Command::Torque(Grid::REFERENCE.current(n)))?;
         rig.run(SETTLE_S, |_| {});
         let mut signal = Stats::default();
         rig.run(AVERAGE_S, |p| signal.push(p.signal()));
         if n > 0 {
-            points.push((i_q, signal.mean() as f32));
+            values[n..].fill(signal.mean() as f32);
         }
     }
-    ReferenceTable::new(Grid::REFERENCE, &points).map_err(Error::refused)
+    ReferenceTable::from_points(Grid::REFERENCE, values)
+        .ok_or_else(|| Error::refused("a value of the reference is too large"))
 }

@@ -193,7 +193,7 @@ impl MovingAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_core::table::{Grid, ReferenceTable};
+    use drive_core::table::{Grid, POINTS, ReferenceTable};
 
     fn linear(i_q: f64, settings: &Settings) -> LinearModel {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());
@@ -211,7 +211,7 @@ mod tests {
         settings.injection.synchronous.bandwidth_hz = 6.0;
         // No saliency of the current: its transient looks like an angle.
         settings.injection.synchronous.reference =
-            ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.0)]).ok();
+            ReferenceTable::from_points(Grid::REFERENCE, [0.0; POINTS]);
         let response = linear(0.01, &settings).response(Disturbance::TorqueCurrent(0.1), 0.4);
         let t_r = 0.2047 / 1.1;
         let wrong = 0.1 * (1.0 - 0.9) / (t_r * 0.7);

@@ -95,7 +95,7 @@ impl Machine {
         for (column, x) in columns.iter_mut().zip(&shifted).skip(first) {
             *column = difference(self.coefficients(x), 1.0 / PART);
         }
-        let Solution { step, information } = solve(&columns, first)?;
+        let (step, information) = solve(&columns, first)?;
         // The step is limited; the next calls continue.
         let unknowns = Unknowns {
             rate: from.rate + limited(step[2] * scale.rate, 0.3 * from.rate),
@@ -118,17 +118,12 @@ impl Machine {
 /// Number of unknowns: speed, resistance and rate, in this order.
 const UNKNOWNS: usize = 3;
 
-/// Least-squares solution in units of the scale.
-struct Solution {
-    step: [f32; UNKNOWNS],
-    /// Information (inverse variance) of the last unknown with the others free.
-    information: f32,
-}
-
 /// Solves the normal equations for the unknowns from `first` on by Cholesky decomposition. `columns` holds
-/// the derivatives by each unknown, then the right-hand side. `None` if they are singular.
+/// the derivatives by each unknown, then the right-hand side. Returns the
+/// solution in units of the scale, and the information (inverse variance) of the last unknown with the others free; `None` if
+/// they are singular.
 #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
-fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
+fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<([f32; UNKNOWNS], f32)> {
     // The last row is the right-hand side after forward substitution.
     let mut l = [[0.0f32; UNKNOWNS]; UNKNOWNS + 1];
     let mut information = 0.0;
@@ -158,7 +153,7 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
         }
         step[i] = sum / l[i][i];
     }
-    Some(Solution { step, information })
+    Some((step, information))
 }
 
 /// Real part of the scalar product.
