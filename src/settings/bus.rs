@@ -36,13 +36,14 @@ const SILENCE_US: u32 = 1750;
 impl Baud {
     /// Bits per second.
     pub fn bits_per_s(self) -> u32 {
-        [4800, 9600, 19_200, 38_400, 57_600, 115_200][self.place()]
+        [4800, 9600, 19_200, 38_400, 57_600, 115_200][self as usize]
     }
 
     /// Ticks of [`CLOCK_HZ`] per bit, rounded: the BRR register (RM0440, USART baud rate generation; 16 to 65535).
     pub fn divider(self) -> u16 {
-        // All rates give values in the range; see the tests.
-        ((CLOCK_HZ + self.bits_per_s() / 2) / self.bits_per_s()) as u16
+        // All rates give values in the range; see the tests. That none is zero the compiler does not find out.
+        let rate = self.bits_per_s().max(1);
+        ((CLOCK_HZ + rate / 2) / rate) as u16
     }
 
     /// Bits of silence that end a frame, rounded up: the RTO field.
