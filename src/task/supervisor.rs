@@ -157,7 +157,7 @@ impl Supervisor {
     }
 
     /// Checks a slice of the control's memory and of its registers, and feeds the watchdog if the rule allows it; called at
-    /// the end of each pass of the main loop.
+    /// the end of each pass of the main loop, and behind what takes long in it.
     pub fn feed_watchdog(&mut self) {
         self.check.iter_mut().for_each(Check::slice);
         let Some((watchdog, rule)) = &mut self.guard else { return };
@@ -209,7 +209,10 @@ impl Supervisor {
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
         control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
-        match self.commissioning.poll(&excited) {
+        let action = self.commissioning.poll(&excited);
+        // A search takes most of the time of the watchdog, and the drive answers a command within a period.
+        self.feed_watchdog();
+        match action {
             None => {}
             Some(Action::Design) => extended(&mut self.guard, || self.commissioning.design()),
             Some(Action::Command(command)) => {

@@ -168,6 +168,11 @@ fn longest(stream: bool) -> Result<(u32, f64)> {
         ear.ask(&mut pair, "stream off")?;
     }
     pair.board.longest = Default::default();
+    // Behind every sample of the carrier period, whose steps differ by more than a command with a stream does.
+    for (n, line) in (0..30).zip(["torque 1.5", "torque -1", "torque 1"].into_iter().cycle()) {
+        ear.ask(&mut pair, line)?;
+        pair.run(SECOND / 20 + n % 10, |_, _| {})?;
+    }
     for line in ["torque 1.5", "torque -1", "torque 1"] {
         ear.ask(&mut pair, line)?;
         // Every seventh period: some of them have a report as well, whenever the trace begins.
