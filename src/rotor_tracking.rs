@@ -43,7 +43,7 @@ impl Tracking {
             return None;
         }
         Some(Self {
-            online: Online::new(settings)?,
+            online: Online::new(settings).ok()?,
             source: settings.angle_source,
             next: 0,
             wait: PERIODS_PER_FIT,

@@ -54,6 +54,9 @@ struct Comparison {
     omega_rms: f64,
     /// Median relative difference of Model C, of each parameter.
     medians: [f64; 5],
+    valid: f64,
+    misfit: f32,
+    uncertainty: f32,
 }
 
 fn compare(signal: Signal, speed: f64, level: Noise, seconds: usize) -> Comparison {
@@ -62,13 +65,15 @@ fn compare(signal: Signal, speed: f64, level: Noise, seconds: usize) -> Comparis
     let mut double = Reference::new(0.999, 1e6);
     let filter = Filter::new(5.0 * TAU * trial.hz, H);
     let (mut on_v, mut on_i) = (filter, filter);
-    let (mut square, mut count) = (0.0, 0);
+    let (mut square, mut count, mut valid) = (0.0, 0, 0);
+    let (mut misfit, mut uncertainty) = (0.0f32, 0.0f32);
     let mut differences = [(); 5].map(|()| Vec::new());
     for (n, (v, i)) in samples(trial, level, 3).take(seconds * RATE).enumerate() {
         single_precision.step(single(v), single(i));
         // The same data: as the converter and the modulator give them, in single precision.
         let rounded = |x: Complex| Complex::new(f64::from(x.re as f32), f64::from(x.im as f32));
         double.step(on_v.step(rounded(v) / VOLTAGE), on_i.step(rounded(i) / CURRENT));
+        assert!(single_precision.uncertainty() > 0.0 && single_precision.uncertainty() < 1e9);
         if n < RATE {
             continue;
         }
@@ -78,6 +83,9 @@ fn compare(signal: Signal, speed: f64, level: Noise, seconds: usize) -> Comparis
         let ours = delta(single_precision.latest());
         square += ((ours.g1 - reference.g1).im / H).powi(2);
         count += 1;
+        valid += usize::from(single_precision.is_valid());
+        misfit = misfit.max(single_precision.misfit());
+        uncertainty = uncertainty.max(single_precision.uncertainty());
         if n % 100 == 0 {
             let pairs = std::iter::zip(model_c(&ours, H).array(), model_c(&reference, H).array());
             for (difference, (a, b)) in differences.iter_mut().zip(pairs) {
@@ -90,7 +98,7 @@ fn compare(signal: Signal, speed: f64, level: Noise, seconds: usize) -> Comparis
         all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
     });
     let omega_rms = (square / f64::from(count)).sqrt();
-    Comparison { omega_rms, medians }
+    Comparison { omega_rms, medians, valid: valid as f64 / f64::from(count), misfit, uncertainty }
 }
 
 #[test]
@@ -104,9 +112,10 @@ fn r1_sixty_seconds_in_single_precision() {
         .map(|&((signal, speed), level)| compare(signal, speed, level, 60))
         .collect();
     for (((signal, speed), level), result) in runs.iter().zip(&results) {
-        let Comparison { omega_rms, medians } = result;
+        let Comparison { omega_rms, medians, valid, misfit, uncertainty } = result;
         println!(
-            "{} {speed} noise {}: {omega_rms:.5} rad/s, C {medians:.6?}",
+            "{} {speed} noise {}: {omega_rms:.5} rad/s, C {medians:.6?}, valid {valid:.3}, \
+             misfit {misfit:.2e}, D {uncertainty:.1e}",
             signal.name(),
             level.current
         );

@@ -38,7 +38,7 @@ mod fit;
 use core::f32::consts::TAU;
 
 use crate::rls::filter::Filter;
-use crate::rls::{Rls, RlsSettings};
+use crate::rls::{Rls, RlsError, RlsSettings};
 use drive_core::flux::TAU_R_LIMITS;
 use drive_core::math::within;
 use drive_core::{AlphaBeta, Dq, PERIOD_S};
@@ -189,9 +189,11 @@ impl MotorModel {
 }
 
 impl Online {
-    /// Estimator for the motor and the sensors of the settings. None where they do not suit the recursive least squares;
-    /// never with settings that [`Settings::build`] accepts.
-    pub fn new(settings: &Settings) -> Option<Self> {
+    /// Estimator for the motor and the sensors of the settings.
+    ///
+    /// # Errors
+    /// [`RlsError`] of the recursive least squares; never with settings that [`Settings::build`] accepts.
+    pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let m = &settings.motor;
         let (i_d, trip_a, dc_over_v) = (settings.i_d(), settings.trip_a(), settings.dc_over_v());
         let synchronous = &settings.injection.synchronous;
@@ -232,7 +234,7 @@ impl Online {
             calls: 0,
         };
         online.restart();
-        Some(online)
+        Ok(online)
     }
 
     /// Processes one control period, in order and without gaps: the `measured` current, A, and the

@@ -54,7 +54,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
         ..RlsSettings::paper(VOLTAGE as f32, CURRENT as f32)
     };
     let mut single = Rls::new(settings)
-        .ok_or_else(|| Error::Internal("a setting of the least squares is out of range".into()))?;
+        .map_err(|_| Error::Internal("a setting of the least squares is out of range".into()))?;
     let mut double = Reference::new(f64::from(settings.lambda), f64::from(settings.p0));
     let filter = Filter::new(corner, H);
     let (mut on_v, mut on_i) = (filter, filter);

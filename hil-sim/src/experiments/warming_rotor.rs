@@ -64,7 +64,7 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
     let mut start = Config { drive: settings, ..config.clone() };
     start.load.mode = LoadMode::Locked;
     let mut rig = Rig::from_config(&start, seed)?;
-    let mut online = Online::new(&settings).ok_or_else(|| {
+    let mut online = Online::new(&settings).map_err(|_| {
         Error::Refused("the settings do not suit the estimation of the rotor time constant".into())
     })?;
     rig.start(Mode::Torque)?;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use induction_drive_core::{AlphaBeta, Motor};
-use induction_drive_rotor_id::rls::{Rls, RlsSettings};
+use induction_drive_rotor_id::rls::{Rls, RlsError, RlsSettings};
 use num_complex::Complex64;
 
 use crate::machine::{J, Machine};
@@ -12,8 +12,9 @@ const H: f64 = 50e-6;
 const OMEGA_M: f64 = 200.0;
 /// 311 V over 3.5 A are about the impedance of the motor at 60 Hz.
 const SETTINGS: RlsSettings = RlsSettings::paper(180.0, 5.0);
-/// Samples until the filters have settled.
+/// Samples until the filters have settled, and those of the memory.
 const SETTLE: usize = 212;
+const MEMORY: usize = 1000;
 
 /// Voltage of the machine.
 #[derive(Clone, Copy)]
@@ -86,7 +87,7 @@ impl Bench {
 #[test]
 fn the_coefficients_predict_the_current_and_hold_the_speed() {
     let mut bench = settled();
-    let theta = bench.rls.latest();
+    let theta = bench.rls.coefficients().unwrap();
     let [g1, g0, h1, u0] = theta.map(|x| Complex64::new(x.re.into(), x.im.into()));
     // Im f1 / h (Eq. 42)
     assert!((g1.im / H - OMEGA_M).abs() < 0.5, "{}", g1.im / H);
@@ -99,47 +100,81 @@ fn the_coefficients_predict_the_current_and_hold_the_speed() {
         sum += (i2 - i1).norm_sqr();
     }
     assert!(error < 1e-8 * sum, "{error} of {sum}");
+    assert!(bench.rls.misfit() < 1e-3 && bench.rls.uncertainty() < 100.0);
 }
 
 /// A bench whose estimator has long found the machine.
 fn settled() -> Bench {
     let mut bench = Bench::new(SETTINGS);
     bench.steps(Signal::Rich, 10_000);
+    assert!(bench.rls.is_valid());
     assert_eq!(bench.rls.missing(), 0);
     bench
 }
 
 #[test]
-fn it_begins_when_the_filters_have_settled() {
+fn it_is_valid_after_one_memory_of_good_samples() {
     let mut bench = settled();
+    bench.rls.begin_at(bench.rls.latest());
+    let first = bench.until(Signal::Rich, Rls::is_valid);
+    assert!((MEMORY..MEMORY + 200).contains(&first), "{first}");
+    // From zero, the errors of the first samples have to be forgotten too.
     bench.rls.reset();
+    assert!(!bench.rls.is_valid() && bench.rls.misfit() == 1.0);
     let first = bench.until(Signal::Rich, |rls| rls.missing() == 0);
     assert!((SETTLE..SETTLE + 100).contains(&first), "{first}");
+    let first = bench.until(Signal::Rich, Rls::is_valid);
+    assert!((MEMORY..8 * MEMORY).contains(&first), "{first}");
 }
 
-/// The jump of the current shows at once in the error.
+#[test]
+fn without_a_signal_it_is_valid_for_one_more_memory() {
+    let mut bench = settled();
+    bench.until(Signal::Nothing, |rls| !rls.is_valid());
+    assert_eq!(bench.rls.missing() as usize, MEMORY + 1);
+    assert_eq!(bench.rls.coefficients(), None);
+    let again = bench.until(Signal::Rich, Rls::is_valid);
+    assert!((MEMORY..4 * MEMORY).contains(&again), "{again}");
+}
+
+/// The jump of the current shows at once; at 20 kHz it is over 0.12 s after the phase is closed.
 #[test]
 fn a_phase_that_opens_is_noticed() {
     let mut bench = settled();
-    let sound = bench.rls.error_square();
-    for _ in 0..100 {
-        let (v, mut i) = (Signal::Rich.at(bench.n), bench.machine.current);
-        i.im = 0.0;
-        bench.rls.step(single(v), single(i));
-        bench.machine.advance(v, H);
-        bench.n += 1;
-    }
-    assert!(bench.rls.error_square() > 10.0 * sound, "{} {sound}", bench.rls.error_square());
+    let mut until = |share: f64, valid: bool| {
+        (0..20_000).find(|_| {
+            let (v, mut i) = (Signal::Rich.at(bench.n), bench.machine.current);
+            i.im *= share;
+            bench.rls.step(single(v), single(i));
+            bench.machine.advance(v, H);
+            bench.n += 1;
+            bench.rls.is_valid() == valid
+        })
+    };
+    let (noticed, again) = (until(0.0, false).unwrap(), until(1.0, true).unwrap());
+    assert!(noticed < 100 && (MEMORY..2400).contains(&again), "{again}");
 }
 
 #[test]
-fn samples_without_excitation_are_not_used() {
+fn poor_excitation_is_never_valid() {
     for signal in [Signal::OneAxis, Signal::Nothing] {
         let mut bench = Bench::new(SETTINGS);
         bench.machine.rate = 0.0; // no rotor: the current stays along the axis
         bench.machine.omega_m = 0.0;
-        bench.steps(signal, 20_000);
+        assert_eq!(bench.until(signal, Rls::is_valid), usize::MAX);
         assert_eq!(bench.rls.missing(), 20_000);
+        assert_eq!(bench.rls.misfit(), 1.0);
+    }
+    // A current that has nothing to do with the voltage.
+    let (mut rls, mut random) = (Rls::new(SETTINGS).unwrap(), 1_u32);
+    for n in 0..20_000 {
+        let mut uniform = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(random) / f64::from(u32::MAX / 2) - 1.0
+        };
+        let current = 10.0 * Complex64::new(uniform(), uniform());
+        rls.step(single(Signal::Rich.at(n)), single(current));
+        assert!(!rls.is_valid());
     }
 }
 
@@ -161,6 +196,7 @@ fn a_sample_at_a_limit_is_left_out_and_the_filters_settle_anew() {
             assert_eq!(bench.rls.missing() as usize, 1 + SETTLE);
             bench.step(Signal::Rich);
             assert_eq!(bench.rls.missing(), 0);
+            assert!(bench.rls.is_valid());
         }
     }
 }
@@ -182,6 +218,7 @@ fn the_error_is_in_units_of_the_base() {
     let expected = (amperes / 20.0 * omega).powi(2) * gain;
     let square = f64::from(rls.error_square());
     assert!((square / expected - 1.0).abs() < 0.1, "{square} {expected}");
+    assert!((rls.misfit() - 1.0).abs() < 0.1, "{}", rls.misfit());
 }
 
 #[test]
@@ -192,7 +229,7 @@ fn it_goes_on_from_what_was_found() {
     for (got, before) in bench.rls.latest().iter().zip(found) {
         assert!((got - before).norm() <= 1e-6 * before.norm());
     }
-    assert_eq!(bench.rls.error_square(), 0.0);
+    assert!(!bench.rls.is_valid());
     // In D^-1/2 U^-1 x, x is in siemens as in `latest`: P0 = 1e6 in units of the bases.
     bench.rls.begin_at(found);
     let siemens: f64 = (SETTINGS.current_base / SETTINGS.voltage_base).into();
@@ -208,23 +245,25 @@ fn it_goes_on_from_what_was_found() {
 #[test]
 fn settings_are_refused_beyond_their_bounds_and_taken_at_them() {
     type Set = fn(&mut RlsSettings, f32);
-    let cases: [(Set, [f32; 2]); 6] = [
-        (|s, x| s.lambda = x, [0.9, 1.0]),
-        (|s, x| s.p0 = x, [1e-3, 1e7]),
-        (|s, x| s.corner = x, [1e-3, 1.0]),
-        (|s, x| s.voltage_limit = x * s.voltage_base, [0.1, 100.0]),
-        (|s, x| s.current_limit = x * s.current_base, [0.1, 100.0]),
-        (|s, x| (s.voltage_base, s.voltage_limit) = (x, x), [1.1e-9, 0.9e9]),
+    let cases: [(Set, [f32; 2], RlsError); 6] = [
+        (|s, x| s.lambda = x, [0.9, 1.0], RlsError::Lambda),
+        (|s, x| s.p0 = x, [1e-3, 1e7], RlsError::Covariance),
+        (|s, x| s.corner = x, [1e-3, 1.0], RlsError::Corner),
+        (|s, x| s.voltage_limit = x * s.voltage_base, [0.1, 100.0], RlsError::Limit),
+        (|s, x| s.current_limit = x * s.current_base, [0.1, 100.0], RlsError::Limit),
+        (|s, x| (s.voltage_base, s.voltage_limit) = (x, x), [1.1e-9, 0.9e9], RlsError::Base),
     ];
     let settings = RlsSettings::paper(128.0, 4.0);
-    for (n, (set, [least, most])) in cases.into_iter().enumerate() {
-        let taken = |x: f32| {
+    for (set, [least, most], error) in cases {
+        let result = |x: f32| {
             let mut s = settings;
             set(&mut s, x);
-            Rls::new(s).is_some()
+            Rls::new(s).map(|_| ())
         };
-        assert!(taken(least) && taken(most), "{n}");
-        assert!(!taken(0.8 * least) && !taken(1.2 * most) && !taken(f32::NAN), "{n}");
+        assert_eq!((result(least), result(most)), (Ok(()), Ok(())), "{error:?}");
+        assert_eq!((result(0.8 * least), result(1.2 * most)), (Err(error), Err(error)));
+        assert_eq!(result(f32::NAN), Err(error));
     }
-    assert!(Rls::new(RlsSettings { current_base: 0.0, ..settings }).is_none());
+    let current = RlsSettings { current_base: 0.0, ..settings };
+    assert_eq!(Rls::new(current).map(|_| ()), Err(RlsError::Base));
 }
