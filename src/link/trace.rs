@@ -1,7 +1,9 @@
 //! The trace: signals of the drive, period by period, recorded in RAM.
 //!
 //! The main loop requests it, the control interrupt writes it, the main loop reads it; `stage` says who owns the
-//! memory. The records form a ring, so that a trace with a trigger holds what came before it.
+//! memory. The records form a ring, so that a trace with a trigger holds what came before it. It is not the
+//! [ring](super::ring) of the other readers: it is a hundred times as long, holds the chosen signals alone, and stands still
+//! once its trigger has come.
 
 mod signals;
 #[cfg(test)]
