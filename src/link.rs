@@ -19,7 +19,7 @@ pub struct Status {
     pub state: State,
     /// Last input of the drive.
     pub sample: Sample,
-    /// Signals of the drive, from the [ring](ring).
+    /// Signals of the drive, from the [`ring`].
     pub telemetry: Telemetry,
     /// Core cycles of the longest control period so far.
     pub worst_cycles: [u32; 2],
