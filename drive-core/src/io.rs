@@ -1,4 +1,4 @@
-//! Input and output of the control step: [`Measured`] and [`Output`]; and of the [front end](crate::front_end) around it, in
+//! Input and output of the control step: [`Measured`] and [`Output`]; and of the [front end](crate::FrontEnd) around it, in
 //! converter codes and timer counts: [`Sample`] and [`Compare`].
 //!
 //! # The delay convention
