@@ -22,7 +22,7 @@ struct Bench {
     commands: Vec<Command>,
 }
 
-/// What a command has come to: the answer, the state behind it, and the last reference and current, A.
+/// Result of a command: the answer, the state behind it, and the last reference and current, A.
 #[derive(Debug)]
 struct Outcome {
     answer: Result<Accepted, Refused>,

@@ -191,7 +191,7 @@ struct Field {
     pub indirect: IndirectState,
     pub observer: ObserverState,
     pub hand_over: HandOver,
-    /// What flux and leakage induce, and the observer's share in the angle, by which it is fed forward.
+    /// Voltage induced by flux and leakage, and the observer's share in the angle, which weights its feed-forward.
     pub induced: Induced,
     pub induced_share: f32,
     pub carrier: Carrier,

@@ -30,7 +30,7 @@ pub(super) struct Motion {
     sums: [f32; 10],
 }
 
-/// What the sums say.
+/// Result of the sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slope {
     /// Speed per integral of the current, electrical rad/s per A s.

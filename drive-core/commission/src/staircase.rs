@@ -46,7 +46,7 @@ struct Stair {
     /// Current, A, and voltage, V, at the end.
     i: f32,
     v: f32,
-    /// Sums of what current, A s, and voltage, V s, differ from it.
+    /// Sums of the differences of current, A s, and voltage, V s, from it.
     charge: f32,
     area: f32,
 }

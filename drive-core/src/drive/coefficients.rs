@@ -78,7 +78,7 @@ pub struct Coefficients {
     pub wiring: WiringCheck,
     /// Largest test voltage of an axis, V.
     pub largest_test_v: f32,
-    /// The measurement of what the inverter drops beyond its dead time.
+    /// The measurement of the voltage that the inverter drops beyond its dead time.
     pub inverter_drop: InverterDrop,
     /// The learning.
     pub learning: Learning,

@@ -287,7 +287,7 @@ impl Observer {
         state.flux / self.coupled
     }
 
-    /// What flux and leakage induce at `flux_freq`, electrical turns per period.
+    /// Voltage that flux and leakage induce at `flux_freq`, electrical turns per period.
     pub fn induced(&self, state: &ObserverState, flux_freq: f32) -> Induced {
         let w = flux_freq * TAU / PERIOD_S;
         let leakage = self.leakage
