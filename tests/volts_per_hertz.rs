@@ -164,7 +164,7 @@ fn braking_keeps_the_link_below_its_limit() {
 /// With a hot heat sink the shaft gives way under a load that it carries when cold, and the drive says why.
 #[test]
 fn a_hot_heat_sink_takes_torque_and_is_named() {
-    for (celsius, why) in [(25.0, Limiting::No), (77.0, Limiting::HeatSink)] {
+    for (celsius, why) in [(25.0, Limiting::None), (77.0, Limiting::HeatSink)] {
         let hot = format!("measurement.heat_sink_c={celsius}");
         let config = Config::load(Some("motulator-2kw2"), None, &[hot]).unwrap();
         let mut rig = turning(&config, 600.0, 1);

@@ -89,7 +89,7 @@ pub struct DcLinkSettings {
 pub enum Limiting {
     /// It is not.
     #[default]
-    No,
+    None,
     /// The dc link has no more voltage at this speed; see `voltage_limit`.
     Voltage,
     /// The heat sink is hot.
@@ -112,7 +112,7 @@ pub enum Limiting {
 impl fmt::Display for Limiting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::No => "nothing",
+            Self::None => "nothing",
             Self::Voltage => "the voltage of the dc link at this speed",
             Self::HeatSink => "the heat sink is hot",
             Self::Motor => "the motor is at its thermal limit",
@@ -146,7 +146,7 @@ impl DcLinkLimits {
         } else if i_q > self.i_q.1 {
             (self.i_q.1, self.why.1)
         } else {
-            (i_q, Limiting::No)
+            (i_q, Limiting::None)
         }
     }
 }
@@ -170,10 +170,10 @@ pub struct DcLink {
     /// Band of the voltage in which generating torque is limited.
     band: (f32, f32),
     low: f32,
-    /// How far the held voltage gives way at most.
-    room: f32,
-    /// Change of the held voltage in a step.
-    gives: f32,
+    /// Largest value of [`DcLinkState::lowered`], V.
+    lowered_max: f32,
+    /// Change of the held voltage in a step, V.
+    lowering: f32,
     per_rise: f32,
     flux_a: f32,
     chopper: Option<Chopper>,
@@ -184,8 +184,8 @@ pub struct DcLink {
 pub struct DcLinkState {
     /// Smoothed voltage, V; none before the first step.
     v: Option<f32>,
-    /// By how much the held voltage has given way, V.
-    given: f32,
+    /// By how much the held voltage is lowered, V.
+    lowered: f32,
     /// Heat of the brake resistor; 1 is all that it can take.
     pub heat: f32,
 }
@@ -196,8 +196,8 @@ impl DcLink {
         Self {
             band: (s.from_v, s.high_v),
             low: s.low_v,
-            room: s.low_v - s.floor_v,
-            gives: (s.low_v - s.floor_v) * (STEP_S / YIELD_S),
+            lowered_max: s.low_v - s.floor_v,
+            lowering: (s.low_v - s.floor_v) * (STEP_S / YIELD_S),
             per_rise: 1.0 / ((s.low_v - s.floor_v) * RISE),
             flux_a: s.flux_a,
             chopper: s.chopper.map(|c| {
@@ -246,8 +246,8 @@ impl DcLink {
         let flux_a = if speed > FLUX { flux * self.flux_a } else { 0.0 };
 
         // 1 at the upper end of the band of motoring torque.
-        let above = gain * (v - self.low + state.given) * self.per_rise;
-        self.give_way(state, above);
+        let above = gain * (v - self.low + state.lowered) * self.per_rise;
+        self.adapt_held_voltage(state, above);
         let slope = if above < 0.0 { RISE_OF_DEPTH } else { 1.0 };
         let motoring = (slope * above).clamp(-1.0, 1.0);
 
@@ -291,15 +291,15 @@ impl DcLink {
         (duty, cold)
     }
 
-    /// Lets the held voltage give way while motoring torque is limited, and come back with room to spare; `above` is
+    /// Lowers the held voltage while motoring torque is limited, and raises it again with room to spare; `above` is
     /// how far up its band the link is.
-    fn give_way(&self, state: &mut DcLinkState, above: f32) {
+    fn adapt_held_voltage(&self, state: &mut DcLinkState, above: f32) {
         if above < 1.0 {
-            state.given += self.gives;
+            state.lowered += self.lowering;
         } else if above > 2.0 {
-            state.given -= self.gives;
+            state.lowered -= self.lowering;
         }
-        state.given = state.given.max(0.0).min(self.room);
+        state.lowered = state.lowered.max(0.0).min(self.lowered_max);
     }
 }
 

@@ -53,7 +53,7 @@ fn line(
     if s.hardware.contains(Hardware::BREAK) {
         write!(f, "fault input trips; ")?;
     }
-    if s.limiting != Limiting::No {
+    if s.limiting != Limiting::None {
         write!(f, "limiting now, because: {}; ", s.limiting)?;
     }
     // While the drive is off, its signals are those of the last run.

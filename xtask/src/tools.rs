@@ -28,6 +28,7 @@ pub fn mutants(shard: &str) -> Result<()> {
     let mut command = run::command(tool("cargo-mutants", "27.1.0")?);
     command
         .args(["mutants", "--package", "induction-drive-core", "--test-tool", "cargo", "-j2"])
+        .args(["--exclude", "**/tests.rs", "--exclude", "**/tests/**"])
         .args(["--minimum-test-timeout", "120", "--sharding", "round-robin", "--shard", shard])
         .arg("--output")
         .arg(&output)

@@ -59,7 +59,7 @@ impl Bench {
             t: 0.0,
             highest: 0.0,
             lowest: 1000.0,
-            why: Limiting::No,
+            why: Limiting::None,
             resistor_j: 0.0,
         }
     }
@@ -70,7 +70,7 @@ impl Bench {
         for _ in 0..steps {
             let freq = self.rpm as f32 * FREQ_PER_RPM;
             let limits =
-                self.limits.step(&mut self.state, self.v as f32, freq, (I_Q, Limiting::No));
+                self.limits.step(&mut self.state, self.v as f32, freq, (I_Q, Limiting::None));
             assert!(limits.i_q.0 <= limits.i_q.1 && (0.0..=1.0).contains(&limits.chopper));
             let asked = (0.1 * (reference(self.t) - self.rpm)) as f32;
             let (taken, why) = limits.hold(asked.clamp(-I_Q, I_Q));
@@ -157,7 +157,7 @@ fn the_shaft_holds_the_link_in_an_outage() {
         let mut bench = Bench::new(SETTINGS, rpm);
         bench.load_nm = load_nm;
         bench.run(1.0, |_| rpm);
-        assert_eq!(bench.why, Limiting::No);
+        assert_eq!(bench.why, Limiting::None);
         bench.mains = 0.0;
         bench.run(seconds, |_| rpm);
         println!("{rpm} rpm: {:.0} V, {:.0} rpm", bench.lowest, bench.rpm);
@@ -166,7 +166,7 @@ fn the_shaft_holds_the_link_in_an_outage() {
         assert!(matches!(bench.why, Limiting::RideThrough | Limiting::DcLinkLow));
         bench.mains = 311.0;
         bench.run(2.0, |_| rpm);
-        assert!((bench.rpm - rpm).abs() < 50.0 && bench.why == Limiting::No, "{} rpm", bench.rpm);
+        assert!((bench.rpm - rpm).abs() < 50.0 && bench.why == Limiting::None, "{} rpm", bench.rpm);
     }
 }
 
@@ -241,19 +241,19 @@ fn a_resistor_takes_what_it_may() {
 fn nothing_is_limited_where_nothing_has_to_be() {
     let limits = DcLink::new(&SETTINGS);
     let step = |v: f32, rpm: f32| {
-        limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, (I_Q, Limiting::No))
+        limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, (I_Q, Limiting::None))
     };
     for (v, rpm) in
         [(311.0, 1800.0), (311.0, -3600.0), (395.0, 250.0), (210.0, -250.0), (395.0, 0.0)]
     {
         let free = step(v, rpm);
         assert_eq!((free.i_q, free.flux_a), ((-I_Q, I_Q), 0.0), "{v} V, {rpm} rpm");
-        assert_eq!(free.hold(-2.9), (-2.9, Limiting::No));
+        assert_eq!(free.hold(-2.9), (-2.9, Limiting::None));
     }
     // The nearer to the trip, the less; only the direction that the link does not bear.
     assert_eq!(step(390.0, 1000.0).hold(-1.0), (0.0, Limiting::DcLinkHigh));
     assert_eq!(step(390.0, -1000.0).hold(1.0), (0.0, Limiting::DcLinkHigh));
-    assert_eq!(step(390.0, 1000.0).hold(1.0), (1.0, Limiting::No));
+    assert_eq!(step(390.0, 1000.0).hold(1.0), (1.0, Limiting::None));
     assert_eq!(step(260.0, 1000.0).hold(1.0), (0.0, Limiting::DcLinkLow));
     assert_eq!(step(215.0, 1000.0).hold(1.0), (-I_Q, Limiting::RideThrough));
     assert_eq!(step(215.0, -1000.0).hold(0.0), (I_Q, Limiting::RideThrough));

@@ -166,7 +166,7 @@ impl Coefficients {
     /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
     fn limit_torque(&self, k: &mut Kept, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
-        let why = if by_voltage { Limiting::Voltage } else { Limiting::No };
+        let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
         k.limits.step(self, step.measured.dc_link, step.rotor_freq, (most.q, why));
     }
 

@@ -24,7 +24,7 @@ pub(super) struct Limits {
 impl Limits {
     pub fn start(&mut self, c: &Coefficients) {
         let voltage = c.voltage_limit.start();
-        *self = Self { voltage, now: DcLinkLimits::default(), why: Limiting::No, ..*self };
+        *self = Self { voltage, now: DcLinkLimits::default(), why: Limiting::None, ..*self };
         self.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 
@@ -73,7 +73,7 @@ impl Kept {
             let square = share * largest * largest - i_d * i_d;
             (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
         } else {
-            (0.0, Limiting::No)
+            (0.0, Limiting::None)
         };
         if is_energised {
             borne
@@ -95,8 +95,8 @@ impl Drive {
         match &self.phase {
             Phase::Field(field) if field.has_torque() => self.kept.limits.why,
             Phase::Scalar(_) => self.kept.limits.why,
-            Phase::Field(_) | Phase::Off(_) | Phase::Fault(..) => Limiting::No,
-            Phase::Prepare(_) | Phase::Excite(_) => Limiting::No,
+            Phase::Field(_) | Phase::Off(_) | Phase::Fault(..) => Limiting::None,
+            Phase::Prepare(_) | Phase::Excite(_) => Limiting::None,
         }
     }
 }

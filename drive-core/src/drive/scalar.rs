@@ -49,7 +49,7 @@ impl Scalar {
         }
         let freq = if stops { 0.0 } else { c.freq_per_speed * self.speed };
         if k.elapsed.is_multiple_of(u32::from(DIVIDER)) {
-            let by_voltage = (f32::INFINITY, Limiting::No);
+            let by_voltage = (f32::INFINITY, Limiting::None);
             k.limits.step(c, measured.dc_link, rotor_freq, by_voltage);
             if rotor_freq.abs() > c.protection.rotor_freq {
                 return Err(Fault::OverSpeed.into());
@@ -72,7 +72,7 @@ impl Scalar {
         let modulated = c.modulator.step(voltage, compensation, measured.dc_link);
 
         k.limits.hold(turned.current.q);
-        if k.limits.why == Limiting::No && s.by_voltage {
+        if k.limits.why == Limiting::None && s.by_voltage {
             k.limits.why = Limiting::Voltage;
         }
         k.seen = Telemetry {

@@ -47,8 +47,8 @@ const FROM_INJECTION: f32 = 0.02;
 const LARGEST_ERROR: f32 = 0.05;
 /// Share of the learned torque limit in the middle of the currents.
 const JUDGED_AT: f32 = 0.5;
-/// Voltages that are kept: the current behind the filter is older than three of them.
-const VOLTAGES: usize = 4;
+/// Voltages that are kept: enough for a current of age 6, two more than its age.
+const VOLTAGES: usize = 8;
 
 /// Coefficients of the observer, per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,7 +73,7 @@ pub struct Observer {
     least: f32,
     /// Share of the resistance per V s of `eps` in a period.
     resistance_gain: f32,
-    /// Age of the current in samples, without and behind the filter.
+    /// Age of the current, samples, without and behind the filter; less than [`VOLTAGES`] - 2.
     pub ages: [f32; 2],
 }
 
@@ -306,6 +306,16 @@ impl Induced {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::{Settings, find};
+
+    #[test]
+    fn the_voltages_of_the_largest_delay_are_kept() {
+        let mut settings = Settings::default();
+        let (_, largest) = find("scales.current_delay_s").unwrap().range(&settings).unwrap();
+        settings.scales.current_delay_s = largest;
+        let observer = settings.build().unwrap().observer.unwrap();
+        assert!(observer.ages[1] < (VOLTAGES - 2) as f32, "{:?}", observer.ages);
+    }
 
     /// A current that was near zero at the last update and grows to 3.5 A before the next: its saliency is wrong by no more than that of
     /// the nominal current, and the flux is seen to stand. (With `b/|i|` of the last update half of the leakage's voltage is seen as

@@ -130,7 +130,7 @@ settings! {
         /// Thermistor of the heat sink.
         ntc: Ntc = Ntc::DEFAULT;
         /// delay of the analog filters of the currents
-        current_delay_s: f32 = 30e-6, number("s").from_to(0.0, 5.0 * PERIOD_S).learned();
+        current_delay_s: f32 = 30e-6, number("s").from_to(0.0, 4.0 * PERIOD_S).learned();
         /// counts of the encoder a turn, four a line
         encoder_counts: u32 = 10_000, whole().from_to(16.0, 1e7);
     }

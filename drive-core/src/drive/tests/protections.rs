@@ -203,7 +203,7 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
         (drive.telemetry().current.q, drive.limiting())
     };
     let (whole, why) = at(&mut drive, 60.0);
-    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::No, "{whole} {why}");
+    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::None, "{whole} {why}");
     let (half, why) = at(&mut drive, 77.5);
     // 4 % of 3.5 A for the curve of the thermistor, which moves i_q by i/i_q of that.
     assert!((half - libm::sqrtf(1.75 * 1.75 - 0.7 * 0.7)).abs() < 0.16, "{half}");
@@ -211,5 +211,5 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
     let (nothing, why) = at(&mut drive, 84.9);
     assert!(nothing.abs() < 0.02 && why == Limiting::HeatSink, "{nothing} {why}");
     let (whole, why) = at(&mut drive, 60.0);
-    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::No, "{whole} {why}");
+    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::None, "{whole} {why}");
 }
