@@ -316,7 +316,7 @@ impl Goal {
         match self {
             Self::Speed { speed, .. } => speed.is_finite(),
             Self::Position { turns, press } => {
-                (turns.unwrap_or(0.0) + press.map_or(0.0, |(speed, _)| speed)).is_finite()
+                turns.is_none_or(f32::is_finite) && press.is_none_or(|(speed, _)| speed.is_finite())
             }
             Self::Torque | Self::Learn | Self::Brake { .. } | Self::Release => true,
         }

@@ -185,4 +185,41 @@ mod tests {
             assert_eq!(found(&sample), fault, "{sample:?}");
         }
     }
+
+    #[test]
+    fn the_third_shunt_is_checked_where_there_is_one() {
+        let shunts = Shunts::new(Line { gain: 0.01, offset: -20.0 }, 5e-6, 0.5);
+        let front_end = FrontEnd { shunts: Some(shunts), ..front_end() };
+        let sample = |current_c| Sample {
+            current_a: 2024,
+            current_b: 2016,
+            current_c,
+            heat_sink: 1309,
+            ..Sample::default()
+        };
+        // The fault after so many samples.
+        let after = |current_c, samples| {
+            let mut state = FrontEndState::default();
+            (0..samples)
+                .map(|_| front_end.measure(&mut state, &sample(current_c), [0.0; 3]).fault)
+                .last()
+                .unwrap()
+        };
+        let cases = [
+            (2000, 100, None),
+            (0, 1, Some(Fault::SensorSaturatedC)),
+            (4095, 1, Some(Fault::SensorSaturatedC)),
+            (1, 1, Some(Fault::CurrentSum)),
+            // 0.6 A too much, above the limit of the mean after two time constants.
+            (2060, 1, None),
+            (2060, 100, Some(Fault::CurrentSum)),
+            (1940, 100, Some(Fault::CurrentSum)),
+            (2040, 1000, None),
+        ];
+        for (current_c, samples, fault) in cases {
+            assert_eq!(after(current_c, samples), fault, "{current_c}, {samples} samples");
+        }
+        // Without shunts the third code means nothing.
+        assert_eq!(measured(&sample(0), [0.0; 3]).fault, None);
+    }
 }

@@ -3,6 +3,11 @@
 pub(crate) mod angle;
 pub(crate) mod frames;
 
+/// Whether all values are finite numbers.
+pub fn all_finite(values: &[f32]) -> bool {
+    values.iter().all(|value| value.is_finite())
+}
+
 /// `value` clamped to a range; NaN stays NaN.
 pub fn within(value: f32, (least, most): (f32, f32)) -> f32 {
     if value > most {

@@ -6,6 +6,7 @@ mod tests;
 use crate::carrier::Injection;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
 use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::math::all_finite;
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, WiringCheck,
 };
@@ -96,26 +97,27 @@ impl Coefficients {
     /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.front_end, &self.current_loop);
-        let sum = s.current_a.gain
-            + s.current_a.offset
-            + s.current_b.gain
-            + s.current_b.offset
-            + s.dc_link.gain
-            + s.dc_link.offset
-            + l.d.k_c
-            + l.d.z_c
-            + l.q.k_c
-            + l.q.z_c
-            + self.injection.current_amplitude
-            + self.estimator.lag
-            + self.current_lag
-            + self.reference_filter[0].one_minus_p
-            + self.reference_filter[1].one_minus_p
-            + self.motion.pi.k_c
-            + self.motion.speed_limit
-            + self.sequence.i_d
-            + self.sequence.stop_ramp;
-        sum.is_finite()
+        all_finite(&[
+            s.current_a.gain,
+            s.current_a.offset,
+            s.current_b.gain,
+            s.current_b.offset,
+            s.dc_link.gain,
+            s.dc_link.offset,
+            l.d.k_c,
+            l.d.z_c,
+            l.q.k_c,
+            l.q.z_c,
+            self.injection.current_amplitude,
+            self.estimator.lag,
+            self.current_lag,
+            self.reference_filter[0].one_minus_p,
+            self.reference_filter[1].one_minus_p,
+            self.motion.pi.k_c,
+            self.motion.speed_limit,
+            self.sequence.i_d,
+            self.sequence.stop_ramp,
+        ])
     }
 }
 

@@ -109,7 +109,8 @@ impl Drive {
                 self.kept.references.injection_axis = turn.unit_vector();
             }
             Command::TestVoltage(voltage) => {
-                finite(voltage.d + voltage.q)?;
+                finite(voltage.d)?;
+                finite(voltage.q)?;
                 let max = self.c.largest_test_v;
                 let inside = |x: f32| (-max..=max).contains(&x);
                 if !(inside(voltage.d) && inside(voltage.q)) {

@@ -12,7 +12,7 @@ use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
 use crate::filter::{LPF, LpfState};
 use crate::io::LOW_SIDES_ON;
-use crate::math::limited;
+use crate::math::{all_finite, limited};
 use crate::protect::WiringCheck;
 use crate::protect::wiring_check::WiringCheckState;
 use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
@@ -46,7 +46,7 @@ struct Control {
 }
 
 /// The next sample, plus or minus one, of the sequence of largest length by x^8 + x^6 + x^5 + x^4 + 1.
-fn next_bit(register: &mut u8) -> f32 {
+pub(super) fn next_bit(register: &mut u8) -> f32 {
     let r = if *register == 0 { 1 } else { *register };
     *register = (r << 1) | ((r >> 7 ^ r >> 5 ^ r >> 4 ^ r >> 3) & 1);
     if r & 1 == 1 { 1.0 } else { -1.0 }
@@ -114,7 +114,7 @@ impl Excite {
                 s.index = if s.index + 1 < CARRIER_SAMPLES { s.index + 1 } else { 0 };
                 let factor = if binary { next_bit(&mut s.register) } else { cos };
                 let wanted = AlphaBeta::new(along, 0.0) + s.carrier * factor;
-                if !(wanted.alpha + wanted.beta).is_finite() {
+                if !wanted.is_finite() {
                     return Err(k.not_finite(c, true).unwrap_or(Fault::NonFiniteState));
                 }
                 let modulated = c.modulator.step(wanted, Abc::ZERO, measured.dc_link);
@@ -158,8 +158,9 @@ impl Drive {
     /// Takes [`Command::Excite`](super::Command::Excite).
     pub(super) fn take_excitation(&mut self, wanted: Excitation) -> Result<Accepted, Refused> {
         if let Excitation::Current { amperes, regulator, carrier, .. } = wanted {
-            let (max, sum) = (self.c.protection.trip_a, amperes + carrier.alpha + carrier.beta);
-            if !(sum + regulator.k_c + regulator.z_c + regulator.direct).is_finite() {
+            let max = self.c.protection.trip_a;
+            let numbers = [amperes, regulator.k_c, regulator.z_c, regulator.direct];
+            if !(all_finite(&numbers) && carrier.is_finite()) {
                 return Err(Refused::NotFinite);
             }
             if amperes.abs() > max {

@@ -4,6 +4,7 @@
 mod excitation;
 mod motor;
 mod protections;
+mod ranges;
 mod trust;
 
 use super::*;

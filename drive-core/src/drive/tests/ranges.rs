@@ -1,0 +1,178 @@
+//! Ranges of commands, and small functions of the machine against independent computations.
+
+use super::*;
+use crate::drive::catching::Residual;
+use crate::drive::excite::next_bit;
+use crate::drive::{Excitation, Regulator};
+
+/// A regulated drive in this mode, with the encoder.
+fn in_mode(mode: Mode) -> Drive {
+    let (mut drive, mut load) = (drive(), Load::new());
+    drive.command(&Command::Start(mode)).unwrap();
+    assert!(run_to(
+        &mut drive,
+        &mut load,
+        if mode == Mode::Torque { State::Torque } else { State::Position }
+    ));
+    drive
+}
+
+fn excitation(amperes: f32, regulator: Regulator, carrier: AlphaBeta) -> Command {
+    Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false })
+}
+
+/// Each command at the ends of its range, and just beyond.
+#[test]
+fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
+    let c = settings().build().unwrap();
+    let (torque, position) = (in_mode(Mode::Torque), in_mode(Mode::Position));
+    let off = Drive::new(c);
+    let (turns, press, trip) = (c.motion.position_limit, c.protection.i_q, c.protection.trip_a);
+    let volts = c.largest_test_v;
+    let least = 0.2 * c.sequence.i_d;
+    let regulator = Regulator { k_c: 25.0, z_c: 0.9, direct: 0.0, filtered: false };
+    let current = |amperes| excitation(amperes, regulator, AlphaBeta::ZERO);
+    let beyond = |x: f32| if x == 0.0 { -1e-6 } else { x * 1.0001 };
+    type Make<'a> = &'a dyn Fn(f32) -> Command;
+    let cases: [(&Drive, Make, f32, f32); 8] = [
+        (&position, &Command::Home, -turns, turns),
+        (&position, &|i_q| Command::Press(30.0, i_q), 0.0, press),
+        (&torque, &|d| Command::TestVoltage(Dq::new(d, 0.0)), -volts, volts),
+        (&torque, &|q| Command::TestVoltage(Dq::new(0.0, q)), -volts, volts),
+        (&off, &current, -trip, trip),
+        (&torque, &Command::TurnInjection, -f32::MAX, f32::MAX),
+        (&torque, &Command::Torque, -f32::MAX, f32::MAX),
+        (&position, &Command::Position, -f32::MAX, f32::MAX),
+    ];
+    for (before, command, min, max) in cases {
+        for end in [min, max] {
+            let mut drive = before.clone();
+            assert!(drive.command(&command(end)).is_ok(), "{:?}", command(end));
+            if end.abs() < f32::MAX {
+                let mut drive = before.clone();
+                let refused = drive.command(&command(beyond(end)));
+                assert_eq!(refused, Err(Refused::OutOfRange { min, max }), "{:?}", command(end));
+            }
+        }
+        for number in [f32::NAN, f32::INFINITY, -f32::INFINITY] {
+            let mut drive = before.clone();
+            let refused = drive.command(&command(number));
+            assert!(refused.is_err(), "{:?}", command(number));
+            assert_eq!(drive.state(), before.state());
+        }
+    }
+    // The direct current has a least value that is refused, and a largest that is taken instead: what the torque leaves of the limit.
+    let mut drive = torque.clone();
+    drive.command(&Command::Torque(2.0)).unwrap();
+    let left = (3.5_f32 * 3.5 - 2.0 * 2.0).sqrt();
+    assert_eq!(drive.command(&Command::Magnetising(least)), Ok(Accepted::AsGiven));
+    assert!(drive.command(&Command::Magnetising(0.999 * least)).is_err());
+    let Ok(Accepted::Limited(most)) = drive.command(&Command::Magnetising(9.0)) else { panic!() };
+    assert!((most - left).abs() < 1e-5, "{most}, not {left}");
+    // An excitation has more numbers that are to be finite.
+    for bad in [f32::NAN, f32::INFINITY] {
+        let none = AlphaBeta::ZERO;
+        let bad = [
+            excitation(1.0, Regulator { k_c: bad, ..regulator }, none),
+            excitation(1.0, Regulator { z_c: bad, ..regulator }, none),
+            excitation(1.0, Regulator { direct: bad, ..regulator }, none),
+            excitation(1.0, regulator, AlphaBeta::new(bad, 0.0)),
+            excitation(1.0, regulator, AlphaBeta::new(0.0, bad)),
+            excitation(bad, regulator, none),
+        ];
+        for command in bad {
+            assert_eq!(off.clone().command(&command), Err(Refused::NotFinite), "{command:?}");
+        }
+    }
+}
+
+/// Register of eight bits: each of its 255 values but zero once; 128 ones; another 254 shifts away it has nothing in common with itself.
+#[test]
+fn the_binary_sequence_has_the_largest_length() {
+    let mut register = 0;
+    let bits: Vec<f32> = (0..510).map(|_| next_bit(&mut register)).collect();
+    assert_eq!(bits[..255], bits[255..]);
+    for shift in 1..255 {
+        let sum: f32 = (0..255).map(|k| bits[k] * bits[k + shift]).sum();
+        assert_eq!(sum, -1.0, "shift {shift}");
+    }
+    assert_eq!(bits[..255].iter().sum::<f32>(), 1.0);
+}
+
+/// The flux of a rotor decays with its time constant. A start waits until its voltage has, and never for less.
+#[test]
+fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
+    let c = sensorless().build().unwrap();
+    let catching = c.catching.unwrap();
+    let per_period = 1.0 / (6000.0 * f64::from(settings().motor.tau_r()));
+    for volts in [1.01, 2.0, 5.0, 20.0] {
+        let residual = Residual::of(volts * catching.left_v);
+        let waits = |elapsed| residual.waits(&c, elapsed);
+        let decayed = (f64::from(volts).ln() / per_period) as u32;
+        let ends = (0..100_000).find(|elapsed| !waits(*elapsed)).unwrap();
+        assert!(
+            (decayed..=decayed * 2 + 2).contains(&ends),
+            "{volts}: {ends}, decayed at {decayed}"
+        );
+        assert!(!waits(ends + 100) && (ends == 0 || waits(ends - 1)));
+        // It makes no difference when the time has passed.
+        assert!(!residual.after(ends).waits(&c, 0) && residual.after(ends - 1).waits(&c, 0));
+    }
+    assert!(!Residual::of(catching.left_v).waits(&c, 0), "as much as is left is no reason to wait");
+    let residual = Residual::of(50.0);
+    assert!(residual.after(catching.flux_gone - 1).is_recent(&c));
+    assert!(!residual.after(catching.flux_gone).is_recent(&c));
+    // The voltage of a flux of 0.5 V s at 50 Hz.
+    let turning = Residual::turning(-50.0 / 6000.0, 0.5);
+    let volts = core::f32::consts::TAU * 50.0 * 0.5;
+    assert!(turning.waits(&c, 0) && !turning.waits(&c, u32::MAX));
+    let same = Residual::of(volts);
+    assert!((0..50_000).all(|n| n % 500 != 0 || same.waits(&c, n) == turning.waits(&c, n)));
+}
+
+/// A number that is none, in each place where the coefficients are checked.
+#[test]
+fn coefficients_that_are_no_numbers_are_found() {
+    let sound = settings().build().unwrap();
+    assert!(sound.is_finite());
+    let places: [fn(&mut Coefficients) -> &mut f32; 19] = [
+        |c| &mut c.front_end.current_a.gain,
+        |c| &mut c.front_end.current_a.offset,
+        |c| &mut c.front_end.current_b.gain,
+        |c| &mut c.front_end.current_b.offset,
+        |c| &mut c.front_end.dc_link.gain,
+        |c| &mut c.front_end.dc_link.offset,
+        |c| &mut c.current_loop.d.k_c,
+        |c| &mut c.current_loop.d.z_c,
+        |c| &mut c.current_loop.q.k_c,
+        |c| &mut c.current_loop.q.z_c,
+        |c| &mut c.injection.current_amplitude,
+        |c| &mut c.estimator.lag,
+        |c| &mut c.current_lag,
+        |c| &mut c.reference_filter[0].one_minus_p,
+        |c| &mut c.reference_filter[1].one_minus_p,
+        |c| &mut c.motion.pi.k_c,
+        |c| &mut c.motion.speed_limit,
+        |c| &mut c.sequence.i_d,
+        |c| &mut c.sequence.stop_ramp,
+    ];
+    for place in places {
+        for bad in [f32::NAN, f32::INFINITY, -f32::INFINITY] {
+            let mut c = sound;
+            *place(&mut c) = bad;
+            assert!(!c.is_finite());
+        }
+    }
+}
+
+#[test]
+fn goals_that_are_no_numbers_are_found() {
+    let position = |turns, press| Goal::Position { turns, press };
+    for bad in [f32::NAN, f32::INFINITY] {
+        assert!(!Goal::Speed { speed: bad, jog: 0 }.is_finite());
+        assert!(!position(Some(bad), None).is_finite());
+        assert!(!position(None, Some((bad, 1.0))).is_finite());
+    }
+    assert!(Goal::SPEED.is_finite() && position(Some(1.0), Some((1.0, 1.0))).is_finite());
+    assert!(Goal::POSITION.is_finite() && Goal::Torque.is_finite());
+}
