@@ -196,4 +196,21 @@ mod tests {
         }
         assert_eq!(blind, [0, 0, 3, 3]);
     }
+
+    /// Noise is judged where the injection has had the angle alone for so many carrier periods, and not where the observer has part of it.
+    #[test]
+    fn noise_is_judged_some_time_after_the_observer_has_left() {
+        let mut state = HandOver::default();
+        let judged = |state: &mut HandOver, hertz: f32| {
+            state.update(hertz * PERIOD_S, Source::Both);
+            state.judges_noise()
+        };
+        let between = 0.5 * (INJECTION_ALONE_BELOW + OBSERVER_ALONE_ABOVE) / PERIOD_S;
+        for _ in 0..3 {
+            assert!(!judged(&mut state, between));
+            assert!(state.weight > 0.0 && state.weight < 1.0);
+            let waited = (0..1000).take_while(|_| !judged(&mut state, 0.0)).count();
+            assert_eq!((state.weight, waited), (0.0, usize::from(NOISE_IS_JUDGED_AFTER) - 1));
+        }
+    }
 }

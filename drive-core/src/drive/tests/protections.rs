@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::dc_link::Limiting;
+use crate::drive::{Excitation, Regulator};
 
 #[test]
 fn every_protection_switches_off_in_the_same_step() {
@@ -212,4 +213,70 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
     assert!(nothing.abs() < 0.02 && why == Limiting::HeatSink, "{nothing} {why}");
     let (whole, why) = at(&mut drive, 60.0);
     assert!((whole - 3.0).abs() < 0.02 && why == Limiting::None, "{whole} {why}");
+}
+
+/// In each phase the load of the motor goes to the square of the current vector relative to that which it carries for ever, with its
+/// time constant; without outputs it decays.
+#[test]
+fn the_load_of_the_motor_follows_the_current_in_every_phase() {
+    let mut s = settings();
+    (s.limits.motor_s, s.limits.motor_a) = (10.0, Some(2.0));
+    let c = s.build().unwrap();
+    let regulator =
+        Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
+    let (amperes, carrier) = (1.5, AlphaBeta::ZERO);
+    let excite =
+        Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false });
+    // The least square of the current that flows, A^2.
+    let cases: [(Option<Command>, State, f32); 5] = [
+        (None, State::Off, 0.0),
+        (Some(Command::Start(Mode::Torque)), State::Calibrating, 0.0),
+        (Some(excite), State::Exciting, 2.2),
+        (Some(Command::Start(Mode::Torque)), State::Torque, 0.4),
+        (Some(Command::Start(Mode::VoltsPerHertz)), State::VoltsPerHertz, 0.1),
+    ];
+    for (command, state, least) in cases {
+        let (mut drive, mut load) = (Drive::new(c), Load::new());
+        if let Some(command) = command {
+            drive.command(&command).unwrap();
+        }
+        assert!(run_to(&mut drive, &mut load, state), "{state:?}");
+        if least > 0.0 {
+            (0..3000).for_each(|_| period(&mut drive, &mut load));
+        }
+        drive.kept.thermal.motor = 0.5;
+        // Less than a start calibrates for.
+        let periods = 3 * crate::protect::Thermal::EVERY;
+        let mut squares = 0.0;
+        for _ in 0..periods {
+            period(&mut drive, &mut load);
+            squares += load.current.length_squared();
+        }
+        assert_eq!(drive.state(), state);
+        let square = squares / periods as f32;
+        assert!(square >= least, "{state:?}: {square}");
+        let goes_to = if least > 0.0 { square / 4.0 } else { 0.0 };
+        let expected = 0.5 + (goes_to - 0.5) * (periods as f32 / 6000.0 / 10.0);
+        let found = drive.kept.thermal.motor;
+        let error = (found - expected).abs() / (0.5 - expected).abs();
+        assert!(error < 0.05, "{state:?}: {found}, not {expected}; {square} A^2");
+    }
+}
+
+/// With a relay the drive starts once the link has been steady, and not below the voltage at which it trips.
+#[test]
+fn a_link_that_is_not_charged_refuses_a_start() {
+    let mut s = settings();
+    s.supply.relay_s = 0.1;
+    let (mut drive, mut load) = (Drive::new(s.build().unwrap()), Load::new());
+    let start = Command::Start(Mode::Torque);
+    for _ in 0..600 {
+        assert_eq!(drive.command(&start), Err(Refused::NotCharged));
+        load.step(&mut drive);
+    }
+    load.step(&mut drive);
+    assert_eq!(drive.clone().command(&start), Ok(Accepted::AsGiven));
+    load.v_dc = 100.0;
+    load.step(&mut drive);
+    assert_eq!(drive.command(&start), Err(Refused::NotCharged));
 }

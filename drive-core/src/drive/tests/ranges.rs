@@ -176,3 +176,10 @@ fn goals_that_are_no_numbers_are_found() {
     assert!(Goal::SPEED.is_finite() && position(Some(1.0), Some((1.0, 1.0))).is_finite());
     assert!(Goal::POSITION.is_finite() && Goal::Torque.is_finite());
 }
+
+#[test]
+fn the_memory_check_covers_the_coefficients() {
+    assert_eq!(Drive::COEFFICIENTS.len(), size_of::<Coefficients>());
+    assert!(Drive::COEFFICIENTS.end <= size_of::<Drive>());
+    assert!(Drive::CHANGES + 4 <= size_of::<Drive>());
+}

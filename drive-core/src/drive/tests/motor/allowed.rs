@@ -331,3 +331,14 @@ fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
     let coast = seconds(&[(0.1, Stop::Coast)]);
     assert!(coast.0 == 0.0 && coast.1 > 270.0, "{coast:?}");
 }
+
+/// 300 rpm of two pairs of poles are 10 Hz.
+#[test]
+fn a_frequency_above_the_limit_of_the_speed_trips_by_voltage_and_frequency() {
+    for (hertz, state) in [(9.0, State::Fault(Fault::OverSpeed)), (11.0, State::VoltsPerHertz)] {
+        let mut bench = turning(Mode::VoltsPerHertz);
+        bench.drive.c.protection.rotor_freq = hertz / 6000.0;
+        (0..20).for_each(|_| bench.step());
+        assert_eq!(bench.drive.state(), state, "{hertz} Hz");
+    }
+}
