@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode, State, Stop};
+use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::Config;
 use hil_sim::experiments::full_range::for_the_range;
 use hil_sim::plant::Load;
@@ -68,5 +68,32 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
         println!("{plant} {rpm} rpm: {}, {largest:.1} degrees", rig.drive.state());
         assert_eq!(rig.drive.state(), State::Torque);
         assert!(largest < 15.0, "{largest}");
+    }
+}
+
+/// Above 2700 rpm the voltage of the rotor drowns in the noise of the sensors: the drive refuses, with either direction, and no current
+/// goes on.
+#[test]
+fn a_shaft_that_turns_too_fast_is_refused() {
+    for (seed, rpm, caught) in
+        [(1, 3300.0, false), (2, -3300.0, false), (3, 2500.0, true), (4, -2500.0, true)]
+    {
+        let mut config = for_the_range(&Config::default()).unwrap();
+        config.prepare.learn = true;
+        let mut rig = Rig::from_config(&config, seed).unwrap();
+        rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
+        let state = match rig.start(Mode::Torque) {
+            Ok(()) => rig.drive.state(),
+            Err(error) => {
+                println!("{error}");
+                rig.drive.state()
+            }
+        };
+        let expected = if caught { State::Torque } else { State::Fault(Fault::NotCaught) };
+        assert_eq!(state, expected, "{rpm} rpm");
+        if !caught {
+            rig.run(0.01, |_| {});
+            rig.run(0.2, |p| assert!(p.torque.abs() < 0.01, "{} Nm", p.torque));
+        }
     }
 }

@@ -21,7 +21,18 @@ pub fn book() -> Result<()> {
     Ok(())
 }
 
-/// `cargo xtask mutants`: changes `drive-core` in the places of one shard, `K/N`, and runs its own tests on
+/// Tests that mutants are run on, beside the unit tests: the filters, the recorded runs, and quick ones of the simulated motor.
+const MUTANT_TESTS: [&str; 7] = [
+    "filters",
+    "replay",
+    "command_turns",
+    "thermal_limit",
+    "volts_per_hertz",
+    "turning_start",
+    "learning",
+];
+
+/// `cargo xtask mutants`: changes `drive-core` in the places of one shard, `K/N`, and runs unit tests and [`MUTANT_TESTS`] on
 /// each change; fails if they catch too few.
 pub fn mutants(shard: &str) -> Result<()> {
     let output = run::folder("mutants")?;
@@ -29,9 +40,12 @@ pub fn mutants(shard: &str) -> Result<()> {
     command
         .args(["mutants", "--package", "induction-drive-core", "--test-tool", "cargo", "-j2"])
         .args(["--exclude", "**/tests.rs", "--exclude", "**/tests/**"])
-        .args(["--minimum-test-timeout", "120", "--sharding", "round-robin", "--shard", shard])
-        .arg("--output")
+        // A baseline would run the tests of the first package alone.
+        .args(["--test-package", "induction-drive-core,induction-drive", "--baseline", "skip"])
+        .args(["--timeout", "300", "--sharding", "round-robin", "--shard", shard, "--output"])
         .arg(&output)
+        .args(["--", "--lib"])
+        .args(MUTANT_TESTS.iter().flat_map(|name| ["--test", name]))
         // With one target directory the two would wait for each other.
         .env_remove("CARGO_TARGET_DIR");
     // Missed mutants are judged below. Anything else than 0, missed (2) or time-out (3) is a failure.

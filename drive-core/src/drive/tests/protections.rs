@@ -3,6 +3,7 @@
 use super::*;
 use crate::dc_link::Limiting;
 use crate::drive::{Excitation, Regulator};
+use crate::settings::CurrentSensors;
 
 #[test]
 fn every_protection_switches_off_in_the_same_step() {
@@ -279,4 +280,43 @@ fn a_link_that_is_not_charged_refuses_a_start() {
     load.v_dc = 100.0;
     load.step(&mut drive);
     assert_eq!(drive.command(&start), Err(Refused::NotCharged));
+}
+
+/// Amplifiers of shunts whose offset changes when the low sides go on: 0.3 A are within the 0.4 A of the first measurement and beyond
+/// half of them.
+#[test]
+fn an_offset_that_comes_with_the_low_sides_is_found_behind_shunts() {
+    let start = |amperes: f32, sensors| {
+        let mut s = settings();
+        s.scales.sensors = sensors;
+        let c = s.build().unwrap();
+        let (mut drive, mut load) = (Drive::new(c), Load::new());
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        for _ in 0..6000 {
+            let i = load.current.to_abc();
+            let moved = if drive.state() == State::Calibrating { 0.0 } else { amperes };
+            let code = |line: Line, i: f32| ((i - line.offset) / line.gain) as u16;
+            let sample = Sample {
+                current_a: code(s.scales.current_a, i.a + moved),
+                current_c: code(s.scales.current_c, i.c),
+                ..load.sample()
+            };
+            let compare = load.step_with(&mut drive, &sample);
+            load.advance(compare);
+            if !matches!(drive.state(), State::Calibrating | State::Precharge) {
+                break;
+            }
+        }
+        drive.state()
+    };
+    let largest = settings().build().unwrap().offsets.largest;
+    let (found, passes) = (State::Fault(Fault::OffsetA), State::Magnetising);
+    for (share, sensors, state) in [
+        (0.6, CurrentSensors::LowSide, found),
+        (-0.6, CurrentSensors::LowSide, found),
+        (0.4, CurrentSensors::LowSide, passes),
+        (0.6, CurrentSensors::InLine, passes),
+    ] {
+        assert_eq!(start(share * largest, sensors), state, "{share} of the limit, {sensors:?}");
+    }
 }
