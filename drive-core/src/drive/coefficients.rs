@@ -6,7 +6,6 @@ mod tests;
 use crate::carrier::Injection;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
 use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
-use crate::math::all_finite;
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, WiringCheck,
 };
@@ -97,7 +96,7 @@ impl Coefficients {
     /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.front_end, &self.current_loop);
-        all_finite(&[
+        crate::math::all_finite(&[
             s.current_a.gain,
             s.current_a.offset,
             s.current_b.gain,

@@ -1,10 +1,8 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use super::prepare::Prepare;
-use super::scalar::Scalar;
 use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
+use super::{allowed::allowed, prepare::Prepare, scalar::Scalar};
 
-use crate::drive::allowed::allowed;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::Mode;
 use crate::math::limited;

@@ -5,8 +5,7 @@
 
 use super::{Drive, Job, Kept, Left, Phase};
 use crate::carrier::{CARRIER_COS, CARRIER_SAMPLES};
-use crate::current::pi::ReferenceState;
-use crate::current::{Pi, PiState, ReferenceFilter};
+use crate::current::{Pi, PiState, ReferenceFilter, pi::ReferenceState};
 use crate::drive::command::{Accepted, Refused};
 use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
