@@ -73,7 +73,7 @@ pub struct Observer {
     least: f32,
     /// Share of the resistance per V s of `eps` in a period.
     resistance_gain: f32,
-    /// Age of the current, samples, without and behind the filter; less than [`VOLTAGES`] - 2.
+    /// Age of the current, samples, without and behind the filter; less than 6.
     pub ages: [f32; 2],
 }
 

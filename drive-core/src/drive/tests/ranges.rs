@@ -1,4 +1,5 @@
 //! Ranges of commands, and small functions of the machine against independent computations.
+#![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use super::*;
 use crate::drive::catching::Residual;
