@@ -4,7 +4,8 @@ use super::*;
 use crate::drive::{Excitation, Regulator};
 use crate::protect::wiring_check::WiringSettings;
 
-fn current(amperes: f32, carrier: AlphaBeta) -> Command {
+/// A regulated direct current and a carrier on top of it.
+pub(super) fn current(amperes: f32, carrier: AlphaBeta) -> Command {
     let regulator =
         Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
     Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false })

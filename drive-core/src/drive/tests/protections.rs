@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::dc_link::Limiting;
-use crate::drive::{Excitation, Regulator};
 use crate::settings::CurrentSensors;
 
 #[test]
@@ -223,11 +222,7 @@ fn the_load_of_the_motor_follows_the_current_in_every_phase() {
     let mut s = settings();
     (s.limits.motor_s, s.limits.motor_a) = (10.0, Some(2.0));
     let c = s.build().unwrap();
-    let regulator =
-        Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
-    let (amperes, carrier) = (1.5, AlphaBeta::ZERO);
-    let excite =
-        Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false });
+    let excite = excitation::current(1.5, AlphaBeta::ZERO);
     // The least square of the current that flows, A^2.
     let cases: [(Option<Command>, State, f32); 5] = [
         (None, State::Off, 0.0),
