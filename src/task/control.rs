@@ -235,16 +235,10 @@ impl Running {
                 hardware |= Hardware::CHOPPER_OFF;
             }
         }
-        let codes = adc.read();
-        let sample = Sample {
-            current_a: codes.current_a,
-            current_b: codes.current_b,
-            current_c: codes.current_c,
-            dc_link: codes.dc_link,
-            heat_sink: codes.heat_sink,
-            encoder: encoder.count(),
-            hardware,
-        };
+        let [current_a, current_b, current_c, dc_link, heat_sink] = adc.read();
+        let encoder = encoder.count();
+        let sample =
+            Sample { current_a, current_b, current_c, dc_link, heat_sink, encoder, hardware };
 
         let (compare, output) = drive.period(&mut self.front_end, &sample);
         pwm.apply(compare);
@@ -272,9 +266,12 @@ impl Running {
         let answered = commands
             .take_with(|command| answers.send_with(|answer| *answer = drive.command(command)));
         let commanded = answered.is_some();
+        if commanded && was_off {
+            adc.convert_both(drive.front_end().both_zero_vectors);
+        }
         IS_OFF.store(drive.is_off(), Ordering::Relaxed);
         let state = drive.state();
-        let codes = [codes.current_a, codes.current_b, codes.current_c];
+        let codes = [current_a, current_b, current_c];
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
 
         self.unreported |= hardware;
@@ -307,6 +304,7 @@ impl Running {
                 record.set(drive.telemetry());
             });
         }
+        adc.close();
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;

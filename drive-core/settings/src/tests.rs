@@ -11,7 +11,7 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
     let changed = |change: fn(&mut Settings)| {
         let mut settings = Settings::default();
         change(&mut settings);
-        settings.shares_learning_with(&Settings::default())
+        settings.learned_with_another(&Settings::default()).is_none()
     };
     let same: [fn(&mut Settings); 6] = [
         |_| {},
@@ -22,12 +22,13 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
         |s| s.speed.limit_rpm = Some(100.0),
     ];
     assert!(same.into_iter().all(changed));
-    let other: [fn(&mut Settings); 10] = [
+    let other: [fn(&mut Settings); 11] = [
         |s| s.motor.r_r = 1.4,
         |s| s.motor.pole_pairs = 3,
         |s| s.inverter.compensate = false,
         |s| s.scales.current_b.gain *= 1.01,
         |s| s.scales.current_delay_s = 0.0,
+        |s| s.scales.both_zero_vectors = true,
         |s| s.ignore_delays = true,
         |s| s.sequence.i_d = Some(0.6),
         |s| s.injection.amplitude_v = Some(60.0),
@@ -214,10 +215,10 @@ fn a_range_without_a_value_says_so() {
 #[test]
 fn a_word_without_code_is_refused_by_name() {
     let mut settings = Settings::default();
-    assert_eq!(settings.check_demodulator(false), Ok(()));
+    assert_eq!(settings.check_words(false), Ok(()));
     settings.injection.demodulator = DemodulatorKind::Envelope;
-    assert_eq!(settings.check_demodulator(true), Ok(()));
-    let error = settings.check_demodulator(false).unwrap_err().to_string();
+    assert_eq!(settings.check_words(true), Ok(()));
+    let error = settings.check_words(false).unwrap_err().to_string();
     let text = "injection.demodulator = envelope: this image is built with synchronous alone";
     assert_eq!(error, text);
 }

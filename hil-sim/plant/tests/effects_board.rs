@@ -15,7 +15,10 @@ use motor_plant::{
 fn read(plant: &mut Plant, settings: &PlantSettings) -> [f64; 2] {
     let lines = settings.measurement.calibration();
     let sample = plant.sample();
-    let current = |code: u16, k: usize| f64::from(code) * lines[k].a_per_code + lines[k].a_at_zero;
+    let conversions = if settings.measurement.both_zero_vectors { 2.0 } else { 1.0 };
+    let current = |code: u16, k: usize| {
+        f64::from(code) / conversions * lines[k].a_per_code + lines[k].a_at_zero
+    };
     [current(sample.current_a, 0), current(sample.current_b, 1)]
 }
 

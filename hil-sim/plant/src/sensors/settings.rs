@@ -42,7 +42,7 @@ pub struct MeasurementSettings {
     pub drift_a: f64,
     /// Drift of the offset of channel B, A/s.
     pub drift_b: f64,
-    /// Whether each sample is the mean of two conversions, in the middle of the period and at its end: in both zero
+    /// Whether the code of a current is the sum of two conversions, in the middle of the period and at its end: in both zero
     /// vectors.
     pub both_zero_vectors: bool,
     /// Dc-link voltage per code, V (12 bits).
