@@ -6,6 +6,7 @@
 //! each converter, half a period before the sequence. The code of a current is the sum of both then.
 
 use cortex_m::asm;
+use drive_core::Sample;
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
@@ -89,10 +90,10 @@ impl Adc {
     /// Whether the currents are converted in the upper zero vector, too, from the next one on.
     #[inline(always)] // the control interrupt calls it, and nothing in the CCM may call into the flash
     pub fn convert_both(&mut self, both: bool) {
-        let needed = if both { EOC | JEOC } else { JEOC };
-        if needed == core::mem::replace(&mut self.needed, needed) {
+        if both == (self.needed & EOC != 0) {
             return;
         }
+        self.needed ^= EOC;
         for converter in [&*self.one, &*self.two] {
             converter.cr().modify(|_, w| {
                 if both { w.adstart().start_conversion() } else { w.adstp().stop_conversion() }
@@ -114,7 +115,7 @@ impl Adc {
 
     /// The codes of the period: currents a, b and c (0 if the board does not measure it), dc link, heat sink; clears the interrupt
     /// request. With both zero vectors those of a and b are sums.
-    pub fn read(&mut self) -> [u16; 5] {
+    pub fn read(&mut self) -> Sample {
         // Before the data are read: a sequence that ends from here on raises a new request.
         self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
         let data = |rank| {
@@ -130,7 +131,7 @@ impl Adc {
         let third = SELECTED.currents.c().is_some();
         let current_c = if third { self.one.jdr(1).read().jdata().bits() } else { 0 };
         let (dc_link, heat_sink) = data(if third { 2 } else { 1 });
-        [current_a, current_b, current_c, dc_link, heat_sink]
+        Sample { current_a, current_b, current_c, dc_link, heat_sink, ..Sample::default() }
     }
 
     /// The period is over: its own reference has been converted, and the next sequence of ADC1 can be told from it.

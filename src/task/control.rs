@@ -235,10 +235,9 @@ impl Running {
                 hardware |= Hardware::CHOPPER_OFF;
             }
         }
-        let [current_a, current_b, current_c, dc_link, heat_sink] = adc.read();
-        let encoder = encoder.count();
-        let sample =
-            Sample { current_a, current_b, current_c, dc_link, heat_sink, encoder, hardware };
+        let read = adc.read();
+        let codes = [read.current_a, read.current_b, read.current_c];
+        let sample = Sample { encoder: encoder.count(), hardware, ..read };
 
         let (compare, output) = drive.period(&mut self.front_end, &sample);
         pwm.apply(compare);
@@ -263,15 +262,13 @@ impl Running {
 
         // Between two steps: a command acts from the next step on.
         // There is room for the answer: the main loop takes the last one before it sends a command.
-        let answered = commands
-            .take_with(|command| answers.send_with(|answer| *answer = drive.command(command)));
-        let commanded = answered.is_some();
-        if commanded && was_off {
+        let answered = commands.take_with(|command| {
+            answers.send_with(|answer| *answer = drive.command(command));
             adc.convert_both(drive.front_end().both_zero_vectors);
-        }
+        });
+        let commanded = answered.is_some();
         IS_OFF.store(drive.is_off(), Ordering::Relaxed);
         let state = drive.state();
-        let codes = [current_a, current_b, current_c];
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
 
         self.unreported |= hardware;

@@ -210,6 +210,27 @@ fn a_range_without_a_value_says_so() {
     assert_eq!(text, whole);
 }
 
+/// The code is the sum of two conversions: half the gain, twice the range, a mean that is a quarter of a period older; the same
+/// currents.
+#[test]
+fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older() {
+    let mut settings = Settings::default();
+    let one = settings.build().unwrap();
+    settings.scales.both_zero_vectors = true;
+    let two = settings.build().unwrap();
+    let (a, b) = (&one.front_end, &two.front_end);
+    assert!(b.both_zero_vectors && !a.both_zero_vectors);
+    assert_eq!(b.full_scale, 2 * a.full_scale);
+    for (before, now) in [(3000, 3001), (0, 1), (4095, 4095)] {
+        let mean = 0.5 * (a.current_a.at(before) + a.current_a.at(now));
+        assert!((b.current_a.at(before + now) - mean).abs() < 1e-6, "{before} {now}");
+        let mean = 0.5 * (a.current_b.at(before) + a.current_b.at(now));
+        assert!((b.current_b.at(before + now) - mean).abs() < 1e-6, "{before} {now}");
+    }
+    assert!((two.current_lag - one.current_lag - 0.25).abs() < 1e-6);
+    assert!((two.estimator.lag - one.estimator.lag - 0.25).abs() < 1e-6);
+}
+
 /// The image is built without the demodulations of the feature `printed`; their words are refused there, and stand for the same
 /// places.
 #[test]
