@@ -194,7 +194,7 @@ impl Sensors {
         let now = self.converted(now, rare.offsets(), rng);
         let Some(middle) = middle else { return now };
         let middle = self.converted(middle, rare.offsets(), rng);
-        [0, 1].map(|k| now[k].saturating_add(middle[k]))
+        [0, 1].map(|k| now[k] + middle[k])
     }
 
     /// The codes at these currents and further offsets, A.
