@@ -136,6 +136,8 @@ const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 /// Compare value of the trigger. The sampling of the currents starts while the counter goes up and ends, which
 /// fixes the sampled value, when the counter is at the top and all low sides are on.
 pub const SAMPLE_AT: u16 = PWM_TOP - CURRENT_SAMPLING.ticks() as u16;
+/// The same in the upper zero vector, on the way down: this sampling ends when the counter is at 0.
+pub const UPPER_SAMPLE_AT: u32 = CURRENT_SAMPLING.ticks();
 /// From the top of the counter to the control interrupt, in ticks. A third current is converted after the first two.
 pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
     + SLOW_SAMPLING.ticks()

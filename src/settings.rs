@@ -87,7 +87,7 @@ impl FirmwareSettings {
 
     /// Drops what was learned, unless it would be the same with the settings `before`.
     pub fn forget_unless_as(&mut self, before: &Self) {
-        if !self.drive.shares_learning_with(&before.drive) {
+        if self.drive.learned_with_another(&before.drive).is_some() {
             self.learned = None;
         }
     }

@@ -19,7 +19,7 @@ use shunts::{ShuntState, Shunts};
 /// Coefficients of the front end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontEnd {
-    /// Calibration of current a, A.
+    /// Calibration of current a, A, by the code of a [`Sample`].
     pub current_a: Line,
     /// Calibration of current b, A.
     pub current_b: Line,
@@ -27,7 +27,9 @@ pub struct FrontEnd {
     pub shunts: Option<Shunts>,
     /// Calibration of the dc-link voltage, V.
     pub dc_link: Line,
-    /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
+    /// Whether the code of a current is the sum of two conversions, one in each zero vector, rather than one.
+    pub both_zero_vectors: bool,
+    /// Largest code of a current. At this code, or at 0, its channel is saturated.
     pub full_scale: u16,
     /// Compare value at which a high side is on throughout.
     pub top: f32,
@@ -85,7 +87,8 @@ impl FrontEnd {
         if self.shunts.is_some() {
             state.shunts.applied(duties);
         }
-        let [a, b, c] = duties.map(|duty| rounded(duty * self.top));
+        // To the nearest integer; 0 for NaN. The cast to u32 is one instruction of the core, the saturating one to u16 twelve.
+        let [a, b, c] = duties.map(|duty| (duty * self.top + 0.5) as u32 as u16);
         Compare { a, b, c, enabled: true }
     }
 
@@ -106,12 +109,6 @@ impl FrontEnd {
     }
 }
 
-/// Rounds a count from 0 to `top` to the nearest integer; 0 for NaN.
-fn rounded(count: f32) -> u16 {
-    // The cast to u32 is one instruction of the core, the saturating cast to u16 twelve.
-    (count + 0.5) as u32 as u16
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +120,7 @@ mod tests {
             current_b: Line::CHANNEL_B,
             shunts: None,
             dc_link: Line { gain: 0.11, offset: 0.0 },
+            both_zero_vectors: false,
             full_scale: 4095,
             top: 14_167.0,
             heat_sink: Ntc::default().checks(70.0, 85.0),

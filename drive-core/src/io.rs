@@ -67,7 +67,8 @@ pub struct Output {
     pub relay: bool,
 }
 
-/// The readings of converters and encoder at the instant `k T` of one PWM period: plain register values.
+/// The readings of converters and encoder at the instant `k T` of one PWM period: plain register values. Where the settings say
+/// so, the code of a current is the sum of two conversions: one half a period before, in the upper zero vector, and one now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Converter code of the current into phase a.

@@ -76,13 +76,10 @@ impl Verdict {
 
     /// The verdict on a slope without torque current, 1/rad.
     pub fn of_slope(at_rest: f32) -> Self {
-        let least = Self::least(at_rest);
-        if at_rest.abs() >= WEAK * least {
-            Self::Sound
-        } else if at_rest.abs() >= least {
-            Self::Weak
-        } else {
-            Self::SlopeTooSmall
+        match at_rest.abs() / Self::least(at_rest) {
+            WEAK.. => Self::Sound,
+            1.0.. => Self::Weak,
+            _ => Self::SlopeTooSmall,
         }
     }
 }

@@ -154,10 +154,7 @@ impl Config {
         let filter_hz = self.measurement.filter_hz;
         scales.current_delay_s =
             if filter_hz > 0.0 { (1.0 / (std::f64::consts::TAU * filter_hz)) as f32 } else { 0.0 };
-        if self.measurement.both_zero_vectors {
-            // The mean is as old as the middle between the two conversions.
-            scales.current_delay_s += 0.25 * drive_core::io::PERIOD_S;
-        }
+        scales.both_zero_vectors = self.measurement.both_zero_vectors;
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
@@ -191,7 +188,7 @@ pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
             SettingsError::Range { name, .. } => {
                 find(name).is_some_and(|entry| entry.get(settings) == drive::Value::Auto)
             }
-            SettingsError::Absent(..) | SettingsError::Tuning(_) => false,
+            SettingsError::Word(..) | SettingsError::Tuning(_) => false,
         };
         let rule = "; it was not set: its rule follows from nameplate, motor, measurement.range_a and inverter.dc_link_v";
         Error::Refused(format!("{error}{}", if by_rule { rule } else { "" }))

@@ -71,6 +71,19 @@ fn section(board: &Board) -> String {
     text
 }
 
+/// Both zero vectors on every board: sensors in the lines can, shunts below the low sides refuse it by name.
+#[test]
+fn shunts_refuse_both_zero_vectors() {
+    for board in ALL {
+        let mut settings = settings_of(board);
+        settings.scales.both_zero_vectors = true;
+        let checked = settings.check().map_err(|why| why.to_string());
+        let why = "scales.both_zero_vectors = yes: shunts below the low sides see nothing in the upper zero vector; set it to no";
+        let in_line = matches!(board.currents, super::Currents::InLine(_));
+        assert_eq!(checked, if in_line { Ok(()) } else { Err(why.to_owned()) }, "{}", board.name);
+    }
+}
+
 /// On a difference the message is the section as it should be.
 #[test]
 fn the_manual_lists_the_boards() {

@@ -1,7 +1,12 @@
 //! The converters: ADC1 and ADC2 sample the currents a and b at the same instant, then current c if the board measures it,
-//! then dc link and heat sink, started by TIM1 once per period. The end of the sequence raises the control interrupt.
+//! then dc link and heat sink, started by TIM1 once per period. The end of ADC2's sequence raises the control interrupt; ADC1
+//! goes on with the chip's own reference.
+//!
+//! Sensors in the lines can be sampled in the upper zero vector as well, where all high sides are on: a regular conversion of
+//! each converter, half a period before the sequence. The code of a current is the sum of both then.
 
 use cortex_m::asm;
+use drive_core::Sample;
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
@@ -11,31 +16,22 @@ use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
 
-/// Codes of one period.
-#[derive(Clone, Copy)]
-pub struct Codes {
-    /// Current a.
-    pub current_a: u16,
-    /// Current b.
-    pub current_b: u16,
-    /// Current c; 0 if the board does not measure it.
-    pub current_c: u16,
-    /// Dc link.
-    pub dc_link: u16,
-    /// Heat sink.
-    pub heat_sink: u16,
-}
-
 /// Events of the converters.
 #[derive(Clone, Copy)]
 pub struct AdcEvents {
     /// A current was outside its window since the last call.
     pub over_current: bool,
-    /// The sequence of ADC1 has ended. An interrupt without it comes from an analog watchdog.
+    /// The sequence of ADC2 has ended. An interrupt without it comes from an analog watchdog.
     pub ended: bool,
-    /// The sequences of both have ended.
+    /// All conversions that the codes need have taken place.
     pub complete: bool,
 }
+
+/// Flags of the register ISR: end of a regular and of an injected conversion, of the injected sequence, analog watchdog.
+const EOC: u32 = 1 << 2;
+const JEOC: u32 = 1 << 5;
+const JEOS: u32 = 1 << 6;
+const AWD1: u32 = 1 << 7;
 
 /// The channel of the chip's own reference at ADC1.
 const OWN_REFERENCE: u8 = 18;
@@ -44,6 +40,8 @@ const OWN_REFERENCE: u8 = 18;
 pub struct Adc {
     one: pac::ADC1,
     two: pac::ADC2,
+    /// Flags without which a conversion is missing: with [`EOC`] the currents are converted in the upper zero vector, too.
+    needed: u32,
 }
 
 impl Adc {
@@ -72,64 +70,82 @@ impl Adc {
             return Err("the converters have no clock");
         }
         // `boards` has checked that each pin reaches its converter. Channel 0 is not one of them.
-        let channels = |first: Option<u8>, slow: Option<u8>| {
-            [first, c.and_then(|c| c.pin.adc1()), slow].map(|channel| channel.unwrap_or(0))
+        let channels = |first: Option<u8>, slow: Option<u8>, last| {
+            [first, c.and_then(|c| c.pin.adc1()), slow, last].map(|channel| channel.unwrap_or(0))
         };
-        prepare(&one, channels(a.pin.adc1(), dc_link.adc1()), protection.window_a)?;
-        prepare(&two, channels(b.pin.adc2(), heat_sink.adc2()), protection.window_b)?;
-        // For `own_reference`.
+        let own = Some(OWN_REFERENCE);
+        prepare(&one, channels(a.pin.adc1(), dc_link.adc1(), own), protection.window_a)?;
+        prepare(&two, channels(b.pin.adc2(), heat_sink.adc2(), None), protection.window_b)?;
         one.smpr2().write(|w| w.smp18().set(board::REFERENCE_SAMPLING.code));
-        // SAFETY: five bits, an existing channel; a sequence of one.
-        one.sqr1().write(|w| unsafe { w.sq1().bits(OWN_REFERENCE) });
-        // Both sequences take the same time, so one interrupt at their end is enough. The analog watchdogs
-        // interrupt earlier, when the current is converted.
-        one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
-        two.ier().write(|w| w.awd1ie().enabled());
+        // Up to dc link and heat sink both sequences take the same time, so one interrupt, of the shorter, is enough. The analog
+        // watchdogs interrupt earlier, when the current is converted.
+        one.ier().write(|w| w.awd1ie().enabled());
+        two.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
         for converter in [&*one, &*two] {
             converter.cr().modify(|_, w| w.jadstart().start_conversion());
         }
-        Ok(Self { one, two })
+        Ok(Self { one, two, needed: JEOC })
+    }
+
+    /// Whether the currents are converted in the upper zero vector, too, from the next one on.
+    #[inline(always)] // the control interrupt calls it, and nothing in the CCM may call into the flash
+    pub fn convert_both(&mut self, both: bool) {
+        if both == (self.needed & EOC != 0) {
+            return;
+        }
+        self.needed ^= EOC;
+        for converter in [&*self.one, &*self.two] {
+            converter.cr().modify(|_, w| {
+                if both { w.adstart().start_conversion() } else { w.adstp().stop_conversion() }
+            });
+        }
     }
 
     /// The events of both converters; clears those of the analog watchdogs.
     pub fn take_events(&mut self) -> AdcEvents {
-        let (one, two) = (self.one.isr().read(), self.two.isr().read());
-        let over_current = one.awd1().bit() || two.awd1().bit();
+        let (one, two) = (self.one.isr().read().bits(), self.two.isr().read().bits());
+        let over_current = (one | two) & AWD1 != 0;
         if over_current {
             self.one.isr().write(|w| w.awd1().clear());
             self.two.isr().write(|w| w.awd1().clear());
         }
-        let ended = one.jeos().bit();
-        AdcEvents { over_current, ended, complete: ended && two.jeos().bit() }
+        let complete = one & two & self.needed == self.needed;
+        AdcEvents { over_current, ended: two & JEOS != 0, complete }
     }
 
-    /// The codes of the sequence that has just ended; clears the interrupt request.
-    pub fn read(&mut self) -> Codes {
+    /// The codes of the period: currents a, b and c (0 if the board does not measure it), dc link, heat sink; clears the interrupt
+    /// request. With both zero vectors those of a and b are sums.
+    pub fn read(&mut self) -> Sample {
         // Before the data are read: a sequence that ends from here on raises a new request.
-        self.one.isr().write(|w| w.jeoc().clear().jeos().clear());
         self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
-        let (current_a, current_b) =
-            (self.one.jdr1().read().jdata().bits(), self.two.jdr1().read().jdata().bits());
-        let (one, two) = (self.one.jdr2().read().jdata(), self.two.jdr2().read().jdata());
-        if SELECTED.currents.c().is_none() {
-            let (dc_link, heat_sink) = (one.bits(), two.bits());
-            return Codes { current_a, current_b, current_c: 0, dc_link, heat_sink };
+        let data = |rank| {
+            let (one, two) = (self.one.jdr(rank).read().jdata(), self.two.jdr(rank).read().jdata());
+            (one.bits(), two.bits())
+        };
+        let (mut current_a, mut current_b) = data(0);
+        if self.needed & EOC != 0 {
+            // Each read clears the EOC of its converter.
+            current_a = current_a.wrapping_add(self.one.dr().read().rdata().bits());
+            current_b = current_b.wrapping_add(self.two.dr().read().rdata().bits());
         }
-        Codes {
-            current_a,
-            current_b,
-            current_c: one.bits(),
-            dc_link: self.one.jdr3().read().jdata().bits(),
-            heat_sink: self.two.jdr3().read().jdata().bits(),
-        }
+        let third = SELECTED.currents.c().is_some();
+        let current_c = if third { self.one.jdr(1).read().jdata().bits() } else { 0 };
+        let (dc_link, heat_sink) = data(if third { 2 } else { 1 });
+        Sample { current_a, current_b, current_c, dc_link, heat_sink, ..Sample::default() }
+    }
+
+    /// The period is over: its own reference has been converted, and the next sequence of ADC1 can be told from it.
+    pub fn close(&mut self) {
+        self.one.isr().write(|w| w.jeoc().clear());
     }
 }
 
-/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels are those of its own current, of
-/// current c (0: none), and of its slow signal. Both converters convert current c, so that both sequences take the same time.
+/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels (0: none) are those of its own
+/// current, of current c, of its slow signal, and of the chip's own reference. Both converters convert current c, so that up to
+/// the slow signal both sequences take the same time.
 fn prepare(
     adc: &RegisterBlock,
-    [current, third, slow]: [u8; 3],
+    channels: [u8; 4],
     (low, high): (u16, u16),
 ) -> Result<(), StartError> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
@@ -149,12 +165,9 @@ fn prepare(
     })
     .ok_or("a converter does not start")?;
 
-    let times = [
-        (current, board::CURRENT_SAMPLING),
-        (third, board::CURRENT_SAMPLING),
-        (slow, board::SLOW_SAMPLING),
-    ];
-    for (channel, time) in times.into_iter().filter(|(channel, _)| *channel != 0) {
+    let (current, ranks) = (channels[0], || channels.into_iter().filter(|channel| *channel != 0));
+    let times = [board::CURRENT_SAMPLING, board::CURRENT_SAMPLING, board::SLOW_SAMPLING];
+    for (channel, time) in channels.into_iter().zip(times).filter(|(channel, _)| *channel != 0) {
         // Channels 1 to 9: all that a board can have.
         adc.smpr1().modify(|_, w| w.smp(channel).set(time.code));
     }
@@ -163,48 +176,37 @@ fn prepare(
     adc.sqr1().write(|w| unsafe { w.sq1().bits(current) });
     adc.cr().modify(|_, w| w.adstart().start_conversion());
     wait_for(|| adc.isr().read().eoc().bit()).ok_or("a converter does not start")?;
-    adc.isr().write(|w| w.eosmp().clear().eoc().clear().eos().clear());
+    // Its EOC stays, for the first period.
+    adc.isr().write(|w| w.eosmp().clear().eos().clear());
 
     // The analog watchdog interrupts at the first code outside the window.
     // SAFETY: twelve bits each, from codes of twelve bits.
     adc.tr1().write(|w| unsafe { w.lt1().bits(low).ht1().bits(high) });
-    // It checks the current alone. No queue of sequences: the one below never changes.
+    // It checks the current alone. No queue of sequences: the one below never changes. The regular conversion is that of the
+    // current again, where trigger output 2 of TIM1 rises; the last one counts.
     // SAFETY: five bits, an existing channel.
     adc.cfgr().modify(|_, w| unsafe {
-        w.awd1ch().bits(current).awd1sgl().set_bit().jawd1en().set_bit().jqdis().set_bit()
+        w.awd1ch().bits(current).awd1sgl().set_bit().awd1en().set_bit().jawd1en().set_bit();
+        w.jqdis().set_bit().ovrmod().set_bit().extsel().tim1_trgo2().exten().rising_edge()
     });
     adc.jsqr().write(|w| {
-        // Lengths are coded less one.
-        // SAFETY: five bits each, existing channels.
-        unsafe {
-            w.jsq1().bits(current);
-            if third == 0 {
-                w.jsq2().bits(slow).jl().set(1);
-            } else {
-                w.jsq2().bits(third).jsq3().bits(slow).jl().set(2);
-            }
+        for (rank, channel) in (0..4).zip(ranks()) {
+            // SAFETY: five bits, an existing channel.
+            unsafe { w.jsq(rank).bits(channel) };
         }
-        // Trigger: rising edge of trigger output 2 of TIM1.
-        w.jextsel().tim1_trgo2().jexten().rising_edge()
+        // Coded less one. Trigger: rising edge of trigger output 1 of TIM1.
+        w.jl().set(ranks().count() as u8 - 1).jextsel().tim1_trgo().jexten().rising_edge()
     });
     Ok(())
 }
 
-/// The code of the chip's own reference, and the one that it had in the factory; `None` if it is not converted. For the main
-/// loop: a regular conversion, which begins behind a sequence of the control and ends long before the next one. An injected
-/// trigger in the middle of a regular conversion may convert channel 0 (ES0430, 2.7.8).
-pub fn own_reference() -> Option<(u16, u16)> {
-    // SAFETY: both always exist. TIM1 is only read, and the control interrupt has nothing to do with regular conversions.
-    let (adc, timer) = unsafe { (&*pac::ADC1::ptr(), &*pac::TIM1::ptr()) };
-    let behind = u32::from(board::PWM_TOP) - board::SAMPLES_READY_TICKS;
-    wait_for(|| {
-        timer.cr1().read().dir().is_down() && u32::from(timer.cnt().read().cnt().bits()) < behind
-    })?;
-    adc.cr().modify(|_, w| w.adstart().start_conversion());
-    wait_for(|| adc.isr().read().eoc().bit())?;
+/// The code of the chip's own reference, and the one that it had in the factory. For the main loop.
+pub fn own_reference() -> (u16, u16) {
+    // Behind the dc link.
+    let rank = if SELECTED.currents.c().is_some() { 3 } else { 2 };
     let factory = board::REFERENCE_CALIBRATION as *const u16;
-    // SAFETY: read-only memory of the chip, aligned.
-    Some((adc.dr().read().rdata().bits(), unsafe { factory.read_volatile() }))
+    // SAFETY: the converter always exists, and only a result is read; read-only memory of the chip, aligned.
+    unsafe { ((*pac::ADC1::ptr()).jdr(rank).read().jdata().bits(), factory.read_volatile()) }
 }
 
 /// Waits until `done`, for [`board::ADC_TIMEOUT_US`] at most.

@@ -63,8 +63,8 @@ impl Pwm {
         timer
             .ccmr1_output()
             .write(|w| w.oc1m().pwm_mode1().oc1pe().enabled().oc2m().pwm_mode1().oc2pe().enabled());
-        // Channel 4 has no pin; its signal is high above its compare value (PWM mode 2) and starts
-        // the conversions.
+        // Channels 4 and 6 have no pins. The signal of 4 is high above its compare value (PWM mode 2), that of 6 below its own
+        // (PWM mode 1): they rise before the top and before 0, and start the conversions there.
         timer
             .ccmr2_output()
             .write(|w| w.oc3m().pwm_mode1().oc3pe().enabled().oc4m().pwm_mode2().oc4pe().enabled());
@@ -72,6 +72,8 @@ impl Pwm {
             timer.ccr(leg).write(|w| w.ccr().set(0));
         }
         timer.ccr(3).write(|w| w.ccr().set(u32::from(board::SAMPLE_AT)));
+        timer.ccmr3_output().write(|w| w.oc6m().pwm_mode1());
+        timer.ccr6().write(|w| w.ccr().set(board::UPPER_SAMPLE_AT));
         let (high, low) = (SELECTED.high.on_at.value, SELECTED.low.on_at.value);
         // Off is the level opposite to the one that switches on, with the timer enabled or not.
         let (high_low_active, low_low_active) = (high == Level::Low, low == Level::Low);
@@ -79,8 +81,8 @@ impl Pwm {
             for leg in 0..3 {
                 w.ois(leg).bit(high_low_active).oisn(leg).bit(low_low_active);
             }
-            // SAFETY: MMS2 is four bits wide; 7 makes the signal of channel 4 the trigger output 2.
-            unsafe { w.mms2().bits(7) }
+            // SAFETY: four bits and three. The signal of channel 6 is the trigger output 2, that of channel 4 the output 1.
+            unsafe { w.mms2().bits(9).mms().bits(7) }
         });
         // Both outputs of the legs.
         timer.ccer().write(|w| {

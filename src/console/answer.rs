@@ -106,7 +106,8 @@ impl Console {
                 if !self.may_stage(drive) {
                     return;
                 }
-                match self.restore.finish(check) {
+                let both = self.settings.latest().drive.scales.both_zero_vectors;
+                match self.restore.finish(check, both) {
                     Ok(learned) => {
                         self.settings.restore(learned);
                         self.staged();

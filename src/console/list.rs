@@ -138,7 +138,8 @@ impl Console {
             }
         }
         let line = place.saturating_sub(LEARNED);
-        let learned = settings.learned.as_ref().and_then(|learned| restore::line(learned, line));
+        let both = settings.drive.scales.both_zero_vectors;
+        let learned = settings.learned.as_ref().and_then(|found| restore::line(found, both, line));
         match learned {
             Some(text) => {
                 out.line(format_args!("{text}"));

@@ -8,6 +8,7 @@ use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_core::learned::Learned;
+use drive_settings::value::Words as _;
 use thiserror::Error;
 
 use super::grammar::WORDS_IN_LINE;
@@ -34,6 +35,9 @@ pub enum RestoreError {
     /// The checksum of the words is another.
     #[error("learned: the checksum of these words is {0:08x}")]
     Checksum(u32),
+    /// Learned with another choice of the zero vectors, this word.
+    #[error("learned: with scales.both_zero_vectors = {0}; set it so before, or learn again")]
+    ZeroVectors(&'static str),
     /// No result that a learning accepts.
     #[error("learned: no result that a learning accepts")]
     Unbelievable,
@@ -62,11 +66,11 @@ impl Restore {
         Ok(())
     }
 
-    /// The result of the words that came in; the next begins anew.
+    /// The result of the words that came in, for currents of `both` zero vectors or of one; the next begins anew.
     ///
     /// # Errors
-    /// Words are missing or damaged, or make no result.
-    pub fn finish(&mut self, check: u32) -> Result<Learned, RestoreError> {
+    /// Words are missing or damaged, make no result, or one for the other.
+    pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
         let Self { words, present } = core::mem::replace(self, Self::new());
         let count = present.trailing_ones() as usize;
         if !learned::is_whole(present) {
@@ -76,13 +80,16 @@ impl Restore {
         if right != check {
             return Err(RestoreError::Checksum(right));
         }
+        if learned::in_both(&words) != both {
+            return Err(RestoreError::ZeroVectors((!both).word()));
+        }
         learned::from_words(&words, present).ok_or(RestoreError::Unbelievable)
     }
 }
 
 /// Line number `i` of a result; `None` behind the last.
-pub fn line(result: &Learned, i: usize) -> Option<impl fmt::Display> {
-    let words = learned::to_words(result);
+pub fn line(result: &Learned, both: bool, i: usize) -> Option<impl fmt::Display> {
+    let words = learned::to_words(result, both);
     let first = i * WORDS_IN_LINE;
     (first < WORDS + WORDS_IN_LINE).then_some(fmt::from_fn(move |f| match words.get(first..) {
         Some(rest) if !rest.is_empty() => {

@@ -68,8 +68,9 @@ fn line(
         write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
     }
     if s.state.is_off() {
-        let (a, b) =
-            (scales.current_a.at(s.sample.current_a), scales.current_b.at(s.sample.current_b));
+        let [a, b] =
+            [(scales.current_a, s.sample.current_a), (scales.current_b, s.sample.current_b)]
+                .map(|(line, code)| scales.of_code(line).at(code));
         write!(f, "sensors a {a:.2} A, b {b:.2} A, ")?;
         if scales.sensors == CurrentSensors::LowSide {
             write!(f, "c {:.2} A, ", scales.current_c.at(s.sample.current_c))?;

@@ -42,18 +42,19 @@ const LSION: u32 = 1;
 
 /// Addresses of peripherals, with the offsets of their registers (RM0440).
 const CONFIGURED: [(u32, &[u16]); 21] = [
-    // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, CCR5, DTR2, AF1, AF2
+    // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, CCR5, CCR6, CCMR3, DTR2, AF1,
+    // AF2
     (0x4001_2c00, &[0, 4, 8, 0xc, 0x18, 0x1c, 0x20, 0x28, 0x2c, 0x30, 0x40, 0x44]),
-    (0x4001_2c00, &[0x48, 0x54, 0x60, 0x64]),
+    (0x4001_2c00, &[0x48, 0x4c, 0x50, 0x54, 0x60, 0x64]),
     // TIM8: CR1, CCMR1, CCER, ARR, BDTR, AF1
     (0x4001_3400, &[0, 0x18, 0x20, 0x2c, 0x44, 0x60]),
     // TIM5, the time base: CR1, CCMR1, CCER, ARR, TISEL
     (0x4000_0c00, &[0, 0x18, 0x20, 0x2c, 0x5c]),
     // TIM2, the encoder: CR1, SMCR, CCMR1, CCER, ARR
     (0x4000_0000, &[0, 8, 0x18, 0x20, 0x2c]),
-    // ADC1 and ADC2: IER, CR, CFGR, CFGR2, SMPR1, SMPR2 and SQR1 of ADC1, TR1, JSQR, DIFSEL, CALFACT; CCR of both
+    // ADC1 and ADC2: IER, CR, CFGR, CFGR2, SMPR1, SMPR2 of ADC1, TR1, SQR1, JSQR, DIFSEL, CALFACT; CCR of both
     (0x5000_0000, &[4, 8, 0xc, 0x10, 0x14, 0x18, 0x20, 0x30, 0x4c, 0xb0, 0xb4]),
-    (0x5000_0100, &[4, 8, 0xc, 0x10, 0x14, 0x20, 0x4c, 0xb0, 0xb4]),
+    (0x5000_0100, &[4, 8, 0xc, 0x10, 0x14, 0x20, 0x30, 0x4c, 0xb0, 0xb4]),
     (0x5000_0300, &[8]),
     // DAC3: CR, DHR12R1, MCR
     (0x5000_1000, &[0, 8, 0x3c]),

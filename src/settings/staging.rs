@@ -53,8 +53,8 @@ pub const UNCONFIRMED: &str = "the board has to be confirmed again before a star
 /// What the user has to know of settings that are in force now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Applied {
-    /// What was learned belonged to other settings and is gone.
-    pub forgotten: bool,
+    /// What was learned is gone: it held for another value of the setting of this name.
+    pub forgotten: Option<&'static str>,
     /// The dead time of the timer holds from the next reset on.
     pub dead_time: bool,
     /// The analog watchdogs and the comparator follow at the next reset.
@@ -72,12 +72,14 @@ impl fmt::Display for Applied {
                 "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
             ),
             (self.unconfirmed, UNCONFIRMED),
-            (self.forgotten, "what was learned belonged to other settings and is forgotten"),
         ];
         let mut separator = ": ";
         for (_, note) in notes.into_iter().filter(|(so, _)| *so) {
             write!(f, "{separator}{note}")?;
             separator = "; ";
+        }
+        if let Some(name) = self.forgotten {
+            write!(f, "{separator}what was learned with another {name} is forgotten: learn again")?;
         }
         Ok(())
     }
@@ -208,7 +210,10 @@ impl Staging {
         let Some(Staged { settings, .. }) = &self.staged else { return Applied::default() };
         let (old, new) = (&self.in_force.drive, &settings.drive);
         let applied = Applied {
-            forgotten: self.in_force.learned.is_some() && settings.learned.is_none(),
+            forgotten: self.in_force.learned.filter(|_| settings.learned.is_none()).map(|_| {
+                // The defaults may differ in others only.
+                new.learned_with_another(old).unwrap_or("set of settings")
+            }),
             dead_time: old.inverter.dead_time_s != new.inverter.dead_time_s,
             protection: board::protection(settings.board, old)
                 != board::protection(settings.board, new),

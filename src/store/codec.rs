@@ -108,7 +108,9 @@ pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     }
     let mut entries = keys::COUNT;
     if let Some(learned) = &settings.learned {
-        let values = learned::to_words(learned).into_iter().enumerate();
+        let values = learned::to_words(learned, settings.drive.scales.both_zero_vectors)
+            .into_iter()
+            .enumerate();
         for ((index, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
             *word = pair(learned::id(index), value);
         }
@@ -200,7 +202,8 @@ pub fn settings(
         return Err(Rejected::Board(settings.board.name));
     }
     if present > 0 {
-        let learned = learned::from_words(&words, present);
+        let same = learned::in_both(&words) == settings.drive.scales.both_zero_vectors;
+        let learned = learned::from_words(&words, present).filter(|_| same);
         settings.learned = Some(learned.ok_or(Rejected::Value(learned::NAME))?);
     }
     Ok(settings)

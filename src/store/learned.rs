@@ -8,7 +8,7 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope; rotor positions in the third byte, 0 counts as 1 |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors; rotor positions in the third byte, 0 counts as 1 |
 //! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
@@ -48,6 +48,7 @@ const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
 const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
+const IN_BOTH: u32 = 1 << 12;
 
 /// The id of a value: the hash of the name plus its index.
 pub fn id(index: usize) -> u32 {
@@ -65,8 +66,13 @@ pub fn is_whole(present: u64) -> bool {
     [NEEDED, WITH_STEP, ALL].contains(&present)
 }
 
-/// The values of a result.
-pub fn to_words(learned: &Learned) -> [u32; WORDS] {
+/// Whether a result with these values was learned with the currents of both zero vectors.
+pub fn in_both(words: &[u32; WORDS]) -> bool {
+    words[FLAGS] & IN_BOTH != 0
+}
+
+/// The values of a result, and of whether it was learned with the currents of both zero vectors.
+pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     let (gains, current) = (learned.gain_mismatch, learned.current_saliency);
     let fits = [
         learned.spread,
@@ -89,7 +95,8 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
         | flag(gains.accepted, HAS_GAINS)
         | flag(current.accepted, HAS_CURRENT)
         | flag(learned.carrier.is_some(), HAS_CARRIER)
-        | flag(learned.slope.is_some(), HAS_SLOPE);
+        | flag(learned.slope.is_some(), HAS_SLOPE)
+        | flag(both, IN_BOTH);
     let slope = learned.slope.map_or([0.0; POINTS], |table| *table.points());
     let Asymmetry { constant, sin, cos } = learned.asymmetry;
     let step = [learned.reference.grid().step_a()];

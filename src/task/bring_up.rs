@@ -248,7 +248,7 @@ fn start_control(
     coefficients: Result<Coefficients, SettingsError>,
     mut pwm: pwm::Pwm,
     dc_link: dc_link::DcLink,
-    adc: adc::Adc,
+    mut adc: adc::Adc,
     encoder: encoder::Encoder,
     window: Window,
     source: clocks::Source,
@@ -273,6 +273,7 @@ fn start_control(
     let ring = singleton!(: Ring<{ board::RECORDED_PERIODS }> = Ring::new()).ok_or(TWICE)?;
     let (signals, reported) = ring.split();
 
+    adc.convert_both(coefficients.front_end.both_zero_vectors);
     pwm.start()?;
     let drive = Drive::new(coefficients);
     control::Control {

@@ -235,16 +235,9 @@ impl Running {
                 hardware |= Hardware::CHOPPER_OFF;
             }
         }
-        let codes = adc.read();
-        let sample = Sample {
-            current_a: codes.current_a,
-            current_b: codes.current_b,
-            current_c: codes.current_c,
-            dc_link: codes.dc_link,
-            heat_sink: codes.heat_sink,
-            encoder: encoder.count(),
-            hardware,
-        };
+        let read = adc.read();
+        let codes = [read.current_a, read.current_b, read.current_c];
+        let sample = Sample { encoder: encoder.count(), hardware, ..read };
 
         let (compare, output) = drive.period(&mut self.front_end, &sample);
         pwm.apply(compare);
@@ -269,12 +262,13 @@ impl Running {
 
         // Between two steps: a command acts from the next step on.
         // There is room for the answer: the main loop takes the last one before it sends a command.
-        let answered = commands
-            .take_with(|command| answers.send_with(|answer| *answer = drive.command(command)));
+        let answered = commands.take_with(|command| {
+            answers.send_with(|answer| *answer = drive.command(command));
+            adc.convert_both(drive.front_end().both_zero_vectors);
+        });
         let commanded = answered.is_some();
         IS_OFF.store(drive.is_off(), Ordering::Relaxed);
         let state = drive.state();
-        let codes = [codes.current_a, codes.current_b, codes.current_c];
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
 
         self.unreported |= hardware;
@@ -307,6 +301,7 @@ impl Running {
                 record.set(drive.telemetry());
             });
         }
+        adc.close();
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;

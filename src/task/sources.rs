@@ -52,8 +52,8 @@ impl Sources {
     /// What is wrong now and was at the last time.
     fn measure(&mut self) -> Hardware {
         let clocks = time::lsi_clocks().is_some_and(|n| board::clocks_agree(n, self.internal));
-        let own = adc::own_reference();
-        let references = own.is_some_and(|(code, then)| board::references_agree(code, then));
+        let (code, then) = adc::own_reference();
+        let references = board::references_agree(code, then);
         let mut found = Hardware::empty();
         found.set(Hardware::CLOCK, !clocks);
         found.set(Hardware::REFERENCE, !references);

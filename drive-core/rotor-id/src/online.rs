@@ -221,7 +221,7 @@ impl Online {
         let mut online = Self {
             rls,
             motor,
-            delay: settings.scales.current_delay_s / PERIOD_S,
+            delay: settings.scales.current_age_s() / PERIOD_S,
             before: AlphaBeta::ZERO,
             present: AlphaBeta::ZERO,
             filters: [Filter::new(TAU * BEFORE_HZ * PERIOD_S); 2],

@@ -11,7 +11,7 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
     let changed = |change: fn(&mut Settings)| {
         let mut settings = Settings::default();
         change(&mut settings);
-        settings.shares_learning_with(&Settings::default())
+        settings.learned_with_another(&Settings::default()).is_none()
     };
     let same: [fn(&mut Settings); 6] = [
         |_| {},
@@ -22,12 +22,13 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
         |s| s.speed.limit_rpm = Some(100.0),
     ];
     assert!(same.into_iter().all(changed));
-    let other: [fn(&mut Settings); 10] = [
+    let other: [fn(&mut Settings); 11] = [
         |s| s.motor.r_r = 1.4,
         |s| s.motor.pole_pairs = 3,
         |s| s.inverter.compensate = false,
         |s| s.scales.current_b.gain *= 1.01,
         |s| s.scales.current_delay_s = 0.0,
+        |s| s.scales.both_zero_vectors = true,
         |s| s.ignore_delays = true,
         |s| s.sequence.i_d = Some(0.6),
         |s| s.injection.amplitude_v = Some(60.0),
@@ -209,15 +210,36 @@ fn a_range_without_a_value_says_so() {
     assert_eq!(text, whole);
 }
 
+/// The code is the sum of two conversions: half the gain, twice the range, a mean that is a quarter of a period older; the same
+/// currents.
+#[test]
+fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older() {
+    let mut settings = Settings::default();
+    let one = settings.build().unwrap();
+    settings.scales.both_zero_vectors = true;
+    let two = settings.build().unwrap();
+    let (a, b) = (&one.front_end, &two.front_end);
+    assert!(b.both_zero_vectors && !a.both_zero_vectors);
+    assert_eq!(b.full_scale, 2 * a.full_scale);
+    for (before, now) in [(3000, 3001), (0, 1), (4095, 4095)] {
+        let mean = 0.5 * (a.current_a.at(before) + a.current_a.at(now));
+        assert!((b.current_a.at(before + now) - mean).abs() < 1e-6, "{before} {now}");
+        let mean = 0.5 * (a.current_b.at(before) + a.current_b.at(now));
+        assert!((b.current_b.at(before + now) - mean).abs() < 1e-6, "{before} {now}");
+    }
+    assert!((two.current_lag - one.current_lag - 0.25).abs() < 1e-6);
+    assert!((two.estimator.lag - one.estimator.lag - 0.25).abs() < 1e-6);
+}
+
 /// The image is built without the demodulations of the feature `printed`; their words are refused there, and stand for the same
 /// places.
 #[test]
 fn a_word_without_code_is_refused_by_name() {
     let mut settings = Settings::default();
-    assert_eq!(settings.check_demodulator(false), Ok(()));
+    assert_eq!(settings.check_words(false), Ok(()));
     settings.injection.demodulator = DemodulatorKind::Envelope;
-    assert_eq!(settings.check_demodulator(true), Ok(()));
-    let error = settings.check_demodulator(false).unwrap_err().to_string();
+    assert_eq!(settings.check_words(true), Ok(()));
+    let error = settings.check_words(false).unwrap_err().to_string();
     let text = "injection.demodulator = envelope: this image is built with synchronous alone";
     assert_eq!(error, text);
 }

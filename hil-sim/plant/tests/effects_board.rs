@@ -15,7 +15,10 @@ use motor_plant::{
 fn read(plant: &mut Plant, settings: &PlantSettings) -> [f64; 2] {
     let lines = settings.measurement.calibration();
     let sample = plant.sample();
-    let current = |code: u16, k: usize| f64::from(code) * lines[k].a_per_code + lines[k].a_at_zero;
+    let conversions = if settings.measurement.both_zero_vectors { 2.0 } else { 1.0 };
+    let current = |code: u16, k: usize| {
+        f64::from(code) / conversions * lines[k].a_per_code + lines[k].a_at_zero
+    };
     [current(sample.current_a, 0), current(sample.current_b, 1)]
 }
 
@@ -54,8 +57,8 @@ fn sensors_have_the_errors_they_are_given() {
 fn two_conversions_a_period_have_less_noise_and_are_a_quarter_older() {
     let deviation = |both: bool| {
         let mut settings = settings();
-        settings.measurement =
-            MeasurementSettings { noise_a: 0.01, both_zero_vectors: both, ..settings.measurement };
+        (settings.measurement.noise_a, settings.measurement.lsb_a) = (0.01, 0.000_28);
+        settings.measurement.both_zero_vectors = both;
         let mut plant = plant(&settings);
         let readings: Vec<f64> = (0..20_000)
             .map(|_| {
@@ -69,7 +72,7 @@ fn two_conversions_a_period_have_less_noise_and_are_a_quarter_older() {
     near(deviation(true), 0.01 / 2.0_f64.sqrt(), 2e-4);
     // A rising current, 12 V on 51 mH: the mean is T/4 behind.
     let mut settings = settings();
-    settings.measurement.both_zero_vectors = true;
+    (settings.measurement.both_zero_vectors, settings.measurement.lsb_a) = (true, 0.000_28);
     let mut plant = held(&settings, Complex::from(12.0), 0.002);
     let slope = {
         let before = plant.clone().current().re;

@@ -97,7 +97,7 @@ fn read(path: &Path, names: &Names, delay: Option<f64>, config: &Config) -> Resu
         first.into_iter().zip(second).map(vector).collect()
     };
     let (v, i) = (vectors(u0?, u1?), vectors(i0?, i1?));
-    let delay = delay.unwrap_or(1.0 + f64::from(config.drive.scales.current_delay_s) / h);
+    let delay = delay.unwrap_or(1.0 + f64::from(config.drive.scales.current_age_s()) / h);
     let to_rad_s = TAU / 60.0 * f64::from(config.motor.pole_pairs);
     let omega_m = speed.into_iter().map(|rpm| rpm * to_rad_s).collect();
     Ok(Record { h, v: delayed(&v, delay), i, omega_m })

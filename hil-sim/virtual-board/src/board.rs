@@ -274,8 +274,8 @@ impl Board {
     /// Lets due events happen.
     fn events(&mut self) -> Result<()> {
         self.follow_outputs();
-        while let Some(at) = self.cpu.chip_mut().catch_up() {
-            self.crest(at)?;
+        while let Some((at, top)) = self.cpu.chip_mut().catch_up() {
+            if top { self.crest(at)? } else { self.valley(at) }
         }
         self.follow_outputs();
         let followed = self.cpu.follow_guard().and_then(|()| self.cpu.follow_flash());

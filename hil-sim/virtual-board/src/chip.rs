@@ -345,20 +345,22 @@ impl Chip {
         self.gates.look(&self.gpio, &self.tim1, self.at, self.now);
     }
 
-    /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
-    /// reached, where the world outside moves on before anything later happens.
-    pub fn catch_up(&mut self) -> Option<u64> {
+    /// Lets events happen that are due by now, up to the top of the PWM counter, or to its 0 if the converters sample there,
+    /// too: the time, and whether it is the top, if it was reached, where the world outside moves on before anything later
+    /// happens.
+    pub fn catch_up(&mut self) -> Option<(u64, bool)> {
         let now = self.now;
         self.attention = false;
         while self.tim1.next_event() <= now {
             match self.tim1.happen() {
-                Event::Trigger(at) => {
-                    let free = !self.adc.disturbs(at);
-                    self.rules.require(free, Rule::AdcDisturbed, || "TIM1_TRGO2".into());
-                    self.adc.trigger(at);
+                Event::Trigger(at, output) => {
+                    let free = !self.adc.disturbs(at, output);
+                    self.rules.require(free, Rule::AdcDisturbed, || "a trigger of TIM1".into());
+                    self.adc.trigger(at, output);
                 }
-                Event::Crest(at) => return Some(at),
-                Event::Valley => {}
+                Event::Crest(at) => return Some((at, true)),
+                Event::Valley(at) if self.adc.samples_twice() => return Some((at, false)),
+                Event::Valley(_) => {}
             }
         }
         if self.rcc.happen(now) {

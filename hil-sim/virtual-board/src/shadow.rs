@@ -43,20 +43,15 @@ impl Shadow {
             settings = FirmwareSettings::of(settings.board);
         }
         let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
-        let drive = Drive::new(settings.build_for(dead_time_s)?);
-        let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
-        let settings = Staging::new(settings);
-        let (front_end, output) = Default::default();
-        let tau_r = None;
         Ok(Self {
-            drive,
-            front_end,
-            output,
-            settings,
+            drive: Drive::new(settings.build_for(dead_time_s)?),
+            front_end: FrontEndState::default(),
+            output: Output::default(),
+            tracking: Tracking::new(&settings.drive),
+            settings: Staging::new(settings),
             dead_time_s,
-            orders,
-            tracking,
-            tau_r,
+            orders: VecDeque::new(),
+            tau_r: None,
             compared: 0,
         })
     }

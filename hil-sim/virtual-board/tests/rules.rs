@@ -401,7 +401,7 @@ fn a_level_is_set_up_in_order_and_waited_for() {
 /// A converter that waits for TIM1, and its reference inside the chip as a regular channel, sampled for a code of the
 /// sampling time.
 fn regular_beside_injected(sampling: u32) -> Vec<Step> {
-    let triggered = 1 << 7 | 8 << 2;
+    let triggered = 1 << 7;
     let converter = [
         Write(CCR, 3 << 16 | 1 << 22),
         Write(ADC1 + 0x0c, 1 << 31),
@@ -415,7 +415,7 @@ fn regular_beside_injected(sampling: u32) -> Vec<Step> {
         Write(TIM1 + 0x2c, 14_167),
         Write(TIM1 + 0x40, 14_000),
         Write(TIM1 + 0x1c, 7 << 12),
-        Write(TIM1 + 4, 7 << 20),
+        Write(TIM1 + 4, 7 << 4),
         Write(TIM1 + 0x14, 1),
         Write(TIM1, 1 << 5 | 1),
     ];

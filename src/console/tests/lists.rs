@@ -190,7 +190,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     // What was refused leaves it too.
     assert!(talk.ask("set motor.r_r 0").starts_with("error"));
     assert!(talk.say("learned\n").len() > 10);
-    let forgotten = "ok: what was learned belonged to other settings and is forgotten";
+    let forgotten = "ok: what was learned with another motor.r_r is forgotten: learn again";
     assert_eq!(talk.ask("set motor.r_r 1.2"), "ok: staged");
     assert_eq!(talk.ask("apply"), forgotten);
     assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");

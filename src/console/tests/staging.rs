@@ -228,6 +228,36 @@ fn damaged_learned_values_are_refused() {
     assert_eq!(other.console.settings.in_force().learned, None);
 }
 
+/// What was learned with the currents of one zero vector is forgotten where both are switched on, and its backup is refused there;
+/// and the other way round.
+#[test]
+fn learned_values_hold_for_one_zero_vector_or_for_both() {
+    for (learned, other) in [("no", "yes"), ("yes", "no")] {
+        let mut talk = Talk::new();
+        let set = |word| format!("set scales.both_zero_vectors {word}\napply\n");
+        talk.say(set(learned));
+        talk.drive.found = Some(found());
+        talk.say("");
+        let backup = talk.say("backup\n");
+        let words = backup.iter().filter(|line| line.starts_with("learned "));
+        let words = words.cloned().collect::<Vec<_>>().join("\n") + "\n";
+        let forgotten =
+            "ok: what was learned with another scales.both_zero_vectors is forgotten: learn again";
+        assert_eq!(talk.say(set(other)).last().unwrap(), forgotten);
+        assert_eq!(talk.console.settings.in_force().learned, None);
+        let refused = format!(
+            "error: learned: with scales.both_zero_vectors = {learned}; set it so before, or learn again"
+        );
+        assert_eq!(talk.say(words.clone()).last().unwrap(), &refused);
+        assert_eq!(talk.console.settings.latest().learned, None);
+        // Beside the setting that it was learned with it is taken.
+        talk.say(set(learned));
+        assert_eq!(talk.say(words).last().unwrap(), "ok: staged");
+        assert_eq!(talk.ask("apply"), "ok");
+        assert_eq!(talk.console.settings.in_force().learned, Some(found()));
+    }
+}
+
 /// Earlier firmware printed fewer words; its result is restored, and has to be learned again for a start without encoder.
 #[test]
 fn a_backup_of_earlier_firmware_is_restored() {
@@ -239,7 +269,7 @@ fn a_backup_of_earlier_firmware_is_restored() {
         ..found()
     };
     for count in [37, 38] {
-        let mut words = crate::store::learned::to_words(&old);
+        let mut words = crate::store::learned::to_words(&old, false);
         // It had one rotor position.
         words[36] &= 0xffff;
         let words = &words[..count];

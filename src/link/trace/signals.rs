@@ -46,8 +46,8 @@ impl Signal {
             Unit::Named => 1.0,
             Unit::Frequency => 1.0 / PERIOD_S,
             Unit::Speed => 60.0 / PERIOD_S / f32::from(settings.motor.pole_pairs),
-            Unit::Sensor(0) => return scales.current_a,
-            Unit::Sensor(1) => return scales.current_b,
+            Unit::Sensor(0) => return scales.of_code(scales.current_a),
+            Unit::Sensor(1) => return scales.of_code(scales.current_b),
             Unit::Sensor(_) if scales.sensors == CurrentSensors::LowSide => {
                 return scales.current_c;
             }

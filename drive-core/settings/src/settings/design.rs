@@ -65,7 +65,8 @@ impl Settings {
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
         let (carrier_v, allowed_v) = (self.carrier_v(), self.unexplained_v());
         let injecting = self.angle_source == AngleSource::Injection || inj.beside_encoder;
-        let current_lag = self.scales.current_delay_s / PERIOD_S;
+        let s = &self.scales;
+        let current_lag = s.current_age_s() / PERIOD_S;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let carrier_a = injection.current_amplitude;
@@ -86,12 +87,13 @@ impl Settings {
         let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
         Ok(Coefficients {
             front_end: FrontEnd {
-                current_a: self.scales.current_a,
-                current_b: self.scales.current_b,
+                current_a: s.of_code(s.current_a),
+                current_b: s.of_code(s.current_b),
+                both_zero_vectors: s.both_zero_vectors,
                 shunts,
-                dc_link: self.scales.dc_link,
-                full_scale: self.scales.full_scale,
-                heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
+                dc_link: s.dc_link,
+                full_scale: s.full_scale.saturating_mul(1 + u16::from(s.both_zero_vectors)),
+                heat_sink: s.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
                 top: f32::from(self.inverter.top),
             },
             offsets: OffsetCheck {
@@ -113,7 +115,8 @@ impl Settings {
             injection_turn,
             injection_axis,
             lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
-            saliency_check: self.saliency_check(),
+            saliency_check: (t.check && self.tracks_synchronously())
+                .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
                 .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
             wiring: WiringCheck::new(&WiringSettings {
@@ -254,12 +257,5 @@ impl Settings {
             rise_s: self.speed.s_ramp_s,
         };
         Motion::new(&design.gains, counts, limit, &ramps, self.i_q_limit_a())
-    }
-
-    /// Only a sensorless start with the synchronous demodulation is checked.
-    fn saliency_check(&self) -> Option<SaliencyCheck> {
-        let t = &self.injection.synchronous;
-        let checked = t.check && self.tracks_synchronously();
-        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r()))
     }
 }

@@ -107,6 +107,10 @@ settings! {
         ];
         /// sensors of the currents: two in the lines a and b, or three shunts below the low sides
         sensors: CurrentSensors = CurrentSensors::InLine, word().changed(Change::Board).learned();
+        /// whether the currents are sampled in both zero vectors, and their mean is used; not with shunts below the low sides
+        ///
+        /// It has less noise, and is a quarter of a period older.
+        both_zero_vectors: bool = false, word().learned();
         /// time from the turn-on of a low side until its shunt can be sampled
         ///
         /// Without the dead time.

@@ -18,8 +18,8 @@ use core::fmt;
 
 use self::value::{Words, words};
 use crate::tuning::TuningError;
-use drive_core::AngleSource;
 use drive_core::carrier::DemodulatorKind;
+use drive_core::{AngleSource, Line, PERIOD_S};
 
 pub use list::{
     BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Nameplate,
@@ -68,28 +68,51 @@ words!(DemodulatorKind {
     Envelope = "envelope",
 });
 
+/// Why shunts below the low sides are sampled in one zero vector, and why a demodulation is not there.
+const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
+const ABSENT: &str = "this image is built with synchronous alone";
+
+impl Scales {
+    /// Calibration of a current by its code, from that by one conversion: the code is the sum of both conversions.
+    pub fn of_code(&self, line: Line) -> Line {
+        Line { gain: if self.both_zero_vectors { 0.5 } else { 1.0 } * line.gain, ..line }
+    }
+
+    /// Age of the currents at the top of the counter, s: the delay of their filters; the mean of both zero vectors is a quarter
+    /// of a period older.
+    pub fn current_age_s(&self) -> f32 {
+        self.current_delay_s + if self.both_zero_vectors { 0.25 * PERIOD_S } else { 0.0 }
+    }
+}
+
 impl Settings {
-    /// Checks the demodulation, and every value against its range, the scales first: the rules of others follow from the
+    /// Checks the words, and every value against its range, the scales first: the rules of others follow from the
     /// sensors' range.
     ///
     /// # Errors
-    /// [`SettingsError::Absent`], or [`SettingsError::Range`] with the first value outside its range.
+    /// [`SettingsError::Word`], or [`SettingsError::Range`] with the first value outside its range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        self.check_demodulator(DemodulatorKind::HAS_ALL)?;
+        self.check_words(DemodulatorKind::HAS_ALL)?;
         let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
         scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
     }
 
-    /// Checks that there is code of the demodulation in a build that has that of all, or of the synchronous one alone.
-    pub(crate) fn check_demodulator(&self, has_all: bool) -> Result<(), SettingsError> {
+    /// Checks that there is code of the demodulation in a build that has that of all, or of the synchronous one alone, and that
+    /// the sensors see what they are to.
+    pub(crate) fn check_words(&self, has_all: bool) -> Result<(), SettingsError> {
+        if self.scales.both_zero_vectors && self.scales.sensors == CurrentSensors::LowSide {
+            return Err(SettingsError::Word("scales.both_zero_vectors", true.word(), BLIND));
+        }
         let kind = self.injection.demodulator;
         let present = has_all || kind == DemodulatorKind::Synchronous;
-        present.then_some(()).ok_or(SettingsError::Absent(kind.word()))
+        let absent = SettingsError::Word("injection.demodulator", kind.word(), ABSENT);
+        present.then_some(()).ok_or(absent)
     }
 
-    /// Whether results learned with the settings `other` are valid for these settings, too.
-    pub fn shares_learning_with(&self, other: &Self) -> bool {
-        SETTINGS.iter().all(|entry| !entry.learned || entry.same(self, other))
+    /// The first setting, by name, for whose value results learned with the settings `other` are not valid.
+    pub fn learned_with_another(&self, other: &Self) -> Option<&'static str> {
+        let differing = SETTINGS.iter().find(|entry| entry.learned && !entry.same(self, other));
+        differing.map(|entry| entry.name)
     }
 }
 
@@ -111,8 +134,8 @@ pub enum SettingsError {
         /// Largest allowed.
         max: f32,
     },
-    /// A demodulation, by its word, for which this build has no code.
-    Absent(&'static str),
+    /// A setting by its name, its word, which this build or this board does not allow, and why.
+    Word(&'static str, &'static str, &'static str),
     /// The design of the controllers failed.
     Tuning(TuningError),
 }
@@ -126,10 +149,7 @@ impl fmt::Display for SettingsError {
                 let beside = if min <= max { "" } else { "nothing beside other settings: " };
                 write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
             }
-            Self::Absent(word) => write!(
-                f,
-                "injection.demodulator = {word}: this image is built with synchronous alone"
-            ),
+            Self::Word(name, word, why) => write!(f, "{name} = {word}: {why}"),
             Self::Tuning(error) => write!(f, "controllers: {error}"),
         }
     }

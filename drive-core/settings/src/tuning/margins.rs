@@ -58,11 +58,9 @@ impl Margins {
 
         let mut nearest = (grid(0), f64::INFINITY, 0);
         let mut phase_margin: Option<(f64, f64)> = None;
-        let mut gain_margin = f64::INFINITY;
-        let mut turned = 0.0;
+        let (mut gain_margin, mut turned) = (f64::INFINITY, 0.0);
 
-        let mut w_before = grid(0);
-        let mut before = open_loop(w_before);
+        let (mut w_before, mut before) = (grid(0), open_loop(grid(0)));
         for n in 1..=LOW + HIGH {
             let w = grid(n);
             let l = open_loop(w);
@@ -124,12 +122,8 @@ pub(super) fn gain_limit(
         // Smaller root of a g² + 2 re g + c = 0, written without cancellation.
         let by_ms =
             if l.re < 0.0 && root >= 0.0 { c / (libm::sqrt(root) - l.re) } else { f64::INFINITY };
-        let by_phase = if 180.0 - l.arg().to_degrees().abs() < phase_margin_deg {
-            1.0 / libm::sqrt(a)
-        } else {
-            f64::INFINITY
-        };
-        if by_ms < by_phase { by_ms } else { by_phase }
+        let in_margin = 180.0 - l.arg().to_degrees().abs() < phase_margin_deg;
+        f64::min(by_ms, if in_margin { 1.0 / libm::sqrt(a) } else { f64::INFINITY })
     };
     let (least, n) = (0..=LOW + HIGH)
         .map(|n| (limit(grid(n)), n))

@@ -184,17 +184,17 @@ impl Sensors {
             let [a, b, _] = phases(self.filtered);
             return self.converted([a, b], [0.0; 2], rng);
         };
-        self.mean_codes(rare, rng)
+        self.rare_codes(rare, rng)
     }
 
-    /// Codes with the rare errors.
+    /// Codes with the rare errors; of two conversions their sum.
     #[cold]
-    fn mean_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
+    fn rare_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let (now, middle) = rare.currents();
         let now = self.converted(now, rare.offsets(), rng);
         let Some(middle) = middle else { return now };
         let middle = self.converted(middle, rare.offsets(), rng);
-        [0, 1].map(|k| (u32::from(now[k]) + u32::from(middle[k])).div_ceil(2) as u16)
+        [0, 1].map(|k| now[k] + middle[k])
     }
 
     /// The codes at these currents and further offsets, A.

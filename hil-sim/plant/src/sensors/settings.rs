@@ -42,7 +42,7 @@ pub struct MeasurementSettings {
     pub drift_a: f64,
     /// Drift of the offset of channel B, A/s.
     pub drift_b: f64,
-    /// Whether each sample is the mean of two conversions, in the middle of the period and at its end: in both zero
+    /// Whether the code of a current is the sum of two conversions, in the middle of the period and at its end: in both zero
     /// vectors.
     pub both_zero_vectors: bool,
     /// Dc-link voltage per code, V (12 bits).
@@ -97,8 +97,9 @@ impl MeasurementSettings {
         let s = self;
         check("measurement.noise_a", s.noise_a, 0.0..=10.0, "A")?;
         check("measurement.range_a", s.range_a, 0.01..=5000.0, "A")?;
-        // 7 to 16 bits.
-        check("measurement.lsb_a", s.lsb_a, s.range_a / 32_000.0..=s.range_a / 80.0, "A")?;
+        // 7 to 16 bits, which the sum of two conversions has, too.
+        let most = if s.both_zero_vectors { 16_000.0 } else { 32_000.0 };
+        check("measurement.lsb_a", s.lsb_a, s.range_a / most..=s.range_a / 80.0, "A")?;
         check("measurement.filter_hz", s.filter_hz, 0.0..=1e6, "Hz")?;
         check("measurement.gain_error_a", s.gain_error_a, -0.5..=0.5, "")?;
         check("measurement.gain_error_b", s.gain_error_b, -0.5..=0.5, "")?;

@@ -64,23 +64,21 @@ impl Board {
         if chip.tim1.broken() {
             hardware |= Hardware::BREAK;
         }
-        let ended = chip.adc.ended();
-        if ended[0] && !ended[1] {
+        let (ended, complete) = chip.adc.ended();
+        if ended && !complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
         // With the drive off the firmware switches it on again instead.
         if !chip.tim8.main_output() && chip.tim1.main_output() {
             hardware |= Hardware::CHOPPER_OFF;
         }
-        let [one, two] = chip.adc.data();
+        let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both convert the third current second.
-        let (current_c, slow) = match chip.gates.stage().sensors {
-            Sensors::InLine => (0, 1),
-            Sensors::LowSide(_) => (one[1], 2),
-        };
+        let in_line = chip.gates.stage().sensors == Sensors::InLine;
+        let (current_c, slow) = if in_line { (0, 1) } else { (one[1], 2) };
         let sample = Sample {
-            current_a: one[0],
-            current_b: two[0],
+            current_a: one[0] + upper_a,
+            current_b: two[0] + upper_b,
             current_c,
             dc_link: one[slow],
             heat_sink: two[slow],
@@ -91,8 +89,7 @@ impl Board {
         if let Some(at) = self.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
-        self.entered =
-            Some(RunningInterrupt { began, sample, ended: ended[0], had_order, accesses });
+        self.entered = Some(RunningInterrupt { began, sample, ended, had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {

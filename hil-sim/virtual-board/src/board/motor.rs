@@ -22,8 +22,10 @@ pub(super) struct Connection {
     at: u64,
     /// Compare values that the motor sees.
     applied: Compare,
-    /// Dead time that it sees, ticks; none before the outputs were on.
-    dead_time: Option<u32>,
+    /// Dead time that it sees, ticks, and whether it moves by half periods; none before the outputs were on.
+    dead_time: Option<(u32, bool)>,
+    /// Further dead time, us.
+    extra_us: f64,
     /// Duty of the chopper and relay that it sees.
     dc_link: (f64, bool),
     /// What the switches stand, V.
@@ -79,6 +81,7 @@ impl Connection {
             at: 0,
             applied: Compare::OFF,
             dead_time: None,
+            extra_us: options.plant.inverter.extra_dead_time_us,
             dc_link: (0.0, false),
             rated_v: stage.rated_v(&options.plant),
             sample: Sample::default(),
@@ -195,16 +198,18 @@ impl Board {
         chip.look_at_gates();
         let (bridge, stage) = (chip.gates.bridge(), chip.gates.stage());
         let (outputs_on, dead_time) = (bridge.outputs_on, bridge.dead_time);
-        let pulses = bridge.check_pulses(stage);
+        let (pulses, halves) = (bridge.check_pulses(stage), chip.adc.samples_twice());
         self.connection.applied = bridge.compare();
         if let Some(reader) = &mut self.connection.shunts {
             reader.top(at, bridge, &self.plant);
         }
-        if outputs_on && self.connection.dead_time != Some(dead_time) {
-            self.connection.dead_time = Some(dead_time);
+        if outputs_on && self.connection.dead_time != Some((dead_time, halves)) {
+            self.connection.dead_time = Some((dead_time, halves));
             // As the firmware computes it from the register, so that both are the same to the bit.
             let us = f64::from(dead_time as f32 / TICKS_PER_S as f32) * 1e6;
-            self.plant.set_dead_time(us)?;
+            // The plant spreads all of it over the time that it is given; half of the edges are in half a period.
+            let half = 0.5 * (us - self.connection.extra_us);
+            self.plant.set_dead_time(if halves { half } else { us })?;
         }
         self.connection.sample = self.plant.sample();
         self.show_sample();
@@ -221,6 +226,13 @@ impl Board {
             _ => {}
         }
         Ok(())
+    }
+
+    /// The counter is at 0, where the converters sample the currents, too.
+    pub(super) fn valley(&mut self, at: u64) {
+        self.advance_plant(at);
+        self.connection.sample = self.plant.sample();
+        self.show_sample();
     }
 
     /// Shows the sample to converters, comparators and encoder.
@@ -250,15 +262,10 @@ impl Board {
         let of = |s: &Sample| [s.current_a, s.current_b, s.current_c];
         let (now, before) = (of(sample), of(&undisturbed));
         for (converter, inputs) in chip.adc.inputs.iter_mut().enumerate() {
-            let mut currents = seen.map_or(now, |codes| codes[converter]);
-            for leg in 0..3 {
-                if now[leg] != before[leg] {
-                    // A disturbed sensor is so for both converters.
-                    currents[leg] = now[leg];
-                }
-            }
-            for (channel, code) in channel::CURRENTS.into_iter().zip(currents) {
-                inputs[channel] = code;
+            for (leg, channel) in channel::CURRENTS.into_iter().enumerate() {
+                // A disturbed sensor is so for both converters.
+                let own = seen.filter(|_| now[leg] == before[leg]);
+                inputs[channel] = own.map_or(now[leg], |codes| codes[converter][leg]);
             }
             inputs[channel::HEAT_SINK] = sample.heat_sink;
         }

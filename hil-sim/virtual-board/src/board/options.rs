@@ -51,6 +51,8 @@ impl Options {
             plant.inverter.propagation_us = delay_s * 1e6;
             plant.inverter.residual_v = drop_v;
         }
+        // The converters of the board do so by themselves.
+        plant.measurement.both_zero_vectors = false;
         plant.inverter.dead_time_us =
             f64::from(firmware_board::dead_time(settings.inverter.dead_time_s).1) * 1e6;
         plant.inverter.timer_top = firmware_board::PWM_TOP;

@@ -1,12 +1,11 @@
-//! ADC1 and ADC2 (RM0440, section 21): start-up with its times, injected sequences started together by TIM1 or by
-//! software, regular sequences started by software, analog watchdog 1 on single injected channels. Nothing else of
-//! them is modelled.
+//! ADC1 and ADC2 (RM0440, section 21): start-up with its times, sequences started together by a trigger output of TIM1 or by
+//! software, analog watchdog 1 on single channels. Nothing else of them is modelled.
 
 mod converter;
 
 use super::{Effect, NEVER, Store, registers};
 use crate::rules::{Rule, Rules};
-use converter::{Converter, Sequence};
+use converter::{Converter, EOC, JEOC, JEOS, Sequence};
 
 registers! {
     ISR = 0x00, 0, 0;
@@ -72,18 +71,17 @@ impl Adc {
         }
     }
 
-    /// The trigger output 2 of TIM1 rises.
-    pub fn trigger(&mut self, at: u64) {
+    /// A trigger output of TIM1, 0 or 1, rises.
+    pub fn trigger(&mut self, at: u64, output: usize) {
         let Some(clock) = self.clock() else { return };
         for (n, one) in self.converters.iter_mut().enumerate() {
-            if !one.waits_for_tim1() {
-                continue;
-            }
+            let waits = |sequence: &Sequence| one.waits_for(*sequence, output);
+            let Some(sequence) = Sequence::ALL.into_iter().find(waits) else { continue };
             if self.lose_triggers[n] > 0 {
                 self.lose_triggers[n] -= 1;
                 continue;
             }
-            one.begin(Sequence::Injected, at, clock);
+            one.begin(sequence, at, clock);
         }
     }
 
@@ -92,9 +90,14 @@ impl Adc {
         self.converters[0].sampling(18) * self.clock().unwrap_or(1) / 2
     }
 
-    /// Whether a trigger at this time comes in the middle of a regular conversion.
-    pub fn disturbs(&self, at: u64) -> bool {
-        self.converters.iter().any(|one| one.disturbs(at))
+    /// Whether a trigger at this time starts a sequence in the middle of a regular conversion.
+    pub fn disturbs(&self, at: u64, output: usize) -> bool {
+        self.converters.iter().any(|one| one.disturbs(at, output))
+    }
+
+    /// Whether TIM1 starts regular conversions.
+    pub fn samples_twice(&self) -> bool {
+        self.converters.iter().any(Converter::samples_twice)
     }
 
     /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,
@@ -128,9 +131,12 @@ impl Adc {
         self.converters.iter().any(Converter::requests)
     }
 
-    /// Whether the sequences of both have ended and were not looked at yet.
-    pub fn ended(&self) -> [bool; 2] {
-        [0, 1].map(|n| self.converters[n].status & converter::JEOS != 0)
+    /// Whether the sequence of the second has ended and was not looked at yet, and whether all else was converted.
+    pub fn ended(&self) -> (bool, bool) {
+        let [one, two] = &self.converters;
+        let regular =
+            [one, two].into_iter().all(|one| !one.samples_twice() || one.status & EOC != 0);
+        (two.status & JEOS != 0, one.status & JEOC != 0 && regular)
     }
 
     /// Whether an analog watchdog has seen its channel outside its window.
@@ -138,9 +144,10 @@ impl Adc {
         self.converters.iter().any(|one| one.status & converter::AWD1 != 0)
     }
 
-    /// Results of the last sequences.
-    pub fn data(&self) -> [[u16; 4]; 2] {
-        [self.converters[0].data, self.converters[1].data]
+    /// Results of the last sequences, and of the regular conversions that TIM1 has started.
+    pub fn data(&self) -> [([u16; 4], u16); 2] {
+        let regular = |one: &Converter| if one.samples_twice() { one.regular } else { 0 };
+        [0, 1].map(|n| (self.converters[n].data, regular(&self.converters[n])))
     }
 
     /// Reads a register of the block that both share.

@@ -1,7 +1,7 @@
 //! TIM1 in centre-aligned mode, as the timer of a power stage (RM0440, section 28).
 //!
-//! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
-//! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
+//! The counter is not stepped: where it is follows from time. Events are its two ends and the rising edges of OC4REF on the way
+//! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters.
 
 mod halt;
 mod outputs;
@@ -31,8 +31,8 @@ registers! {
     CCR4 = 0x40, 0, 0xf_ffff;
     BDTR = 0x44, 0, 0x3fff_ffff;
     _ = 0x48, 0, 0xe00f_ffff;
-    _ = 0x4c, 0, 0xf_ffff;
-    _ = 0x50, 0, 0x0101_fcfc;
+    CCR6 = 0x4c, 0, 0xf_ffff;
+    CCMR3 = 0x50, 0, 0x0101_fcfc;
     _ = 0x54, 0, 0x300ff;
     AF1 = 0x60, 1, 0x3_ffff;
     _ = 0x64, 1, 0x7_3fff;
@@ -48,12 +48,12 @@ const BKP: u32 = 1 << 13;
 /// An event and its time.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
-    /// The converters are triggered.
-    Trigger(u64),
+    /// A trigger output, 0 or 1, rises.
+    Trigger(u64, usize),
     /// The counter is at its top.
     Crest(u64),
     /// The counter is at 0.
-    Valley,
+    Valley(u64),
 }
 
 /// The timer.
@@ -71,7 +71,8 @@ pub struct Tim1 {
     /// Next end of the count, and whether it is the top.
     next_end: u64,
     at_top_next: bool,
-    trigger_at: u64,
+    /// When each trigger output rises next.
+    trigger_at: [u64; 2],
     /// Level of the break pin; `None` is not sure.
     fault_pin: Option<bool>,
     /// Outputs of the comparators.
@@ -96,7 +97,7 @@ impl Default for Tim1 {
             status: 0,
             next_end: NEVER,
             at_top_next: true,
-            trigger_at: NEVER,
+            trigger_at: [NEVER; 2],
             fault_pin: Some(true),
             comparators: [false; 7],
             first_lock: None,
@@ -160,13 +161,17 @@ impl Tim1 {
 
     /// When the next event is.
     pub fn next_event(&self) -> u64 {
-        if self.frozen.is_some() { NEVER } else { self.next_end.min(self.trigger_at) }
+        if self.frozen.is_some() {
+            NEVER
+        } else {
+            self.trigger_at.into_iter().fold(self.next_end, u64::min)
+        }
     }
 
     /// Lets the next event happen.
     pub fn happen(&mut self) -> Event {
-        if self.trigger_at <= self.next_end {
-            return Event::Trigger(std::mem::replace(&mut self.trigger_at, NEVER));
+        if let Some(output) = self.trigger_at.iter().position(|at| *at <= self.next_end) {
+            return Event::Trigger(std::mem::replace(&mut self.trigger_at[output], NEVER), output);
         }
         let crest = self.at_top_next;
         self.at_top_next = !crest;
@@ -181,23 +186,28 @@ impl Tim1 {
         }
         self.next_end = end + u64::from(self.top);
         if crest {
+            let after = self.rises_after(1, self.store.get(CCR6));
+            self.trigger_at[1] = after.map_or(NEVER, |ticks| self.next_end - ticks);
             return Event::Crest(end);
         }
         self.plan_trigger();
-        Event::Valley
+        Event::Valley(end)
     }
 
     /// OC4REF rises on the way up where the counter reaches its compare value.
     fn plan_trigger(&mut self) {
-        self.trigger_at = self.trigger_of(self.from).unwrap_or(NEVER);
+        let after = self.rises_after(0, self.active[3]);
+        self.trigger_at[0] = after.map_or(NEVER, |ticks| self.from + ticks);
     }
 
-    /// The time of the trigger in the period that begins with the counter at 0 at this time.
-    fn trigger_of(&self, from: u64) -> Option<u64> {
-        let mode = self.store.get(CCMR2) >> 12 & 7;
-        let rises = mode == 7 && self.active[3] > 0 && self.active[3] <= self.top;
-        let is_trigger = self.store.get(CR2) >> 20 & 0xf == 7;
-        (rises && is_trigger).then(|| from + u64::from(self.active[3]))
+    /// The ticks between the counter at 0 and the edge of a trigger output at this compare value; none if there is none.
+    fn rises_after(&self, output: usize, compare: u32) -> Option<u64> {
+        // Channel 4 in PWM mode 2 as output 1, channel 6 in mode 1 as output 2.
+        let (mode, wanted) = [(CCMR2, 7), (CCMR3, 6)][output];
+        let rises = self.store.get(mode) >> 12 & 7 == wanted && (1..=self.top).contains(&compare);
+        let selected = [(4, 7, 7), (20, 0xf, 9)][output];
+        let is_trigger = self.store.get(CR2) >> selected.0 & selected.1 == selected.2;
+        (rises && is_trigger).then_some(u64::from(compare))
     }
 
     fn update(&mut self, flag: bool) {
@@ -332,7 +342,7 @@ impl Tim1 {
             CR1 if old & !value & 1 != 0 => {
                 self.held = self.count(now).0;
                 self.next_end = NEVER;
-                self.trigger_at = NEVER;
+                self.trigger_at = [NEVER; 2];
             }
             ARR if self.store.get(CR1) & 1 << 7 == 0 => self.top = value.max(1),
             CCR1..=CCR4 => {

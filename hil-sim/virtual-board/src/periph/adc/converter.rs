@@ -6,9 +6,10 @@ use super::{
 use crate::rules::Rule;
 
 const ADRDY: u32 = 1;
-const EOC: u32 = 1 << 2;
+/// End of a regular conversion, and of an injected one.
+pub(super) const EOC: u32 = 1 << 2;
 const EOS: u32 = 1 << 3;
-const JEOC: u32 = 1 << 5;
+pub(super) const JEOC: u32 = 1 << 5;
 /// End of an injected sequence.
 pub(super) const JEOS: u32 = 1 << 6;
 /// Analog watchdog 1.
@@ -17,8 +18,6 @@ const ADEN: u32 = 1;
 const ADDIS: u32 = 1 << 1;
 const ADSTART: u32 = 1 << 2;
 const JADSTART: u32 = 1 << 3;
-const ADSTP: u32 = 1 << 4;
-const JADSTP: u32 = 1 << 5;
 const VREGEN: u32 = 1 << 28;
 const DEEPPWD: u32 = 1 << 29;
 const ADCALDIF: u32 = 1 << 30;
@@ -47,6 +46,16 @@ pub(super) enum Sequence {
     Injected,
 }
 
+impl Sequence {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Regular, Self::Injected];
+
+    /// The bit of CR that it waits or runs by.
+    fn started(self) -> u32 {
+        [ADSTART, JADSTART][self as usize]
+    }
+}
+
 /// A sequence that runs: its rank, and when that is converted.
 #[derive(Clone, Copy, Debug)]
 struct Running {
@@ -66,7 +75,8 @@ pub(super) struct Converter {
     running: [Running; 2],
     /// Injected data.
     pub data: [u16; 4],
-    regular: u16,
+    /// Regular data.
+    pub regular: u16,
     /// Since when the regulator is on.
     regulator_from: u64,
     /// End of the last calibration, and of the start-up.
@@ -98,16 +108,32 @@ impl Converter {
         self.status & self.store.get(IER) != 0
     }
 
-    /// Whether a rising edge of `TIM1_TRGO2` starts the injected sequence.
-    pub fn waits_for_tim1(&self) -> bool {
-        let idle = self.running[Sequence::Injected as usize].done_at == NEVER;
-        self.control & JADSTART != 0 && idle && self.store.get(JSQR) >> 2 & 0x7f == 1 << 5 | 8
+    /// Whether a rising edge of a trigger output of TIM1 starts a sequence.
+    pub fn waits_for(&self, sequence: Sequence, output: usize) -> bool {
+        let (selection, codes) = match sequence {
+            Sequence::Regular => (self.store.get(CFGR) >> 5, [9, 10]),
+            Sequence::Injected => (self.store.get(JSQR) >> 2, [0, 8]),
+        };
+        let idle = self.running[sequence as usize].done_at == NEVER;
+        self.control & sequence.started() != 0 && idle && selection & 0x7f == 1 << 5 | codes[output]
     }
 
-    /// Whether a trigger at this time comes in the middle of a regular conversion.
-    pub fn disturbs(&self, at: u64) -> bool {
+    /// Whether a trigger at this time starts the injected sequence in the middle of a regular conversion.
+    pub fn disturbs(&self, at: u64, output: usize) -> bool {
         let done_at = self.running[Sequence::Regular as usize].done_at;
-        self.waits_for_tim1() && (at + 1..NEVER).contains(&done_at)
+        self.waits_for(Sequence::Injected, output) && (at + 1..NEVER).contains(&done_at)
+    }
+
+    /// Whether a trigger starts the regular sequence.
+    pub fn samples_twice(&self) -> bool {
+        self.control & ADSTART != 0 && self.is_triggered(Sequence::Regular)
+    }
+
+    fn is_triggered(&self, sequence: Sequence) -> bool {
+        match sequence {
+            Sequence::Regular => self.store.get(CFGR) >> 10 & 3 != 0,
+            Sequence::Injected => self.store.get(JSQR) >> 7 & 3 != 0,
+        }
     }
 
     /// Starts a sequence.
@@ -181,7 +207,7 @@ impl Converter {
             self.status |= ADRDY;
         }
         let mut converted = 0;
-        for sequence in [Sequence::Regular, Sequence::Injected] {
+        for sequence in Sequence::ALL {
             while self.running[sequence as usize].done_at <= now {
                 let Running { rank, done_at } = self.running[sequence as usize];
                 let channel = self.channel(sequence, rank);
@@ -201,46 +227,33 @@ impl Converter {
     }
 
     fn take(&mut self, sequence: Sequence, rank: u32, channel: u32, code: u16) {
-        match sequence {
-            Sequence::Injected => {
-                self.data[rank as usize & 3] = code;
-                self.status |= JEOC;
-                self.watch(channel, code);
-            }
-            Sequence::Regular => {
-                self.regular = code;
-                self.status |= EOC;
-            }
-        }
+        let (data, flag) = match sequence {
+            Sequence::Injected => (&mut self.data[rank as usize & 3], JEOC),
+            Sequence::Regular => (&mut self.regular, EOC),
+        };
+        *data = code;
+        self.status |= flag;
+        self.watch(sequence, channel, code);
     }
 
     /// A sequence has ended: what runs now.
     fn end(&mut self, sequence: Sequence, at: u64) -> Running {
-        match sequence {
-            Sequence::Injected => {
-                self.status |= JEOS;
-                // Without a trigger it has run once.
-                if self.store.get(JSQR) >> 7 & 3 == 0 {
-                    self.control &= !JADSTART;
-                }
-                IDLE
-            }
-            Sequence::Regular => {
-                self.status |= EOS;
-                if self.store.get(CFGR) & CONT != 0 {
-                    let lasts = self.conversion(sequence, 0);
-                    return Running { rank: 0, done_at: at + lasts };
-                }
-                self.control &= !ADSTART;
-                IDLE
-            }
+        self.status |= if sequence == Sequence::Regular { EOS } else { JEOS };
+        if sequence == Sequence::Regular && self.store.get(CFGR) & CONT != 0 {
+            return Running { rank: 0, done_at: at + self.conversion(sequence, 0) };
         }
+        // Without a trigger it has run once.
+        if !self.is_triggered(sequence) {
+            self.control &= !sequence.started();
+        }
+        IDLE
     }
 
-    fn watch(&mut self, channel: u32, code: u16) {
+    fn watch(&mut self, sequence: Sequence, channel: u32, code: u16) {
         let cfgr = self.store.get(CFGR);
-        let (single, injected) = (cfgr >> 22 & 1 != 0, cfgr >> 24 & 1 != 0);
-        let watched = injected && (!single || cfgr >> 26 & 0x1f == channel);
+        // AWD1EN and JAWD1EN.
+        let (single, enabled) = (cfgr >> 22 & 1 != 0, cfgr >> (23 + sequence as u32) & 1 != 0);
+        let watched = enabled && (!single || cfgr >> 26 & 0x1f == channel);
         let window = self.store.get(TR1);
         let code = u32::from(code);
         if watched && (code < window & 0xfff || code > window >> 16 & 0xfff) {
@@ -329,26 +342,21 @@ impl Converter {
             self.ready = false;
             self.ready_at = NEVER;
         }
-        for (bit, sequence) in [(ADSTART, Sequence::Regular), (JADSTART, Sequence::Injected)] {
+        for (bit, sequence) in Sequence::ALL.map(|sequence| (sequence.started(), sequence)) {
             if value & bit == 0 || self.control & bit != 0 {
                 continue;
             }
             if rules.require(self.ready, Rule::AdcEarly, "a conversion started before ADRDY") {
                 self.control |= bit;
-                let triggered = match sequence {
-                    Sequence::Regular => self.store.get(CFGR) >> 10 & 3 != 0,
-                    Sequence::Injected => self.store.get(JSQR) >> 7 & 3 != 0,
-                };
-                if !triggered {
+                if !self.is_triggered(sequence) {
                     self.begin(sequence, now, clock.unwrap_or(1));
                 }
             }
         }
-        for (stop, bit, sequence) in
-            [(ADSTP, ADSTART, Sequence::Regular), (JADSTP, JADSTART, Sequence::Injected)]
-        {
-            if value & stop != 0 {
-                self.control &= !bit;
+        for sequence in Sequence::ALL {
+            // ADSTP and JADSTP.
+            if value & sequence.started() << 2 != 0 {
+                self.control &= !sequence.started();
                 self.running[sequence as usize] = IDLE;
             }
         }

@@ -13,7 +13,7 @@ impl Tim1 {
         let Some(since) = self.frozen.take() else { return };
         let stood = now - since;
         self.from += stood;
-        for at in [&mut self.next_end, &mut self.trigger_at] {
+        for at in self.trigger_at.iter_mut().chain([&mut self.next_end]) {
             *at = at.saturating_add(stood);
         }
     }

@@ -158,8 +158,8 @@ impl Tim1 {
     /// The time of a top of the counter after which the compare value of channel 4 triggers, ticks from that top; none
     /// when it does not.
     pub fn trigger_after_top(&self) -> Option<u64> {
-        let triggers = self.trigger_of(0).is_some() && self.counting();
-        triggers.then(|| u64::from(self.top) + u64::from(self.active[3]))
+        let after = self.rises_after(0, self.active[3]).filter(|_| self.counting());
+        after.map(|ticks| u64::from(self.top) + ticks)
     }
 }
 

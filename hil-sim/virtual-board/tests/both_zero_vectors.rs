@@ -1,0 +1,186 @@
+//! Currents sampled in both zero vectors: less noise, the same bits on the host, and the protections see both conversions.
+
+mod common;
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use anyhow::Result;
+use drive_core::{Fault, State};
+use hil_sim::Config;
+use virtual_board::power_stage::{ALL, REFERENCE};
+use virtual_board::{Board, Image, Options, Pair};
+
+/// Longest from a reset to the greeting, periods.
+const START: u64 = 30_000;
+const YES: &str = "set scales.both_zero_vectors yes";
+
+/// Most cycles of a control interrupt to the last compare value, and in all.
+#[derive(Debug, Default)]
+struct Cycles {
+    to_compares: u32,
+    whole: u32,
+}
+
+/// A start without a sensor, torque in both directions, and a stop: the true torque is the one asked for, within 5 %.
+fn torque(pair: &mut Pair) -> Result<Cycles> {
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    let settings = pair.shadow.settings();
+    let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
+    let mut most = Cycles::default();
+    for i_q in [1.5, -1.0] {
+        pair.order(&format!("torque {i_q}"))?;
+        pair.run(6000, |_, _| {})?;
+        let mut sum = 0.0;
+        pair.run(6000, |pair, period| {
+            sum += pair.board.plant.torque();
+            most.to_compares = most.to_compares.max(period.to_compares);
+            most.whole = most.whole.max(period.cycles);
+        })?;
+        let (torque, wanted) = (sum / 6000.0, per_ampere * i_q);
+        println!("{i_q} A: {torque:.4} Nm of {wanted:.4} Nm");
+        assert!((torque / wanted - 1.0).abs() < 0.05, "{torque} of {wanted}");
+    }
+    pair.order("stop")?;
+    pair.until_state(State::Off)?;
+    Ok(most)
+}
+
+/// Mean and deviation of the reading of current a with the outputs off, A.
+fn reading(pair: &mut Pair) -> Result<[f64; 2]> {
+    let scales = pair.shadow.settings().scales;
+    let line = scales.of_code(scales.current_a);
+    let mut readings = Vec::new();
+    pair.run(12_000, |_, period| readings.push(f64::from(line.at(period.sample.current_a))))?;
+    let mean = |of: &dyn Fn(f64) -> f64| {
+        readings.iter().map(|r| of(*r)).sum::<f64>() / readings.len() as f64
+    };
+    let middle = mean(&|r| r);
+    Ok([middle, mean(&|r| (r - middle).powi(2)).sqrt()])
+}
+
+/// Switched on and off again at the console, with a run in each: every compare value is that of the host's drive (see
+/// `Shadow::follow`), and two conversions have the noise of one over the root of 2. (One has 5 mA and the steps of its code;
+/// the deviation of 12 000 readings is good to 0.6 %.)
+#[test]
+fn both_zero_vectors_halve_the_variance_and_the_host_computes_the_same() -> Result<()> {
+    let mut pair = common::pair(&Config::default(), 41)?;
+    let one = reading(&mut pair)?;
+    let cycles = [torque(&mut pair)?, {
+        pair.order(YES)?;
+        pair.order("apply")?;
+        torque(&mut pair)?
+    }];
+    let two = reading(&mut pair)?;
+    println!("one {one:?} A, two {two:?} A; {cycles:#?}");
+    assert!((two[0] - one[0]).abs() < 2e-4, "{one:?} {two:?}");
+    assert!((two[1] / one[1] / 0.5_f64.sqrt() - 1.0).abs() < 0.03, "{one:?} {two:?}");
+    // Two more readings and additions.
+    assert!(cycles[1].to_compares <= cycles[0].to_compares + 15, "{cycles:#?}");
+    assert!(cycles[1].whole <= cycles[0].whole + 15, "{cycles:#?}");
+    pair.order("set scales.both_zero_vectors no")?;
+    pair.order("apply")?;
+    torque(&mut pair)?;
+    let again = reading(&mut pair)?;
+    assert!((again[1] / one[1] - 1.0).abs() < 0.03, "{one:?} {again:?}");
+    Ok(())
+}
+
+/// A board that was saved with the setting on, and regulates torque.
+fn regulating(seed: u64) -> Result<Pair> {
+    let mut config = Config::default();
+    config.measurement.both_zero_vectors = true;
+    config.calibrate();
+    let options = Options::new(&config, seed).set_up(&config)?;
+    let mut pair = Pair::new(Image::built()?, options)?;
+    assert!(pair.shadow.settings().scales.both_zero_vectors);
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    Ok(pair)
+}
+
+/// Whether the counter is on its way to the top.
+fn goes_up(pair: &mut Pair) -> bool {
+    let chip = pair.board.chip();
+    chip.tim1.read(0, chip.now).is_some_and(|cr1| cr1 & 1 << 4 == 0)
+}
+
+/// An over-current that only the conversion in the upper zero vector sees trips there: the outputs are off before the next top.
+#[test]
+fn the_analog_watchdogs_see_the_upper_zero_vector() -> Result<()> {
+    let mut pair = regulating(42)?;
+    let (upper, asked) = (Rc::new(Cell::new(false)), Rc::new(Cell::new(0_u32)));
+    let (seen, count) = (upper.clone(), asked.clone());
+    pair.board.disturb = Some(Box::new(move |sample| {
+        count.set(count.get() + 1);
+        if seen.replace(false) {
+            sample.current_a = 4000;
+        }
+    }));
+    // From a top on, behind its sample: the next one is that of the upper zero vector.
+    let at = asked.get();
+    while asked.get() == at || goes_up(&mut pair) {
+        pair.board.run_ticks(100)?;
+    }
+    let began = pair.board.chip().now;
+    upper.set(true);
+    while pair.board.chip().tim1.outputs_on() {
+        pair.board.run_ticks(100)?;
+        assert!(pair.board.chip().now < began + 14_167 + 1700, "no trip");
+    }
+    pair.board.run_periods(3000)?;
+    let log = pair.board.take_log()?;
+    let fault = format!("fault {}: {}", Fault::AnalogWatchdog.code(), Fault::AnalogWatchdog);
+    assert!(log.iter().any(|line| line.contains(&fault)), "{log:#?}");
+    Ok(())
+}
+
+/// A trigger that one converter loses in the upper zero vector is noticed at the next top: its old code is not used again.
+#[test]
+fn a_conversion_that_is_missing_in_the_upper_zero_vector_is_noticed() -> Result<()> {
+    for lost in [[1, 0], [0, 1]] {
+        let mut pair = regulating(43)?;
+        while goes_up(&mut pair) {
+            pair.board.run_ticks(100)?;
+        }
+        pair.board.chip().adc.lose_triggers = lost;
+        pair.run(3, |_, _| {})?;
+        assert_eq!(pair.shadow.drive.state().fault(), Some(Fault::ConverterOverrun), "{lost:?}");
+        assert!(!pair.board.chip().tim1.outputs_on());
+    }
+    Ok(())
+}
+
+/// Shunts below the low sides see nothing there: their boards refuse the setting by name, and go on as before.
+#[test]
+fn a_board_with_shunts_refuses_it() -> Result<()> {
+    for stage in ALL.into_iter().filter(|stage| **stage != REFERENCE) {
+        let options = Options::on(stage, &stage.config()?, 44);
+        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
+        let mut heard = String::new();
+        while !heard.contains("last run: ") {
+            board.run_periods(100)?;
+            heard += &board.take_console();
+            assert!(board.time() < START as f64 / 6000.0, "{heard}");
+        }
+        for (line, answer) in [
+            (YES, "ok: staged"),
+            (
+                "apply",
+                "error: scales.both_zero_vectors = yes: shunts below the low sides see nothing in the upper zero vector; set it to no",
+            ),
+            ("revert", "ok"),
+            ("start torque", "ok"),
+        ] {
+            board.run_periods(600)?;
+            board.take_console();
+            board.type_line(line);
+            board.run_periods(30_000)?;
+            let heard = board.take_console();
+            assert!(heard.contains(answer), "{}: {line}: {heard}", stage.name);
+        }
+        assert!(!board.chip().adc.samples_twice() && board.violations().is_empty());
+    }
+    Ok(())
+}
