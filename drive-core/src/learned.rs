@@ -21,6 +21,8 @@ pub(crate) const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
 const WEAK: f32 = 1.5;
 /// Largest accepted part of the signal that repeats four times in a turn, relative to the slope without torque current: 8.6°.
 pub(crate) const RIPPLE: f32 = 0.15;
+/// From this share on it is told: 2.9°.
+const CURVED: f32 = 0.05;
 /// Least torque limit, in steps of the table: 1 A of 3.5 A.
 pub(crate) const LEAST_LIMIT: usize = 4;
 
@@ -153,7 +155,11 @@ impl fmt::Display for Learned {
             ),
             Verdict::OutOfRange => f.write_str("a value is out of its range"),
         }?;
-        if self.verdict.is_accepted() { Ok(()) } else { f.write_str("; nothing was changed") }
+        f.write_str(match self.verdict.is_accepted() {
+            true if ripple > CURVED * slope.abs() => "; a current sensor is not quite linear",
+            true => "",
+            false => "; nothing was changed",
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! The commissioning: what it finds on machines and boards drawn at random, and what it refuses.
 
+use hil_sim::config::{FluxLevel, LoadMode, PlantModel};
 use hil_sim::{Config, experiments};
 
 fn config(runs: u32) -> Config {
@@ -20,8 +21,76 @@ fn random_machines_are_accepted_and_right() {
             assert!(error < 0.9, "seed {seed}: {name} {error} %");
         }
         // Free shafts; the nameplate's peak; 12 s for all but the check of the current loop.
-        assert!(get("shaft_deg_max") < 0.1 && get("current_max_of_peak") < 1.0);
+        assert!(get("shaft_deg_max") < 0.5 && get("current_max_of_peak") < 1.0);
         assert!(get("seconds_max") < 13.0 && get("margin_deg_min") > 45.0);
+    }
+}
+
+/// Phases, legs and sensors that differ as those of sound motors and boards do, all at once.
+#[test]
+fn small_differences_of_the_phases_are_no_refusal() {
+    let mut config = config(20);
+    config.commission.disturbed = true;
+    for seed in [5, 6] {
+        let metrics = experiments::run("commission", &config, seed).unwrap().metrics;
+        let get = |name: &str| metrics.get(name).unwrap();
+        assert_eq!((get("accepted"), get("wrongly_accepted")), (20.0, 0.0), "seed {seed}");
+        assert!(get("error_max_pct.mismatch") < 0.4 && get("error_max_pct.r_s") < 2.0);
+    }
+}
+
+/// Resistances that differ are told from the gains of the sensors, which `accept` scales, whatever those are.
+#[test]
+fn a_resistance_is_no_gain() {
+    let with = |percent: f64, gain: f64| {
+        let mut config = Config::default();
+        let more = percent / 100.0 * config.motor.r_s;
+        (config.inverter.more_ohm_b, config.inverter.more_ohm_c) = (-more, more);
+        config.measurement.gain_error_a = gain;
+        config
+    };
+    for (percent, gain) in [(0.52, 0.0), (0.87, 0.0), (0.87, 0.01), (-1.3, 0.0), (-1.3, -0.01)] {
+        let config = with(percent, gain);
+        let settings = experiments::commission::commissioned(&config, 3).unwrap();
+        let [a, b] = [settings.scales.current_a, settings.scales.current_b].map(|line| line.gain);
+        let [a, b] =
+            [a / config.drive.scales.current_a.gain, b / config.drive.scales.current_b.gain];
+        let scaled = f64::from(b / a) - 1.0;
+        assert!((scaled - gain).abs() < 0.002, "{percent} %, gain {gain}: scaled by {scaled}");
+        // Which has half of the common gain error.
+        let r_s = f64::from(settings.motor.r_s) / config.motor.r_s - 1.0 + 0.5 * gain;
+        assert!(r_s.abs() < 0.003, "{percent} %, gain {gain}: r_s by {r_s}");
+    }
+    let refusal =
+        |config: &Config| experiments::commission::commissioned(config, 3).unwrap_err().to_string();
+    let text = refusal(&with(5.0, 0.0));
+    assert!(text.contains("r_b over r_c") && text.contains("cable"), "{text}");
+    let text = refusal(&with(0.0, 0.06));
+    assert!(text.contains("gain mismatch = 0.06"), "{text}");
+    // A leg that is late by 0.8 us, whose current across is constant; a shaft at 10 rpm.
+    let mut config = Config::default();
+    config.inverter.more_dead_time_b_us = 0.8;
+    let text = refusal(&config);
+    assert!(text.contains("legs b and c differ"), "{text}");
+    let mut config = Config::default();
+    config.load.mode = LoadMode::Speed;
+    config.load.speed_rpm = 10.0;
+    let text = refusal(&config);
+    assert!(text.contains("the shaft turns"), "{text}");
+}
+
+/// Nodes of 50 to 140 pF lie where a threshold would decide.
+#[test]
+fn the_capacitance_of_the_nodes_is_no_resistance() {
+    for picofarad in [0.0, 50.0, 100.0, 140.0, 200.0, 500.0, 1000.0] {
+        let mut config = Config::default();
+        config.inverter.node_capacitance_f = 1e-12 * picofarad;
+        for (plant, level) in [(PlantModel::A, FluxLevel::Low), (PlantModel::M4, FluxLevel::High)] {
+            (config.model.plant, config.model.flux_level) = (plant, level);
+            let settings = experiments::commission::commissioned(&config, 9).unwrap();
+            let error = f64::from(settings.motor.r_s) / config.motor.r_s - 1.0;
+            assert!(error.abs() < 0.003, "{picofarad} pF, {plant:?}: r_s by {error}");
+        }
     }
 }
 
@@ -29,8 +98,8 @@ fn random_machines_are_accepted_and_right() {
 #[test]
 fn iron_is_found_by_the_staircase() {
     let mut config = config(20);
-    config.model.plant = hil_sim::config::PlantModel::M4;
-    config.model.flux_level = hil_sim::config::FluxLevel::High;
+    config.model.plant = PlantModel::M4;
+    config.model.flux_level = FluxLevel::High;
     let metrics = experiments::run("commission", &config, 3).unwrap().metrics;
     let get = |name: &str| metrics.get(name).unwrap();
     assert_eq!((get("accepted"), get("wrongly_accepted")), (20.0, 0.0));

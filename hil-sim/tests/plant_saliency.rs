@@ -60,6 +60,16 @@ fn textbook_machine_has_its_impedance_at_600_hz() {
 }
 
 #[test]
+fn a_saliency_fixed_to_the_stator_needs_no_flux() {
+    let s =
+        SaliencySettings { stator_fixed: 0.01, stator_fixed_deg: 30.0, ..SaliencySettings::NONE };
+    let axis = FRAC_PI_2 / 3.0;
+    let [low, high] = [axis, axis + FRAC_PI_2].map(|angle| injected(s, 0.0, 50.0, angle));
+    let ratio = low[0].norm() / high[0].norm();
+    assert!((ratio - 1.01 / 0.99).abs() < 1e-4, "{ratio}");
+}
+
+#[test]
 fn the_flux_axis_has_the_high_impedance() {
     let s = SaliencySettings::default();
     let [d, _] = injected(s, 0.7, 1.0, 0.0);

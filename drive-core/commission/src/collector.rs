@@ -7,6 +7,7 @@ use super::motion::Motion;
 use super::plant_fit::PlantFit;
 use drive_core::carrier::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use drive_core::{Abc, AlphaBeta, PERIOD_S};
+use num_complex::Complex32;
 
 /// Bins of a record.
 pub const BINS: usize = 57;
@@ -196,9 +197,9 @@ impl Collector {
     }
 
     /// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.
-    pub(super) fn phasors(&self) -> [[f32; 2]; 4] {
+    pub(super) fn phasors(&self) -> [Complex32; 4] {
         let share = 2.0 / self.recorded.samples as f32;
-        self.recorded.carrier.map(|parts| parts.map(|sum| share * sum))
+        self.recorded.carrier.map(|[cos, sin]| share * Complex32::new(cos, -sin))
     }
 
     /// Noise of the sensors a and b, A rms, and the dc link, V, without current.

@@ -8,10 +8,19 @@
 //!
 //! For a given rotor time constant `i_m` follows from the measured current, exactly over bins of constant current, and the
 //! rest is linear in the four unknowns. The time constant with the least misfit is searched for.
+//!
+//! Across phase a no voltage is put out. What flows there, `i'`, with `i_m'` of its own, is linear in four unknowns again:
+//!
+//! ```text
+//! r_s i' + R_R (i' - i_m') = c i + v' + g (i - i_m) - w L_M di_w/dt        di_w/dt = i_m - i_w / tau_r
+//! ```
+//!
+//! `c` is of sensors and resistances that differ between the phases b and c, `v'` of legs, `g` of sensors alone, and a shaft
+//! that turns with `w` brings the flux across: that changes and decays, but leaves no steady current.
 
 use super::collector::{Bin, Collector};
 use super::report::Refusal;
-use drive_core::PERIOD_S;
+use drive_core::{AlphaBeta, PERIOD_S, SQRT_3};
 
 /// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
 /// inductance meanwhile: a share of the rotor time constant, from 12 ms to 60 ms.
@@ -36,18 +45,37 @@ pub(super) struct Fitted {
     pub e: f32,
     /// Voltage times current that e lacks at a small current, V A; see [`levels`](super::levels).
     pub bend: f32,
-    /// Gain mismatch of the sensors; see [`levels`](super::levels).
-    pub mismatch: f32,
     /// ohm.
     pub r_r: f32,
     /// s.
     pub tau_r: f32,
+    /// Magnetising current at the end of the bins, A.
+    pub magnetising: f32,
+    /// What the currents of the phases b and c differ by; see [`levels`](super::levels).
+    pub difference: f32,
     /// Rms of the residual, V.
     pub misfit: f32,
     /// Standard deviations of r_s, e, R_R by what the fit leaves.
     pub deviations: [f32; 3],
     /// That of tau_r, s.
     pub tau_deviation: f32,
+}
+
+impl Fitted {
+    /// The fit across phase a, to bins that began without flux; none where nothing can be fitted: what the currents of the phases
+    /// b and c differ by, voltage, V, electrical speed of the shaft, rad/s, and rms of the residual, V.
+    pub fn across(&self, sums: &Collector) -> Option<[f32; 4]> {
+        let resistances = Some([self.r_s, self.r_r]);
+        let best = fit(sums, 0.0, self.tau_r, begins(self.tau_r), resistances)?;
+        let [c, volts, _, turning] = best.values.map(|value| value as f32);
+        Some([SQRT_3 * c / self.r_s, volts, -turning, libm::sqrt(best.left / best.weight) as f32])
+    }
+}
+
+/// Bins from here on count with this time constant, s: control periods.
+fn begins(tau_r: f32) -> f32 {
+    let (least, most) = FROM_S;
+    (FROM_OF_TAU_R * tau_r).clamp(least, most) / PERIOD_S
 }
 
 /// A fit for one time constant.
@@ -57,6 +85,8 @@ struct Candidate {
     left: f64,
     values: [f64; N],
     variances: [f64; N],
+    /// Magnetising current at the end, A.
+    magnetising: f32,
     /// Periods, and bins.
     weight: f64,
     bins: f64,
@@ -92,7 +122,7 @@ impl Search {
     /// One fit; the result after the last. Refused where nothing can be fitted.
     pub fn step(&mut self, sums: &Collector) -> Result<Option<Fitted>, Refusal> {
         let x = self.from + self.step * f32::from(self.point);
-        if let Some(candidate) = fit(sums, self.steady, libm::expf(x), self.begins) {
+        if let Some(candidate) = fit(sums, self.steady, libm::expf(x), self.begins, None) {
             let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
             if better {
                 self.best = Some((x, candidate));
@@ -113,8 +143,7 @@ impl Search {
             return Ok(Some(self.fitted(x, &best)));
         }
         if self.round == 0 {
-            let (least, most) = FROM_S;
-            self.begins = (FROM_OF_TAU_R * libm::expf(x)).clamp(least, most) / PERIOD_S;
+            self.begins = begins(libm::expf(x));
         }
         // From one spacing below the best to one above.
         self.from = x - self.step;
@@ -134,23 +163,38 @@ impl Search {
         let misfit = libm::sqrt(best.left / best.weight) as f32;
         let tau_deviation = tau_r * libm::sqrt(2.0 * variance / curvature.max(1e-12)) as f32;
         let deviations = [d_r_s, d_e, d_r_r];
-        Fitted { r_s, e, r_r, tau_r, misfit, deviations, tau_deviation, ..Fitted::default() }
+        let (magnetising, default) = (best.magnetising, Fitted::default());
+        Fitted { r_s, e, r_r, tau_r, magnetising, misfit, deviations, tau_deviation, ..default }
     }
 }
 
-/// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level.
-fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Option<Candidate> {
-    // Products of i, 1, i - i_m, di/dt and v.
+/// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level: along
+/// phase a, or across it with these resistances r_s and R_R, ohm.
+fn fit(
+    sums: &Collector,
+    mut magnetising: f32,
+    tau_r: f32,
+    begins: f32,
+    across: Option<[f32; 2]>,
+) -> Option<Candidate> {
+    // Products of what stands at the four unknowns, and of the voltage.
     let (mut products, mut count) = ([[0.0_f64; N + 1]; N + 1], 0.0_f64);
+    // i_m' and i_w.
+    let (mut beside, mut turning) = (0.0_f32, 0.0_f32);
     for half in 0..2 {
         let mut bins = sums.bins(half).peekable();
         let (mut start, mut before) = (0.0_f32, None::<Bin>);
         while let Some(bin) = bins.next() {
-            let i = bin.current.alpha;
-            // Exact for a constant current: end and mean of i_m over the bin.
+            let AlphaBeta { alpha: i, beta: j } = bin.current;
+            // Exact for a constant current: ends of all three over the bin, and means of i_m and i' - i_m'.
             let turned = bin.periods * PERIOD_S / tau_r;
             let decayed = -libm::expm1f(-turned);
             let mean = i + (magnetising - i) * (decayed / turned);
+            let late = turned * (1.0 - decayed) * (magnetising - i);
+            let grown = tau_r * (i * decayed + late) - decayed * turning;
+            turning += grown;
+            let fresh = (j - beside) * decayed;
+            beside += fresh;
             magnetising += (i - magnetising) * decayed;
             let counts = start >= begins;
             start += bin.periods;
@@ -159,16 +203,13 @@ fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Optio
             {
                 let apart = bin.periods + 0.5 * (before.periods + after.periods);
                 let slope = (after.current.alpha - before.current.alpha) / (apart * PERIOD_S);
-                let x = [i, 1.0, i - mean, slope, bin.voltage].map(f64::from);
+                let [last, v] = match across {
+                    None => [slope, bin.voltage],
+                    Some([r_s, r_r]) => [r_r * grown / turned, r_s * j + r_r * fresh / turned],
+                };
+                let x = [i, 1.0, i - mean, last, v].map(f64::from);
                 let w = f64::from(bin.periods);
-                // The upper half, and few operations: in software they take some 60 cycles each, and the main loop
-                // must be back within 4 ms.
-                for n in 0..=N {
-                    let weighted = w * x[n];
-                    for m in n..=N {
-                        products[n][m] += weighted * x[m];
-                    }
-                }
+                add(&mut products, x, w);
                 count += 1.0;
             }
         }
@@ -177,16 +218,48 @@ fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Optio
         return None;
     }
     let inverse = inverse(&products)?;
-    let xy: [f64; N] = core::array::from_fn(|n| products[n][N]);
-    let values = inverse.map(|row| row.iter().zip(&xy).map(|(a, b)| a * b).sum::<f64>());
-    let explained: f64 = values.iter().zip(&xy).map(|(a, b)| a * b).sum();
+    let values = values(&inverse, &products);
+    let explained: f64 = values.iter().zip(&products).map(|(a, row)| a * row[N]).sum();
     let left = (products[N][N] - explained).max(0.0);
     let variances = core::array::from_fn(|n| inverse[n][n]);
-    Some(Candidate { left, values, variances, weight: products[1][1], bins: count })
+    Some(Candidate { left, values, variances, magnetising, weight: products[1][1], bins: count })
+}
+
+/// The products of the unknowns and of the voltage, their upper half, as [`inverse`] takes them.
+type Products = [[f64; N + 1]; N + 1];
+
+/// Adds an equation of this weight.
+fn add(products: &mut Products, x: [f64; N + 1], weight: f64) {
+    // Few operations: in software they take some 60 cycles each, and the main loop must be back within 4 ms.
+    for n in 0..=N {
+        let weighted = weight * x[n];
+        for m in n..=N {
+            products[n][m] += weighted * x[m];
+        }
+    }
+}
+
+/// The unknowns, by the inverse.
+fn values(inverse: &[[f64; N]; N], products: &Products) -> [f64; N] {
+    inverse.map(|row| row.iter().zip(products).map(|(a, row)| a * row[N]).sum())
+}
+
+/// Resistance r_s, ohm, e, V, and d, V A, of steady voltages r_s i + e - d/i at these currents, by least squares: those of an
+/// inverter whose current has to swing the capacitance of the nodes.
+pub(super) fn bent(points: &[(f32, f32)]) -> Result<[f32; 3], Refusal> {
+    let mut products = [[0.0; N + 1]; N + 1];
+    // There is no fourth.
+    products[N - 1][N - 1] = 1.0;
+    for &(i, v) in points {
+        add(&mut products, [i, 1.0, -1.0 / i, 0.0, v].map(f64::from), 1.0);
+    }
+    let inverse = inverse(&products).ok_or(Refusal::SamplesLost)?;
+    let [r_s, e, d, _] = values(&inverse, &products).map(|value| value as f32);
+    Ok([r_s, e, d])
 }
 
 /// The inverse of a positive definite matrix, given by its upper half, by Gauss and Jordan; none where it is not one.
-fn inverse(a: &[[f64; N + 1]; N + 1]) -> Option<[[f64; N]; N]> {
+fn inverse(a: &Products) -> Option<[[f64; N]; N]> {
     // A and the identity beside it become the identity and the inverse.
     let mut rows = [[0.0; 2 * N]; N];
     for n in 0..N {

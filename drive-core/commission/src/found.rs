@@ -36,7 +36,9 @@ pub struct Levels {
     pub tau_r: f32,
     /// Voltage that a phase of the inverter loses, V: dead time and drop.
     pub inverter_v: f32,
-    /// (gain of sensor a)/(gain of b) - 1.
+    /// What the currents of the phases b and c differ by at dc, (-i_a)/(2 i_b) - 1: sensors and resistances.
+    pub difference: f32,
+    /// (gain of sensor a)/(gain of b) - 1; the carrier finds it, until then 0.
     pub mismatch: f32,
     /// Whether the main flux saturates: `r_r` and `tau_r` are then those of no circuit.
     pub saturates: bool,
@@ -60,11 +62,14 @@ impl Levels {
     }
 
     pub(super) fn new(fit: &Fitted) -> Self {
-        // Impedances were divided by the current of sensor a.
-        let gain = 1.0 + 0.5 * fit.mismatch;
-        let (r_s, r_r, inverter_v) = (fit.r_s * gain, fit.r_r * gain, 0.75 * fit.e);
-        let Fitted { tau_r, mismatch, .. } = *fit;
-        Self { r_s, r_r, tau_r, inverter_v, mismatch, saturates: false }
+        let Fitted { r_s, r_r, tau_r, e, difference, .. } = *fit;
+        Self { r_s, r_r, tau_r, inverter_v: 0.75 * e, difference, ..Self::default() }
+    }
+
+    /// With this gain mismatch: impedances were divided by the current of sensor a.
+    pub(super) fn with_mismatch(self, mismatch: f32) -> Self {
+        let gain = (1.0 + 0.5 * mismatch) / (1.0 + 0.5 * self.mismatch);
+        Self { r_s: self.r_s * gain, r_r: self.r_r * gain, mismatch, ..self }
     }
 }
 

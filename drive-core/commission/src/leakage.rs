@@ -15,44 +15,51 @@
 use core::f32::consts::TAU;
 
 use super::{
-    Answer, Collector, Commissioning, Leakage, Meaning, Quantity, Record, Refusal, SIZE, Step,
+    Answer, Collector, Commissioning, Leakage, Levels, Meaning, Quantity, Record, Refusal, SIZE,
+    Step,
 };
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
 use drive_settings::rules::CARRIER_HZ;
+use num_complex::Complex32;
 
 /// Bisections of the inductance.
 const BISECTIONS: u32 = 30;
 
-/// Bias of the carrier, as shares of the test current; carrier current likewise; largest carrier as a share of the dc link.
-const BIASES: [f32; 2] = [0.5, 0.25];
-const CARRIER: f32 = 0.07;
-const CARRIER_OF_BUS: f32 = 0.3;
+/// Bias of the carrier and carrier current, as shares of the test current. The first also gives the gain mismatch.
+const BIASES: [(f32, f32); 2] = [(0.5, 0.14), (0.25, 0.07)];
+/// Parts of each.
+const PARTS: usize = 7;
+/// Largest carrier as a share of the dc link.
+const CARRIER_OF_BUS: f32 = 0.4;
 /// Longest time until the flux of a bias counts as standing, s: it moves the saliency, not the mean inductance.
 const SETTLED_S: f32 = 2.1;
 /// Samples of a record, and time of the rise of the carrier, and of its fall, s.
-const RECORDED: f32 = 1500.0;
+const RECORDED: f32 = 3000.0;
 const RISE_S: f32 = 0.05;
-/// Largest gain mismatch that is left at the carrier.
-const LEFT: f32 = 0.01;
+/// Largest gain mismatch, and difference of the resistances of phases b and c.
+const MISMATCH: f32 = 0.05;
+const RESISTANCES: f32 = 0.06;
 /// rad/s.
 const CARRIER_RAD_PER_S: f32 = TAU * CARRIER_HZ;
 
-/// A/V along phase a, and across it.
-fn admittances(seen: &[[f32; 2]; 4]) -> [f32; 2] {
-    let [v_a, v_b, i_a, i_b] = seen.map(|[re, im]| libm::hypotf(re, im));
-    [i_a / v_a, i_b / v_b]
+/// 1 - (gain of b)/(gain of a), from the carrier along phase a and across it. A motor, however salient, makes as much current
+/// across by a voltage along as the other way round.
+fn gains(along: &[Complex32; 4], across: &[Complex32; 4]) -> Complex32 {
+    let [v, _, i, i_across] = along;
+    let [v_along, v_across, i_along, _] = across;
+    SQRT_3 * (i_across / i - (i_along * v / i - v_along) / v_across)
 }
 
-/// Gain mismatch that the carrier along phase a shows: (gain of a)/(gain of b) - 1.
-fn mismatch([_, _, [re_a, im_a], [re_b, im_b]]: &[[f32; 2]; 4]) -> f32 {
-    SQRT_3 * (re_a * re_b + im_a * im_b) / (re_a * re_a + im_a * im_a)
+/// Share of the sample before in what the analog filter, periods, passes.
+fn held(filter: f32) -> f32 {
+    if filter > 0.0 { filter * -libm::expm1f(-1.0 / filter) } else { 0.0 }
 }
 
 /// The inductance, H, that gives this admittance, A/V, with the resistance R', ohm, and the analog filter, periods.
 fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) -> f32 {
     let (sin, cos) = libm::sincosf(TAU / CARRIER_SAMPLES as f32);
-    let b = if filter > 0.0 { filter * -libm::expm1f(-1.0 / filter) } else { 0.0 };
+    let b = held(filter);
     let seen = libm::hypotf((1.0 - b) + b * cos, b * sin);
     let (mut low, mut high) = (libm::logf(range.0), libm::logf(range.1));
     for _ in 0..BISECTIONS {
@@ -69,12 +76,16 @@ impl Commissioning {
     pub(super) fn leakage(&mut self, sums: &mut Collector) -> Answer {
         let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
         let regulator = self.regulator()?;
-        let volts = CARRIER * self.plate.amperes * CARRIER_RAD_PER_S * self.rough()?;
+        let bias = self.state.part / PARTS;
+        let Some(&(share, carrier)) = BIASES.get(bias) else {
+            return self.report_leakage(levels);
+        };
+        let volts = carrier * self.plate.amperes * CARRIER_RAD_PER_S * self.rough()?;
         let volts = volts.min(CARRIER_OF_BUS * self.plate.dc_link);
         let none = AlphaBeta::ZERO;
         let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
         // The parts of a bias.
-        let parts = [
+        let parts: [_; PARTS] = [
             (Record::Nothing, (3.0 * levels.tau_r).min(SETTLED_S), none),
             (Record::Nothing, RISE_S, along),
             (Record::Carrier, RECORDED * PERIOD_S, along),
@@ -83,25 +94,22 @@ impl Commissioning {
             (Record::Carrier, RECORDED * PERIOD_S, across),
             (Record::Nothing, RISE_S, none),
         ];
-        let (bias, part) = (self.state.part / parts.len(), self.state.part % parts.len());
-        let Some(&share) = BIASES.get(bias) else { return self.report_leakage() };
+        let part = self.state.part % PARTS;
         // A record has ended: along the bias, or across it.
         if let 3 | 6 = part {
             let axis = usize::from(part == 6);
             let seen = sums.phasors();
-            let admittance = admittances(&seen)[axis];
-            let half = 0.5 * levels.mismatch;
-            let gain = if axis == 0 { 1.0 + half } else { 1.0 - half };
             let (least, most) = self.plate.leakage;
             let range = (0.1 * least, 10.0 * most);
-            self.inductances[bias][axis] =
-                inductance(admittance / gain, levels.r_s + levels.r_r, self.plate.filter, range);
+            let [v_a, v_b, i_a, i_b] = seen;
+            let admittance = if axis == 0 { i_a / v_a } else { i_b / v_b };
+            let admittance = libm::hypotf(admittance.re, admittance.im);
+            let r = levels.r_s + levels.r_r;
+            self.inductances[bias][axis] = inductance(admittance, r, self.plate.filter, range);
             if axis == 0 {
-                let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-                let of_noise = 6.0 * noise / (volts * admittance * fpu_sqrt::sqrtf(RECORDED / 2.0));
-                let allowed = of_noise.max(LEFT);
-                Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
-                    .up_to(allowed, Meaning::Turning)?;
+                self.state.along = seen;
+            } else if bias == 0 {
+                self.state.gains = gains(&self.state.along, &seen);
             }
         }
         let (record, seconds, carrier) = parts[part];
@@ -110,12 +118,21 @@ impl Commissioning {
         self.begin(sums, (record, seconds, excitation))
     }
 
-    fn report_leakage(&mut self) -> Answer {
+    fn report_leakage(&mut self, levels: Levels) -> Answer {
+        // A lag of b mixes in a share of the sample before, whatever the current does between the two.
+        let (sin, cos) = libm::sincosf(TAU / CARRIER_SAMPLES as f32);
+        let (z, b) = (Complex32::new(cos, -sin), held(self.plate.filter));
+        let lag = (1.0 - z) / (1.0 - b + b * z);
+        let share = self.state.gains.im / lag.im;
+        let b_over_a = 1.0 - (self.state.gains.re - share * lag.re);
+        let mismatch = 1.0 / b_over_a - 1.0;
+        let by_gain = |[a, b]: [f32; 2]| [a * (1.0 + 0.5 * mismatch), b * (1.0 - 0.5 * mismatch)];
+        self.inductances = self.inductances.map(by_gain);
         // With the bias along phase a.
         let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
         let [high, low] = self.inductances;
         let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);
-        let [most, least] = BIASES.map(|share| share * self.plate.amperes);
+        let [most, least] = BIASES.map(|(share, _)| share * self.plate.amperes);
         let slope = (high[1] - low[1]) / (most - least);
         let fundamental = low[1] - slope * least;
         let values = [
@@ -124,7 +141,12 @@ impl Commissioning {
             Quantity::new("saliency at a quarter", "", saliency(low)),
             Quantity::new("fundamental wave, no current", "H", fundamental),
             Quantity::new("its change per ampere", "H/A", slope),
+            Quantity::new("gain mismatch", "", mismatch).up_to(MISMATCH, Meaning::Mismatch)?,
+            Quantity::new("lag of sensor b", "us", share * PERIOD_S * 1e6),
+            Quantity::new("r_b over r_c, less 1", "", 2.0 * (levels.difference - mismatch))
+                .up_to(RESISTANCES, Meaning::Resistances)?,
         ];
+        self.found.levels = Some(levels.with_mismatch(mismatch));
         self.found.leakage = Some(Leakage { inductance, fundamental, slope });
         self.report(&values)
     }

@@ -1,23 +1,22 @@
 //! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
 
+use super::fit::bent;
 use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
     Record, Refusal, SIZE, Step, TAU_R, TIME,
 };
-use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
+use drive_core::{Excitation, PERIOD_S, SQRT_3};
 
 /// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
 /// depends on the current.
 const LEVELS: [f32; 4] = [0.8, 0.2, 0.45, 0.3];
 const LEVEL_S: f32 = 1.5;
-/// Bins at the end of a level that count as steady.
-const STEADY: usize = BINS - 6;
 /// Largest deviation of the rotor resistance of a linear motor.
 const LINEAR: f32 = 0.017;
-/// Largest gain mismatch.
-const MISMATCH: f32 = 0.05;
-/// Largest current across phase a, as a share of that along it, and of the test current.
-const ACROSS: (f32, f32) = (0.015, 0.001);
+/// Fastest shaft that counts as at rest, electrical rad/s. A free one turns by degrees.
+const AT_REST: f32 = 1.0;
+/// Largest difference of the delays of two legs, s.
+const LEGS_S: f32 = 0.3e-6;
 /// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
 const MISFIT_PER_NOISE: f32 = 105.0;
 const MISFIT_OF_BUS: f32 = 8e-5;
@@ -27,28 +26,15 @@ const SATURATED: f32 = 30.0;
 const ENDS: usize = BINS - 2;
 /// Largest error of the third level: share of the resistive voltage, and of the dc link.
 const THIRD: (f32, f32) = (0.01, 6.5e-5);
-/// Share of it from which on the inverter's voltage is taken to depend on the current.
+/// Share of it from which on a further level has to confirm that the inverter's voltage depends on the current.
 const BENT: f32 = 0.3;
 /// Least voltage of the inverter, as a share of that of the dead time: with less, nodes of much capacitance make it grow with the
 /// current up to the test current, like a resistance. (Transistors may turn off later than they turn on.)
 const DEAD_TIME: f32 = 0.7;
-/// Wait before the third level is measured, and time of its mean, in rotor time constants.
+/// Wait before the third level is measured, and least time of its mean, in rotor time constants. It is as long as the first two
+/// at least.
 const WAIT_T: f32 = 3.0;
-const MEAN_T: f32 = 0.5;
-
-impl Fitted {
-    /// With an inverter whose voltage is e - d/i, as that of nodes whose capacitance the current has to swing. The line through
-    /// the first two levels misses the third, of a test current `i`, by `error`.
-    fn bent(self, error: f32, i: f32) -> Self {
-        let [high, low, third, _] = LEVELS;
-        let slope = -1.0 / (high * low);
-        let missed = 1.0 / low + slope * (third - low) - 1.0 / third;
-        let bend = error * i / missed;
-        let r_s = self.r_s + slope * bend / (i * i);
-        let e = self.e + (self.r_s - r_s) * high * i + bend / (high * i);
-        Self { r_s, e, bend, ..self }
-    }
-}
+const MEAN_T: f32 = 1.0;
 
 impl Commissioning {
     pub(super) fn levels(&mut self, sums: &mut Collector) -> Answer {
@@ -62,7 +48,12 @@ impl Commissioning {
             // The first two levels have ended; or the third, or the fourth.
             3 => {
                 let Some(fit) = self.search(sums, 0.0)? else { return Ok(Next::Wait) };
-                self.state.fitted = Fitted { mismatch: self.mismatch(sums, noise)?, ..fit };
+                let difference = self.across(sums, &fit, limit)?;
+                // The low level has lasted as long as the search.
+                let low = LEVELS[1] * self.plate.amperes;
+                let since = sums.recorded.samples as f32 * PERIOD_S / fit.tau_r;
+                let magnetising = low + (fit.magnetising - low) * libm::expf(-since);
+                self.state.fitted = Fitted { magnetising, difference, ..fit };
                 if fit.misfit > limit || fit.deviations[2] > LINEAR * fit.r_r {
                     return self.report_saturated(sums, limit);
                 }
@@ -76,7 +67,7 @@ impl Commissioning {
             _ => {}
         }
         let tau_r = self.state.fitted.tau_r;
-        let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(QUIET_S));
+        let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(LEVEL_S - WAIT_T * tau_r));
         let [high, low, third, fourth] = LEVELS.map(|share| self.along(share, regulator));
         let parts = [
             (Record::Nothing, QUIET_S, Excitation::Rest),
@@ -90,41 +81,42 @@ impl Commissioning {
         self.begin(sums, parts[part % parts.len()])
     }
 
-    /// The gain mismatch that the first two levels show. No current may flow across phase a, once the gains are corrected.
-    fn mismatch(&self, sums: &Collector, noise: f32) -> Result<f32, Refusal> {
-        let [high, low] = [0, 1].map(|half| sums.mean(half, STEADY).current);
-        let (da, db) = (high.alpha - low.alpha, on_b(high) - on_b(low));
-        let mismatch = -da / (2.0 * db) - 1.0;
-        Quantity::new("gain mismatch", "", mismatch).up_to(MISMATCH, Meaning::Mismatch)?;
-        for bin in sums.bins(0).chain(sums.bins(1)) {
-            let (a, b) = (bin.current.alpha, on_b(bin.current));
-            let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
-            let across = (a + 2.0 * b) * (1.0 / SQRT_3);
-            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * self.plate.amperes;
-            let allowed = allowed + 6.0 * noise / fpu_sqrt::sqrtf(bin.periods);
-            Quantity::new("current across phase a", "A", across)
-                .up_to(allowed, Meaning::Turning)?;
-        }
-        Ok(mismatch)
+    /// What the currents of the phases b and c differ by. A shaft that turns makes a current across phase a that changes, legs that
+    /// differ a constant one.
+    fn across(&self, sums: &Collector, fit: &Fitted, limit: f32) -> Result<f32, Refusal> {
+        let [difference, volts, speed, misfit] = fit.across(sums).ok_or(Refusal::SamplesLost)?;
+        let legs = LEGS_S / PERIOD_S * self.plate.dc_link * (1.0 / SQRT_3);
+        let (moved, positive) = (2.0 * limit, (0.0, f32::INFINITY));
+        Quantity::new("R_R", "ohm", fit.r_r).checked(positive, [Meaning::Turning; 2])?;
+        Quantity::new("turning flux", "rad/s", speed).up_to(AT_REST, Meaning::Turning)?;
+        Quantity::new("misfit across phase a", "V", misfit).up_to(moved, Meaning::Turning)?;
+        Quantity::new("voltage across phase a", "V", volts).up_to(legs, Meaning::Legs)?;
+        Ok(difference)
     }
 
-    /// Whether the third level or the fourth confirms what the first two have shown. The third may show instead that the
-    /// voltage of the inverter depends on the current.
+    /// Whether the third level or the fourth confirms what the first two have shown. The third also gives what the voltage of
+    /// the inverter lacks at a small current; where that is much, the fourth has to confirm it.
     fn is_confirmed(&mut self, sums: &Collector) -> Result<bool, Refusal> {
         let (fit, seen) = (self.state.fitted, sums.mean(0, 0));
         let resistive = fit.r_s * seen.current.alpha;
         let allowed = THIRD.0 * resistive + THIRD.1 * self.plate.dc_link;
         // What is left of the transient from the level before.
-        let turned = seen.periods * PERIOD_S / fit.tau_r;
-        let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
-        let [_, before, now, last] = LEVELS.map(|share| share * self.plate.amperes);
+        let (i, turned) = (seen.current.alpha, seen.periods * PERIOD_S / fit.tau_r);
+        let behind = (i - fit.magnetising) * libm::expf(-WAIT_T);
+        let rest = behind * -libm::expm1f(-turned) / turned;
+        self.state.fitted.magnetising = i - behind * libm::expf(-turned);
         let is_third = self.state.part == 5;
-        let stepped = if is_third { now - before } else { last - now };
-        let bent = fit.e - fit.bend / seen.current.alpha;
-        let error = seen.voltage - bent - resistive - fit.r_r * stepped * rest;
-        if is_third && error > BENT * allowed {
-            self.state.fitted = fit.bent(error, self.plate.amperes);
-            return Ok(false);
+        let error = seen.voltage - (fit.e - fit.bend / i) - resistive - fit.r_r * rest;
+        // A capacitance is not negative.
+        if is_third && error > 0.0 {
+            let third = (i, seen.voltage - fit.r_r * rest);
+            let [high, low, ..] = LEVELS.map(|share| share * self.plate.amperes);
+            let [high, low] = [high, low].map(|i| (i, fit.r_s * i + fit.e));
+            let fitted = &mut self.state.fitted;
+            [fitted.r_s, fitted.e, fitted.bend] = bent(&[high, low, third])?;
+            if error > BENT * allowed {
+                return Ok(false);
+            }
         }
         Quantity::new("error of the last level", "V", error).up_to(allowed, Meaning::Inverter)?;
         Ok(true)
@@ -142,7 +134,7 @@ impl Commissioning {
         let values = [
             Quantity::new("r_s", "ohm", levels.r_s).checked(self.plate.r_s, SIZE)?,
             self.inverter_voltage(&levels)?,
-            Quantity::new("gain mismatch", "", levels.mismatch),
+            Quantity::new("difference of b and c", "", levels.difference),
             misfit(&fit, limit),
         ];
         self.found.levels = Some(levels);
@@ -165,7 +157,7 @@ impl Commissioning {
             Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(TAU_R, TIME)?,
             Quantity::new("L_M", "H", levels.coupled()),
             self.inverter_voltage(&levels)?.within(0.75 * d_e),
-            Quantity::new("gain mismatch", "", fit.mismatch),
+            Quantity::new("difference of b and c", "", fit.difference),
             misfit(fit, limit),
         ])
     }
@@ -174,9 +166,4 @@ impl Commissioning {
 /// The misfit, beside that of a linear motor.
 fn misfit(fit: &Fitted, limit: f32) -> Quantity {
     Quantity::new("misfit", "V", fit.misfit).allowing((0.0, limit))
-}
-
-/// Phase current b of a current vector, A.
-fn on_b(i: AlphaBeta) -> f32 {
-    0.5 * (SQRT_3 * i.beta - i.alpha)
 }

@@ -65,6 +65,7 @@ use drive_core::{AlphaBeta, Excitation, Excited, FirstOrder, PERIOD_S, Regulator
 use drive_settings::Settings;
 use drive_settings::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
 use drive_settings::value::Words as _;
+use num_complex::Complex32;
 
 pub use collector::{BINS, Bin, Collector, Record};
 pub use found::{Found, Leakage, Levels};
@@ -145,6 +146,9 @@ struct StepState {
     trains: u32,
     /// Levels: the fit to the first two.
     fitted: Fitted,
+    /// Leakage: the carrier along the present bias, and what the gains of the sensors differ by.
+    along: [Complex32; 4],
+    gains: Complex32,
     stairs: Staircase,
     /// The plants along and across that the current loop is to be designed for.
     plants: [Option<FirstOrder>; 2],

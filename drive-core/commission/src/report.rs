@@ -16,10 +16,9 @@ words! {
         Sensors = "sensors",
         /// Volt-second pulses: wiring, open phases, rough transient inductance.
         Wiring = "wiring",
-        /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter, gain
-        /// mismatch.
+        /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter.
         Levels = "levels",
-        /// The carrier along and across a bias: transient inductance, saliency at standstill.
+        /// The carrier along and across a bias: transient inductance, saliency at standstill, gain mismatch.
         Leakage = "leakage",
         /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
         Staircase = "staircase",
@@ -116,15 +115,19 @@ words! {
         /// The model of a linear motor does not fit.
         Misfit = "the motor is not linear at these currents, or something has moved",
         /// Gains that differ.
-        Mismatch = "compare scales.current_a and scales.current_b with an ammeter; was the shaft at rest?",
-        /// Current across the axis of the voltage.
-        Turning = "the shaft turns, or the gains of the sensors differ",
+        Mismatch = "compare scales.current_a and scales.current_b with an ammeter",
+        /// Resistances that differ.
+        Resistances = "look for a bad joint, a cable or a winding: the resistances of phases b and c differ",
+        /// Voltages of the legs that differ.
+        Legs = "dead time, drive or switches of the legs b and c differ",
+        /// Current across the axis of the voltage that changes.
+        Turning = "the shaft turns",
         /// Inverter voltage that depends on the current.
         Inverter = "the voltage that the inverter loses still grows with the current",
         /// Value too uncertain.
         Uncertain = "too much noise for this motor",
         /// The step response of the current loop.
-        Loop = "the motor is not as it was measured",
+        Loop = "the motor is not as it was measured, or a filter lies before it",
         /// The speed does not follow the torque.
         NotFree = "the shaft must be free to turn; friction, a load or a coupling hides the inertia",
     }

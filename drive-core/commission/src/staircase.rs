@@ -1,10 +1,10 @@
 //! Step 6: the magnetising curve, where the main flux saturates.
 //!
 //! The current along phase a climbs a staircase. In every step the stator flux grows by the area under the voltage that the
-//! end of the step does not explain, and the ends themselves lie on a line:
+//! end of the step does not explain, and the ends themselves lie on a line, but for what an inverter lacks at small currents:
 //!
 //! ```text
-//! psi_s += sum T (v - v_end - r_s (i - i_end))        v_end = r_s i_end + e        psi_m = psi_s - L_l i
+//! psi_s += sum T (v - v_end - r_s (i - i_end))        v_end = r_s i_end + e - d/i_end        psi_m = psi_s - L_l i
 //! ```
 //!
 //! The first step begins at a current at which the inverter already takes its full voltage; the flux there is on the
@@ -15,6 +15,7 @@
 //! r_r = R_R'/k'^2        k' = 1/sqrt(1 + L_s'/L_M')        L_l = L_s'/(1 + k')        l_m = psi_m(i_d)/i_d
 //! ```
 
+use super::fit::bent;
 use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Meaning, Next, Quantity, Record, Refusal, SIZE,
     Step, TAU_R, TIME,
@@ -80,14 +81,12 @@ impl Staircase {
     /// The line through the ends, and the flux of the levels. Currents are those of sensor a over its `gain`.
     fn evaluate(&mut self, gain: f32, dc_link: f32) -> Result<(), Refusal> {
         let [first, rest @ ..] = &self.stairs;
-        let count = rest.len() as f32;
-        let mean = |of: fn(&Stair) -> f32| rest.iter().fold(0.0, |sum, s| sum + of(s) / count);
-        let (i, v) = (mean(|s| s.i), mean(|s| s.v));
-        let sum = |of: &dyn Fn(&Stair) -> f32| rest.iter().fold(0.0, |sum, s| sum + of(s));
-        let r_s = sum(&|s| (s.i - i) * (s.v - v)) / sum(&|s| (s.i - i) * (s.i - i));
+        let ends: [_; STEPS - 1] = core::array::from_fn(|n| (rest[n].i, rest[n].v));
+        let [r_s, e, bend] = bent(&ends)?;
         for s in rest {
             let allowed = LINE.0 * r_s * s.i + LINE.1 * dc_link;
-            Quantity::new("distance from the resistive line", "V", s.v - v - r_s * (s.i - i))
+            let distance = s.v - (r_s * s.i + e - bend / s.i);
+            Quantity::new("distance from the resistive line", "V", distance)
                 .up_to(allowed, Meaning::Inverter)?;
         }
         let growth = |s: &Stair| s.area - r_s * s.charge;
@@ -97,7 +96,7 @@ impl Staircase {
             flux += growth(s);
             *place = (s.i / gain, flux);
         }
-        (self.r_s, self.e) = (r_s * gain, v - r_s * i);
+        (self.r_s, self.e) = (r_s * gain, e);
         Ok(())
     }
 

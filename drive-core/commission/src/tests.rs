@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use super::collector::{Collector, Record};
-use super::fit::{Fitted, Search};
+use super::fit::{Fitted, Search, bent};
 use drive_core::{AlphaBeta, PERIOD_S};
 
 const T: f64 = PERIOD_S as f64;
@@ -74,4 +74,16 @@ fn the_levels_give_back_the_motor() {
         near(fit.r_r, r_r, 5e-3, "R_R");
         near(fit.tau_r, tau_r, 5e-3, "tau_r");
     }
+}
+
+#[test]
+fn steady_voltages_give_resistance_and_bend() {
+    // 140 pF at 311 V and 6 kHz.
+    let (r_s, e, d) = (5.4, 7.0, 0.054);
+    let point = |i: f32| (i, r_s * i + e - d / i);
+    let found = bent(&[2.9, 0.72, 1.6].map(point)).unwrap();
+    for (found, truth) in found.into_iter().zip([r_s, e, d]) {
+        assert!((found / truth - 1.0).abs() < 1e-3, "{found}, not {truth}");
+    }
+    assert!(bent(&[2.9, 0.72].map(point)).is_err(), "two levels do not tell a bend");
 }

@@ -35,12 +35,14 @@ pub(crate) struct Averaged {
     pub inverse_knee: f64,
     /// Ohm.
     pub on_resistance: f64,
+    /// Further resistance of each phase, ohm.
+    pub resistances: [f64; 3],
 }
 
 impl Averaged {
-    /// Whether the switches have neither capacitance nor resistance.
+    /// Whether the switches have neither capacitance nor resistance, and the phases are alike.
     pub(crate) fn ideal(&self) -> bool {
-        self.inverse_knee == 0.0 && self.on_resistance == 0.0
+        self.inverse_knee == 0.0 && self.on_resistance == 0.0 && self.resistances == [0.0; 3]
     }
 }
 
@@ -64,7 +66,7 @@ impl Source for Averaged {
     }
 }
 
-/// The same with capacitance at the nodes and resistance of the switches.
+/// The same with capacitance at the nodes, resistance of the switches, and phases that differ.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RealSwitches(pub Averaged);
 
@@ -80,7 +82,9 @@ impl Source for RealSwitches {
         };
         let error = |k: usize| {
             let size = if signs[k] > 0.0 { legs.lost[k] } else { legs.gained[k] };
-            shares[k] * (size - legs.residual) + signs[k] * legs.residual
+            shares[k] * (size - legs.residual)
+                + signs[k] * legs.residual
+                + currents[k] * legs.resistances[k]
         };
         legs.v - i * legs.on_resistance - clarke([error(0), error(1), error(2)])
     }

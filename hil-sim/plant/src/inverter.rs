@@ -38,6 +38,10 @@ pub struct InverterSettings {
     pub node_capacitance: f64,
     /// Resistance of a switch that conducts, ohm.
     pub on_resistance: f64,
+    /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.
+    pub more_ohm: [f64; 3],
+    /// Further dead time of each leg, us. Averaged inverter only.
+    pub more_dead_time_us: [f64; 3],
     /// Whether to integrate between the exact instants of the edges rather than averages.
     pub switched: bool,
 }
@@ -59,6 +63,8 @@ impl InverterSettings {
         extra_dead_time_us: 0.0,
         node_capacitance: 0.0,
         on_resistance: 0.0,
+        more_ohm: [0.0; 3],
+        more_dead_time_us: [0.0; 3],
         switched: false,
     };
 
@@ -84,6 +90,9 @@ pub struct Inverter {
     pub(crate) capacitance: f64,
     /// Ohm.
     pub(crate) on_resistance: f64,
+    /// Resistance of each phase, ohm, and dead time of each leg, s, beyond the common ones.
+    pub(crate) resistances: [f64; 3],
+    pub(crate) more_dead_time: [f64; 3],
     pub(crate) switched: bool,
     /// Compare values of the period before.
     pub(crate) previous: Compare,
@@ -104,6 +113,10 @@ impl Inverter {
         let most = if s.switched { 0.0 } else { 1e-6 };
         check("inverter.node_capacitance", s.node_capacitance, 0.0..=most, "F")?;
         check("inverter.on_resistance", s.on_resistance, 0.0..=100.0, "ohm")?;
+        let most = if s.switched { 0.0 } else { 10.0 };
+        for more in [s.more_ohm, s.more_dead_time_us].as_flattened() {
+            check("inverter.more_ohm, inverter.more_dead_time_us", *more, -most..=most, "")?;
+        }
         let mut inverter = Self {
             vdc: 0.0,
             top: f64::from(s.timer_top),
@@ -113,6 +126,8 @@ impl Inverter {
             residual: s.residual_v,
             capacitance: s.node_capacitance,
             on_resistance: s.on_resistance,
+            resistances: s.more_ohm,
+            more_dead_time: s.more_dead_time_us.map(|us| us * 1e-6),
             switched: s.switched,
             previous: Compare::OFF,
         };
@@ -165,19 +180,21 @@ impl Inverter {
             let blend = self.propagation / period;
             v += (clarke(self.duties(&self.previous)) - v) * blend;
         }
-        let dead = self.dead_time / period;
         // A pulse shorter than the dead time vanishes; the dead time cannot take more than it.
-        let taken = |available: f64, duty: f64| {
-            if duty > 0.0 && duty < 1.0 { self.vdc * dead.min(available) } else { 0.0 }
+        let taken = |leg: usize, available: f64| {
+            let dead = (self.dead_time + self.more_dead_time[leg]) / period;
+            let switches = duties[leg] > 0.0 && duties[leg] < 1.0;
+            if switches { self.vdc * dead.max(0.0).min(available) } else { 0.0 }
         };
         let charge = self.capacitance * self.vdc;
         Averaged {
             inverse_knee: if charge > 0.0 { self.dead_time.max(1e-9) / charge } else { 0.0 },
             residual: self.residual,
             on_resistance: self.on_resistance,
+            resistances: self.resistances,
             v: v * self.vdc,
-            lost: duties.map(|d| taken(d, d) + self.residual),
-            gained: duties.map(|d| taken(1.0 - d, d) + self.residual),
+            lost: std::array::from_fn(|k| taken(k, duties[k]) + self.residual),
+            gained: std::array::from_fn(|k| taken(k, 1.0 - duties[k]) + self.residual),
         }
     }
 }

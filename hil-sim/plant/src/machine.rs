@@ -87,17 +87,29 @@ pub struct SaliencySettings {
     pub hold_a: f64,
     /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
     pub psi_n: Option<f64>,
+    /// Part fixed to the stator; positive is low impedance along its axis.
+    pub stator_fixed: f64,
+    /// That axis, electrical degrees from phase a.
+    pub stator_fixed_deg: f64,
 }
 
 impl Default for SaliencySettings {
     fn default() -> Self {
-        Self { a_psi: -0.035, b1: 0.036, chi: 0.0, hold_a: 5.0, psi_n: None }
+        Self { a_psi: -0.035, b1: 0.036, ..Self::NONE }
     }
 }
 
 impl SaliencySettings {
     /// No saliency: the textbook machine.
-    pub const NONE: Self = Self { a_psi: 0.0, b1: 0.0, chi: 0.0, hold_a: 5.0, psi_n: None };
+    pub const NONE: Self = Self {
+        a_psi: 0.0,
+        b1: 0.0,
+        chi: 0.0,
+        hold_a: 5.0,
+        psi_n: None,
+        stator_fixed: 0.0,
+        stator_fixed_deg: 0.0,
+    };
 }
 
 /// Electrical state of the machine.
@@ -165,6 +177,7 @@ pub struct Machine {
     hold_a: f64,
     psi_n_squared: f64,
     half_chi_r: f64,
+    stator_fixed: Complex,
 }
 
 impl Machine {
@@ -183,6 +196,8 @@ impl Machine {
         check("saliency.hold_a", s.hold_a, 0.01..=10_000.0, "A")?;
         check("saliency.b1", s.b1, -50.0..=50.0, "1/A")?;
         check("saliency.chi", s.chi, 0.0..=10.0, "")?;
+        check("saliency.stator_fixed", s.stator_fixed, -0.1..=0.1, "")?;
+        check("saliency.stator_fixed_deg", s.stator_fixed_deg, -180.0..=180.0, "deg")?;
         let psi_n = s.psi_n.unwrap_or(0.7 * m.lm);
         check("saliency.psi_n", psi_n, 1e-4..=100.0, "Wb")?;
         refuse_singular(m, s, psi_n)?;
@@ -207,6 +222,7 @@ impl Machine {
             hold_a: s.hold_a,
             psi_n_squared: psi_n * psi_n,
             half_chi_r: 0.5 * s.chi * m.rr * coupling * coupling,
+            stator_fixed: Complex::cis(2.0 * s.stator_fixed_deg.to_radians()) * s.stator_fixed,
         })
     }
 
@@ -253,7 +269,7 @@ impl Machine {
         } else {
             0.0
         };
-        x.psi * x.psi * flux_part + x.i * x.i * current_part
+        x.psi * x.psi * flux_part + x.i * x.i * current_part + self.stator_fixed
     }
 
     /// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
@@ -353,7 +369,7 @@ fn refuse_singular(
     let r = (m.lm * s.hold_a / psi_n).powi(2);
     let per_a_psi = 2.0 * r / (1.0 + r);
     let (flux_part, current_part) = (s.a_psi.abs() * per_a_psi, s.b1.abs() * s.hold_a);
-    let saliency = flux_part + current_part;
+    let saliency = flux_part + current_part + s.stator_fixed.abs();
     if saliency <= SALIENCY_LIMIT {
         return Ok(());
     }

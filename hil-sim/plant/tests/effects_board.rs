@@ -112,6 +112,11 @@ fn the_inverter_has_the_errors_it_is_given() {
     near(error, leg(dead * 2.7 / 2.2), 1e-6);
     let (error, i) = lost(|i| i.on_resistance = 0.5, 15.0);
     near(error, leg(dead) + 0.5 * i, 1e-3);
+    // Lines and legs of b and c, which share the current.
+    let (error, i) = lost(|s| s.more_ohm = [0.0, 0.6, 0.6], 15.0);
+    near(error, leg(dead) + 0.2 * i, 1e-3);
+    let (error, _) = lost(|s| s.more_dead_time_us = [0.0, 0.5, 0.5], 15.0);
+    near(error, 2.0 / 3.0 * dead * (1.0 + 2.7 / 2.2), 1e-6);
     // 20 nF take 2.8 A to swing within the dead time. Below, the error of a leg is i t^2/(2 C) of a period.
     let (error, i) = lost(|i| i.node_capacitance = 20e-9, 10.0);
     let swing = |i: f64| i * 2.2e-6 * 2.2e-6 / (2.0 * 20e-9) * 6000.0;

@@ -137,6 +137,10 @@ keys! {
         psi_n: Option<f64> = None, [0.0001 .. 100], "Wb";
         /// Weight of the high-frequency rotor resistance of Eq. 3.8.
         chi: f64 = 0.0, [0 .. 10], "";
+        /// Saliency fixed to the stator; positive is low inductance along its axis.
+        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "";
+        /// Axis of that saliency, electrical, from phase a.
+        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg";
     }
     /// Choice of the machine model.
     "" model: ModelConfig {
@@ -209,6 +213,14 @@ keys! {
         node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F";
         /// Resistance of a switch that conducts.
         on_resistance: f64 = 0.0, [0 .. 100], "ohm";
+        /// Resistance of line and winding of phase b beyond that of phase a; not with switched.
+        more_ohm_b: f64 = 0.0, [-10 .. 10], "ohm";
+        /// Resistance of line and winding of phase c beyond that of phase a; not with switched.
+        more_ohm_c: f64 = 0.0, [-10 .. 10], "ohm";
+        /// Dead time of leg b beyond that of leg a; not with switched.
+        more_dead_time_b_us: f64 = 0.0, [-1 .. 1], "us";
+        /// Dead time of leg c beyond that of leg a; not with switched.
+        more_dead_time_c_us: f64 = 0.0, [-1 .. 1], "us";
         /// Phase that is interrupted between inverter and motor.
         open_phase: OpenPhase = OpenPhase::None, [OpenPhase], "";
         /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
@@ -366,6 +378,12 @@ keys! {
         flux_deg: f64 = 0.0, [-180 .. 180], "deg";
         /// How long the reversal of the speed takes.
         reversal_s: f64 = 60.0, [1 .. 3600], "s";
+    }
+    /// The experiment commission.
+    "commission." commission: CommissionConfig {
+        /// Whether the machines drawn also have phases, legs and sensors that differ: resistances by 2 % and delays by 0.1 us
+        /// either way, a stator-fixed saliency of 1 % along any axis, and a lag of channel b of 10 us.
+        disturbed: bool = false, [switch], "";
     }
     /// Errors that monte-carlo draws for every run, beside the operating point.
     "spread." spread: SpreadConfig {

@@ -113,6 +113,8 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             chi: config.saliency.chi,
             hold_a: config.saliency.hold_a.unwrap_or(config.amperes(5.0)),
             psi_n: Some(config.saliency.psi_n.unwrap_or(config.amperes(0.7) * m.l_m)),
+            stator_fixed: config.saliency.stator_fixed,
+            stator_fixed_deg: config.saliency.stator_fixed_deg,
         },
         iron: iron(config),
         warming: WarmingSettings {
@@ -147,6 +149,8 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             extra_dead_time_us: i.extra_dead_time_s * 1e6,
             node_capacitance: i.node_capacitance_f,
             on_resistance: i.on_resistance,
+            more_ohm: [0.0, i.more_ohm_b, i.more_ohm_c],
+            more_dead_time_us: [0.0, i.more_dead_time_b_us, i.more_dead_time_c_us],
             ..InverterSettings::default()
         },
         measurement: MeasurementSettings {

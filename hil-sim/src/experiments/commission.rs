@@ -28,14 +28,19 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "beyond the dissertation",
     about: "From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
             with `prepare.learn` the drive then learns and is judged at 16 operating points.",
-    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "spread.machine", "runs", "seconds"]],
+    uses: &[
+        BENCH,
+        DRIVE,
+        &["load.", "prepare.learn", "spread.machine", "runs", "seconds", "commission."],
+    ],
     not: &[],
     run: whole::<Commission>,
 };
 
-/// Errors, in percent, as [`Circuit::values`], twice of which count as wrong: of a linear machine, and of one of iron.
-const RIGHT_PCT: [f64; 5] = [1.5; 5];
-const RIGHT_IRON_PCT: [f64; 5] = [2.0, 2.0, 6.0, 6.0, 6.0];
+/// Errors, in percent, as [`Circuit::values`] and of the gain mismatch, twice of which count as wrong: of a linear machine, and
+/// of one of iron.
+const RIGHT_PCT: [f64; 6] = [1.5, 1.5, 1.5, 1.5, 1.5, 0.5];
+const RIGHT_IRON_PCT: [f64; 6] = [2.0, 2.0, 6.0, 6.0, 6.0, 0.5];
 /// Time of each run afterwards, s, unless `seconds` says otherwise.
 const RUN_S: f64 = 2.0;
 /// Share of the expected saliency from which on a machine counts as one that has enough.
@@ -81,7 +86,7 @@ pub struct Commission {
 pub struct Record {
     /// Why it was refused.
     refused: Option<String>,
-    /// Errors in percent, as [`Circuit::values`].
+    /// Errors in percent, as [`Circuit::values`] and of the gain mismatch.
     errors: Vec<f64>,
     /// Time of the steps up to the leakage, of the staircase, and of the current loop, s.
     #[serde(with = "exact")]
@@ -209,7 +214,11 @@ impl Study for Commission {
             (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
         }
         let pairs = found.values().into_iter().zip(truth.values());
-        let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
+        let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0));
+        let sensors = &config.measurement;
+        let gains = (1.0 + sensors.gain_error_a) / (1.0 + sensors.gain_error_b);
+        let mismatch = session.commissioning.found().levels.map_or(0.0, |levels| levels.mismatch);
+        let errors = errors.chain([100.0 * (1.0 + f64::from(mismatch) - gains)]).collect();
         let mut told = Vec::new();
         for (at, report) in session.reports.iter().filter(|_| self.machines.is_none()) {
             let values = report.values.iter().flatten().map(ToString::to_string).collect();
@@ -251,7 +260,8 @@ impl Study for Commission {
             |r: &&&Record| r.errors.iter().zip(right).any(|(e, most)| e.abs() > 2.0 * most);
         let wrong = accepted.iter().filter(is_wrong).count();
         m.set("wrongly_accepted", wrong as f64);
-        let names = Circuit::of_plant(&self.config).values().map(|(name, _)| name);
+        let [r_s, leakage, rr, lm, tau_r] = Circuit::of_plant(&self.config).values().map(|v| v.0);
+        let names = [r_s, leakage, rr, lm, tau_r, "mismatch"];
         for (n, name) in names.into_iter().enumerate() {
             let sizes = sorted(accepted.iter().map(|r| r.errors[n].abs()));
             m.set(format!("error_q95_pct.{name}"), quantile(&sizes, 0.95));

@@ -183,6 +183,9 @@ fn what_does_not_fit_is_not_accepted() {
     assert!((f64::from(found.ripple) / (0.16 * k) - 1.0).abs() < 0.01, "{}", found.ripple);
     let text = found.to_string();
     assert!(text.contains("four times") && text.contains("not linear"), "{text}");
+    // Less is accepted, and told from a third of it on.
+    let told = |size: f64| bent(size * k).to_string().contains("not quite linear");
+    assert!(told(0.055) && !told(0.045));
     // A saliency that does not follow the law of the current.
     let learned = result(&|i_q: f64| 0.02 * (4.0 * i_q).sin());
     assert!(learned.verdict.is_accepted() && !learned.current_saliency.accepted, "{learned:?}");

@@ -25,10 +25,12 @@ impl Circuit {
         Self { r_s, leakage: l_ls + k * l_lr, r_r: k * k * r_r, coupled: k * l_m }
     }
 
-    /// That of the simulated motor, with the switch that a phase current flows through; with iron, at its nominal flux.
+    /// That of the simulated motor, with the switch that a phase current flows through, and the mean of the phases; with iron,
+    /// at its nominal flux.
     pub fn of_plant(config: &Config) -> Self {
-        let m = plant_settings(config).machine;
-        Self::of([m.rs + config.inverter.on_resistance, m.rr, m.lls, m.llr, m.lm])
+        let (m, i) = (plant_settings(config).machine, &config.inverter);
+        let more = i.on_resistance + (i.more_ohm_b + i.more_ohm_c) / 3.0;
+        Self::of([m.rs + more, m.rr, m.lls, m.llr, m.lm])
     }
 
     /// Rotor time constant, s.
@@ -80,5 +82,20 @@ pub fn drawn(config: &Config, seed: u64) -> Config {
     let errors = &mut drawn.measurement;
     (errors.gain_error_a, errors.gain_error_b) = (between(-0.005, 0.005), between(-0.005, 0.005));
     (errors.offset_a, errors.offset_b) = (between(-offset, offset), between(-offset, offset));
+    if config.commission.disturbed {
+        let r_s = drawn.motor.r_s;
+        let [a, b, c] = [(); 3].map(|()| r_s * between(-0.02, 0.02));
+        let [late_a, late_b, late_c] = [(); 3].map(|()| between(-0.1, 0.1));
+        let (axis, inverter) = (between(-180.0, 180.0), &mut drawn.inverter);
+        drawn.motor.r_s += a;
+        (inverter.more_ohm_b, inverter.more_ohm_c) = (b - a, c - a);
+        inverter.extra_dead_time_s += late_a * 1e-6;
+        inverter.more_dead_time_b_us = late_b - late_a;
+        inverter.more_dead_time_c_us = late_c - late_a;
+        if config.model.plant == PlantModel::A {
+            (drawn.saliency.stator_fixed, drawn.saliency.stator_fixed_deg) = (0.01, axis);
+        }
+        drawn.measurement.lag_b_us = 10.0;
+    }
     drawn
 }
