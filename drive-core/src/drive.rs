@@ -48,6 +48,7 @@ use crate::protect::noise_watch::NoiseWatchState;
 use crate::protect::plausibility::{CarrierWatch, PredictionState};
 use crate::protect::saliency_check::SaliencyCheckState;
 use crate::protect::thermal::{Thermal, ThermalLoads};
+use crate::protect::travel_watch::TravelWatchState;
 use crate::supply::RelayState;
 
 use axes::Axes;
@@ -248,17 +249,23 @@ enum FluxPhase {
     /// The frame stands, and nothing is judged: a turning shaft is looked for.
     Search(CatchState),
     /// The flux of a turning rotor builds up from this period on.
-    Build {
-        from: u32,
-    },
+    Build { from: u32 },
     /// The frame is held along phase a until the flux stands; then the saliency is checked.
     #[default]
     Hold,
     /// Tracking without torque: is it the flux that is tracked?
     Verify,
-    Ready,
+    /// The sensors are watched while the carrier is off.
+    Ready(TravelWatchState),
     /// Ready, and a learning measures.
     Learn(LearningState),
+}
+
+impl FluxPhase {
+    #[inline(always)] // a constant would be copied with the memory that it shares
+    pub fn ready() -> Self {
+        Self::Ready(TravelWatchState::NEW)
+    }
 }
 
 /// The work of the current, with its reference. That of the torque is the torque current itself.

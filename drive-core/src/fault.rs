@@ -82,6 +82,8 @@ faults! {
     ChopperOff = 49, "the chip has switched the brake chopper off";
     WrongClock = 50, "the core clock and the clock of the watchdog do not agree";
     WrongReference = 51, "the reference voltage of the converters is wrong";
+    SensorSilentA = 52, "current sensor a stands still while the current turns: open or stuck";
+    SensorSilentB = 53, "current sensor b stands still while the current turns: open or stuck";
 }
 
 impl Fault {

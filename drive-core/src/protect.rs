@@ -7,6 +7,7 @@ pub(crate) mod offsets;
 pub(crate) mod plausibility;
 pub(crate) mod saliency_check;
 pub(crate) mod thermal;
+pub(crate) mod travel_watch;
 pub(crate) mod wiring_check;
 
 pub use heat_sink::HeatSink;
@@ -16,4 +17,5 @@ pub use offsets::OffsetCheck;
 pub use plausibility::Prediction;
 pub use saliency_check::SaliencyCheck;
 pub use thermal::{Body, Thermal};
+pub use travel_watch::TravelWatch;
 pub use wiring_check::{WiringCheck, WiringSettings};

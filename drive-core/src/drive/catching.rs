@@ -118,7 +118,7 @@ impl Field {
         let d = within(most + FORCING_GAIN * missing, (0.0, current));
         if k.elapsed.wrapping_sub(from) >= built {
             c.motion.start(&mut self.motion, k.rotor_count);
-            self.enter(k, FluxPhase::Ready);
+            self.enter(k, FluxPhase::ready());
         }
         Dq { d, q: 0.0 }
     }

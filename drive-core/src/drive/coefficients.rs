@@ -7,7 +7,8 @@ use crate::carrier::Injection;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
 use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
 use crate::protect::{
-    LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, WiringCheck,
+    LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
+    WiringCheck,
 };
 use crate::{Angle, AngleSource, DcLink, FrontEnd, Learning, Motion, Relay, UnitVector};
 
@@ -90,6 +91,8 @@ pub struct Coefficients {
     pub volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub unlearned: bool,
+    /// The watch on sensors that stand still.
+    pub travel_watch: TravelWatch,
 }
 
 impl Coefficients {

@@ -44,14 +44,14 @@ impl Field {
             (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::Catching,
             (FluxPhase::Hold, _) => State::Magnetising,
             (FluxPhase::Verify, _) => State::Verifying,
-            (FluxPhase::Ready | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
+            (FluxPhase::Ready(_) | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
         }
     }
 
     /// Whether torque, speed or position is regulated as asked for.
     pub fn regulates(&self) -> bool {
         match &self.flux {
-            FluxPhase::Ready => self.goal.regulates(),
+            FluxPhase::Ready(_) => self.goal.regulates(),
             FluxPhase::Search(_) | FluxPhase::Build { .. } | FluxPhase::Hold => false,
             FluxPhase::Verify | FluxPhase::Learn(_) => false,
         }
@@ -235,7 +235,7 @@ impl Field {
             FluxPhase::Build { from } => return Ok(self.build(c, k, from)),
             FluxPhase::Hold => return Ok(self.magnetise(c, k)?),
             FluxPhase::Verify => return Ok(self.verify(c, k)?),
-            FluxPhase::Ready | FluxPhase::Learn(_) => {}
+            FluxPhase::Ready(_) | FluxPhase::Learn(_) => {}
         }
         let i_q = match self.goal {
             Goal::Torque => k.references.current.q,
@@ -336,7 +336,7 @@ impl Field {
                 } else if c.lock_monitor.is_some() {
                     FluxPhase::Verify
                 } else {
-                    FluxPhase::Ready
+                    FluxPhase::ready()
                 };
                 k.elapsed = 0;
             }
@@ -356,7 +356,7 @@ impl Field {
             if !k.stands() {
                 return Err(Fault::LostLock);
             }
-            self.enter(k, FluxPhase::Ready);
+            self.enter(k, FluxPhase::ready());
         }
         Ok(Dq { d: k.references.current.d, q: 0.0 })
     }

@@ -19,7 +19,7 @@
 //! averages of sample 9.
 
 use super::trust::{Judged, Lock, Trust};
-use super::{Field, Kept};
+use super::{Field, FluxPhase, Kept};
 use crate::carrier::CARRIER_SAMPLES;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
@@ -97,7 +97,7 @@ impl Coefficients {
                 }
                 let silent = s.hand_over.is_carrier_off();
                 self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
-                Ok(())
+                self.watch_travel(s, step)
             }
             6 => {
                 self.update_observer(s, step);
@@ -128,6 +128,15 @@ impl Coefficients {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.judges_noise()),
             None => Ok(()),
+        }
+    }
+
+    /// Watches, where no carrier does, that both sensors follow a current that turns.
+    fn watch_travel(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+        let freq = if self.injects(s) { 0.0 } else { step.flux_freq };
+        match &mut s.flux {
+            FluxPhase::Ready(state) => self.travel_watch.step(state, &step.measured.phases, freq),
+            _ => Ok(()),
         }
     }
 

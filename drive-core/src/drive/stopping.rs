@@ -31,7 +31,7 @@ impl Field {
                 return;
             }
             (
-                FluxPhase::Ready,
+                FluxPhase::Ready(_),
                 Goal::Torque | Goal::Speed { .. } | Goal::Position { .. },
                 Stop::Ramp | Stop::Quick,
             ) => {
@@ -46,7 +46,7 @@ impl Field {
                 | FluxPhase::Build { .. }
                 | FluxPhase::Hold
                 | FluxPhase::Verify
-                | FluxPhase::Ready
+                | FluxPhase::Ready(_)
                 | FluxPhase::Learn(_),
                 Goal::Torque
                 | Goal::Speed { .. }
@@ -56,12 +56,12 @@ impl Field {
                 _,
             ) => {
                 // A torque that was asked for during the start has not come yet.
-                if !matches!(self.flux, FluxPhase::Ready | FluxPhase::Learn(_)) {
+                if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
                     k.references.current.q = 0.0;
                 }
                 self.goal = Goal::Release;
             }
         }
-        self.enter(k, FluxPhase::Ready);
+        self.enter(k, FluxPhase::ready());
     }
 }

@@ -54,6 +54,8 @@ fn codes_never_change() {
         (49, Fault::ChopperOff),
         (50, Fault::WrongClock),
         (51, Fault::WrongReference),
+        (52, Fault::SensorSilentA),
+        (53, Fault::SensorSilentB),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

@@ -16,7 +16,7 @@ use drive_core::filter::lpf_lag_samples;
 use drive_core::flux::{Indirect, Leakage, Observer};
 use drive_core::protect::{
     Body, LockMonitor, LockMonitorSettings, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck,
-    Thermal, WiringCheck, WiringSettings,
+    Thermal, TravelWatch, WiringCheck, WiringSettings,
 };
 use drive_core::{
     Angle, AngleSource, Coefficients, DcLink, FirstOrder, FrontEnd, Learning, Motion, PERIOD_S,
@@ -119,6 +119,7 @@ impl Settings {
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
                 .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
+            travel_watch: TravelWatch::new(self.share_of_range(1.0)),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
                 expected_a: self.share_of_rated(WIRING_A),

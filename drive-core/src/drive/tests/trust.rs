@@ -48,7 +48,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
         (FluxPhase::Build { from: 7 }, 7 + alone),
         (FluxPhase::Hold, 5),
         (FluxPhase::Verify, 5),
-        (FluxPhase::Ready, 5),
+        (FluxPhase::ready(), 5),
         (FluxPhase::Learn(Default::default()), 5),
     ];
     let mut table = std::collections::BTreeMap::<&str, String>::new();

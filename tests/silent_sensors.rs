@@ -1,0 +1,86 @@
+//! Procedure: at speed, where the carrier is off, a current sensor opens or sticks. The drive must switch off within half a turn of
+//! the flux or 8 ms, whichever is later.
+#![allow(clippy::disallowed_methods)]
+
+use std::f64::consts::TAU;
+
+use drive_core::{Command, Mode, State};
+use hil_sim::Config;
+use hil_sim::experiments::full_range::for_the_range;
+use hil_sim::plant::{Channel, CurrentFault, Load};
+use hil_sim::rig::{RATE_HZ, Rig};
+
+/// Pole pairs of the motor.
+const POLE_PAIRS: f64 = 2.0;
+/// Longest time where half a turn of the flux is shorter, s.
+const LONGEST_S: f64 = 0.008;
+
+/// A drive that has learned and regulates torque on a shaft of this speed.
+fn at_speed(rpm: f64) -> Rig {
+    let config = Config::load(None, None, &["prepare.learn=yes".to_owned()]).unwrap();
+    let mut rig = Rig::from_config(&for_the_range(&config).unwrap(), 5).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    for n in 1..=100 {
+        let speed = rpm * TAU / 60.0 * f64::from(n) / 100.0;
+        rig.set_load(Load::Speed { speed }).unwrap();
+        rig.run(0.01 * (rpm / 1000.0).abs(), |_| {});
+    }
+    rig.run(0.3, |_| {});
+    rig
+}
+
+/// Number `n` of a sequence that fills 0 to 1 evenly.
+fn spread(n: u32, step: f64) -> f64 {
+    (f64::from(n) * step).fract()
+}
+
+#[test]
+fn a_silent_sensor_is_noticed_at_speed() {
+    // 300 faults a speed and kind with RUNS=300.
+    let runs = std::env::var("RUNS").map_or(30, |runs| runs.parse().unwrap());
+    for rpm in [900.0_f64, 1800.0, -3000.0] {
+        let rig = at_speed(rpm);
+        let allowed_s = (0.5 * 60.0 / (POLE_PAIRS * rpm.abs())).max(LONGEST_S);
+        for open in [true, false] {
+            let (mut took_ms, mut silent, mut late) = (Vec::new(), 0, Vec::new());
+            for n in 0..runs {
+                let mut rig = rig.clone();
+                let i_q = 6.0 * spread(n, 0.618_034) - 3.0;
+                rig.command(&Command::Torque(i_q as f32)).unwrap();
+                rig.run(0.1 + 0.1 * spread(n, 0.414_214), |_| {});
+                assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {i_q} A");
+                let channel = if n % 2 == 0 { Channel::A } else { Channel::B };
+                let fault = if open {
+                    CurrentFault::Open
+                } else {
+                    let [a, b, _] = rig.plant.phase_currents();
+                    CurrentFault::Stuck((2022.0 + if n % 2 == 0 { a } else { b } / 0.0022) as u16)
+                };
+                rig.plant.set_current_fault(channel, fault);
+                let mut periods = 0;
+                while rig.drive.state() == State::Torque && f64::from(periods) < 0.2 * RATE_HZ {
+                    rig.step();
+                    periods += 1;
+                }
+                let s = f64::from(periods) / RATE_HZ;
+                silent += u32::from(
+                    matches!(rig.drive.state(), State::Fault(fault) if (52..=53).contains(&fault.code())),
+                );
+                if s > allowed_s {
+                    late.push((i_q, s, rig.drive.state()));
+                }
+                took_ms.push(1e3 * s);
+            }
+            took_ms.sort_by(f64::total_cmp);
+            let at = |share: f64| took_ms[(share * (took_ms.len() - 1) as f64) as usize];
+            println!(
+                "{rpm} rpm, {}: {:.1} ms in the median, {:.1} 95 %, {:.1} at most of {runs}; silent {silent}",
+                if open { "open" } else { "stuck" },
+                at(0.5),
+                at(0.95),
+                at(1.0)
+            );
+            assert!(late.is_empty(), "{rpm} rpm, open {open}: {late:?}");
+        }
+    }
+}
