@@ -68,7 +68,7 @@ impl TravelWatch {
         flux_freq: f32,
     ) -> Result<(), Fault> {
         let turn = flux_freq.abs() * CARRIER_SAMPLES as f32;
-        if !(turn * MOST as f32 >= TURN) {
+        if turn * (MOST as f32) < TURN {
             state.taken = 0;
             return Ok(());
         }
