@@ -119,8 +119,12 @@ impl Search {
         Self { steady, begins: FROM_S.0 / PERIOD_S, from, step, ..Self::default() }
     }
 
-    /// One fit; the result after the last. Refused where nothing can be fitted.
+    /// One fit; the result in the call after the last one, which leaves time for another fit to the same bins. Refused where nothing
+    /// can be fitted.
     pub fn step(&mut self, sums: &Collector) -> Result<Option<Fitted>, Refusal> {
+        if self.round == ROUNDS {
+            return Ok(self.best.map(|(x, best)| self.fitted(x, &best)));
+        }
         let x = self.from + self.step * f32::from(self.point);
         if let Some(candidate) = fit(sums, self.steady, libm::expf(x), self.begins, None) {
             let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
@@ -138,9 +142,10 @@ impl Search {
         if self.point < points {
             return Ok(None);
         }
-        let (x, best) = self.best.ok_or(Refusal::SamplesLost)?;
+        let (x, _) = self.best.ok_or(Refusal::SamplesLost)?;
         if self.round + 1 == ROUNDS {
-            return Ok(Some(self.fitted(x, &best)));
+            self.round = ROUNDS;
+            return Ok(None);
         }
         if self.round == 0 {
             self.begins = begins(libm::expf(x));

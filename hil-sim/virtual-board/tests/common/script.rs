@@ -116,7 +116,7 @@ impl Script {
             (0x3c, 0),
             // The first conversion's sampling of 24.5 clocks ends at the top.
             (0x40, TOP - 98),
-            (CR2, 7 << 20 | setup.idle),
+            (CR2, 7 << 4 | setup.idle),
             (CCER, setup.ccer),
             (BDTR, setup.bdtr),
             // Dead time of two clocks a tick, centre-aligned, preloaded.
@@ -190,7 +190,7 @@ impl Script {
             let ranks = channels.iter().zip([9, 15, 21, 27]);
             let sequence = ranks.fold(0, |word, (channel, at)| word | channel << at);
             let length = channels.len() as u32 - 1;
-            self.write(base + 0x4c, sequence | 1 << 7 | 8 << 2 | length)?;
+            self.write(base + 0x4c, sequence | 1 << 7 | length)?;
             self.write(base + 0x08, 1 << 28 | 1 | 1 << 3)?;
         }
         Ok(())
