@@ -54,7 +54,8 @@ fn a_silent_sensor_is_noticed_at_speed() {
                     CurrentFault::Open
                 } else {
                     let [a, b, _] = rig.plant.phase_currents();
-                    CurrentFault::Stuck((2022.0 + if n % 2 == 0 { a } else { b } / 0.0022) as u16)
+                    let current = if channel == Channel::A { a } else { b };
+                    CurrentFault::Stuck((2022.0 + current / 0.0022) as u16)
                 };
                 rig.plant.set_current_fault(channel, fault);
                 let mut periods = 0;
@@ -81,6 +82,8 @@ fn a_silent_sensor_is_noticed_at_speed() {
                 at(1.0)
             );
             assert!(late.is_empty(), "{rpm} rpm, open {open}: {late:?}");
+            // The slower the flux turns, the more the prediction of the current finds alone.
+            assert!(silent > 0 || rpm == 900.0, "{rpm} rpm, open {open}");
         }
     }
 }

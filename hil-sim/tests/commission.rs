@@ -57,7 +57,7 @@ fn a_resistance_is_no_gain() {
             [a / config.drive.scales.current_a.gain, b / config.drive.scales.current_b.gain];
         let scaled = f64::from(b / a) - 1.0;
         assert!((scaled - gain).abs() < 0.002, "{percent} %, gain {gain}: scaled by {scaled}");
-        // Which has half of the common gain error.
+        // A gain error of sensor a is half a common one, which the resistance carries.
         let r_s = f64::from(settings.motor.r_s) / config.motor.r_s - 1.0 + 0.5 * gain;
         assert!(r_s.abs() < 0.003, "{percent} %, gain {gain}: r_s by {r_s}");
     }

@@ -51,7 +51,7 @@ pub(super) struct Fitted {
     pub tau_r: f32,
     /// Magnetising current at the end of the bins, A.
     pub magnetising: f32,
-    /// What the currents of the phases b and c differ by; see [`levels`](super::levels).
+    /// Relative difference of the currents of phases b and c; see [`levels`](super::levels).
     pub difference: f32,
     /// Rms of the residual, V.
     pub misfit: f32,
@@ -62,8 +62,8 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// The fit across phase a, to bins that began without flux; none where nothing can be fitted: what the currents of the phases
-    /// b and c differ by, voltage, V, electrical speed of the shaft, rad/s, and rms of the residual, V.
+    /// The fit across phase a, to bins that began without flux; none where nothing can be fitted: relative difference of the
+    /// currents of phases b and c, voltage, V, electrical speed of the shaft, rad/s, and rms of the residual, V.
     pub fn across(&self, sums: &Collector) -> Option<[f32; 4]> {
         let resistances = Some([self.r_s, self.r_r]);
         let best = fit(sums, 0.0, self.tau_r, begins(self.tau_r), resistances)?;
@@ -182,7 +182,7 @@ fn fit(
     begins: f32,
     across: Option<[f32; 2]>,
 ) -> Option<Candidate> {
-    // Products of what stands at the four unknowns, and of the voltage.
+    // Sums of the products of the four regressors and the voltage.
     let (mut products, mut count) = ([[0.0_f64; N + 1]; N + 1], 0.0_f64);
     // i_m' and i_w.
     let (mut beside, mut turning) = (0.0_f32, 0.0_f32);
@@ -230,7 +230,7 @@ fn fit(
     Some(Candidate { left, values, variances, magnetising, weight: products[1][1], bins: count })
 }
 
-/// The products of the unknowns and of the voltage, their upper half, as [`inverse`] takes them.
+/// Sums of the products of the regressors and the voltage: the upper half, as [`inverse`] takes it.
 type Products = [[f64; N + 1]; N + 1];
 
 /// Adds an equation of this weight.

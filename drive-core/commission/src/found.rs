@@ -36,7 +36,7 @@ pub struct Levels {
     pub tau_r: f32,
     /// Voltage that a phase of the inverter loses, V: dead time and drop.
     pub inverter_v: f32,
-    /// What the currents of the phases b and c differ by at dc, (-i_a)/(2 i_b) - 1: sensors and resistances.
+    /// Relative difference of the currents of phases b and c at dc, (-i_a)/(2 i_b) - 1: by sensors and resistances.
     pub difference: f32,
     /// (gain of sensor a)/(gain of b) - 1; the carrier finds it, until then 0.
     pub mismatch: f32,

@@ -81,7 +81,7 @@ impl Commissioning {
         self.begin(sums, parts[part % parts.len()])
     }
 
-    /// What the currents of the phases b and c differ by. A shaft that turns makes a current across phase a that changes, legs that
+    /// Relative difference of the currents of phases b and c. A shaft that turns makes a current across phase a that changes, legs that
     /// differ a constant one.
     fn across(&self, sums: &Collector, fit: &Fitted, limit: f32) -> Result<f32, Refusal> {
         let [difference, volts, speed, misfit] = fit.across(sums).ok_or(Refusal::SamplesLost)?;

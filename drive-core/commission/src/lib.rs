@@ -146,7 +146,7 @@ struct StepState {
     trains: u32,
     /// Levels: the fit to the first two.
     fitted: Fitted,
-    /// Leakage: the carrier along the present bias, and what the gains of the sensors differ by.
+    /// Leakage: the carrier along the present bias, and the relative difference of the sensors' gains.
     along: [Complex32; 4],
     gains: Complex32,
     stairs: Staircase,

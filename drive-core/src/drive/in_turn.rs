@@ -8,7 +8,7 @@
 //! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
 //! | 4 | lock monitor | saliency (0) |
-//! | 5 | reference current of the saliency; the slowly turning axes | - |
+//! | 5 | reference current of the saliency; the slowly turning axes; travel of the sensors | - |
 //! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
 //! | 7 | currents that the voltage allows; rotor voltage for the prediction at 8 | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |

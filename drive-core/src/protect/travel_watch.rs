@@ -13,11 +13,12 @@ use crate::Fault;
 use crate::carrier::CARRIER_SAMPLES;
 use crate::math::frames::Abc;
 
-/// Looks that are kept, a power of two, and carrier periods between the first and the last.
+/// Looks that are kept, a power of two, and the carrier periods between the first and the last.
 const LOOKS: usize = 8;
-const MOST: usize = LOOKS - 1;
-/// Least carrier periods. Three looks at a current that is reversed meanwhile may see the same value (5 of 4600 such runs).
-const LEAST: usize = 3;
+const LONGEST_PERIODS: usize = LOOKS - 1;
+/// Shortest time, carrier periods. In two, with three looks, a current that is reversed may show the same value three times (5 of
+/// 4600 such runs).
+const SHORTEST_PERIODS: usize = 3;
 /// Turn of the flux in which each phase moves.
 const TURN: f32 = 0.25;
 /// Travel of a sensor that is silent relative to the other one.
@@ -68,7 +69,7 @@ impl TravelWatch {
         flux_freq: f32,
     ) -> Result<(), Fault> {
         let turn = flux_freq.abs() * CARRIER_SAMPLES as f32;
-        if turn * (MOST as f32) < TURN {
+        if turn * (LONGEST_PERIODS as f32) < TURN {
             state.taken = 0;
             return Ok(());
         }
@@ -76,7 +77,7 @@ impl TravelWatch {
         state.next = state.next.wrapping_add(1);
         state.taken = state.taken.saturating_add(1);
         // The quarter turn ends in the last of these periods.
-        let periods = ((TURN / turn) as usize + 1).clamp(LEAST, MOST);
+        let periods = ((TURN / turn) as usize + 1).clamp(SHORTEST_PERIODS, LONGEST_PERIODS);
         if state.taken <= periods {
             return Ok(());
         }
@@ -105,5 +106,69 @@ impl TravelWatchState {
             }
         }
         [largest[0] - least[0], largest[1] - least[1]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use core::f64::consts::TAU;
+
+    /// Looks until the fault, of a current of so many A that turns at `hz` from this angle, turns, on; from look `dead` on a sensor
+    /// shows this value instead.
+    fn until(
+        (ampere, hz, from): (f64, f64, f64),
+        (dead, sensor, shown): (usize, usize, f32),
+    ) -> Option<(usize, Fault)> {
+        let (watch, mut state) = (TravelWatch::new(1.0), TravelWatchState::NEW);
+        (0..100).find_map(|look| {
+            let angle = TAU * (from + hz * look as f64 / 600.0);
+            let mut seen = [0.0, TAU / 3.0].map(|axis| (ampere * (angle - axis).cos()) as f32);
+            if look >= dead {
+                seen[sensor] = shown;
+            }
+            let phases = Abc::new(seen[0], seen[1], -(seen[0] + seen[1]));
+            let fault = watch.step(&mut state, &phases, (hz / 6000.0) as f32).err()?;
+            Some((look, fault))
+        })
+    }
+
+    /// Frequencies from the least one of the watch to that of 3600 rpm of four poles, and angles that fill a turn.
+    fn cases() -> impl Iterator<Item = (f64, f64)> {
+        let angles = |hz| (0..36).map(move |n| (hz, f64::from(n) / 36.0));
+        [24.0, -30.0, 45.0, 60.0, -80.0, 100.0, 120.0].into_iter().flat_map(angles)
+    }
+
+    #[test]
+    fn sensors_that_follow_are_not_silent() {
+        for (hz, from) in cases() {
+            for ampere in [0.2, 0.7, 4.0] {
+                assert_eq!(until((ampere, hz, from), (100, 0, 0.0)), None, "{ampere} {hz} {from}");
+            }
+        }
+    }
+
+    /// Within a quarter turn, four looks at least, and one look more; and a current of 3 A moves the other sensor by enough then.
+    #[test]
+    fn a_sensor_that_stands_is_named_within_a_quarter_turn() {
+        for (hz, from) in cases() {
+            let periods = (0.25 * 600.0 / hz.abs()).ceil().max(3.0) as usize;
+            for (sensor, fault) in [(0, Fault::SensorSilentA), (1, Fault::SensorSilentB)] {
+                for shown in [0.0, 1.7] {
+                    let (look, found) = until((3.0, hz, from), (20, sensor, shown)).unwrap();
+                    assert_eq!(found, fault, "{hz} {from} {shown}");
+                    assert!(look <= 20 + periods + 1, "{hz} {from} {shown}: {}", look - 20);
+                }
+            }
+        }
+    }
+
+    /// Below the least frequency, with a carrier, and where the other sensor hardly moves, nothing is judged.
+    #[test]
+    fn where_little_moves_nothing_is_judged() {
+        assert_eq!(until((3.0, 21.0, 0.0), (0, 0, 0.0)), None);
+        assert_eq!(until((3.0, 0.0, 0.0), (0, 1, 0.0)), None);
+        assert_eq!(until((0.19, 60.0, 0.0), (0, 1, 0.0)), None);
     }
 }

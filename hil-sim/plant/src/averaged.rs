@@ -66,7 +66,7 @@ impl Source for Averaged {
     }
 }
 
-/// The same with capacitance at the nodes, resistance of the switches, and phases that differ.
+/// An inverter with capacitance at the nodes and resistance of the switches, at phases whose resistances differ.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RealSwitches(pub Averaged);
 

@@ -228,8 +228,8 @@ fn damaged_learned_values_are_refused() {
     assert_eq!(other.console.settings.in_force().learned, None);
 }
 
-/// What was learned with the currents of one zero vector is forgotten where both are switched on, and its backup is refused there;
-/// and the other way round.
+/// A result that was learned with one zero vector is forgotten when both are switched on, and its backup is refused then; and the
+/// other way round.
 #[test]
 fn learned_values_hold_for_one_zero_vector_or_for_both() {
     for (learned, other) in [("no", "yes"), ("yes", "no")] {

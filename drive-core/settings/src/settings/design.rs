@@ -115,6 +115,7 @@ impl Settings {
             injection_turn,
             injection_axis,
             lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
+            // A sensorless start with the synchronous demodulation alone is checked.
             saliency_check: (t.check && self.tracks_synchronously())
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
