@@ -184,7 +184,7 @@ fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
 }
 
 /// The window watchdog is fed too early when the control interrupt comes three times as often as it should. (Up to some 2.3 times
-/// it may come: after a long interrupt the next begins as early.)
+/// it may come: after a long interrupt the next begins as early.) Where the main loop checks that register just then, it is faster.
 #[test]
 fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
     const TIM1_ARR: u32 = 0x4001_2c2c;
@@ -193,21 +193,29 @@ fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
     board.forgive();
     ask(&mut board, "start torque", "ok")?;
     board.run_periods(1200)?;
-    assert!(board.gates().any_on());
-    let began = board.chip().now;
-    // And the compare value that triggers the converters, which the counter would not reach.
-    for register in [TIM1_ARR, TIM1_CCR4] {
-        let value = board.chip().read(register, 4);
-        board.chip().write(register, 4, value / 3);
+    let energised = board.keep()?;
+    let mut by_window = 0;
+    for later in [0, 7_000, 39_000, 150_000] {
+        board.go_back(&energised)?;
+        board.run_ticks(later)?;
+        assert!(board.gates().any_on() && board.resets.is_empty());
+        let began = board.chip().now;
+        // And the compare value that triggers the converters, which the counter would not reach.
+        for register in [TIM1_ARR, TIM1_CCR4] {
+            let value = board.chip().read(register, 4);
+            board.chip().write(register, 4, value / 3);
+        }
+        while board.resets.is_empty() && board.chip().now < began + 4 * TICKS_PER_PERIOD {
+            board.run_ticks(100)?;
+        }
+        let (at, cause) = *board.resets.first().context("no reset")?;
+        let periods = (at - began) as f64 / TICKS_PER_PERIOD as f64;
+        println!("{cause} after {periods:.2} periods");
+        assert!(periods < 2.0, "{cause} after {periods} periods");
+        assert!(!board.chip().tim1.outputs_on());
+        by_window += u32::from(cause == Reset::Window);
     }
-    while board.resets.is_empty() && board.chip().now < began + 4 * TICKS_PER_PERIOD {
-        board.run_ticks(100)?;
-    }
-    let (at, cause) = *board.resets.first().context("no reset")?;
-    let periods = (at - began) as f64 / TICKS_PER_PERIOD as f64;
-    println!("{cause} after {periods:.2} periods");
-    assert!(cause == Reset::Window && periods < 2.0, "{cause} after {periods} periods");
-    assert!(!board.chip().tim1.outputs_on());
+    assert!(by_window > 0);
     Ok(())
 }
 
