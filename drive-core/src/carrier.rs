@@ -1,6 +1,7 @@
 //! The injected carrier: generation of its voltage and demodulation of its current.
 
 pub(crate) mod asymmetry;
+pub(crate) mod at_start;
 pub(crate) mod demodulator;
 pub(crate) mod drift;
 pub(crate) mod injection;
@@ -9,6 +10,7 @@ mod sample;
 pub(crate) mod synchronous;
 
 pub use asymmetry::Asymmetry;
+pub use at_start::AtStart;
 #[cfg(feature = "printed")]
 pub use demodulator::{Demodulate, Literal, Rectified};
 pub use injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod, Injection};

@@ -27,6 +27,8 @@ use core::hint::black_box;
 use core::mem::offset_of;
 use core::ops::Range;
 
+use crate::carrier::Asymmetry;
+use crate::carrier::at_start::AtStartState;
 use crate::carrier::injection::Carrier;
 use crate::current::inverter_drop::InverterDropState;
 use crate::current::pi::{DqPiState, ReferenceState};
@@ -217,6 +219,8 @@ struct Field {
     pub estimator: EstimatorState,
     /// Large while a turning shaft is looked for.
     pub flux: FluxPhase,
+    /// Asymmetry that was seen before there was current or flux, beyond the known one.
+    pub at_start: Option<Asymmetry>,
 }
 
 /// The source of the angle of the frame.
@@ -248,6 +252,8 @@ impl Frame {
 enum FluxPhase {
     /// The frame stands, and nothing is judged: a turning shaft is looked for.
     Search(CatchState),
+    /// The shaft stands; flux that is left decays, then the asymmetry of sensors and stator is measured.
+    Asymmetry(AtStartState),
     /// The flux of a turning rotor builds up from this period on.
     Build { from: u32 },
     /// The frame is held along phase a until the flux stands; then the saliency is checked.
@@ -354,6 +360,8 @@ struct Left {
     inverter_drop: f32,
     /// Baseline of the lock monitor, A^2.
     baseline: f32,
+    /// Asymmetry of sensors and stator beyond the learned one.
+    asymmetry: Asymmetry,
     /// Flux in the motor; `None` before the first run.
     residual: Option<Residual>,
 }

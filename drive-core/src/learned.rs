@@ -112,6 +112,9 @@ pub struct Learned {
     pub gain_mismatch: Fitted,
     /// Asymmetry that is taken out of the demodulated signals: what the gain mismatch, where it is accepted, leaves.
     pub asymmetry: Asymmetry,
+    /// Asymmetry that the start saw before there was current or flux, beyond gain mismatch and `asymmetry`: a later start expects it.
+    /// None where flux was left.
+    pub at_start: Option<Asymmetry>,
     /// Number of rotor positions, 1 or more, whose mean gain mismatch and asymmetry are. The slots of the rotor have an
     /// asymmetry that changes with its position, sensors and stator have not.
     pub positions: u8,
@@ -183,6 +186,7 @@ impl Learned {
             && (1..POINTS).contains(&self.points)
             && self.positions > 0
             && self.asymmetry.size() <= LARGEST_ASYMMETRY
+            && self.at_start.is_none_or(|seen| seen.size() <= LARGEST_ASYMMETRY)
             && self.slope_at_rest == slope
             && (least_limit_a..=POINTS as f32 * step).contains(&self.limit_a)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)
@@ -203,9 +207,12 @@ impl Learned {
             let corrected = before.gain_mismatch.or(Fitted::default()).value;
             gains.value = corrected + share * gains.value;
         }
+        // The rest of what was found now is as much that of this position.
+        let rest = self.asymmetry.with_gains(&self.gain_mismatch);
         Self {
             gain_mismatch: gains,
             asymmetry: before.asymmetry.plus(&self.asymmetry, share),
+            at_start: self.at_start.map(|seen| seen.plus(&rest, 1.0 - share)),
             positions,
             current_saliency: self.current_saliency.or(before.current_saliency),
             carrier: self.carrier.or(before.carrier),

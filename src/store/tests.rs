@@ -49,6 +49,11 @@ fn learned(random: [f32; POINTS]) -> Learned {
             sin: 0.05 * random[11],
             cos: 0.05 * random[12],
         },
+        at_start: (random[14] > 0.0).then_some(Asymmetry {
+            constant: 0.05 * random[13],
+            sin: 0.05 * random[14],
+            cos: 0.05 * random[15],
+        }),
         positions: 1 + (random[13].abs() * 254.0) as u8,
         gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },
         current_saliency: Fitted { value: random[5], misfit: 1.0, accepted: random[5].abs() < 0.3 },

@@ -42,6 +42,8 @@ const STEP: f32 = CARRIER_S / (2.0 * 2.0 / 3.0);
 /// State of the estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GainDrift {
+    /// Asymmetry beyond the learned one that the start has measured.
+    pub at_start: Asymmetry,
     /// The mismatch m.
     pub mismatch: f32,
     /// Mean deviation of the ratio from 1.
@@ -53,10 +55,15 @@ pub struct GainDrift {
 }
 
 impl GainDrift {
+    /// No drift since a start that has measured this asymmetry beyond the learned one.
+    pub fn new(at_start: Asymmetry) -> Self {
+        Self { at_start, ..Self::default() }
+    }
+
     /// `learned` with the drift, for a saliency that was seen with the injection along `axis`.
     pub fn on_top_of(&mut self, learned: &Asymmetry, axis: UnitVector) -> Asymmetry {
         self.h = 2.0 * GAINS.along(axis.turned_by(axis));
-        learned.plus(&GAINS, self.mismatch)
+        learned.plus(&self.all(), 1.0)
     }
 
     /// The largest drift that is followed with this slope without torque current, 1/rad.
@@ -77,8 +84,13 @@ impl GainDrift {
         }
     }
 
+    /// All asymmetry beyond the learned one.
+    pub fn all(&self) -> Asymmetry {
+        self.at_start.plus(&GAINS, self.mismatch)
+    }
+
     /// The carrier current squared across phase a, where a start measures |C|_ref, relative to that without drift.
-    pub fn at_start(&self) -> f32 {
+    pub fn across_a(&self) -> f32 {
         1.0 - self.mismatch
     }
 }
@@ -116,7 +128,7 @@ mod tests {
             let mut seen = Saliency { q: 0.0, carrier_squared: square as f32, i_q: 0.0 };
             drift.on_top_of(&Asymmetry::default(), axis).take_out(&mut seen, axis);
             drift.step(
-                seen.carrier_squared * drift.at_start() - 1.0,
+                seen.carrier_squared * drift.across_a() - 1.0,
                 (hz / 6000.0) as f32,
                 LARGEST,
             );
@@ -169,7 +181,7 @@ mod tests {
                 let mut seen =
                     Saliency { q: 0.0, carrier_squared: 1.0 + deviation as f32, i_q: 0.0 };
                 drift.on_top_of(&Asymmetry::default(), axis).take_out(&mut seen, axis);
-                let deviation = seen.carrier_squared * drift.at_start() - 1.0;
+                let deviation = seen.carrier_squared * drift.across_a() - 1.0;
                 drift.step(deviation, flux_freq as f32, LARGEST);
                 assert!(drift.mismatch.abs() < 0.001, "{degrees} {loss}: {}", drift.mismatch);
             }

@@ -68,7 +68,7 @@ impl Field {
     #[cold]
     pub(super) fn search(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
         let (Some(catching), FluxPhase::Search(search)) = (&c.catching, &mut self.flux) else {
-            self.hold(c, k, 0);
+            self.stand(c, k, 0);
             return Ok(Dq::ZERO);
         };
         // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
@@ -88,7 +88,7 @@ impl Field {
             Caught::Standing => {
                 self.residual = None;
                 self.hand_over = HandOver::default();
-                self.hold(c, k, 0);
+                self.stand(c, k, 0);
             }
             Caught::Turning(flux_freq) => {
                 let freq = catching.path.rotor(flux_freq);

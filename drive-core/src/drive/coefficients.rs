@@ -4,6 +4,7 @@
 mod tests;
 
 use crate::carrier::Injection;
+use crate::carrier::at_start::AtStart;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
 use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
 use crate::protect::{
@@ -93,6 +94,8 @@ pub struct Coefficients {
     pub unlearned: bool,
     /// The watch on sensors that stand still.
     pub travel_watch: TravelWatch,
+    /// The measurement of the asymmetry at a start, where the synchronous demodulation tracks.
+    pub at_start: Option<AtStart>,
 }
 
 impl Coefficients {

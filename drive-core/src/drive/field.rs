@@ -4,6 +4,8 @@
 use super::catching::Residual;
 use super::in_turn::StepResults;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
+use crate::carrier::at_start::AtStartState;
+use crate::carrier::drift::GainDrift;
 use crate::carrier::{CarrierPeriod, CarrierSample};
 use crate::current::inverter_drop::DropSample;
 use crate::drive::state::State;
@@ -32,6 +34,10 @@ impl Field {
         self.observer.resistance = left.resistance;
         c.turn(&mut self.axes, 0.0, c.injection_axis, false);
         c.estimator.start(&mut self.estimator);
+        // A learning begins anew.
+        if self.frame != Frame::LockedShaft {
+            self.estimator.drift = GainDrift::new(left.asymmetry);
+        }
         if let Some(observer) = &c.observer {
             observer.start(&mut self.observer);
         }
@@ -42,7 +48,7 @@ impl Field {
             (_, Goal::Brake { .. }) => State::Braking,
             (_, Goal::Release) => State::Stopping,
             (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::Catching,
-            (FluxPhase::Hold, _) => State::Magnetising,
+            (FluxPhase::Asymmetry(_) | FluxPhase::Hold, _) => State::Magnetising,
             (FluxPhase::Verify, _) => State::Verifying,
             (FluxPhase::Ready(_) | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
         }
@@ -52,8 +58,8 @@ impl Field {
     pub fn regulates(&self) -> bool {
         match &self.flux {
             FluxPhase::Ready(_) => self.goal.regulates(),
-            FluxPhase::Search(_) | FluxPhase::Build { .. } | FluxPhase::Hold => false,
-            FluxPhase::Verify | FluxPhase::Learn(_) => false,
+            FluxPhase::Search(_) | FluxPhase::Asymmetry(_) | FluxPhase::Build { .. } => false,
+            FluxPhase::Hold | FluxPhase::Verify | FluxPhase::Learn(_) => false,
         }
     }
 
@@ -70,7 +76,9 @@ impl Field {
         Left {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
-            baseline: self.lock.baseline,
+            // It was measured before a drift was found.
+            baseline: self.lock.baseline / self.estimator.drift.across_a(),
+            asymmetry: self.estimator.drift.all(),
             residual: Some(residual),
         }
     }
@@ -230,12 +238,8 @@ impl Field {
     /// # Errors
     /// Why the outputs go off.
     fn wanted(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
-        match self.flux {
-            FluxPhase::Search(_) => return Ok(self.search(c, k)?),
-            FluxPhase::Build { from } => return Ok(self.build(c, k, from)),
-            FluxPhase::Hold => return Ok(self.magnetise(c, k)?),
-            FluxPhase::Verify => return Ok(self.verify(c, k)?),
-            FluxPhase::Ready(_) | FluxPhase::Learn(_) => {}
+        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+            return self.find_flux(c, k);
         }
         let i_q = match self.goal {
             Goal::Torque => k.references.current.q,
@@ -254,6 +258,19 @@ impl Field {
         let (i_d, most) = (k.references.current.d, k.limits.voltage.most.d);
         let d = if i_d < most { i_d } else { most } + k.limits.now.flux_a;
         Ok(Dq { d, q: k.limits.hold(i_q) })
+    }
+
+    /// The current while the flux is found, built up and verified, A.
+    #[cold]
+    fn find_flux(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
+        Ok(match self.flux {
+            FluxPhase::Search(_) => self.search(c, k)?,
+            FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k),
+            FluxPhase::Build { from } => self.build(c, k, from),
+            FluxPhase::Hold => self.magnetise(c, k)?,
+            FluxPhase::Verify => self.verify(c, k)?,
+            FluxPhase::Ready(_) | FluxPhase::Learn(_) => Dq::ZERO,
+        })
     }
 
     /// The torque current of the speed or the position loop, A.
@@ -290,6 +307,40 @@ impl Field {
     #[inline(always)] // a small phase is written, not the memory that it shares
     pub fn enter(&mut self, k: &mut Kept, flux: FluxPhase) {
         (self.flux, k.elapsed) = (flux, 0);
+    }
+
+    /// Goes on with a shaft that stands: measures the asymmetry where that is of use, then lets the flux build up.
+    #[cold]
+    pub fn stand(&mut self, c: &Coefficients, k: &mut Kept, encoder: u32) {
+        let learns = self.frame == Frame::LockedShaft;
+        if c.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
+            self.enter(k, FluxPhase::Asymmetry(AtStartState::new(learns)));
+        } else {
+            self.hold(c, k, encoder);
+        }
+    }
+
+    /// The current while flux that is left decays and the asymmetry is measured: none.
+    #[cold]
+    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Kept) -> Dq {
+        let (Some(at_start), FluxPhase::Asymmetry(state)) = (&c.at_start, &mut self.flux) else {
+            return Dq::ZERO;
+        };
+        if let Some(axis) = at_start.step(state, k.elapsed, self.estimator.saliency().q) {
+            k.references.injection_axis = axis;
+            return Dq::ZERO;
+        }
+        k.references.injection_axis = c.injection_axis;
+        self.at_start = Some(state.found());
+        if let (Frame::Tracked, Some(change)) = (self.frame, at_start.change(state)) {
+            let known = &mut self.estimator.drift.at_start;
+            *known = known.plus(&change, 1.0);
+        }
+        if let Some(observer) = &c.observer {
+            observer.start(&mut self.observer);
+        }
+        self.hold(c, k, 0);
+        Dq::ZERO
     }
 
     /// Holds the frame along phase a, and lets the flux build up there.

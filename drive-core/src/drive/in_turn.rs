@@ -217,7 +217,7 @@ impl Coefficients {
         }
         let seen = s.estimator.synchronous.saliency;
         // A drift of the gains since the start is not in what the start measured.
-        let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
+        let scale = s.carrier.per_share_squared * s.estimator.drift.across_a();
         if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, baseline)? {
             self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
         }

@@ -36,6 +36,7 @@ impl Drive {
             looked: check.map(|check| check.mean(&field.saliency_check)),
             per_looked: check.map_or(0.0, |check| check.per_mean()),
             baseline: field.lock.baseline,
+            at_start: field.at_start,
         };
         let learned = c.learning.result(learning, &start);
         self.kept.learned = Some(learned);
@@ -96,6 +97,9 @@ impl Coefficients {
         }
         if let Some(monitor) = &mut self.lock_monitor {
             monitor.take(learned);
+        }
+        if let Some(at_start) = &mut self.at_start {
+            at_start.learned = learned.at_start;
         }
         if learned.gain_mismatch.accepted {
             self.front_end.correct_mismatch(learned.gain_mismatch.value);

@@ -111,7 +111,7 @@ impl Drive {
                     field.residual = left.residual;
                     field.flux = FluxPhase::Search(CatchState::default());
                 } else {
-                    field.hold(c, k, encoder);
+                    field.stand(c, k, encoder);
                 }
             }
         }

@@ -43,6 +43,7 @@ impl Field {
             }
             (
                 FluxPhase::Search(_)
+                | FluxPhase::Asymmetry(_)
                 | FluxPhase::Build { .. }
                 | FluxPhase::Hold
                 | FluxPhase::Verify

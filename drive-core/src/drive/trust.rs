@@ -59,6 +59,8 @@ impl Field {
         match (&self.flux, self.frame) {
             // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
             (FluxPhase::Search(_), _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+            // There is neither current nor flux.
+            (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
             (FluxPhase::Build { from }, _) => match &c.catching {
                 Some(c) if elapsed.wrapping_sub(*from) < c.alone => Trust { source: Injection, turns: true, lock: OwnBaseline, current: No, mean: false, resistance: false, drop: false },
                 _ => Trust { source: Both, turns: true, lock: OwnBaseline, current: Tolerantly, mean: false, resistance: false, drop: false },

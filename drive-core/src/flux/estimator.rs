@@ -165,7 +165,7 @@ impl Estimator {
         demodulator.start(self.demodulator, self.rms_samples);
         (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
         (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
-        (*drift, *angle_error) = (GainDrift::default(), 0.0);
+        (*drift, *angle_error) = (GainDrift::new(drift.at_start), 0.0);
     }
 
     /// Takes an accepted result of a learning.

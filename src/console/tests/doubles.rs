@@ -188,6 +188,7 @@ pub fn found() -> Learned {
         spread: 0.001,
         ripple: 0.0,
         asymmetry: Asymmetry { constant: 0.0004, sin: -0.0003, cos: 0.0 },
+        at_start: None,
         positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0002, accepted: true },
         current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },

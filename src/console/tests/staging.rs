@@ -216,8 +216,8 @@ fn damaged_learned_values_are_refused() {
     lines[0].push(if last == '0' { '1' } else { '0' });
     assert!(say(&lines).starts_with("error: learned: the checksum of these words is "));
     assert_eq!(
-        say(&["learned 57 00000000 00000000".to_owned()]),
-        "error: learned: more than 58 words"
+        say(&["learned 60 00000000 00000000".to_owned()]),
+        "error: learned: more than 61 words"
     );
     assert!(!other.console.settings.is_staged());
     // Whole, but then other settings.
@@ -266,6 +266,7 @@ fn a_backup_of_earlier_firmware_is_restored() {
         slope_at_rest: 0.0,
         limit_a: Grid::REFERENCE.current(13),
         asymmetry: Asymmetry::default(),
+        at_start: None,
         ..found()
     };
     for count in [37, 38] {

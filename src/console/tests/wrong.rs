@@ -55,7 +55,7 @@ const WRONG: [(&str, &[&str]); 65] = [
     ("set motor.r_s 5 motor.r_r 0", &["motor.r_r", "0", "0.001 to 1000 ohm"]),
     ("set wiring_checked 1", &["wiring_checked", "1", "no yes"]),
     ("learned 0 12", &["12", "eight hexadecimal digits"]),
-    ("learned 99 00000000", &["index", "99", "0 to 57"]),
+    ("learned 99 00000000", &["index", "99", "0 to 60"]),
     ("learned check 00000000", &["word 0 is missing"]),
     ("faults 99", &["fault", "99", "1 to 53"]),
     ("faults 24", &["fault", "24", "`docs/faults.md` lists"]),

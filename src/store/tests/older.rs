@@ -65,6 +65,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         spread: 0.001,
         ripple: 0.0,
         asymmetry: Asymmetry::default(),
+        at_start: None,
         positions: 1,
         gain_mismatch: fitted(0.01, 0.0002),
         current_saliency: fitted(0.03, 0.02),

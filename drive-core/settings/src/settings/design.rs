@@ -8,7 +8,8 @@ use core::f32::consts::TAU;
 
 use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
-use drive_core::carrier::{DemodulatorKind, Injection};
+
+use drive_core::carrier::{AtStart, DemodulatorKind, Injection};
 use drive_core::current::{
     DeadTime, DqPi, InverterDrop, Modulator, Pi, ReferenceFilter, VoltageLimit,
 };
@@ -25,6 +26,8 @@ use drive_core::{
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
+/// Rotor time constants in which flux decays before the asymmetry is measured: the saliency, in its square, to 0.25 %.
+const DECAY_T: f32 = 3.0;
 /// Time between two steps of the thermal loads, s.
 const THERMAL_S: f32 = Thermal::EVERY as f32 * PERIOD_S;
 /// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
@@ -121,6 +124,9 @@ impl Settings {
             noise_watch: (self.angle_source == AngleSource::Injection)
                 .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
             travel_watch: TravelWatch::new(self.share_of_range(1.0)),
+            at_start: self
+                .tracks_synchronously()
+                .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
                 expected_a: self.share_of_rated(WIRING_A),

@@ -1,6 +1,7 @@
 //! The table of [`Trust`] in every phase of the flux and for every source of the angle.
 
 use super::*;
+use crate::carrier::at_start::AtStartState;
 use crate::drive::trust::{Judged, Lock, Trust};
 use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;
@@ -44,6 +45,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let alone = c.catching.unwrap().alone;
     let phases = [
         (FluxPhase::Search(CatchState::default()), 5),
+        (FluxPhase::Asymmetry(AtStartState::new(false)), 5),
         (FluxPhase::Build { from: 7 }, 7 + alone - 1),
         (FluxPhase::Build { from: 7 }, 7 + alone),
         (FluxPhase::Hold, 5),
@@ -57,10 +59,11 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
             let field = Field { flux: flux.clone(), frame, ..Field::default() };
             let name = match (number, frame) {
                 (0, _) => "looking for a turning shaft",
-                (1, _) => "the same, found",
-                (2, _) => "the same, 0.2 s later",
-                (3, Frame::LockedShaft) => "magnetising to learn",
-                (3, Frame::Encoder | Frame::Tracked) => "magnetising",
+                (1, _) => "standing, the asymmetry is measured",
+                (2, _) => "turning, found",
+                (3, _) => "the same, 0.2 s later",
+                (4, Frame::LockedShaft) => "magnetising to learn",
+                (4, Frame::Encoder | Frame::Tracked) => "magnetising",
                 (_, Frame::LockedShaft) => "learning, and stopping from it",
                 (_, Frame::Encoder | Frame::Tracked) => "verifying, regulating, stopping",
             };

@@ -24,6 +24,8 @@ pub struct Start {
     pub per_looked: f32,
     /// Squared carrier current without torque current, A^2.
     pub baseline: f32,
+    /// Asymmetry before there was current or flux.
+    pub at_start: Option<Asymmetry>,
 }
 
 /// The slope over the torque current, that without it, and the largest current that it allows, A.
@@ -57,10 +59,7 @@ impl Learning {
             Verdict::of_slope(slope.at_rest)
         };
         // The check and the baseline were taken with the asymmetry, with the flux along phase a.
-        let all = match gain_mismatch.accepted {
-            true => asymmetry.plus(&Asymmetry::of_gain_mismatch(gain_mismatch.value), 1.0),
-            false => asymmetry,
-        };
+        let all = asymmetry.with_gains(&gain_mismatch);
         let seen = |q: f32, carrier_squared: f32, axis| {
             let mut saliency = Saliency { q, carrier_squared, i_q: 0.0 };
             all.take_out(&mut saliency, axis);
@@ -80,6 +79,7 @@ impl Learning {
             ripple,
             gain_mismatch,
             asymmetry,
+            at_start: start.at_start.map(|seen| seen.plus(&all, -1.0)),
             positions: 1,
             current_saliency,
             flux_saliency: start.per_looked * looked,

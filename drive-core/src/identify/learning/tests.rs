@@ -19,7 +19,7 @@ fn learning() -> Learning {
 
 /// Measurements before the learning: no check, and the carrier without torque current.
 fn start() -> Start {
-    Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER }
+    Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER, at_start: None }
 }
 
 /// Goes through all points with the signal that `q(i_q, lead, theta)` gives and the voltage `v(i_q)`.
@@ -263,6 +263,7 @@ fn found() -> Learned {
         spread: 0.001,
         ripple: 0.0,
         asymmetry: Asymmetry { constant: 0.001, sin: 0.002, cos: -0.003 },
+        at_start: Some(Asymmetry { constant: 0.001, sin: 0.0, cos: 0.001 }),
         positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0, accepted: true },
         current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
@@ -283,6 +284,11 @@ fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
     assert!((both.gain_mismatch.value - 0.009).abs() < 1e-6);
     let off = both.asymmetry.plus(&Asymmetry { constant: 0.002, sin: 0.0, cos: -0.003 }, -1.0);
     assert!(off.size() < 1e-7 && both.positions == 2, "{both:?}");
+    // Its start saw 0.001 each of constant and cosine beyond all that it found, and half of that is not taken out.
+    let seen =
+        second.asymmetry.with_gains(&second.gain_mismatch).plus(&both.at_start.unwrap(), -2.0);
+    let off = seen.plus(&Asymmetry { constant: 0.001, sin: 0.0, cos: 0.001 }, 2.0);
+    assert!(off.size() < 1e-7, "{both:?}");
     // A third that finds nothing changes nothing.
     second.gain_mismatch.value = 0.0;
     second.asymmetry = Asymmetry::default();
@@ -300,10 +306,12 @@ fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
 #[test]
 fn what_no_learning_can_have_found_is_not_believed() {
     assert!(found().is_believable());
-    let spoilt: [fn(&mut Learned); 12] = [
+    let spoilt: [fn(&mut Learned); 14] = [
         |l| l.verdict = Verdict::SlopeTooSmall,
         |l| l.spread = f32::NAN,
         |l| l.asymmetry.sin = f32::NAN,
+        |l| l.at_start.as_mut().unwrap().cos = 0.2,
+        |l| l.at_start.as_mut().unwrap().sin = f32::NAN,
         |l| l.slope_at_rest = -0.05,
         |l| l.slope = None,
         |l| l.limit_a = 0.9,

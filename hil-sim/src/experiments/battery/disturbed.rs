@@ -52,8 +52,10 @@ pub static AFTER: [Disturbance; 8] = [
 pub enum Asymmetry {
     /// None.
     None,
-    /// Gains of the current sensors that differ by this, in thousandths.
-    Gains(i16),
+    /// Gain of current sensor a that is higher by this, in thousandths.
+    GainA(i16),
+    /// The same of sensor b.
+    GainB(i16),
     /// Cross-talk from channel b to channel a, likewise.
     CrossTalk(i16),
     /// Saliency fixed to the stator of a motor of iron, likewise.
@@ -66,7 +68,8 @@ impl Asymmetry {
         let percent = |thousandths: i16| f64::from(thousandths) / 10.0;
         match self {
             Self::None => "nothing changed".to_owned(),
-            Self::Gains(by) => format!("gains {:+} %", percent(by)),
+            Self::GainA(by) => format!("gain a {:+} %", percent(by)),
+            Self::GainB(by) => format!("gain b {:+} %", percent(by)),
             Self::CrossTalk(by) => format!("cross-talk {:+} %", percent(by)),
             Self::StatorFixed(by) => format!("stator-fixed {:+} %", percent(by)),
         }
@@ -78,10 +81,8 @@ impl Asymmetry {
         let sensors = &mut config.measurement;
         match self {
             Self::None => {}
-            Self::Gains(by) => {
-                sensors.gain_error_a += 0.5 * share(by);
-                sensors.gain_error_b -= 0.5 * share(by);
-            }
+            Self::GainA(by) => sensors.gain_error_a += share(by),
+            Self::GainB(by) => sensors.gain_error_b += share(by),
             Self::CrossTalk(by) => sensors.cross_talk_a += share(by),
             Self::StatorFixed(by) => config.iron.stator_fixed += share(by),
         }

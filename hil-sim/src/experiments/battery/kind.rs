@@ -70,14 +70,16 @@ const RESTLESS: [Kind; 6] = [
     Kind::Restless { hz: 6000, forced: true },
 ];
 /// The last two need a motor of iron.
-const DRAGGED: [Kind; 7] = [
+const DRAGGED: [Kind; 9] = [
     Kind::Dragged(Asymmetry::None),
-    Kind::Dragged(Asymmetry::Gains(10)),
-    Kind::Dragged(Asymmetry::Gains(-10)),
-    Kind::Dragged(Asymmetry::CrossTalk(10)),
-    Kind::Dragged(Asymmetry::CrossTalk(-10)),
-    Kind::Dragged(Asymmetry::StatorFixed(10)),
-    Kind::Dragged(Asymmetry::StatorFixed(-10)),
+    Kind::Dragged(Asymmetry::GainA(10)),
+    Kind::Dragged(Asymmetry::GainA(-10)),
+    Kind::Dragged(Asymmetry::GainB(10)),
+    Kind::Dragged(Asymmetry::GainB(-10)),
+    Kind::Dragged(Asymmetry::CrossTalk(5)),
+    Kind::Dragged(Asymmetry::CrossTalk(-5)),
+    Kind::Dragged(Asymmetry::StatorFixed(6)),
+    Kind::Dragged(Asymmetry::StatorFixed(-6)),
 ];
 
 /// The kinds that a configuration asks for, and how many runs there are unless it says.
@@ -92,7 +94,7 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
         BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
         BatteryRuns::Dragged => {
             // Model A has no saliency that is fixed to the stator.
-            let ends = if config.model.plant == PlantModel::A { 5 } else { DRAGGED.len() };
+            let ends = if config.model.plant == PlantModel::A { 7 } else { DRAGGED.len() };
             (DRAGGED[..ends].to_vec(), 24 * ends)
         }
     }
@@ -373,9 +375,9 @@ mod tests {
             let is_fixed = |kind: &&Kind| matches!(kind, Kind::Dragged(Asymmetry::StatorFixed(_)));
             (kinds.iter().filter(is_fixed).count(), kinds.len(), runs)
         };
-        assert_eq!(fixed(&config), (0, 5, 120));
+        assert_eq!(fixed(&config), (0, 7, 168));
         config.set("plant", &Value::Word("r".into())).unwrap();
-        assert_eq!(fixed(&config), (2, 7, 168));
+        assert_eq!(fixed(&config), (2, 9, 216));
     }
 
     /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is

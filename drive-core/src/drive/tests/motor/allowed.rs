@@ -78,7 +78,7 @@ fn bench_of(settings: &Settings, state: State, mode: Mode) -> Option<Bench> {
         _ => Command::Start(mode),
     };
     bench.drive.command(&start).unwrap();
-    for _ in 0..18_000 {
+    for _ in 0..36_000 {
         let now = bench.drive.state();
         if now == state {
             return Some(bench);

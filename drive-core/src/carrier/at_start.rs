@@ -1,0 +1,181 @@
+//! Asymmetry of sensors and stator, measured at a start before there is current or flux.
+//!
+//! Under torque at zero stator frequency an asymmetry that the drive does not know holds the frame, and nothing tells it from the
+//! saliency of the flux. Without flux and without direct current there is no other saliency: what is seen with the injection along
+//! phase a, 60° and 120° ahead of it is the [asymmetry](super::asymmetry) alone. (Along these axes the inverter's voltage drops lie
+//! along the carrier, too.)
+//!
+//! ```text
+//! q(0°) = constant + cos      q(60°), q(120°) = constant - cos/2 +- sin sqrt3/2
+//! ```
+
+use crate::carrier::Asymmetry;
+use crate::carrier::injection::CARRIER_S;
+use crate::{SQRT_3, UnitVector, periods};
+
+/// Injection axes, from phase a.
+const AXES: [UnitVector; 3] = [
+    UnitVector { cos: 1.0, sin: 0.0 },
+    UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 },
+    UnitVector { cos: -0.5, sin: 0.5 * SQRT_3 },
+];
+/// Time in which the averages of the demodulation settle, and averaging time of a start and of a learning, of each axis, s.
+const SETTLE_S: f32 = 0.02;
+const AVERAGE_S: f32 = 0.12;
+const LEARNING_S: f32 = 0.96;
+/// Deviations of its own noise from which on a change of the asymmetry counts: noise alone exceeds them in less than one of 1000 starts.
+const DEVIATIONS: f32 = 5.0;
+/// Carrier periods for which the noise of q lasts: the averages contain four, with weights of 1, 3, 3 and 1.
+const CORRELATED: f32 = 3.2;
+
+/// The measurement at a start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtStart {
+    /// Control periods in which flux that is left decays first.
+    pub decay: u32,
+    /// What the start of the learning saw beyond all that was learned: later ones look for changes. None where nothing was learned.
+    pub learned: Option<Asymmetry>,
+}
+
+/// State of the measurement: sums of q and of its squares.
+#[derive(Clone, Copy, Debug)]
+pub struct AtStartState {
+    /// Averaging time of an axis, control periods.
+    average: u32,
+    q: [f32; AXES.len()],
+    q_squared: f32,
+}
+
+impl AtStart {
+    /// Takes the saliency, which known asymmetries were taken out of, `elapsed` control periods after the begin; returns the injection
+    /// axis for the next one, or `None` at the end.
+    pub fn step(&self, state: &mut AtStartState, elapsed: u32, q: f32) -> Option<UnitVector> {
+        let all = periods(SETTLE_S) + state.average;
+        let elapsed = elapsed.saturating_sub(self.decay);
+        let (number, of_axis) = (elapsed.checked_div(all)?, elapsed.checked_rem(all)?);
+        let sum = state.q.get_mut(number as usize)?;
+        if of_axis >= periods(SETTLE_S) {
+            *sum += q;
+            state.q_squared += q * q;
+        }
+        AXES.get(number as usize).copied()
+    }
+
+    /// What has changed since the learning, if that is more than noise makes.
+    pub fn change(&self, state: &AtStartState) -> Option<Asymmetry> {
+        let change = state.found().plus(&self.learned?, -1.0);
+        (change.size() > DEVIATIONS * state.deviation()).then_some(change)
+    }
+}
+
+impl AtStartState {
+    /// The measurement of a start; that of a learning, which all later ones are compared with, takes longer.
+    pub fn new(learns: bool) -> Self {
+        let average = periods(if learns { LEARNING_S } else { AVERAGE_S });
+        Self { average, q: [0.0; AXES.len()], q_squared: 0.0 }
+    }
+
+    /// The asymmetry that was seen beyond the known one.
+    pub fn found(&self) -> Asymmetry {
+        let [along_a, ahead, behind] = self.q.map(|sum| sum / self.average as f32);
+        let constant = (along_a + ahead + behind) * (1.0 / 3.0);
+        Asymmetry { constant, sin: (ahead - behind) * (1.0 / SQRT_3), cos: along_a - constant }
+    }
+
+    /// Standard deviation of the size of a change since the learning that noise makes.
+    fn deviation(&self) -> f32 {
+        let per_average = 1.0 / self.average as f32;
+        let of_means = self.q.into_iter().map(|sum| sum * sum).sum::<f32>() * per_average;
+        let variance = (self.q_squared - of_means) * (per_average * (1.0 / 3.0));
+        // That of the mean of an axis, of which the three numbers have 1/3, 2/3 and 2/3; and with that of the learning.
+        let of_mean = variance * (CORRELATED * CARRIER_S / AVERAGE_S);
+        fpu_sqrt::sqrtf(of_mean * (2.0 / 3.0) * (1.0 + AVERAGE_S / LEARNING_S))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::carrier::Saliency;
+
+    const WITHOUT_DECAY: AtStart = AtStart { decay: 0, learned: None };
+
+    /// What is seen of an asymmetry with the injection along `axis`.
+    fn seen(of: &Asymmetry, axis: UnitVector) -> Saliency {
+        let mut seen = Saliency { q: 0.0, carrier_squared: 0.05, i_q: 0.0 };
+        let minus = Asymmetry { constant: 0.0, sin: 0.0, cos: 0.0 }.plus(of, -1.0);
+        minus.take_out(&mut seen, axis);
+        seen
+    }
+
+    /// The measurement of this asymmetry, with these values instead while the averages settle.
+    fn measured(of: &Asymmetry, unsettled: f32) -> (AtStartState, u32) {
+        let (mut state, mut axis) = (AtStartState::new(false), AXES[2]);
+        let at_start = AtStart { decay: 777, learned: None };
+        for elapsed in 0..10_000_u32 {
+            let measures = elapsed.saturating_sub(777) % periods(SETTLE_S + AVERAGE_S);
+            let settles = measures < periods(SETTLE_S);
+            let mut now = seen(of, axis);
+            if settles {
+                now.q = unsettled;
+            }
+            match at_start.step(&mut state, elapsed, now.q) {
+                Some(next) => axis = next,
+                None => return (state, elapsed),
+            }
+        }
+        panic!("it does not end");
+    }
+
+    #[test]
+    fn an_asymmetry_is_found_in_three_axes() {
+        for (constant, sin, cos) in
+            [(0.0, 0.0, 0.0), (-0.0029, 0.005, -0.0029), (0.006, -0.004, -0.003), (0.0, 0.0, 0.01)]
+        {
+            let asymmetry = Asymmetry { constant, sin, cos };
+            let (state, took) = measured(&asymmetry, 1.0);
+            assert_eq!(took, 777 + 3 * 840);
+            assert!(state.found().plus(&asymmetry, -1.0).size() < 1e-5, "{:?}", state.found());
+        }
+    }
+
+    /// White noise, which the demodulation has averaged over four carrier periods, makes a change that counts in none of 1000 starts,
+    /// and ten times as much as it makes counts.
+    #[test]
+    fn noise_is_no_asymmetry() {
+        let mut x = 1_u32;
+        let mut white = || {
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            2.0 * SQRT_3 * ((x >> 8) as f32 / (1 << 24) as f32 - 0.5)
+        };
+        let (mut counted, mut sum) = (0, 0.0);
+        let mut start = |learns| {
+            let (mut state, mut last) = (AtStartState::new(learns), [0.0; 4]);
+            for elapsed in 0..3 * (120 + state.average) {
+                if elapsed % 10 == 0 {
+                    last = [white(), last[0], last[1], last[2]];
+                }
+                let [a, b, c, d] = last;
+                let q = 0.004 * (a + 3.0 * b + 3.0 * c + d) / 8.0;
+                WITHOUT_DECAY.step(&mut state, elapsed, q);
+            }
+            state
+        };
+        let change = |now: &AtStartState, learned| {
+            AtStart { learned: Some(learned), ..WITHOUT_DECAY }.change(now)
+        };
+        for _ in 0..1000 {
+            let (learned, now) = (start(true).found(), start(false));
+            let by_noise = now.found().plus(&learned, -1.0);
+            sum += by_noise.size() * by_noise.size();
+            counted += usize::from(change(&now, learned).is_some());
+        }
+        assert_eq!(counted, 0);
+        let rms = fpu_sqrt::sqrtf(sum / 1000.0);
+        let learned = Asymmetry { constant: 0.0, sin: 10.0 / SQRT_3 * rms, cos: 0.0 };
+        assert!((0..100).all(|_| change(&start(false), learned).is_some()));
+        let none = Asymmetry { constant: 0.0, sin: 0.0, cos: f32::NAN };
+        assert!(change(&start(false), none).is_none());
+        assert!(WITHOUT_DECAY.change(&start(false)).is_none());
+    }
+}
