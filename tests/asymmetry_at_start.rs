@@ -4,19 +4,24 @@
 mod common;
 
 use common::{Rig, config};
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Fault, Mode, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Load, Plant};
 
 /// A motor of iron at high flux.
 const IRON: [&str; 4] = ["plant=r", "flux_level=high", "sequence.flux=high", "prepare.learn=yes"];
 
-/// Mean angle error, degrees, of the third second under torque, with these changes since the learning.
-fn mean_error(changes: &[&str], i_q: f32) -> f64 {
+/// A drive that has learned, with these changes since then.
+fn changed(changes: &[&str]) -> Rig {
     let learned = Rig::from_config(&config(&IRON), 3).unwrap();
     let mut plant = plant_settings(&config(&[&IRON, changes].concat()));
     plant.mechanics.load = Load::Locked;
-    let mut rig = Rig::of(Plant::new(&plant, 7).unwrap(), learned.drive);
+    Rig::of(Plant::new(&plant, 7).unwrap(), learned.drive)
+}
+
+/// Mean angle error, degrees, of the third second under torque, with these changes since the learning.
+fn mean_error(changes: &[&str], i_q: f32) -> f64 {
+    let mut rig = changed(changes);
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(i_q)).unwrap();
     rig.run(2.0, |_| {});
@@ -40,5 +45,15 @@ fn a_start_measures_what_has_changed_since_the_learning() {
             println!("{changes:?}, {i_q} A: {error:.1} degrees");
             assert!(error.abs() < 4.0, "{changes:?}, {i_q} A: {error}");
         }
+    }
+}
+
+/// A sensor whose gain is 30 % off is no drift: the start ends before there is flux.
+#[test]
+fn more_asymmetry_than_a_learning_accepts_is_a_fault() {
+    for change in ["measurement.gain_error_a=0.3", "measurement.gain_error_b=-0.3"] {
+        let mut rig = changed(&[change]);
+        assert!(rig.start(Mode::Torque).is_err(), "{change}");
+        assert_eq!(rig.drive.state(), State::Fault(Fault::NothingLearned), "{change}");
     }
 }

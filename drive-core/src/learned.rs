@@ -39,7 +39,7 @@ pub struct Fitted {
 
 impl Fitted {
     /// This value where it was accepted, or else `other`.
-    fn or(self, other: Self) -> Self {
+    pub(crate) fn or(self, other: Self) -> Self {
         if self.accepted { self } else { other }
     }
 }
@@ -113,7 +113,7 @@ pub struct Learned {
     /// Asymmetry that is taken out of the demodulated signals: what the gain mismatch, where it is accepted, leaves.
     pub asymmetry: Asymmetry,
     /// Asymmetry that the start saw before there was current or flux, beyond gain mismatch and `asymmetry`: a later start expects it.
-    /// None where flux was left.
+    /// None with an encoder, or of an earlier firmware.
     pub at_start: Option<Asymmetry>,
     /// Number of rotor positions, 1 or more, whose mean gain mismatch and asymmetry are. The slots of the rotor have an
     /// asymmetry that changes with its position, sensors and stator have not.

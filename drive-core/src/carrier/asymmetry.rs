@@ -41,8 +41,7 @@ impl Asymmetry {
 
     /// This one and that of a gain mismatch, where it was accepted.
     pub fn with_gains(&self, gains: &Fitted) -> Self {
-        let mismatch = if gains.accepted { gains.value } else { 0.0 };
-        self.plus(&Self::of_gain_mismatch(mismatch), 1.0)
+        self.plus(&Self::of_gain_mismatch(gains.or(Fitted::default()).value), 1.0)
     }
 
     /// Sum of this one and a `share` of the other.

@@ -11,6 +11,7 @@ use crate::current::inverter_drop::DropSample;
 use crate::drive::state::State;
 use crate::filter::LPF;
 use crate::identify::learning::LearningState;
+use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
 use crate::protect::SaliencyCheck;
 use crate::protect::saliency_check::SaliencyCheckAction;
@@ -265,7 +266,7 @@ impl Field {
     fn find_flux(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
         Ok(match self.flux {
             FluxPhase::Search(_) => self.search(c, k)?,
-            FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k),
+            FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k)?,
             FluxPhase::Build { from } => self.build(c, k, from),
             FluxPhase::Hold => self.magnetise(c, k)?,
             FluxPhase::Verify => self.verify(c, k)?,
@@ -321,26 +322,32 @@ impl Field {
     }
 
     /// The current while flux that is left decays and the asymmetry is measured: none.
+    ///
+    /// # Errors
+    /// [`Fault::NothingLearned`] for more asymmetry than a learning accepts.
     #[cold]
-    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Kept) -> Dq {
+    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
         let (Some(at_start), FluxPhase::Asymmetry(state)) = (&c.at_start, &mut self.flux) else {
-            return Dq::ZERO;
+            return Ok(Dq::ZERO);
         };
         if let Some(axis) = at_start.step(state, k.elapsed, self.estimator.saliency().q) {
             k.references.injection_axis = axis;
-            return Dq::ZERO;
+            return Ok(Dq::ZERO);
         }
         k.references.injection_axis = c.injection_axis;
         self.at_start = Some(state.found());
         if let (Frame::Tracked, Some(change)) = (self.frame, at_start.change(state)) {
             let known = &mut self.estimator.drift.at_start;
             *known = known.plus(&change, 1.0);
+            if known.size() > LARGEST_ASYMMETRY {
+                return Err(Fault::NothingLearned);
+            }
         }
         if let Some(observer) = &c.observer {
             observer.start(&mut self.observer);
         }
         self.hold(c, k, 0);
-        Dq::ZERO
+        Ok(Dq::ZERO)
     }
 
     /// Holds the frame along phase a, and lets the flux build up there.

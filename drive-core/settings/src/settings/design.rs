@@ -8,7 +8,6 @@ use core::f32::consts::TAU;
 
 use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
-
 use drive_core::carrier::{AtStart, DemodulatorKind, Injection};
 use drive_core::current::{
     DeadTime, DqPi, InverterDrop, Modulator, Pi, ReferenceFilter, VoltageLimit,
