@@ -39,8 +39,13 @@ pub struct Fitted {
 
 impl Fitted {
     /// This value where it was accepted, or else `other`.
-    pub(crate) fn or(self, other: Self) -> Self {
+    fn or(self, other: Self) -> Self {
         if self.accepted { self } else { other }
+    }
+
+    /// `asymmetry` and that of this gain mismatch.
+    pub(crate) fn with(self, asymmetry: &Asymmetry) -> Asymmetry {
+        asymmetry.plus(&Asymmetry::of_gain_mismatch(self.or(Self::default()).value), 1.0)
     }
 }
 
@@ -208,7 +213,7 @@ impl Learned {
             gains.value = corrected + share * gains.value;
         }
         // The rest of what was found now is as much that of this position.
-        let rest = self.asymmetry.with_gains(&self.gain_mismatch);
+        let rest = self.gain_mismatch.with(&self.asymmetry);
         Self {
             gain_mismatch: gains,
             asymmetry: before.asymmetry.plus(&self.asymmetry, share),

@@ -13,7 +13,6 @@
 //! with the saliency of the flux are of second order and left.)
 
 use crate::carrier::Saliency;
-use crate::learned::Fitted;
 use crate::{SQRT_3, UnitVector};
 
 /// The learned numbers, dimensionless; 0 without an asymmetry.
@@ -37,11 +36,6 @@ impl Asymmetry {
     /// The gain mismatch that explains most of these numbers, by least squares.
     pub fn gain_mismatch(&self) -> f32 {
         1.2 * (self.sin - (self.cos + self.constant) / SQRT_3)
-    }
-
-    /// This one and that of a gain mismatch, where it was accepted.
-    pub fn with_gains(&self, gains: &Fitted) -> Self {
-        self.plus(&Self::of_gain_mismatch(gains.or(Fitted::default()).value), 1.0)
     }
 
     /// Sum of this one and a `share` of the other.

@@ -59,7 +59,7 @@ impl Learning {
             Verdict::of_slope(slope.at_rest)
         };
         // The check and the baseline were taken with the asymmetry, with the flux along phase a.
-        let all = asymmetry.with_gains(&gain_mismatch);
+        let all = gain_mismatch.with(&asymmetry);
         let seen = |q: f32, carrier_squared: f32, axis| {
             let mut saliency = Saliency { q, carrier_squared, i_q: 0.0 };
             all.take_out(&mut saliency, axis);

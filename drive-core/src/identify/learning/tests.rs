@@ -285,8 +285,7 @@ fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
     let off = both.asymmetry.plus(&Asymmetry { constant: 0.002, sin: 0.0, cos: -0.003 }, -1.0);
     assert!(off.size() < 1e-7 && both.positions == 2, "{both:?}");
     // Its start saw 0.001 each of constant and cosine beyond all that it found, and half of that is not taken out.
-    let seen =
-        second.asymmetry.with_gains(&second.gain_mismatch).plus(&both.at_start.unwrap(), -2.0);
+    let seen = second.gain_mismatch.with(&second.asymmetry).plus(&both.at_start.unwrap(), -2.0);
     let off = seen.plus(&Asymmetry { constant: 0.001, sin: 0.0, cos: 0.001 }, 2.0);
     assert!(off.size() < 1e-7, "{both:?}");
     // A third that finds nothing changes nothing.
