@@ -212,7 +212,7 @@ impl Learned {
             let corrected = before.gain_mismatch.or(Fitted::default()).value;
             gains.value = corrected + share * gains.value;
         }
-        // The rest of what was found now is as much that of this position.
+        // The mean of the positions leaves this share of what was found at this one, and a start there sees it.
         let rest = self.gain_mismatch.with(&self.asymmetry);
         Self {
             gain_mismatch: gains,

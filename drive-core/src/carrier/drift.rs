@@ -42,7 +42,7 @@ const STEP: f32 = CARRIER_S / (2.0 * 2.0 / 3.0);
 /// State of the estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GainDrift {
-    /// Asymmetry beyond the learned one that the start has measured.
+    /// Asymmetry beyond the learned one that this start and the runs before have found.
     pub at_start: Asymmetry,
     /// The mismatch m.
     pub mismatch: f32,

@@ -5,7 +5,6 @@ use super::catching::Residual;
 use super::in_turn::StepResults;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
 use crate::carrier::at_start::AtStartState;
-use crate::carrier::drift::GainDrift;
 use crate::carrier::{CarrierPeriod, CarrierSample};
 use crate::current::inverter_drop::DropSample;
 use crate::drive::state::State;
@@ -37,7 +36,7 @@ impl Field {
         c.estimator.start(&mut self.estimator);
         // A learning begins anew.
         if self.frame != Frame::LockedShaft {
-            self.estimator.drift = GainDrift::new(left.asymmetry);
+            self.estimator.drift.at_start = left.asymmetry;
         }
         if let Some(observer) = &c.observer {
             observer.start(&mut self.observer);
