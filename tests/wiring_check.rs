@@ -51,7 +51,7 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
             }
             _ => {}
         }
-        let (compare, _) = drive.period(&mut front_end, &sample);
+        let (compare, _) = drive.period(&mut front_end, &sample, &mut |_| {});
         if !compare.enabled {
             pending = Compare::OFF;
         }

@@ -93,8 +93,8 @@ impl Interrupt {
     /// Called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
         let sample = self.board.sample();
-        let (compare, output) = self.drive.period(&mut self.front_end, &sample);
-        self.board.output(&compare);
+        let put_out = &mut |compare| self.board.output(&compare);
+        let (_, output) = self.drive.period(&mut self.front_end, &sample, put_out);
         self.board.dc_link(output.chopper, output.relay);
         // The rest of the period belongs to commands.
         if let Ok(command) = self.commands.try_recv() {

@@ -78,7 +78,7 @@ pub use telemetry::{Room, Telemetry};
 /// drive.command(&Command::Start(Mode::Torque))?;
 /// // One period, with codes of zero current, 311 V and 25 °C.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };
-/// let (compare, _) = drive.period(&mut front_end, &sample);
+/// let (compare, _) = drive.period(&mut front_end, &sample, &mut |_| {});
 /// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
 /// assert_eq!(drive.state(), State::Calibrating);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -426,11 +426,24 @@ impl Drive {
     }
 
     /// One PWM period between converters and timer: front end, [`step`](Self::step), front end.
+    ///
+    /// `put_out` gets the compare values as soon as they are known. Checks and slow tasks follow, and it is called again where one of
+    /// them switches the outputs off: before the next period, so that the first values never act.
     #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
-    pub fn period(&mut self, front_end: &mut FrontEndState, sample: &Sample) -> (Compare, Output) {
+    pub fn period(
+        &mut self,
+        front_end: &mut FrontEndState,
+        sample: &Sample,
+        put_out: &mut dyn FnMut(Compare),
+    ) -> (Compare, Output) {
         let measured = self.c.front_end.measure(front_end, sample, self.kept.offsets);
-        let output = self.step(&measured);
-        (self.c.front_end.put_out(front_end, &output), output)
+        let regulated = matches!(self.phase, Phase::Field(_));
+        let output = self.step_with(&measured, put_out);
+        let compare = self.c.front_end.put_out(front_end, &output);
+        if !(regulated && compare.enabled) {
+            put_out(compare);
+        }
+        (compare, output)
     }
 
     /// One PWM period: from that which was measured at instant `k T` to the duties of the period that begins at `(k + 1) T`.
@@ -438,6 +451,11 @@ impl Drive {
     /// Never panics. Whatever is wrong with the input or with the state becomes a latched fault,
     /// with the outputs off in the same step.
     pub fn step(&mut self, measured: &Measured) -> Output {
+        self.step_with(measured, &mut |_| {})
+    }
+
+    /// The same, with the compare values that result early where they do.
+    fn step_with(&mut self, measured: &Measured, put_out: &mut dyn FnMut(Compare)) -> Output {
         let checked = self.c.protect(measured);
         let result = match &mut self.phase {
             Phase::Field(field) => {
@@ -445,7 +463,7 @@ impl Drive {
                 // taking it from one of three bases within reach.
                 let (field, c, kept) = black_box((field, &self.c, &mut self.kept));
                 match checked {
-                    Ok(()) => field.step(c, kept, measured).map(Some),
+                    Ok(()) => field.step(c, kept, measured, put_out).map(Some),
                     Err(fault) => Err(fault.into()),
                 }
             }

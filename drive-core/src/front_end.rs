@@ -87,6 +87,11 @@ impl FrontEnd {
         if self.shunts.is_some() {
             state.shunts.applied(duties);
         }
+        self.compare(duties)
+    }
+
+    /// Timer counts of duties.
+    pub(crate) fn compare(&self, duties: [f32; 3]) -> Compare {
         // To the nearest integer; 0 for NaN. The cast to u32 is one instruction of the core, the saturating one to u16 twelve.
         let [a, b, c] = duties.map(|duty| (duty * self.top + 0.5) as u32 as u16);
         Compare { a, b, c, enabled: true }

@@ -185,7 +185,7 @@ impl Rig {
     /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
     #[inline]
     pub fn step_with(&mut self, sample: &Sample) {
-        let (compare, output) = self.drive.period(&mut self.front_end, sample);
+        let (compare, output) = self.drive.period(&mut self.front_end, sample, &mut |_| {});
         if !compare.enabled {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;

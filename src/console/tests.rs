@@ -28,7 +28,7 @@ use rotor_id::online::NoEstimate;
 
 /// A whole period of a drive with its front end.
 fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
-    drive.period(front_end, sample).0
+    drive.period(front_end, sample, &mut |_| {}).0
 }
 
 struct Talk {

@@ -239,8 +239,8 @@ impl Running {
         let codes = [read.current_a, read.current_b, read.current_c];
         let sample = Sample { encoder: encoder.count(), hardware, ..read };
 
-        let (compare, output) = drive.period(&mut self.front_end, &sample);
-        pwm.apply(compare);
+        let put_out = &mut |compare| pwm.apply(compare);
+        let (_, output) = drive.period(&mut self.front_end, &sample, put_out);
 
         // The timer was at its top again before all compare values were written.
         self.late = Hardware::empty();

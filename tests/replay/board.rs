@@ -41,7 +41,10 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
             encoder: u32::from_le_bytes(bytes[8..].try_into().unwrap()),
             ..Sample::default()
         };
-        let (compare, _) = drive.period(&mut front_end, &sample);
+        let mut last = None;
+        let (compare, _) =
+            drive.period(&mut front_end, &sample, &mut |compare| last = Some(compare));
+        assert_eq!(last, Some(compare), "{n}");
         compares.push(compare);
         if let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
             order(&mut drive, &mut settings, line);

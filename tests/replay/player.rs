@@ -180,7 +180,10 @@ pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Ha
         while let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
             player.order(&mut drive, line);
         }
-        let (compare, output) = drive.period(&mut front_end, sample);
+        let mut last = None;
+        let (compare, output) =
+            drive.period(&mut front_end, sample, &mut |compare| last = Some(compare));
+        assert_eq!(last, Some(compare), "{n}");
         if n.is_multiple_of(BLOCK) {
             hashes.push(Hashes::default());
         }

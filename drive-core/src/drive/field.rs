@@ -14,7 +14,7 @@ use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
 use crate::protect::SaliencyCheck;
 use crate::protect::saliency_check::SaliencyCheckAction;
-use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Measured, PERIOD_S, motion};
+use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured, PERIOD_S, motion};
 
 /// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
 const STANDING_FREQ: f32 = PERIOD_S;
@@ -83,7 +83,7 @@ impl Field {
         }
     }
 
-    /// One period.
+    /// One period. The compare values go to `put_out` before the rest is done.
     ///
     /// # Errors
     /// Why the outputs go off: a fault, or it has stopped.
@@ -92,6 +92,7 @@ impl Field {
         c: &Coefficients,
         k: &mut Kept,
         measured: &Measured,
+        put_out: &mut dyn FnMut(Compare),
     ) -> Result<[f32; 3], End> {
         if self.frame == Frame::Encoder {
             k.rotor_count = measured.encoder;
@@ -204,6 +205,7 @@ impl Field {
         if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
             return Err(s.not_finite(c, k).unwrap_or(Fault::NonFiniteState).into());
         }
+        put_out(c.front_end.compare(modulated.duties));
 
         // Checks and slow tasks, one a sample.
         let results = StepResults {

@@ -12,7 +12,7 @@ use crate::filter::dissertation::LPF;
 use crate::flux::AngleSource;
 use crate::math::frames::{Abc, AlphaBeta};
 
-use crate::carrier::DemodulatorKind;
+use crate::carrier::{CARRIER_SAMPLES, DemodulatorKind};
 use crate::front_end::FrontEndState;
 use crate::io::{Compare, Hardware, Sample};
 use crate::line::Line;
@@ -31,7 +31,7 @@ const MODES: [Mode; 6] = [
 
 /// A whole period of a drive with its front end.
 fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
-    drive.period(front_end, sample).0
+    drive.period(front_end, sample, &mut |_| {}).0
 }
 
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
@@ -42,21 +42,25 @@ struct Load {
     /// The only direction in which a current can flow when a phase is open.
     only: Option<UnitVector>,
     front_end: FrontEndState,
+    /// A random number of this period. Without noise the converter's steps make a regular oscillation, which a start takes for a
+    /// rotor that turns.
+    random: u32,
 }
 
 impl Load {
     fn new() -> Self {
         let (pending, front_end) = (Compare::OFF, FrontEndState::default());
-        Self { current: AlphaBeta::ZERO, pending, v_dc: 311.0, only: None, front_end }
+        Self { current: AlphaBeta::ZERO, pending, v_dc: 311.0, only: None, front_end, random: 1 }
     }
 
     fn sample(&self) -> Sample {
         let i = self.current.to_abc();
-        let code = |line: Line, i: f32| ((i - line.offset) / line.gain) as u16;
+        let noise = |shift: u32| (self.random >> shift & 3) as f32 - 1.0;
+        let code = |line: Line, i: f32, noise| ((i - line.offset) / line.gain + noise) as u16;
         Sample {
             heat_sink: 1309,
-            current_a: code(Line::CHANNEL_A, i.a),
-            current_b: code(Line::CHANNEL_B, i.b),
+            current_a: code(Line::CHANNEL_A, i.a, noise(16)),
+            current_b: code(Line::CHANNEL_B, i.b, noise(24)),
             dc_link: (self.v_dc / 0.11) as u16,
             ..Sample::default()
         }
@@ -81,6 +85,7 @@ impl Load {
             self.current = AlphaBeta::along(axis, along);
         }
         self.pending = compare;
+        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
     }
 }
 
@@ -246,6 +251,31 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque), "case {number}");
     }
+}
+
+/// The compare values leave before the checks that come once a carrier period; one that fails takes them back in the same period.
+#[test]
+fn a_late_check_takes_the_compare_values_back() {
+    let (mut drive, mut load) = running();
+    drive.c.protection.rotor_freq = -1.0;
+    let mut put_out = vec![];
+    for _ in 0..CARRIER_SAMPLES {
+        put_out.clear();
+        let sample = load.sample();
+        let (compare, output) =
+            drive.period(&mut load.front_end, &sample, &mut |compare| put_out.push(compare));
+        assert_eq!(put_out.last(), Some(&compare));
+        assert_eq!(
+            (put_out.len(), compare.enabled),
+            if drive.is_off() { (2, false) } else { (1, true) }
+        );
+        assert!(put_out[0].enabled && output.duties.is_some() != drive.is_off());
+        if drive.is_off() {
+            break;
+        }
+        load.advance(compare);
+    }
+    assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
 }
 
 #[test]

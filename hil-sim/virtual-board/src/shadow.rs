@@ -153,7 +153,8 @@ impl Shadow {
     pub fn follow(&mut self, period: &Period) -> Result<()> {
         let learning = self.drive.state() == State::Learning;
         let compare;
-        (compare, self.output) = self.drive.period(&mut self.front_end, &period.sample);
+        (compare, self.output) =
+            self.drive.period(&mut self.front_end, &period.sample, &mut |_| {});
         if learning
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()
