@@ -9,5 +9,5 @@ pub(crate) mod voltage_limit;
 pub use dead_time::DeadTime;
 pub use inverter_drop::InverterDrop;
 pub use modulation::Modulator;
-pub use pi::{DqPi, Pi, PiState, ReferenceFilter};
+pub use pi::{DIRECT_SHARE, DIRECT_SHARE_WITHOUT_CARRIER, DqPi, Pi, PiState};
 pub use voltage_limit::VoltageLimit;

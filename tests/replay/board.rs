@@ -86,18 +86,18 @@ fn torque_steps_without_a_sensor() {
     assert_eq!(
         hashes,
         [
-            0x0380_d587_c69c_1fe0,
-            0x21c7_d90e_ce23_3e9f,
-            0xcd26_0dd2_978c_62ec,
-            0x8199_c1b6_97b8_28f6,
-            0x1af9_0f01_4f0b_8c3c,
-            0x8479_1d78_9ad6_2c37,
-            0xddfc_8026_fef1_cef2,
-            0xe71a_8249_cb57_1dbf,
-            0x3c34_6671_f5fc_694c,
-            0xe1fa_0e1a_92f7_2ed3,
-            0x8d3a_2944_4b97_3fe8,
-            0x75b3_67a3_586d_8d54
+            0xb4fe_f4ab_c64f_f1b7,
+            0xaae8_816b_4b76_ab82,
+            0xd371_9a6e_938c_006c,
+            0xbb88_378e_b690_69b3,
+            0x15d4_387b_9bce_7adb,
+            0xc1d4_9cc0_33e5_9940,
+            0x3759_7957_5c32_3d89,
+            0xea48_e23a_5507_fa01,
+            0xf813_d63e_0d14_64e3,
+            0x573f_ca55_4cfe_83b9,
+            0x25ab_533e_3e93_6bae,
+            0x5a5a_7d2d_5f79_7ac1
         ],
         "{hashes:#018x?}"
     );
@@ -106,15 +106,15 @@ fn torque_steps_without_a_sensor() {
 #[test]
 fn position_steps_with_the_encoder() {
     let (hashes, interrupts) = replay("encoder");
-    assert_eq!(interrupts, 27_423);
+    assert_eq!(interrupts, 27_434);
     assert_eq!(
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0xfefb_fb1b_a014_fdb4,
-            0xb711_7307_7e71_96ed,
-            0x74cc_b81d_4e17_93e7,
-            0x6050_7326_df57_46eb
+            0xd323_cad4_947f_9b1c,
+            0x0bcd_77ec_132e_12fe,
+            0xa005_be75_c9a4_b9fb,
+            0x9742_ada2_39ac_7f38
         ],
         "{hashes:#018x?}"
     );

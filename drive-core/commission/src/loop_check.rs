@@ -3,7 +3,7 @@
 
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use drive_core::Regulator;
-use drive_settings::tuning::DIRECT_SHARE;
+use drive_core::current::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
 const STEP: [f32; 2] = [0.4, 0.7];

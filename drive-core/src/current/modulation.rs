@@ -4,7 +4,7 @@
 //! O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the two zero vectors, without
 //! sectors or tables. A test compares the on-times with Table 2.
 
-use crate::{Abc, AlphaBeta, PERIOD_S, SQRT_3};
+use crate::{Abc, AlphaBeta, PERIOD_S, SQRT_3, math};
 
 /// Pulses shorter than the dead time plus this time are dropped or extended, s.
 const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
@@ -125,8 +125,14 @@ impl Modulator {
         // NaN differs from itself and so counts as limited.
         let limited = shortened || (!is_whole && duties != ideal);
         let realised = if limited {
-            let [a, b, c] = duties;
-            (Abc::new(a, b, c) * v_dc - compensation).to_alpha_beta()
+            // A leg that does not switch has no dead time.
+            let dead = 0.5 * (1.0 - self.usable) * v_dc;
+            let leg = |duty: f32, lost: f32| {
+                let switches = duty > 0.0 && duty < 1.0;
+                duty * v_dc - if switches { lost } else { lost - math::limited(lost, dead) }
+            };
+            let ([a, b, c], lost) = (duties, compensation);
+            Abc::new(leg(a, lost.a), leg(b, lost.b), leg(c, lost.c)).to_alpha_beta()
         } else {
             wanted
         };
@@ -224,14 +230,19 @@ mod tests {
 
     #[test]
     fn compensation_does_not_cost_the_wanted_voltage() {
-        // With the part for the compensation kept free, the compensated legs never saturate.
+        // With the part for the compensation kept free, the compensated legs never saturate. A leg that does not switch loses
+        // nothing to the dead time.
         let m = Modulator::new(2.2e-6, true);
         let dt = V_DC * 2.2e-6 / PERIOD_S;
         for degrees in 0..360 {
             let w = polar(400.0, f64::from(degrees).to_radians());
             let out = m.step(w, Abc::new(dt, -dt, dt), V_DC);
             assert!(counts(&out).iter().all(|&c| c <= TOP));
-            let put_out = mean(counts(&out)) - Abc::new(dt, -dt, dt).to_alpha_beta();
+            let duties = counts(&out);
+            let lost =
+                |leg: usize, volts| if (1..TOP).contains(&duties[leg]) { volts } else { 0.0 };
+            let put_out =
+                mean(duties) - Abc::new(lost(0, dt), lost(1, -dt), lost(2, dt)).to_alpha_beta();
             let error = put_out - out.realised;
             assert!(error.length_squared() < (2.0 * COUNT_V as f32).powi(2));
         }

@@ -12,7 +12,8 @@
 //!
 //! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference
 //! between realised and wanted output. Without the second call (or with zero) the controller is exactly the
-//! unlimited one.
+//! unlimited one. The current loop takes less of it, [`DqPi::condition`]: by the whole difference the voltage leaves its limit
+//! before the current is there, and a step of the torque takes twice as long.
 //!
 //! The state is the output itself, in `f32`: near 180 V it does not change for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
@@ -54,6 +55,22 @@ impl Pi {
     pub fn step(&self, state: &mut PiState, error: f32) -> f32 {
         let output = state.output + self.k_c * (error - self.z_c * state.error);
         *state = PiState { output, error };
+        output
+    }
+
+    /// Filters one sample of the reference, any unit: Eq. 3.40 with its pole `p_f` at `z_c`, beside a `direct` share s of the
+    /// reference, 0 to 1,
+    ///
+    /// ```text
+    /// F(z) = s + (1 - s) (1 - p_f)/(z - p_f)
+    /// ```
+    ///
+    /// Unit gain at dc. As printed, with s = 0, it is strictly proper: the output depends on the references up to the previous
+    /// step, and the pole cancels the zero of the controller in the response to the reference.
+    pub fn filter(&self, state: &mut ReferenceState, direct: f32, reference: f32) -> f32 {
+        let rest = reference - state.next;
+        let output = state.next + direct * rest;
+        state.next += (1.0 - self.z_c) * rest;
         output
     }
 
@@ -101,6 +118,14 @@ impl DqPi {
         Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
 
+    /// Conditions the controllers by `correction` = realised - wanted voltage, V peak, where that was limited: as if the last
+    /// error had been smaller by `correction/k_c`, that of a reference that could be realised (Hanus, Kinnaert and Henrotte,
+    /// Automatica 23(6), 1987). The next step takes `z_c` of that error back, so `1 - z_c` of the correction remains.
+    pub fn condition(&self, state: &mut DqPiState, correction: Dq) {
+        state.d.back_calculate((1.0 - self.d.z_c) * correction.d);
+        state.q.back_calculate((1.0 - self.q.z_c) * correction.q);
+    }
+
     /// Takes back what the last error adds by integration: before each step of proportional controllers.
     pub fn hold(&self, state: &mut DqPiState) {
         let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;
@@ -110,30 +135,21 @@ impl DqPi {
 }
 
 impl DqPiState {
-    /// Anti-windup: adds `correction` = realised - wanted voltage, zero if nothing was limited.
+    /// Adds `correction` to the voltages.
     pub fn back_calculate(&mut self, correction: Dq) {
         self.d.back_calculate(correction.d);
         self.q.back_calculate(correction.q);
     }
 }
 
-/// First-order reference filter, Eq. 3.40: F_ref(z) = (1 - p_f)/(z - p_f), beside a direct share s of the reference:
-///
-/// ```text
-/// F(z) = s + (1 - s) (1 - p_f)/(z - p_f)
-/// ```
-///
-/// Unit gain at dc. As printed, without a direct share, it is strictly proper: the output depends on the references up to
-/// the previous step. With `p_f` = `z_c` it cancels the zero of the controller in the response to the reference.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReferenceFilter {
-    /// 1 - p_f, in (0, 1].
-    pub one_minus_p: f32,
-    /// Direct share, 0 to 1.
-    pub direct: f32,
-}
+/// Direct share of the current reference, beside the printed filter. Alone the filter takes 7.3 ms to 90 % of a torque step;
+/// without it the zero of the controller makes 25 % of overshoot. A share of 0.8 cancels the slow mode of the loop; 0.6 leaves
+/// a margin for the low-pass filter and for the current of the carrier, which adds to an overshoot.
+pub const DIRECT_SHARE: f32 = 0.6;
+/// Direct share without a carrier, and so without the low-pass filter in the loop.
+pub const DIRECT_SHARE_WITHOUT_CARRIER: f32 = 0.8;
 
-/// State of a [`ReferenceFilter`]: its next output.
+/// State of [`Pi::filter`]: its next output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceState {
     next: f32,
@@ -143,25 +159,5 @@ impl ReferenceState {
     /// A filter that has settled at this reference.
     pub const fn at_rest(reference: f32) -> Self {
         Self { next: reference }
-    }
-}
-
-impl ReferenceFilter {
-    /// Filter with its pole at `p_f`, in [0, 1), as printed.
-    pub const fn new(p_f: f64) -> Self {
-        Self { one_minus_p: (1.0 - p_f) as f32, direct: 0.0 }
-    }
-
-    /// This filter with a `direct` share of the reference, 0 to 1.
-    pub const fn with_direct(self, direct: f32) -> Self {
-        Self { direct, ..self }
-    }
-
-    /// Filters one sample, any unit.
-    pub fn step(&self, state: &mut ReferenceState, reference: f32) -> f32 {
-        let rest = reference - state.next;
-        let output = state.next + self.direct * rest;
-        state.next += self.one_minus_p * rest;
-        output
     }
 }

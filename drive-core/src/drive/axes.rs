@@ -16,7 +16,7 @@ pub(super) struct Axes {
     pub seen: UnitVector,
     /// The flux when the voltage will act.
     pub applied: UnitVector,
-    /// The flux when the current before the one that is seen flowed.
+    /// The flux when the unfiltered current of the sample before flowed.
     pub before: UnitVector,
 }
 
@@ -44,7 +44,7 @@ impl Coefficients {
             carrier: injection.turned_slightly(-freq * self.estimator.lag),
             seen: along.turned_slightly(-freq * lag),
             applied: along.turned_slightly(freq * VOLTAGE_LEAD),
-            before: along.turned_slightly(-freq * (lag + 1.0)),
+            before: along.turned_slightly(-freq * (self.lag_share * self.current_lag + 1.0)),
         };
     }
 }

@@ -5,7 +5,7 @@ mod tests;
 
 use crate::carrier::Injection;
 use crate::carrier::at_start::AtStart;
-use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, VoltageLimit};
+use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, VoltageLimit};
 use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
@@ -30,8 +30,6 @@ pub struct Coefficients {
     pub demodulate: bool,
     /// Take a rotor time constant while running.
     pub track_rotor: bool,
-    /// Filters of the current references, d and q.
-    pub reference_filter: [ReferenceFilter; 2],
     /// Current controllers.
     pub current_loop: DqPi,
     /// Modulation of the voltages.
@@ -116,8 +114,6 @@ impl Coefficients {
             self.injection.current_amplitude,
             self.estimator.lag,
             self.current_lag,
-            self.reference_filter[0].one_minus_p,
-            self.reference_filter[1].one_minus_p,
             self.motion.pi.k_c,
             self.motion.speed_limit,
             self.sequence.i_d,

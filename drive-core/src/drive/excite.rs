@@ -5,7 +5,7 @@
 
 use super::{Drive, Job, Kept, Left, Phase};
 use crate::carrier::{CARRIER_COS, CARRIER_SAMPLES};
-use crate::current::{Pi, PiState, ReferenceFilter, pi::ReferenceState};
+use crate::current::{Pi, PiState, pi::ReferenceState};
 use crate::drive::command::{Accepted, Refused};
 use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
@@ -101,11 +101,11 @@ impl Excite {
             Excitation::Current { amperes, regulator, carrier, binary } => {
                 let s = &mut self.control;
                 let Regulator { k_c, z_c, direct, filtered } = regulator;
-                let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
-                let reference = filter.step(&mut s.reference, amperes);
+                let pi = Pi { k_c, z_c };
+                let reference = pi.filter(&mut s.reference, direct, amperes);
                 let behind = LPF.step(&mut self.low_pass, current);
                 let seen = if filtered { behind } else { current };
-                let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - seen.alpha);
+                let along = pi.step(&mut s.regulator, reference - seen.alpha);
                 let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
                 s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
                 s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);

@@ -6,7 +6,7 @@ use super::in_turn::StepResults;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
 use crate::carrier::at_start::AtStartState;
 use crate::carrier::{CarrierPeriod, CarrierSample};
-use crate::current::inverter_drop::DropSample;
+use crate::current::{DIRECT_SHARE, DIRECT_SHARE_WITHOUT_CARRIER, inverter_drop::DropSample};
 use crate::drive::state::State;
 use crate::filter::LPF;
 use crate::identify::learning::LearningState;
@@ -103,9 +103,11 @@ impl Field {
         let counted = self.frame.is_counted();
         let s = self;
         let index = s.carrier.advance();
+        let carrier_is_off = s.hand_over.is_carrier_off();
+        let direct = if carrier_is_off { DIRECT_SHARE_WITHOUT_CARRIER } else { DIRECT_SHARE };
         let reference = Dq {
-            d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
-            q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
+            d: c.current_loop.d.filter(&mut s.reference[0], direct, wanted.d),
+            q: c.current_loop.q.filter(&mut s.reference[1], direct, wanted.q),
         };
         k.seen.reference = reference;
 
@@ -124,7 +126,6 @@ impl Field {
 
         // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
         // alone it would let the sidebands of a turning carrier through.)
-        let carrier_is_off = s.hand_over.is_carrier_off();
         let carrier = if carrier_is_off || !c.inject {
             CarrierPeriod::default()
         } else {
@@ -152,8 +153,7 @@ impl Field {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let seen = (seen, !carrier_is_off);
-            let turning = c.observe_fundamental(s, index, &trust, flux.freq, seen, phi);
+            let turning = c.observe_fundamental(s, index, &trust, flux.freq, rest, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
             if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
@@ -165,26 +165,31 @@ impl Field {
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
             + s.induced.at(reference) * s.induced_share
             + k.references.test_voltage;
-        (k.seen.current, k.seen.voltage) = (current, voltage);
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
         let applied = phi.turned_by(axes.applied);
-        let total = (voltage + axes.injection * carrier.voltage).to_alpha_beta(applied);
+        let carrier_voltage = (axes.injection * carrier.voltage).to_alpha_beta(applied);
+        let total = voltage.to_alpha_beta(applied) + carrier_voltage;
 
-        // Dead-time compensation, by the signs of the currents that will flow.
-        let expected = (current + axes.injection * carrier.mean_current).to_alpha_beta(applied);
+        // Dead-time compensation, by the signs of the currents that will flow: with the carrier, or in a step.
+        let coming = match carrier_is_off {
+            true => current - k.seen.current,
+            false => axes.injection * carrier.mean_current,
+        };
+        let expected = (current + coming).to_alpha_beta(applied);
         let signs = c.dead_time.signs(expected.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
+        (k.seen.current, k.seen.voltage) = (current, voltage);
         (k.seen.measured, k.seen.realised) = (measured_current, modulated.realised);
         (k.seen.dc_link, k.seen.rotor_freq) = (measured.dc_link, rotor_freq);
         if modulated.limited {
-            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
+            let missing = modulated.realised - total;
+            c.current_loop.condition(&mut s.current_loop, missing.to_dq(applied));
         }
         s.prediction.collect(measured_current, modulated.realised);
         if !counted && c.observer.is_some() {
-            let carrier = AlphaBeta::along(applied.turned_by(axes.injection), carrier.voltage);
-            s.observer.put_out(modulated.realised - carrier);
+            s.observer.put_out(modulated.realised - carrier_voltage);
         }
 
         if trust.drop {

@@ -14,33 +14,32 @@ const COMPARED_FROM: f32 = 0.3;
 const RESISTANCE_UP_TO: f32 = 6.0 * crate::io::PERIOD_S;
 
 impl Coefficients {
-    /// One period of the observer; the turn of the flux that it sees. `current` is the one that is regulated, behind the
-    /// filter or not, `phi` the axis of the flux at the sample.
+    /// One period of the observer; the turn of the flux that it sees. `current` is the measured one without the expected carrier, `phi`
+    /// the axis of the flux at the sample.
     pub(super) fn observe_fundamental(
         &self,
         s: &mut Field,
         index: usize,
         trust: &Trust,
         flux_freq: f32,
-        (current, filtered): (AlphaBeta, bool),
+        current: AlphaBeta,
         phi: UnitVector,
     ) -> Turning {
         const PER_RADIAN: f32 = 1.0 / TAU;
         let Some(observer) = &self.observer else { return Turning::default() };
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
-        let age = observer.ages[usize::from(filtered)];
         let turned = if s.hand_over.advance_blanking() {
             state.skip(current);
             s.hand_over.mean_turn()
         } else {
-            observer.step(state, current, phi.turned_by(s.axes.before), age, weight);
+            observer.step(state, current, phi.turned_by(s.axes.before), weight);
             state.turned * PER_RADIAN
         };
         let up_to = if weight == 0.0 { RESISTANCE_UP_TO } else { 0.0 };
         if trust.resistance && flux_freq.abs() < up_to {
             observer.track_resistance(state);
         }
-        s.hand_over.turning(index, turned, state.slip * PER_RADIAN, age)
+        s.hand_over.turning(index, turned, state.slip * PER_RADIAN, observer.age)
     }
 
     /// The slow part of the observer.

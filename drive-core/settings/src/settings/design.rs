@@ -9,10 +9,7 @@ use core::f32::consts::TAU;
 use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
 use drive_core::carrier::{AtStart, DemodulatorKind, Injection};
-use drive_core::current::{
-    DeadTime, DqPi, InverterDrop, Modulator, Pi, ReferenceFilter, VoltageLimit,
-};
-use drive_core::filter::lpf_lag_samples;
+use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLimit};
 use drive_core::flux::{Indirect, Leakage, Observer};
 use drive_core::protect::{
     Body, LockMonitor, LockMonitorSettings, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck,
@@ -86,7 +83,6 @@ impl Settings {
             share: self.observer.leakage_share,
             slope: self.observer.leakage_slope,
         };
-        let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
         Ok(Coefficients {
             front_end: FrontEnd {
                 current_a: s.of_code(s.current_a),
@@ -140,8 +136,6 @@ impl Settings {
                 (carrier_v, carrier_a),
             ),
             current_loop: DqPi { d, q },
-            reference_filter: designs
-                .map(|d| ReferenceFilter::new(d.z_c).with_direct(tuning::DIRECT_SHARE)),
             current_lag,
             lag_share,
             modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
@@ -176,7 +170,7 @@ impl Settings {
                 current_squared: current_limit * current_limit,
                 i_q: current_limit,
             },
-            observer: self.uses_observer().then(|| Observer::new(m, &leakage, i_d, ages)),
+            observer: self.uses_observer().then(|| Observer::new(m, &leakage, i_d, current_lag)),
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),

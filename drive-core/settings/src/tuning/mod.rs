@@ -86,11 +86,6 @@ pub struct RuleDesign {
     pub v: f64,
 }
 
-/// Direct share of the current reference, beside the printed filter. Alone the filter takes 7.3 ms to 90 % of a torque step;
-/// without it the zero of the controller makes 25 % of overshoot. A share of 0.8 would cancel the slow mode of the loop;
-/// 0.6 leaves a margin for other plants.
-pub const DIRECT_SHARE: f32 = 0.6;
-
 /// Result of [`design_current_loop`], with intermediate results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentLoopDesign {

@@ -52,14 +52,13 @@ fn anti_windup_of_figure_40() {
 /// stays within 2 %.
 fn step_of_3_39(p: f32, filtered: bool) -> (f32, usize) {
     let pi = Pi { k_c: 52.48, z_c: 0.94786 };
-    let filter = ReferenceFilter::new(0.94786);
     let (mut state, mut reference) = (PiState::default(), ReferenceState::default());
     let (mut y, mut peak, mut outside) = (0.0f32, 0.0f32, 0);
     for k in 0..2000 {
         if (y - 1.0).abs() > 0.02 {
             outside = k + 1;
         }
-        let r = if filtered { filter.step(&mut reference, 1.0) } else { 1.0 };
+        let r = if filtered { pi.filter(&mut reference, 0.0, 1.0) } else { 1.0 };
         let u = pi.step(&mut state, r - y);
         y = p * y + 0.004_053_2 * u;
         peak = peak.max(y);
@@ -84,9 +83,9 @@ fn step_response_of_section_3_8() {
 
 #[test]
 fn reference_filter_is_3_40() {
-    let (filter, mut state) = (ReferenceFilter::new(0.75), ReferenceState::default());
+    let (pi, mut state) = (Pi { k_c: 1.0, z_c: 0.75 }, ReferenceState::default());
     // (1 - p)/(z - p): 0, 1 - p, (1 - p) p, ...
-    let h = [1.0, 0.0, 0.0, 0.0].map(|x| filter.step(&mut state, x));
+    let h = [1.0, 0.0, 0.0, 0.0].map(|x| pi.filter(&mut state, 0.0, x));
     assert_eq!(h, [0.0, 0.25, 0.1875, 0.140_625]);
 }
 

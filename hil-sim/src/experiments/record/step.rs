@@ -1,10 +1,11 @@
 //! How fast the torque follows a step, and what takes the time.
 
 use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::current::DIRECT_SHARE;
 use drive_core::filter::{LPF, LpfState};
 use drive_core::io::PERIOD_S;
 use drive_core::{AlphaBeta, Command, FirstOrder};
-use drive_settings::tuning::{CurrentLoopDesign, DIRECT_SHARE, EquivalentCircuit, motor_plant};
+use drive_settings::tuning::{CurrentLoopDesign, EquivalentCircuit, motor_plant};
 
 use crate::config::{Config, built};
 use crate::error::Error;
