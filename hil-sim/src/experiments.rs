@@ -36,7 +36,6 @@ mod plant_identification;
 mod position;
 mod profile;
 mod record;
-mod reversal;
 pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
@@ -47,6 +46,7 @@ mod steady;
 mod torque;
 mod torque_envelope;
 pub mod torque_limit;
+mod torque_rise;
 pub mod warming_rotor;
 
 pub use torque::assumptions;
@@ -235,7 +235,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     sensorless_position::EXPERIMENT,
     torque::STEPS,
     torque::RAMP,
-    reversal::EXPERIMENT,
+    torque::REVERSAL,
     perturbation::EXPERIMENT,
     speed_profile::EXPERIMENT,
     monte_carlo::EXPERIMENT,
@@ -247,6 +247,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     torque_envelope::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     record::EXPERIMENT,
+    torque_rise::EXPERIMENT,
     smallest_slope::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,

@@ -1,13 +1,10 @@
-//! The record: the torque limit at zero stator frequency for minutes, a slow reversal of the speed under the same torque,
-//! and how fast the torque follows.
+//! The record: the torque limit at zero stator frequency for minutes, and a slow reversal of the speed under the same torque.
 
 mod held;
-mod step;
 
 use drive_core::Command;
 
 use self::held::{Held, Standstill, reversing};
-use self::step::{CurrentLoop, PARTS, Response, measured};
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
 use super::torque::assumptions;
@@ -17,14 +14,13 @@ use crate::config::{Config, open_phase, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Plant;
-use crate::rig::{RATE_HZ, Rig};
+use crate::rig::Rig;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "record",
     stands_for: "what section 5.2 leaves open",
-    about: "A drive that has learned: at its torque limit: zero stator frequency for `record.minutes`, a reversal of the speed, \
-            and a torque step with what takes its time.",
+    about: "A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.",
     uses: &[BENCH, DRIVE, &["record.", "after."]],
     not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
     run,
@@ -115,7 +111,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for course in [Course::Standstill, Course::Reversal] {
         outcome.figures.push(held_figure(course, &held));
     }
-    steps(&config, &rig, limit, &mut outcome)?;
     outcome.remarks = assumptions(&config);
     outcome.remarks.push(torque.text(&config));
     outcome.remark(
@@ -188,61 +183,4 @@ fn held_figure(course: Course, all: &[Held]) -> Figure {
         figure = figure.panel(panel);
     }
     figure
-}
-
-/// The step to the torque limit at rest.
-fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Result<(), Error> {
-    let mut rig = rig.clone();
-    bring_up(&mut rig, 0.0)?;
-    let [torque, reference] = measured(&rig, limit)?;
-    let whole = CurrentLoop::new(config)?;
-    let linear = whole.response();
-    let ms = |response: &Response| response.time_ms(0.9);
-    let m = &mut outcome.metrics;
-    m.set("step_90_ms", ms(&torque));
-    m.set("step_overshoot_pct", 100.0 * torque.overshoot());
-    m.set("step_reference_90_ms", ms(&reference));
-    m.set("step_linear_90_ms", ms(&linear));
-    let mut table = Table::new("Torque step to 90 %", &[]).note(
-        "Motor: the torque of the simulated motor, mean over steps at all samples of a carrier period. Loop: the linear \
-         current loop, whole and without one of its parts beside the same controller; what the part costs is the \
-         difference.",
-    );
-    let mut row = |name: String, response: &Response, cost: Option<f64>| {
-        table.record([
-            ("", Cell::from(name)),
-            ("90 % after (ms)", Cell::fixed(ms(response), 2)),
-            ("within 2 % after (ms)", Cell::fixed(response.settled_ms(), 2)),
-            ("overshoot (%)", Cell::fixed(100.0 * response.overshoot(), 1)),
-            ("cost to 90 % (ms)", Cell::or_dash(cost.map(|cost| Cell::fixed(cost, 2)))),
-        ]);
-    };
-    row("motor, torque".to_owned(), &torque, None);
-    row("drive, filtered reference".to_owned(), &reference, None);
-    row("loop, whole".to_owned(), &linear, None);
-    let mut lines = Panel::new("time after the command (ms)", "share of the final value")
-        .with(share("torque of the motor", &torque))
-        .with(share("filtered reference", &reference));
-    for (part, name) in PARTS.into_iter().enumerate() {
-        let without = whole.without(part).response();
-        let cost = ms(&linear) - ms(&without);
-        m.set(
-            format!(
-                "step_cost_{}_ms",
-                ["reference_filter", "direct_share", "low_pass", "delay"][part]
-            ),
-            cost,
-        );
-        row(format!("loop, without {name}"), &without, Some(cost));
-        lines = lines.with(share(&format!("loop without {name}"), &without));
-    }
-    outcome.tables.push(table);
-    outcome.figures.push(Figure::new("step", "Step to the torque limit at rest", "").panel(lines));
-    Ok(())
-}
-
-fn share(name: &str, response: &Response) -> Series {
-    let end = response.end();
-    let points = response.0.iter().enumerate();
-    Series::line(name, points.map(|(k, value)| (1e3 * k as f64 / RATE_HZ, value / end)).collect())
 }

@@ -33,6 +33,16 @@ pub const RAMP: Experiment = Experiment {
     run: ramp,
 };
 
+/// Section 5.2 asks for the response to disturbances.
+pub const REVERSAL: Experiment = Experiment {
+    name: "torque-reversal",
+    stands_for: "section 5.2",
+    about: "Sudden steps of the torque current up to full reversal, without a position sensor.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
+    run: reversal,
+};
+
 /// Seconds after the first torque reference that are not judged: the angle settles from the
 /// magnetising position.
 const SETTLING_S: f64 = 0.5;
@@ -42,25 +52,45 @@ pub const LOST_DEG: f64 = 45.0;
 
 /// Levels of Figure 38, as multiples of `reference.iq_a`.
 const LEVELS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+/// Torque currents of the reversals one after another on the dissertation's motor, A.
+const REVERSALS: [f64; 9] = [0.5, 1.0, 2.0, 3.0, 0.5, 2.0, -2.0, 3.0, -3.0];
 /// Time at each level, s.
 const LEVEL_S: f64 = 1.0;
 
 /// Steps of the torque reference, Figure 38.
 fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
-    let level_s = context.seconds.map_or(LEVEL_S, |s| s / LEVELS.len() as f64);
     let iq = context.config.iq_a();
-    let profile = |t: f64| iq * LEVELS[((t / level_s) as usize).min(LEVELS.len() - 1)];
-    let run = Run::new(context, level_s * LEVELS.len() as f64, profile)?;
+    let what = ["steps", "Torque steps without a position sensor", "Figure 38"];
+    levels(context, &LEVELS.map(|level| iq * level), what)
+}
 
-    let mut outcome = run.outcome("steps", "Torque steps without a position sensor", "Figure 38");
-    let steps: Vec<Step> = (0..LEVELS.len())
-        .map(|n| run.level(iq * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
+/// Steps up to full reversal.
+fn reversal(context: &Context<'_>) -> Result<Outcome, Error> {
+    let what = ["reversal", "Steps and reversals of the torque current", "section 5.2"];
+    levels(context, &REVERSALS.map(|iq| context.config.amperes(iq)), what)
+}
+
+/// Steps to these levels, A.
+fn levels(
+    context: &Context<'_>,
+    levels: &[f64],
+    [name, title, source]: [&str; 3],
+) -> Result<Outcome, Error> {
+    let level_s = context.seconds.map_or(LEVEL_S, |s| s / levels.len() as f64);
+    let profile = |t: f64| levels[((t / level_s) as usize).min(levels.len() - 1)];
+    let run = Run::new(context, level_s * levels.len() as f64, profile)?;
+
+    let mut outcome = run.outcome(name, title, source);
+    let steps: Vec<Step> = (0..levels.len())
+        .map(|n| run.level(levels[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
         .collect();
     outcome.steps = Some(steps);
     let end = run.points.last().map_or(0.0, |p| p.t);
-    let levels = LEVELS.iter().enumerate().skip(1);
     let events = levels
-        .map(|(n, level)| (n as f64 * level_s, format!("{:.2} A", iq * level)))
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(n, level)| (n as f64 * level_s, format!("{level:.2} A")))
         .filter(|event| event.0 < end);
     if let Some(figure) = outcome.figures.first_mut() {
         // Before a fault, which ends the run.
