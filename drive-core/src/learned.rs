@@ -212,7 +212,7 @@ impl Learned {
             let corrected = before.gain_mismatch.or(Fitted::default()).value;
             gains.value = corrected + share * gains.value;
         }
-        // The mean of the positions leaves this share of what was found at this one, and a start there sees it.
+        // The mean over the positions differs from the asymmetry of this one by `1 - share` of it, which a start there measures.
         let rest = self.gain_mismatch.with(&self.asymmetry);
         Self {
             gain_mismatch: gains,

@@ -20,8 +20,8 @@ use crate::rig::{Point, RATE_HZ, Rig};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "torque-rise",
     stands_for: "beyond the dissertation",
-    about: "Steps from no torque to nine tenths of what the drive allows, over speed and sign: time to 90 %, the time that the \
-            voltage allows, overshoot, current, angle.",
+    about: "Torque steps of a learned drive over speed and sign: rise time to 90 %, its physical limit by the dc-link voltage, overshoot, \
+            peak current and angle error.",
     uses: &[BENCH, DRIVE],
     not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
     run,
@@ -30,21 +30,21 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Speeds, rpm on four poles, and the one from which on there is no carrier.
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 600.0, 800.0, 1200.0, 1800.0, 2100.0, 2700.0, 3600.0];
 const WITHOUT_CARRIER_RPM: f64 = 780.0;
-/// Share of the torque current that the drive allows and the voltage bears at that moment.
-const SHARE: f64 = 0.9;
+/// Height of the step, as a share of the largest torque current that drive and voltage permit before it.
+const STEP_SHARE: f64 = 0.9;
 /// Share of the voltage that the compensation of the dead time leaves.
 const USABLE: f64 = 0.97;
 /// Time in which flux and limits settle without torque, s.
 const SETTLING_S: f64 = 1.0;
 /// Time that the figure shows, s.
 const SHOWN_S: f64 = 0.012;
-/// Periods from a command to its voltage, half a one for the mean of where it comes included.
+/// Delay from a command to its voltage, periods: one, and on average half a period until the next sample.
 const DELAY: f64 = 1.5;
 
 /// A step: speed, rpm, and sign of the torque.
 type Case = (f64, f64);
 
-/// What is seen of it, and the physical limit, ms.
+/// The measured step, and the physical limit of its rise time, ms.
 type Seen = (Rise, f64);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -83,7 +83,7 @@ fn step(config: &Config, rig: &Rig, (rpm, sign): Case) -> Result<Seen, Error> {
     };
     let (least, most) = rig.drive.room().i_q;
     let allowed = f64::from(if sign > 0.0 { most } else { least });
-    let i_q = SHARE * physical.borne(start.id, allowed);
+    let i_q = STEP_SHARE * physical.borne(start.id, allowed);
     let limit_ms = 1e3 * (physical.least_s(start.id, 0.9 * i_q) + DELAY / RATE_HZ);
     Ok((Rise::measured(&rig, i_q)?, limit_ms))
 }
@@ -105,7 +105,7 @@ impl Physical {
         (j_w * self.leakage + self.resistance) * i + j_w * self.flux
     }
 
-    /// As much of the torque current `i_q` as [`USABLE`] of the voltage bears for long while the flux is the present one, A.
+    /// The largest share of the torque current `i_q`, in steps of a hundredth, that [`USABLE`] of the voltage sustains at this flux, A.
     fn borne(&self, i_d: f64, i_q: f64) -> f64 {
         let bears =
             |i_q: &f64| self.steady(Complex64::new(i_d, *i_q)).norm() <= USABLE * self.voltage;
@@ -191,8 +191,8 @@ fn share(name: &str, response: &Response) -> Series {
 mod tests {
     use super::*;
 
-    /// Without speed and resistance the current rises along a line: L i/V. At speed the whole circle of the voltage ends in a polygon
-    /// of what a search over constant directions reaches, and never later.
+    /// Without speed and resistance the current rises linearly, in L i/V. At speed the optimal voltage is faster than every voltage of
+    /// constant direction in the frame of the flux, by less than a tenth.
     #[test]
     fn the_physical_limit_is_that_of_simple_cases() {
         let still =

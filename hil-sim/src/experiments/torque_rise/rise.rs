@@ -38,9 +38,9 @@ impl Response {
     }
 }
 
-/// What a step of the torque reference from zero does on a drive that regulates no torque.
+/// Response of the motor to a step of the torque reference from zero.
 pub struct Rise {
-    /// Torque current of the motor, A: its torque by that of an ampere. Mean over steps at all ten samples of a carrier period, in which
+    /// Torque current of the motor, A: its torque divided by the torque of an ampere. Mean over steps at all ten samples of a carrier period, in which
     /// the carrier cancels.
     pub current: Response,
     /// Largest current of a phase, A.
