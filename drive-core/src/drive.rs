@@ -358,8 +358,6 @@ struct Left {
     resistance: f32,
     /// Voltage per phase that the inverter drops beyond its dead time, V.
     inverter_drop: f32,
-    /// Baseline of the lock monitor, A^2.
-    baseline: f32,
     /// Asymmetry of sensors and stator beyond the learned one.
     asymmetry: Asymmetry,
     /// Flux in the motor; `None` before the first run.

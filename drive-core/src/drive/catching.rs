@@ -8,6 +8,7 @@ use crate::flux::catch::{self, Caught};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::math::within;
+use crate::protect::lock_monitor::LockMonitorState;
 use crate::{Catching, Coefficients, Dq, Fault, PERIOD_S};
 
 /// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
@@ -99,9 +100,7 @@ impl Field {
                 self.flux = FluxPhase::Build { from: k.elapsed };
                 self.estimator.turn_with(freq);
                 self.indirect = IndirectState::default();
-                if let Some(observer) = &c.observer {
-                    observer.start(&mut self.observer);
-                }
+                self.observer.start(c.observer.as_ref());
             }
         }
         Ok(Dq { d, q: 0.0 })
@@ -109,18 +108,26 @@ impl Field {
 
     /// The current while the flux of a turning rotor builds up, from period `from` on: as much flux as the voltage bears,
     /// and with all current until it has built up.
+    ///
+    /// # Errors
+    /// [`Fault::NotCaught`] where no voltage shows it: in a frame that does not turn with the rotor there is none.
     #[cold]
-    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Kept, from: u32) -> Dq {
+    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Kept, from: u32) -> Result<Dq, Fault> {
         let most = k.limits.voltage.most.d;
         let missing = most - c.observer.as_ref().map_or(most, |o| o.magnetising(&self.observer));
         let (current, built) =
             c.catching.map_or((most, 0), |catching| (catching.current, catching.built));
         let d = within(most + FORCING_GAIN * missing, (0.0, current));
         if k.elapsed.wrapping_sub(from) >= built {
+            Fault::NotCaught.unless(c.prediction.sees_flux(&self.prediction))?;
+            // At speed the carrier current without torque does not tell that under torque: what comes is the baseline.
+            if self.hand_over.weight > 0.0 {
+                self.lock = LockMonitorState::default();
+            }
             c.motion.start(&mut self.motion, k.rotor_count);
             self.enter(k, FluxPhase::ready());
         }
-        Dq { d, q: 0.0 }
+        Ok(Dq { d, q: 0.0 })
     }
 
     /// The fault of a drive that ends with this one: where a turning shaft is looked for or magnetised, a wrong speed shows as a

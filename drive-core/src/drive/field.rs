@@ -30,7 +30,6 @@ impl Field {
         self.goal = goal;
         // A start on a turning shaft measures none of them.
         self.inverter_drop.volts = left.inverter_drop;
-        self.lock.baseline = left.baseline;
         self.observer.resistance = left.resistance;
         c.turn(&mut self.axes, 0.0, c.injection_axis, false);
         c.estimator.start(&mut self.estimator);
@@ -38,9 +37,7 @@ impl Field {
         if self.frame != Frame::LockedShaft {
             self.estimator.drift.at_start = left.asymmetry;
         }
-        if let Some(observer) = &c.observer {
-            observer.start(&mut self.observer);
-        }
+        self.observer.start(c.observer.as_ref());
     }
 
     pub fn state(&self) -> State {
@@ -76,8 +73,6 @@ impl Field {
         Left {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
-            // It was measured before a drift was found.
-            baseline: self.lock.baseline / self.estimator.drift.across_a(),
             asymmetry: self.estimator.drift.all(),
             residual: Some(residual),
         }
@@ -273,7 +268,7 @@ impl Field {
         Ok(match self.flux {
             FluxPhase::Search(_) => self.search(c, k)?,
             FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k)?,
-            FluxPhase::Build { from } => self.build(c, k, from),
+            FluxPhase::Build { from } => self.build(c, k, from)?,
             FluxPhase::Hold => self.magnetise(c, k)?,
             FluxPhase::Verify => self.verify(c, k)?,
             FluxPhase::Ready(_) | FluxPhase::Learn(_) => Dq::ZERO,
@@ -349,9 +344,7 @@ impl Field {
                 return Err(Fault::NothingLearned);
             }
         }
-        if let Some(observer) = &c.observer {
-            observer.start(&mut self.observer);
-        }
+        self.observer.start(c.observer.as_ref());
         self.hold(c, k, 0);
         Ok(Dq::ZERO)
     }

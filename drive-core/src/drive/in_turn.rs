@@ -207,10 +207,8 @@ impl Coefficients {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
         let baseline = match step.trust.lock {
             Lock::Off => return Ok(()),
-            Lock::OwnBaseline if s.lock.is_of_last_start() => return Ok(()),
-            Lock::Baseline | Lock::OwnBaseline => true,
-            // Once it is there, the monitor also watches the observer.
-            Lock::Watch => s.hand_over.weight >= 1.0 && !s.lock.is_measured(),
+            Lock::Baseline => true,
+            Lock::Watch => !s.lock.is_measured(),
         };
         if !(self.injects(s) && s.carrier.is_settled()) {
             return Ok(());

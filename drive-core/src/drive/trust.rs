@@ -2,7 +2,7 @@
 //! prints it.
 
 use Judged::{No, Strictly, Tolerantly};
-use Lock::{Baseline, Off, OwnBaseline, Watch};
+use Lock::{Baseline, Off, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
 use super::{Field, FluxPhase, Frame};
@@ -24,8 +24,6 @@ pub(super) enum Lock {
     Off,
     /// It measures its baseline.
     Baseline,
-    /// The same, unless there is one of the last start: flux that builds up on a turning shaft makes a poor one.
-    OwnBaseline,
     Watch,
 }
 
@@ -62,8 +60,8 @@ impl Field {
             // There is neither current nor flux.
             (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
             (FluxPhase::Build { from }, _) => match &c.catching {
-                Some(c) if elapsed.wrapping_sub(*from) < c.alone => Trust { source: Injection, turns: true, lock: OwnBaseline, current: No, mean: false, resistance: false, drop: false },
-                _ => Trust { source: Both, turns: true, lock: OwnBaseline, current: Tolerantly, mean: false, resistance: false, drop: false },
+                Some(c) if elapsed.wrapping_sub(*from) < c.alone => Trust { source: Injection, turns: true, lock: Off, current: No, mean: false, resistance: false, drop: false },
+                _ => Trust { source: Both, turns: true, lock: Baseline, current: Tolerantly, mean: true, resistance: false, drop: false },
             },
             (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
             (FluxPhase::Hold, Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },

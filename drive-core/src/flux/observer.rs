@@ -135,6 +135,12 @@ pub struct Induced {
 }
 
 impl ObserverState {
+    /// Begins anew without flux, with the resistance as it was, for this observer, where there is one.
+    pub fn start(&mut self, observer: Option<&Observer>) {
+        let flux = observer.map_or(0.0, |observer| observer.least);
+        *self = Self { flux, resistance: self.resistance, ..Self::default() };
+    }
+
     /// Takes the voltage that a step puts out, without the carrier, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
         self.latest = self.latest.wrapping_add(VOLTAGES - 1) % VOLTAGES;
@@ -189,12 +195,6 @@ impl Observer {
             let middle = b * JUDGED_AT * learned.limit_a;
             self.current_saliency = b * (1.0 - self.flux_saliency + middle);
         }
-    }
-
-    /// Resets `state` to no flux, with the resistance as it was.
-    pub fn start(&self, state: &mut ObserverState) {
-        let (flux, resistance) = (self.least, state.resistance);
-        *state = ObserverState { flux, resistance, ..ObserverState::default() };
     }
 
     /// One period, from the `current` of a sample, A, and the voltages that were put out before it. `frame` is the axis of the
@@ -323,7 +323,7 @@ mod tests {
             Leakage { flux_saliency: 0.0, current_saliency: per_a, share: 1.0, slope: 0.0 };
         let observer = Observer::new(&motor, &leakage, 1.4, 0.0);
         let mut state = ObserverState::default();
-        observer.start(&mut state);
+        state.start(Some(&observer));
         state.current = Dq { d: 0.05, q: 0.0 };
         observer.update(&mut state, 0.0);
         let change = 0.35;

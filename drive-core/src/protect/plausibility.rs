@@ -140,6 +140,10 @@ const EMF_SHARE_BUILDING: f32 = 1.0;
 const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
 /// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.
 const MEAN_EMF_SHARE: f32 = 0.5;
+/// Share of the back-emf, and of the allowed mean, that a flux which has built up without torque may miss. (Right frames miss at most
+/// 0.3 V beyond the first; one that is 2 Hz too fast or too slow misses all of it.)
+const MISSED_SHARE: f32 = 0.25;
+const MISSED: f32 = 0.1;
 
 impl Prediction {
     /// Comparison for a motor with the current response `plant`, A/V, and an allowed unexplained voltage at
@@ -170,6 +174,14 @@ impl Prediction {
         let axis = flux.axis.turned_slightly(-MIDDLE * flux.flux_freq);
         state.rotor = rotor.to_alpha_beta(axis);
         state.flux = (axis, self.emf * flux.magnetising * flux.flux_freq);
+    }
+
+    /// Whether the mean of the unexplained voltage leaves room for a flux that turns with the frame: without one the whole back-emf
+    /// is missing.
+    pub fn sees_flux(&self, state: &PredictionState) -> bool {
+        let (_, emf) = state.flux;
+        let missing = if emf < 0.0 { -state.mean.q } else { state.mean.q };
+        missing <= MISSED_SHARE * emf.abs() + MISSED * self.allowed_mean[1]
     }
 
     /// Compares the `current`, A, after it was collected; called in every fifth

@@ -2,7 +2,7 @@
 //! dc link, per region of the speed.
 //!
 //! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless the settings say otherwise, or the
-//! drive commissions itself; it learns its tables at that current first.
+//! drive commissions itself; it learns its tables at that current first. Keys `after.NAME` change the motor or the sensors behind that.
 
 mod case;
 mod summary;
@@ -32,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "beyond the dissertation",
     about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
             the drive does not notice.",
-    uses: &[BENCH, DRIVE, &["full_range.", "prepare.commission", "runs"]],
+    uses: &[BENCH, DRIVE, &["full_range.", "prepare.commission", "after.", "runs"]],
     not: &[],
     run: whole::<FullRange>,
 };
@@ -140,6 +140,7 @@ impl FullRange {
             Err(fault) => return Ok((Run::unlearned(seed, *fault), Vec::new())),
             Ok(drive) => drive,
         };
+        config = config.after_learning().map_err(Error::refused)?;
         if case.kind == RangeKind::WrongParameters {
             config = self.changed(number, &config);
         }

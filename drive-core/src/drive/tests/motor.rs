@@ -286,6 +286,50 @@ fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
     assert!((bench.motor.rpm() - 700.0).abs() < 15.0, "{}", bench.motor.rpm());
 }
 
+/// A frame that turns by several hertz more or less than the rotor has no flux: the whole back-emf is missing, and the drive does
+/// not begin to regulate, unless it is pulled in. One that errs by a hertz is.
+#[test]
+fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
+    let mut settings = motor_settings(AngleSource::Injection);
+    (settings.observer.enabled, settings.sequence.catch) = (true, true);
+    let mut refused = 0;
+    for (rpm, wrong_by, caught) in [
+        (180.0, 0.0, true),
+        (180.0, 1.0, true),
+        (-180.0, 1.0, true),
+        (180.0, 8.0, false),
+        (-180.0, -8.0, false),
+        (-180.0, 8.0, false),
+        (300.0, -7.0, false),
+        (300.0, -13.0, false),
+    ] {
+        let mut bench = Bench::new(&settings);
+        bench.motor.omega = rpm / 60.0 * 2.0 * core::f64::consts::TAU;
+        bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
+        let mut builds = false;
+        while matches!(bench.drive.state(), State::Calibrating | State::Precharge | State::Catching)
+        {
+            bench.step();
+            if let Phase::Field(field) = &mut bench.drive.phase {
+                let now = matches!(field.flux, FluxPhase::Build { .. });
+                if now && !builds {
+                    let freq = field.estimator.rotor_freq;
+                    field.estimator.turn_with(freq + wrong_by * PERIOD_S);
+                }
+                builds = now;
+            }
+        }
+        // A flux that has been pulled in settles.
+        bench.run(0.3);
+        let state = bench.drive.state();
+        let is_right = state == State::Torque && bench.worst(0.1) < 6.0;
+        let is_refused = !caught && state == State::Fault(Fault::NotCaught);
+        assert!(is_right || is_refused, "{rpm} rpm, wrong by {wrong_by} Hz: {state}");
+        refused += u32::from(is_refused);
+    }
+    assert!(refused >= 2, "{refused}");
+}
+
 /// With the shaft locked, learning finds the parameters of the simulated motor.
 #[test]
 fn learning_finds_the_saliencies_and_the_mismatch() {

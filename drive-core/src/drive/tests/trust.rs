@@ -18,7 +18,6 @@ fn row(trust: &Trust) -> String {
     let lock = match trust.lock {
         Lock::Off => "off",
         Lock::Baseline => "baseline",
-        Lock::OwnBaseline => "baseline, unless one is kept",
         Lock::Watch => "watches",
     };
     let current = match trust.current {

@@ -140,6 +140,24 @@ fn no_carrier_and_no_number_are_faults() {
     }
 }
 
+/// The baseline is the mean of the first 0.05 s, and that of the last 0.05 s from then on: what was before is forgotten.
+#[test]
+fn the_baseline_is_a_mean_of_the_last_carrier_periods() {
+    let monitor = monitor();
+    let mut state = LockMonitorState::default();
+    for n in 0..MEASURED {
+        assert!(!state.is_measured());
+        monitor.step(&mut state, &seen(0.25 + 0.001 * f32::from(n % 2), 0.0), 1.0, true).unwrap();
+        let mean = if n == 0 { 0.0625 } else { 0.0625 + 0.5 * (0.251 * 0.251 - 0.0625) };
+        assert!((state.baseline - mean).abs() < 1e-4, "{n}: {}", state.baseline);
+    }
+    assert!(state.is_measured());
+    for _ in 0..6 * u32::from(AVERAGED) {
+        monitor.step(&mut state, &seen(0.28, 0.0), 1.0, true).unwrap();
+    }
+    assert!((state.baseline / (0.28 * 0.28) - 1.0).abs() < 1e-3, "{}", state.baseline);
+}
+
 #[test]
 fn the_carrier_of_a_lost_flux_ends_the_lock() {
     let settings = LockMonitorSettings {

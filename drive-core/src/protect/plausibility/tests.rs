@@ -144,6 +144,22 @@ fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
     assert!((n as f32 / expected - 1.0).abs() < 0.2, "{n} for {expected}");
 }
 
+/// A flux that has built up without torque may miss a quarter of the back-emf and a tenth of the allowed mean.
+#[test]
+fn a_back_emf_that_is_missing_is_seen_with_either_sign() {
+    let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
+    for emf in [0.0_f32, 4.0, -4.0, 20.0, -20.0] {
+        let most = 0.25 * emf.abs() + 0.3;
+        let sees = |missing: f32| {
+            let mean = Dq::new(5.0, missing * if emf < 0.0 { -1.0 } else { 1.0 });
+            let flux = (Angle::ZERO.unit_vector(), emf);
+            prediction.sees_flux(&PredictionState { mean, flux, ..PredictionState::default() })
+        };
+        assert!(sees(0.99 * most) && sees(-20.0) && !sees(1.01 * most), "{emf}");
+        assert!(!sees(f32::NAN));
+    }
+}
+
 /// A warm stator is believed to be cold: 30 % of 5.4 ohm at 2 A are 3.2 V, beyond what a tracked resistance allows.
 #[test]
 fn the_resistance_that_is_tracked_is_reckoned_with() {

@@ -9,7 +9,7 @@ const SEARCH_SHARE: f32 = 0.714;
 /// Share of the current that trips up to which both together may come.
 const SHARE_OF_TRIP: f32 = 0.7;
 /// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
-const BUILT_S: f32 = 0.35;
+const BUILT_S: f32 = 0.5;
 const ALONE_S: f32 = 0.2;
 /// Rotor time constants after which no flux is left in a motor that was switched off.
 const FLUX_GONE_T: f32 = 4.0;
