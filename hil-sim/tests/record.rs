@@ -11,8 +11,8 @@ fn record(set: &[&str]) -> Metrics {
 }
 
 /// The slip at i_d = 0.7 A is i_q/0.7 r_r/L_r, 36.66 rpm per ampere on four poles: so fast the shaft turns against it while
-/// the flux stands. Sound angles change the slip little: 60 learnings (seeds 101 to 160) by 1.4 rpm in the mean, 4.5 at most, and 60 that
-/// did not measure the asymmetry at their start by 1.6, 5.9. The learned slope allows 2.25 A to 3 A of torque current.
+/// the flux stands. Sound angles change the slip little: 60 learnings (seeds 101 to 160) by 1.7 rpm in the mean and 4.4 at most with the
+/// flux at 0 degrees, 2.2 and 7.2 at 100 degrees. The learned slope allows 2.25 A to 3 A of torque current.
 #[test]
 fn full_torque_is_held_at_zero_stator_frequency() {
     for at in ["record.flux_deg=0", "record.flux_deg=100"] {
@@ -20,7 +20,7 @@ fn full_torque_is_held_at_zero_stator_frequency() {
         let get = |name: &str| metrics.get(name).expect(name);
         let limit = get("limit_a");
         let slip = 36.66 * limit;
-        assert!((get("hold_speed_rpm") - slip).abs() < 6.5, "{}", get("hold_speed_rpm"));
+        assert!((get("hold_speed_rpm") - slip).abs() < 8.0, "{}", get("hold_speed_rpm"));
         // In 6 s the flux does not get further than its travel: a turn would be 0.17 Hz.
         assert!(get("hold_stator_hz") < 0.05, "{}", get("hold_stator_hz"));
         // The noise of the estimated angle moves the flux; turning it would pass 180 degrees.
