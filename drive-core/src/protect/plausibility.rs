@@ -140,8 +140,8 @@ const EMF_SHARE_BUILDING: f32 = 1.0;
 const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
 /// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.
 const MEAN_EMF_SHARE: f32 = 0.5;
-/// Share of the back-emf, and of the allowed mean, that a flux which has built up without torque may miss. (Right frames miss at most
-/// 0.3 V beyond the first; one that is 2 Hz too fast or too slow misses all of it.)
+/// Share of the back-emf, and of the allowed mean, that a flux which has built up without torque may miss. (192 right starts on three
+/// motors missed no more than the first; a frame that is 2 Hz too fast or too slow misses all of it.)
 const MISSED_SHARE: f32 = 0.25;
 const MISSED: f32 = 0.1;
 
