@@ -24,6 +24,7 @@ pub(super) enum Lock {
     Off,
     /// It measures its baseline.
     Baseline,
+    /// It judges; where the start has not measured the baseline, it measures it first.
     Watch,
 }
 

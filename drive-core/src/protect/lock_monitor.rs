@@ -178,11 +178,11 @@ impl LockMonitor {
         if held {
             let place = self.grid.place(saliency.i_q);
             let carrier = carrier * between(&self.inverse_square, place);
-            let periods = state.measured.saturating_add(1).min(AVERAGED);
-            state.baseline += (carrier - state.baseline) / f32::from(periods);
+            let measured = state.measured.saturating_add(1);
+            let change = (carrier - state.baseline) / f32::from(measured.min(AVERAGED));
             *state = LockMonitorState {
-                baseline: state.baseline,
-                measured: state.measured.saturating_add(1),
+                baseline: state.baseline + change,
+                measured,
                 weak: state.weak,
                 i_q: saliency.i_q,
                 rested: REST,

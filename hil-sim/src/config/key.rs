@@ -3,7 +3,7 @@
 use drive_settings::entry::Entry;
 use drive_settings::{SETTINGS, Settings, find, value as drive};
 
-use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, Value};
+use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, Value, check_model};
 use crate::error::{Error, nearest};
 
 /// A key of the bench or of the drive.
@@ -189,15 +189,16 @@ impl Config {
     /// The configuration after the learning: the bench has changed, the drive has not.
     ///
     /// # Errors
-    /// The reason why a value is not allowed; those that were taken are.
-    pub fn after_learning(&self) -> Result<Self, &'static str> {
+    /// [`Error::Refused`] with the reason why a value is not allowed, or as [`check_model`].
+    pub fn after_learning(&self) -> Result<Self, Error> {
         let mut config = Self { after: After::default(), ..self.clone() };
         for key in BENCH {
             match self.after.get(key.name) {
                 Value::Unset => {}
-                value => (key.set)(&mut config, &value)?,
+                value => (key.set)(&mut config, &value).map_err(Error::refused)?,
             }
         }
+        check_model(&config)?;
         Ok(config)
     }
 }

@@ -118,8 +118,7 @@ impl Study for Battery {
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let config = context.config.clone();
         check_model(&config)?;
-        let after = config.after_learning().map_err(Error::refused)?;
-        check_model(&after)?;
+        let after = config.after_learning()?;
         let (kinds, runs) = kind::chosen(&config);
         let runs = config.extent.runs.map_or(runs, |runs| runs as usize);
         let drives = std::iter::repeat_with(OnceLock::new).take(runs.div_ceil(GROUP)).collect();

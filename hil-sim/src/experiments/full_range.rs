@@ -136,15 +136,15 @@ impl FullRange {
         let (case, seed) = (self.case(number), seed_of(self.seed, number));
         let mut config = self.config.clone();
         trial::set_up(case, &mut config);
+        let mut bench = config.after_learning()?;
         let drive = match self.drive(case, &config)? {
             Err(fault) => return Ok((Run::unlearned(seed, *fault), Vec::new())),
             Ok(drive) => drive,
         };
-        config = config.after_learning().map_err(Error::refused)?;
         if case.kind == RangeKind::WrongParameters {
-            config = self.changed(number, &config);
+            bench = self.changed(number, &bench);
         }
-        Trial::new(case, &config, drive, seed, traced)?.run(seed)
+        Trial::new(case, &bench, drive, seed, traced)?.run(seed)
     }
 }
 
