@@ -22,9 +22,9 @@ use drive_settings::{Settings, SettingsError, find, value as drive};
 
 pub use after::After;
 use file::FileAssignment;
-pub use key::Key;
+pub use key::{Key, check_model};
 pub use keys::*;
-pub use plant::{check_model, current_lines, flux_level_a, open_phase, plant_settings};
+pub use plant::{current_lines, flux_level_a, open_phase, plant_settings};
 pub use value::{Allowed, Value};
 
 use crate::error::Error;

@@ -3,7 +3,8 @@
 use drive_settings::entry::Entry;
 use drive_settings::{SETTINGS, Settings, find, value as drive};
 
-use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, Value, check_model};
+use super::value::Field as _;
+use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
 use crate::error::{Error, nearest};
 
 /// A key of the bench or of the drive.
@@ -183,6 +184,31 @@ fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &
     };
     config.after.set(key.name, taken);
     Ok(())
+}
+
+/// Refuses keys that do nothing with the chosen machine model.
+///
+/// # Errors
+/// [`Error::Refused`] with the first of them.
+pub fn check_model(config: &Config) -> Result<(), Error> {
+    let is_a = config.model.plant == PlantModel::A;
+    let (other, remedy) =
+        if is_a { ("iron.", "--plant linear or a family") } else { ("saliency.", "--plant a") };
+    let default = Config::default();
+    let idle = Key::all().find(|key| {
+        let name = key.name();
+        (name.starts_with(other) || is_a && name == "flux_level")
+            && key.get(config) != key.get(&default)
+    });
+    match idle {
+        None => Ok(()),
+        Some(key) => Err(Error::Refused(format!(
+            "{} = {}: plant = {} does not use it; it acts with {remedy}",
+            key.name(),
+            key.get(config),
+            config.model.plant.to_value()
+        ))),
+    }
 }
 
 impl Config {

@@ -5,9 +5,8 @@ use std::f64::consts::TAU;
 use drive_core::Line;
 use drive_core::io::CONVERTER_CODES;
 
-use super::{Config, FluxLevel, Key, LoadMode, PlantModel};
+use super::{Config, FluxLevel, LoadMode};
 use crate::config::value::Field as _;
-use crate::error::Error;
 use crate::plant::{
     DcLinkSettings, FAMILIES, InverterSettings, IronSettings, Load, MachineSettings,
     MeasurementSettings, MechanicsSettings, PlantSettings, SaliencySettings, WarmingSettings,
@@ -18,31 +17,6 @@ pub fn current_lines(sensors: &MeasurementSettings) -> [Line; 2] {
     sensors
         .calibration()
         .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 })
-}
-
-/// Refuses keys that do nothing with the chosen machine model.
-///
-/// # Errors
-/// [`Error::Refused`] with the first of them.
-pub fn check_model(config: &Config) -> Result<(), Error> {
-    let is_a = config.model.plant == PlantModel::A;
-    let (other, remedy) =
-        if is_a { ("iron.", "--plant linear or a family") } else { ("saliency.", "--plant a") };
-    let default = Config::default();
-    let idle = Key::all().find(|key| {
-        let name = key.name();
-        (name.starts_with(other) || is_a && name == "flux_level")
-            && key.get(config) != key.get(&default)
-    });
-    match idle {
-        None => Ok(()),
-        Some(key) => Err(Error::Refused(format!(
-            "{} = {}: plant = {} does not use it; it acts with {remedy}",
-            key.name(),
-            key.get(config),
-            config.model.plant.to_value()
-        ))),
-    }
 }
 
 /// The direct current, A peak, at whose flux the numbers of a family of iron hold.
