@@ -21,7 +21,7 @@ const AXES: [UnitVector; 3] = [
 ];
 /// Time in which the averages of the demodulation settle, and averaging time of a start and of a learning, of each axis, s.
 const SETTLE_S: f32 = 0.02;
-const AVERAGE_S: f32 = 0.12;
+const AVERAGE_S: f32 = 0.24;
 const LEARNING_S: f32 = 0.96;
 /// Standard deviations of the noise above which a change of the asymmetry counts. White noise exceeds them in none of 1000 starts; of 12
 /// starts of the simulated drive at low flux that had no change, the largest measured one was 3.7 deviations.
@@ -136,7 +136,7 @@ mod tests {
         {
             let asymmetry = Asymmetry { constant, sin, cos };
             let (state, took) = measured(&asymmetry, 1.0);
-            assert_eq!(took, 777 + 3 * 840);
+            assert_eq!(took, 777 + 3 * 1560);
             assert!(state.found().plus(&asymmetry, -1.0).size() < 1e-5, "{:?}", state.found());
         }
     }
