@@ -12,6 +12,7 @@ use hil_sim::rig::Rig;
 /// that was left by a stop. (They did by up to 40 %.)
 #[test]
 fn a_start_on_a_turning_shaft_keeps_the_resistance() {
+    let mut refused = 0;
     for (seed, rpm, torque) in [(1, 85.0, -2.2), (2, -60.0, 2.2), (3, 140.0, 1.0), (4, 85.0, 2.2)] {
         for pause in [0.05, 0.15, 0.25, 0.37, 1.5] {
             let mut config = for_the_range(&Config::default()).unwrap();
@@ -33,7 +34,13 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
                 rig.run(0.001, |_| {});
             }
             rig.run(pause, |_| {});
-            rig.start(Mode::Torque).unwrap();
+            // What is left and what the search adds can cancel out: the shaft seems to stand, and the saliency check refuses it.
+            if rig.start(Mode::Torque).is_err() {
+                refused += 1;
+                assert_eq!(rig.drive.state(), State::Fault(Fault::NoSaliency));
+                rig.command(&Command::Clear).unwrap();
+                rig.start(Mode::Torque).unwrap();
+            }
             rig.run(0.01, |_| {});
             let (state, more) = (rig.drive.state(), rig.drive.stator_resistance().unwrap());
             println!(
@@ -46,6 +53,7 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
             assert!((more - before).abs() < 0.002, "{more}");
         }
     }
+    assert!(refused <= 1, "{refused}");
 }
 
 /// On iron the carrier current changes with the flux that builds up: the lock monitor begins to measure its baseline 0.2 s later, and

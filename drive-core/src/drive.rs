@@ -213,6 +213,8 @@ struct Field {
     pub lead: Angle,
     pub lead_axis: UnitVector,
     pub goal: Goal,
+    /// What the run before left.
+    pub given: Left,
     /// Flux of a run before, until the speed of the shaft is found.
     pub residual: Option<Residual>,
     /// Large: it holds the state of the alternative demodulations.

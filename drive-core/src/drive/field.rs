@@ -29,6 +29,7 @@ impl Field {
         };
         self.goal = goal;
         // A start on a turning shaft measures none of them.
+        self.given = *left;
         self.inverter_drop.volts = left.inverter_drop;
         self.observer.resistance = left.resistance;
         c.turn(&mut self.axes, 0.0, c.injection_axis, false);
@@ -53,11 +54,7 @@ impl Field {
 
     /// Whether torque, speed or position is regulated as asked for.
     pub fn regulates(&self) -> bool {
-        match &self.flux {
-            FluxPhase::Ready(_) => self.goal.regulates(),
-            FluxPhase::Search(_) | FluxPhase::Asymmetry(_) | FluxPhase::Build { .. } => false,
-            FluxPhase::Hold | FluxPhase::Verify | FluxPhase::Learn(_) => false,
-        }
+        matches!(self.flux, FluxPhase::Ready(_)) && self.goal.regulates()
     }
 
     /// Whether there is torque for a purpose: as asked for, or to come to rest.
@@ -69,12 +66,16 @@ impl Field {
     pub fn left(&self) -> Left {
         // Until a speed is found nothing is known but what it was given.
         let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
-        let residual = self.residual.unwrap_or_else(turning);
+        let residual = Some(self.residual.unwrap_or_else(turning));
+        // Until the flux is verified the shaft may turn, and what was measured may be its voltage.
+        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+            return Left { residual, ..self.given };
+        }
         Left {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
             asymmetry: self.estimator.drift.all(),
-            residual: Some(residual),
+            residual,
         }
     }
 
