@@ -34,7 +34,8 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
                 rig.run(0.001, |_| {});
             }
             rig.run(pause, |_| {});
-            // What is left and what the search adds can cancel out: the shaft seems to stand, and the saliency check refuses it.
+            // The residual flux and the flux of the search can cancel. The drive then takes the shaft for standing, and the
+            // saliency check refuses the start.
             if rig.start(Mode::Torque).is_err() {
                 refused += 1;
                 assert_eq!(rig.drive.state(), State::Fault(Fault::NoSaliency));

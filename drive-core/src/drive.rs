@@ -213,10 +213,8 @@ struct Field {
     pub lead: Angle,
     pub lead_axis: UnitVector,
     pub goal: Goal,
-    /// What the run before left.
+    /// Results of the run before; the residual flux until the speed of the shaft is found.
     pub given: Left,
-    /// Flux of a run before, until the speed of the shaft is found.
-    pub residual: Option<Residual>,
     /// Large: it holds the state of the alternative demodulations.
     pub estimator: EstimatorState,
     /// Large while a turning shaft is looked for.

@@ -76,7 +76,7 @@ impl Field {
         let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
-        let drives = self.residual.is_some_and(|residual| residual.volts > NEGLIGIBLE_EMF_V);
+        let drives = self.given.residual.is_some_and(|residual| residual.volts > NEGLIGIBLE_EMF_V);
         if n == 0 && !drives {
             self.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * catching.current);
         }
@@ -87,7 +87,7 @@ impl Field {
         match search.step(n, self.observer.change) {
             Caught::Searching => {}
             Caught::Standing => {
-                self.residual = None;
+                self.given.residual = None;
                 self.hand_over = HandOver::default();
                 self.stand(c, k, 0);
             }
@@ -96,7 +96,7 @@ impl Field {
                 if freq.abs() > HIGHEST {
                     return Err(Fault::NotCaught);
                 }
-                self.residual = None;
+                self.given.residual = None;
                 self.flux = FluxPhase::Build { from: k.elapsed };
                 self.estimator.turn_with(freq);
                 self.indirect = IndirectState::default();

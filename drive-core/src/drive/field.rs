@@ -66,7 +66,7 @@ impl Field {
     pub fn left(&self) -> Left {
         // Until a speed is found nothing is known but what it was given.
         let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
-        let residual = Some(self.residual.unwrap_or_else(turning));
+        let residual = Some(self.given.residual.unwrap_or_else(turning));
         // Until the flux is verified the shaft may turn, and what was measured may be its voltage.
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             return Left { residual, ..self.given };

@@ -108,7 +108,6 @@ impl Drive {
                 field.begin(c, goal, &left);
                 if catches {
                     field.hand_over.switch_carrier_off();
-                    field.residual = left.residual;
                     field.flux = FluxPhase::Search(CatchState::default());
                 } else {
                     field.stand(c, k, encoder);
