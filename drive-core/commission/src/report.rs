@@ -67,12 +67,20 @@ pub struct Report {
 }
 
 /// The reason why a step is refused. The settings stay as they were.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
     /// An entry of the nameplate, with what is plausible beside the others.
+    #[error(
+        "{} = {} {}: with the rest of the nameplate {:.4} to {:.4} is plausible",
+        .0.name, .0.value, .0.unit, .0.allowed.0, .0.allowed.1
+    )]
     Plate(Quantity),
     /// A measured value that cannot belong to a motor with this nameplate.
+    #[error(
+        "{} = {:.5} {}: allowed is {:.5} to {:.5}; {}",
+        .found.name, .found.value, .found.unit, .found.allowed.0, .found.allowed.1, .meaning.word()
+    )]
     Value {
         /// As measured, with what is allowed.
         found: Quantity,
@@ -80,23 +88,37 @@ pub enum Refusal {
         meaning: Meaning,
     },
     /// The drive is in a state in which it cannot be commissioned: a fault has stopped it, or somebody has.
+    #[error("the drive is {0}")]
     Drive(State),
     /// What the answers to the pulses say.
+    #[error("{0}")]
     Wiring(Fault),
     /// The pulses on this phase, 0 to 2, are not answered: it is open.
+    #[error("phase {} is open", phase(*.0))]
     PhaseOpen(u8),
     /// A current sensor, 0 or 1, shows no current.
+    #[error("current sensor {} shows no current", phase(*.0))]
     SensorOpen(u8),
     /// No pulse is answered at all.
+    #[error("no motor: no pulse is answered")]
     NoMotor,
     /// The current loop cannot be designed for what was found.
+    #[error("{0}")]
     Design(TuningError),
     /// A step that must come before is missing.
+    #[error("the step {} comes first", .0.word())]
     Needs(Step),
     /// The drive has not taken a command.
+    #[error("{0}")]
     Command(Refused),
     /// Samples were lost on the way to the evaluation.
+    #[error("samples were lost; repeat it")]
     SamplesLost,
+}
+
+/// Letter of a phase by its number.
+fn phase(number: u8) -> char {
+    char::from(b'a'.wrapping_add(number))
 }
 
 words! {
@@ -213,32 +235,6 @@ impl fmt::Display for Report {
             ),
             None => write!(f, "{}: sound", self.step.word()),
             Some(refusal) => write!(f, "{}: refused: {refusal}", self.step.word()),
-        }
-    }
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let phase = |number| char::from(b'a'.wrapping_add(number));
-        match *self {
-            Self::Plate(Quantity { name, unit, value, allowed: (min, max), .. }) => write!(
-                f,
-                "{name} = {value} {unit}: with the rest of the nameplate {min:.4} to {max:.4} is plausible"
-            ),
-            Self::Value { found, meaning } => {
-                let Quantity { name, unit, value, allowed: (min, max), .. } = found;
-                let why = meaning.word();
-                write!(f, "{name} = {value:.5} {unit}: allowed is {min:.5} to {max:.5}; {why}")
-            }
-            Self::Drive(state) => write!(f, "the drive is {state}"),
-            Self::Design(error) => write!(f, "{error}"),
-            Self::Wiring(fault) => write!(f, "{fault}"),
-            Self::PhaseOpen(n) => write!(f, "phase {} is open", phase(n)),
-            Self::SensorOpen(n) => write!(f, "current sensor {} shows no current", phase(n)),
-            Self::NoMotor => f.write_str("no motor: no pulse is answered"),
-            Self::Command(why) => write!(f, "{why}"),
-            Self::Needs(step) => write!(f, "the step {} comes first", step.word()),
-            Self::SamplesLost => f.write_str("samples were lost; repeat it"),
         }
     }
 }

@@ -14,8 +14,6 @@ pub mod rules;
 mod tracked;
 pub mod value;
 
-use core::fmt;
-
 use self::value::{Words, words};
 use crate::tuning::TuningError;
 use drive_core::carrier::DemodulatorKind;
@@ -119,9 +117,15 @@ impl Settings {
 /// The reason why settings were refused.
 ///
 /// Exhaustive on purpose: who translates a reason has to translate a new one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// A value outside its range.
+    #[error(
+        "{name} = {value}: allowed is {}{min} to {max}{}{unit}",
+        // NaN counts as none.
+        if .min <= .max { "" } else { "nothing beside other settings: " },
+        if .unit.is_empty() { "" } else { " " }
+    )]
     Range {
         /// Name of the setting.
         name: &'static str,
@@ -135,27 +139,12 @@ pub enum SettingsError {
         max: f32,
     },
     /// A setting by its name, its word, which this build or this board does not allow, and why.
+    #[error("{0} = {1}: {2}")]
     Word(&'static str, &'static str, &'static str),
     /// The design of the controllers failed.
+    #[error("controllers: {0}")]
     Tuning(TuningError),
 }
-
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Range { name, unit, value, min, max } => {
-                let space = if unit.is_empty() { "" } else { " " };
-                // NaN counts as none.
-                let beside = if min <= max { "" } else { "nothing beside other settings: " };
-                write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
-            }
-            Self::Word(name, word, why) => write!(f, "{name} = {word}: {why}"),
-            Self::Tuning(error) => write!(f, "controllers: {error}"),
-        }
-    }
-}
-
-impl core::error::Error for SettingsError {}
 
 impl From<TuningError> for SettingsError {
     fn from(error: TuningError) -> Self {

@@ -34,30 +34,20 @@ impl fmt::Display for Value {
 pub const AUTO: &str = "auto";
 
 /// Reason why a text is not a value of a setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
     /// Not a finite number.
+    #[error("not a number")]
     Number,
     /// Neither a finite number nor `auto`.
+    #[error("neither a number nor `{AUTO}`")]
     NumberOrAuto,
     /// Not a whole number up to this one.
+    #[error("not a whole number from 0 to {0}")]
     Whole(u32),
     /// Not one of these words.
+    #[error("not one of:{}", fmt::from_fn(|f| .0.iter().try_for_each(|word| write!(f, " {word}"))))]
     Word(&'static [&'static str]),
-}
-
-impl fmt::Display for ValueError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number => f.write_str("not a number"),
-            Self::NumberOrAuto => write!(f, "neither a number nor `{AUTO}`"),
-            Self::Whole(max) => write!(f, "not a whole number from 0 to {max}"),
-            Self::Word(words) => {
-                f.write_str("not one of:")?;
-                words.iter().try_for_each(|word| write!(f, " {word}"))
-            }
-        }
-    }
 }
 
 /// The finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).

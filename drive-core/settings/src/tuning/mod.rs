@@ -31,7 +31,6 @@
 //! [`design_current_loop`] therefore lowers k_c until both meet their limits.
 
 use core::f64::consts::{PI, TAU};
-use core::fmt;
 
 use drive_core::filter::{LPF, Section, response};
 use drive_core::{FirstOrder, Motor};
@@ -102,7 +101,9 @@ pub struct CurrentLoopDesign {
 }
 
 /// Reason why a controller could not be designed: a value is NaN or not strictly between its bounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+// Settings are f32: their digits, not those of the f64 they became.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{name} = {}: must be above {} and below {}", *.value as f32, *.min as f32, *.max as f32)]
 pub struct TuningError {
     /// Name of the value, with its unit.
     pub name: &'static str,
@@ -113,16 +114,6 @@ pub struct TuningError {
     /// Upper bound, excluded.
     pub max: f64,
 }
-
-impl fmt::Display for TuningError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Settings are f32: their digits, not those of the f64 they became.
-        let [value, min, max] = [self.value, self.min, self.max].map(|x| x as f32);
-        write!(f, "{} = {value}: must be above {min} and below {max}", self.name)
-    }
-}
-
-impl core::error::Error for TuningError {}
 
 fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), TuningError> {
     // NaN fails the comparison.
