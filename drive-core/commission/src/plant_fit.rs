@@ -5,7 +5,7 @@ use num_complex::Complex32;
 use super::Refusal;
 use drive_core::filter::{LPF, LpfState};
 use drive_core::{AlphaBeta, FirstOrder};
-use rotor_id::rls::ud::{Forgetting, Ud};
+use rotor_id::rls::ud::Ud;
 
 /// Samples until filters and amplitude have settled.
 pub(super) const SETTLING: u32 = 600;
@@ -41,7 +41,7 @@ impl PlantFit {
         if self.samples > SETTLING {
             let x = [y1, u2, u3, 1.0].map(|x| Complex32::new(x, 0.0));
             let y = Complex32::new(filtered.beta, 0.0);
-            self.sound &= self.ud.update(x, y, Forgetting::NONE).is_some();
+            self.sound &= self.ud.update(x, y, 1.0).is_some();
         }
     }
 

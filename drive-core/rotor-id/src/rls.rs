@@ -28,7 +28,7 @@ use num_complex::Complex32;
 
 use drive_core::AlphaBeta;
 use filter::Filter;
-use ud::{Forgetting, N, Ud};
+use ud::{N, Ud};
 
 /// Initial estimate: all coefficients of Eq. 14 zero, as in the paper.
 const START: [Complex32; N] =
@@ -131,7 +131,6 @@ pub struct Rls {
     axes: [f32; 3],
     /// Weight of a sample in the means over one memory.
     forget: f32,
-    forgetting: Forgetting,
     unknown: f32,
     /// Samples left until the filters have settled.
     settling: u32,
@@ -177,7 +176,6 @@ impl Rls {
             settle,
             memory,
             forget: 1.0 / memory as f32,
-            forgetting: Forgetting { lambda, inverse: 1.0 / lambda },
             unknown: UNKNOWN / (corner * corner * corner),
             validity: Validity::default(),
         }
@@ -191,8 +189,7 @@ impl Rls {
         let RlsSettings { voltage_limit, current_limit, .. } = self.settings;
         if !(inside(voltage, voltage_limit) && inside(current, current_limit)) {
             self.settling = self.settle;
-            self.unused();
-            return;
+            return self.unused();
         }
         let v = self.voltage.step(Complex32::from(voltage) * self.scale[0]);
         let i = self.current.step(Complex32::from(current) * self.scale[1]);
@@ -202,8 +199,7 @@ impl Rls {
         }
         if self.settling > 0 {
             self.settling -= 1;
-            self.unused();
-            return;
+            return self.unused();
         }
         for (power, x) in self.power.iter_mut().zip([v2, i2]) {
             *power += LOUDNESS * (x.norm_sqr() - *power);
@@ -215,12 +211,11 @@ impl Rls {
         let (determinant, trace) = (alpha * beta - both * both, alpha + beta);
         let one_axis = determinant < ONE_AXIS * (trace * trace);
         if one_axis || self.power[0] < SILENT || self.power[1] < SILENT {
-            self.unused();
-            return;
+            return self.unused();
         }
         let wound_up = self.ud.largest() > WIND_UP;
-        let forgetting = if wound_up { Forgetting::NONE } else { self.forgetting };
-        match self.ud.update([di, i2, dv, v2], i.change, forgetting) {
+        let lambda = if wound_up { 1.0 } else { self.settings.lambda };
+        match self.ud.update([di, i2, dv, v2], i.change, lambda) {
             Some(error) => self.judge(error, i.change),
             None => self.reset(),
         }
