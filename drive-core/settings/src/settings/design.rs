@@ -63,9 +63,13 @@ impl Settings {
         let (inj, t) = (&self.injection, &self.injection.synchronous);
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
         let (carrier_v, allowed_v) = (self.carrier_v(), self.unexplained_v());
+        let allowed_mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
+        let tracks = self.tracks_synchronously();
         let injecting = self.angle_source == AngleSource::Injection || inj.beside_encoder;
         let s = &self.scales;
         let current_lag = s.current_age_s() / PERIOD_S;
+        let carrier_lag = current_lag + estimator::carrier_lag(motor_plant);
+        let trip_freq = self.freq_of_rpm(self.speed_trip_rpm());
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let carrier_a = injection.current_amplitude;
@@ -101,12 +105,7 @@ impl Settings {
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
-            indirect: Indirect::new(
-                m,
-                self.scales.encoder_counts,
-                i_d,
-                2.0 * self.speed_trip_rpm() / 60.0,
-            ),
+            indirect: Indirect::new(m, s.encoder_counts, i_d, 2.0 * self.speed_trip_rpm() / 60.0),
             inject: injecting && carrier_v > 0.0,
             demodulate: injecting,
             injection,
@@ -114,13 +113,12 @@ impl Settings {
             injection_axis,
             lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
             // A sensorless start with the synchronous demodulation alone is checked.
-            saliency_check: (t.check && self.tracks_synchronously())
+            saliency_check: (t.check && tracks)
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
                 .then(|| NoiseWatch::new(t.flux_saliency, carrier_a)),
             travel_watch: TravelWatch::new(self.share_of_range(1.0)),
-            at_start: self
-                .tracks_synchronously()
+            at_start: tracks
                 .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
@@ -129,12 +127,7 @@ impl Settings {
                 highest_v: largest_test_v,
             }),
             largest_test_v,
-            estimator: self.estimator(
-                lag_share,
-                current_lag + estimator::carrier_lag(motor_plant),
-                self.freq_of_rpm(self.speed_trip_rpm()),
-                (carrier_v, carrier_a),
-            ),
+            estimator: self.estimator(lag_share, carrier_lag, trip_freq, (carrier_v, carrier_a)),
             current_loop: DqPi { d, q },
             current_lag,
             lag_share,
@@ -150,13 +143,8 @@ impl Settings {
             relay: self.relay(),
             volts_per_hertz: self.volts_per_hertz(),
             learning: self.learning(),
-            unlearned: self.tracks_synchronously() && !t.allow_unlearned,
-            prediction: Prediction::new(
-                m,
-                motor_plant,
-                allowed_v,
-                UNEXPLAINED_MEAN.map(|share| share * allowed_v),
-            ),
+            unlearned: tracks && !t.allow_unlearned,
+            prediction: Prediction::new(m, motor_plant, allowed_v, allowed_mean_v),
             catching: self.catching([d.k_c, q.k_c]),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
             dc_link: DcLink::new(&self.dc_link_limits()),
@@ -234,10 +222,8 @@ impl Settings {
     pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
         let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
-        let tracking_hz = match self.angle_source {
-            AngleSource::Encoder => None,
-            AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
-        };
+        let tracking_hz = (self.angle_source == AngleSource::Injection)
+            .then(|| f64::from(self.injection.synchronous.bandwidth_hz));
         tuning::design_motion_loops(
             f64::from(acceleration),
             tracking_hz,

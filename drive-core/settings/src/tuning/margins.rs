@@ -141,14 +141,10 @@ fn crossing(f: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The minimum of `f` beside grid point `n`.
+/// Position and value of the minimum of `f` beside grid point `n`, by golden section; `f` is unimodal there.
 fn minimum_near(f: &dyn Fn(f64) -> f64, n: u32) -> (f64, f64) {
-    minimum(f, grid(n.max(1) - 1), grid((n + 1).min(LOW + HIGH)))
-}
-
-/// Position and value of the minimum of a unimodal function, by golden section.
-fn minimum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (grid(n.max(1) - 1), grid((n + 1).min(LOW + HIGH)));
     let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
     let (mut f_a, mut f_b) = (f(a), f(b));
     for _ in 0..40 {

@@ -269,7 +269,7 @@ pub fn design_current_loop(
     } else {
         let open_loop = current_loop(z_c, physical, &LPF.sections);
         let limit = gain_limit(&open_loop, MIN_PHASE_MARGIN_DEG, MAX_MS);
-        let k_c = if limit < rule_k_c { limit } else { rule_k_c } * 0.999;
+        let k_c = f64::min(limit, rule_k_c) * 0.999;
         (k_c, margins_with(k_c)?)
     };
     let below_zero = no_crossover(margins.crossover_hz, z_c, period_s);
