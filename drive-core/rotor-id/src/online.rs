@@ -129,7 +129,15 @@ pub enum NoEstimate {
 #[derive(Clone, Copy, Debug)]
 pub struct Online {
     rls: Rls,
-    motor: MotorModel,
+    /// Parameters of the settings, at standstill.
+    nominal: Unknowns,
+    tau_r: f32,
+    /// Inductances of the settings, without saliency.
+    machine: Machine,
+    flux_saliency: f32,
+    current_saliency: f32,
+    /// Square of [`STEADY_CURRENT`], A².
+    steady_squared: f32,
     /// Delay of the analog current filter in periods: share of the previous voltage in the effective one.
     delay: f32,
     /// Voltage of the previous period, V.
@@ -150,44 +158,6 @@ pub struct Online {
     calls: u32,
 }
 
-/// MotorModel parameters from the settings.
-#[derive(Clone, Copy, Debug)]
-struct MotorModel {
-    r_s: f32,
-    tau_r: f32,
-    sigma_l_s: f32,
-    l_s: f32,
-    flux_saliency: f32,
-    current_saliency: f32,
-    /// Square of [`STEADY_CURRENT`], A².
-    steady_squared: f32,
-}
-
-impl MotorModel {
-    /// Parameters of the settings at the speed `omega_m`, electrical rad/s.
-    fn nominal(&self, omega_m: f32) -> Unknowns {
-        Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
-    }
-
-    /// Inductances of the machine at `current`, A: L x = sigma L_s (x - s x*) with the saliency s, where x
-    /// rotates with the current in the steady state.
-    fn machine(&self, current: Dq) -> Machine {
-        let square = current.length_squared();
-        let along = current.d * current.d - current.q * current.q;
-        let share = if square > 1e-6 {
-            self.current_saliency * fpu_sqrt::sqrtf(square) + self.flux_saliency * along / square
-        } else {
-            self.flux_saliency
-        };
-        let more = self.sigma_l_s * share;
-        Machine {
-            sigma_l_s: self.sigma_l_s + more,
-            coupled: self.l_s - self.sigma_l_s,
-            period: SAMPLE_S,
-        }
-    }
-}
-
 impl Online {
     /// Estimator for the motor and the sensors of the settings.
     ///
@@ -196,19 +166,11 @@ impl Online {
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let m = &settings.motor;
         let (i_d, trip_a, dc_over_v) = (settings.i_d(), settings.trip_a(), settings.dc_over_v());
-        let synchronous = &settings.injection.synchronous;
-        let (l_s, steady) = (m.l_m + m.l_ls, STEADY_CURRENT * i_d);
+        let (l_s, tau_r, steady) = (m.l_m + m.l_ls, m.tau_r(), STEADY_CURRENT * i_d);
+        let sigma_l_s = l_s - m.l_m * m.l_m / m.l_r();
+        let nominal = Unknowns { r_s: m.r_s, rate: 1.0 / tau_r, omega_m: 0.0 };
         // Within the range that the least squares require.
         let base = |typical: f32, limit: f32| within(typical, (0.02 * limit, limit));
-        let motor = MotorModel {
-            r_s: m.r_s,
-            tau_r: m.tau_r(),
-            sigma_l_s: l_s - m.l_m * m.l_m / m.l_r(),
-            l_s,
-            flux_saliency: synchronous.flux_saliency,
-            current_saliency: settings.current_saliency(),
-            steady_squared: steady * steady,
-        };
         let rls = Rls::new(RlsSettings {
             lambda: LAMBDA,
             p0: P0,
@@ -220,7 +182,12 @@ impl Online {
         })?;
         let mut online = Self {
             rls,
-            motor,
+            nominal,
+            tau_r,
+            machine: Machine { sigma_l_s, coupled: l_s - sigma_l_s, period: SAMPLE_S },
+            flux_saliency: settings.injection.synchronous.flux_saliency,
+            current_saliency: settings.current_saliency(),
+            steady_squared: steady * steady,
             delay: settings.scales.current_age_s() / PERIOD_S,
             before: AlphaBeta::ZERO,
             present: AlphaBeta::ZERO,
@@ -228,7 +195,7 @@ impl Online {
             sum: Complex32::ZERO,
             sampled: Complex32::ZERO,
             pushed: 0,
-            unknowns: motor.nominal(0.0),
+            unknowns: nominal,
             current: Dq::ZERO,
             speed: 0.0,
             calls: 0,
@@ -280,10 +247,24 @@ impl Online {
 
     /// Restarts the least squares from the parameters of the settings.
     fn begin(&mut self) {
-        let nominal = self.motor.nominal(self.speed);
-        self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
-        self.unknowns = nominal;
+        self.unknowns = Unknowns { omega_m: self.speed, ..self.nominal };
+        self.rls.begin_at(self.machine().coefficients(&self.unknowns));
         self.calls = 0;
+    }
+
+    /// The machine at the mean current: L x = sigma L_s (x - s x*) with the saliency s, where x rotates with the
+    /// current in the steady state.
+    fn machine(&self) -> Machine {
+        let Dq { d, q } = self.current;
+        let square = self.current.length_squared();
+        let share = if square > 1e-6 {
+            let of_flux = self.flux_saliency * (d * d - q * q) / square;
+            self.current_saliency * fpu_sqrt::sqrtf(square) + of_flux
+        } else {
+            self.flux_saliency
+        };
+        let sigma_l_s = self.machine.sigma_l_s;
+        Machine { sigma_l_s: sigma_l_s + sigma_l_s * share, ..self.machine }
     }
 
     /// Advances the fit by one step and returns the estimate; to be called ten times per second. `current`
@@ -310,14 +291,14 @@ impl Online {
         let (most, uncertain) =
             if free_speed { (STEADY_GUESS, UNCERTAIN_GUESS) } else { (STEADY, UNCERTAIN) };
         let moved = (current - self.current).length_squared();
-        let steady = (seen - self.speed).abs() < most && moved < self.motor.steady_squared;
+        let steady = (seen - self.speed).abs() < most && moved < self.steady_squared;
         if !steady {
             self.begin();
             return Err(NoEstimate::Transient);
         }
         self.calls = self.calls.saturating_add(1);
-        let nominal = self.motor.nominal(self.speed);
-        let machine = self.motor.machine(self.current);
+        let nominal = Unknowns { omega_m: self.speed, ..self.nominal };
+        let machine = self.machine();
         let Some(fit) = machine.step(&self.rls, &self.unknowns, &nominal, free_speed) else {
             self.unknowns = nominal;
             return Err(NoEstimate::PoorExcitation);
@@ -325,18 +306,15 @@ impl Online {
         self.unknowns = fit.unknowns;
         let Unknowns { r_s, rate, omega_m } = fit.unknowns;
         let (tau_r, uncertainty) = (1.0 / rate, fit.uncertainty);
-        let ratio = tau_r / self.motor.tau_r;
+        let ratio = tau_r / self.tau_r;
         let certain = uncertainty < uncertain && self.rls.missing() < MISSING;
         let at_rest = fit.moved < AT_REST;
+        let tau_r_in_range = ratio > TAU_R_LIMITS[0] && ratio < TAU_R_LIMITS[1];
         if self.calls < SETTLE || !at_rest {
             Err(NoEstimate::Settling)
         } else if !certain {
             Err(NoEstimate::PoorExcitation)
-        } else if ratio > TAU_R_LIMITS[0]
-            && ratio < TAU_R_LIMITS[1]
-            && r_s > 0.0
-            && r_s < 3.0 * nominal.r_s
-        {
+        } else if tau_r_in_range && r_s > 0.0 && r_s < 3.0 * nominal.r_s {
             Ok(RotorEstimate { tau_r, resistance: r_s, omega_m, uncertainty })
         } else {
             self.unknowns = nominal;
