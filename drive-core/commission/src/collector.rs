@@ -62,6 +62,14 @@ pub struct Bin {
     pub current: AlphaBeta,
 }
 
+impl Bin {
+    /// The means of sums over as many periods.
+    fn mean(&self) -> Self {
+        let share = 1.0 / self.periods;
+        Self { voltage: self.voltage * share, current: self.current * share, ..*self }
+    }
+}
+
 /// The sums.
 ///
 /// Call [`begin`](Self::begin) before the command that changes the excitation, and [`push`](Self::push) for every step of
@@ -178,10 +186,7 @@ impl Collector {
     /// The bins of a half that have samples, in their order.
     pub fn bins(&self, half: usize) -> impl Iterator<Item = Bin> + Clone + '_ {
         let filled = self.bins.get(half).into_iter().flatten().filter(|bin| bin.periods > 0.0);
-        filled.map(|sum| {
-            let share = 1.0 / sum.periods;
-            Bin { voltage: sum.voltage * share, current: sum.current * share, ..*sum }
-        })
+        filled.map(Bin::mean)
     }
 
     /// Mean over the bins of a half from the given one on.
@@ -192,8 +197,7 @@ impl Collector {
             sum.voltage += bin.voltage * bin.periods;
             sum.current += bin.current * bin.periods;
         }
-        let share = 1.0 / sum.periods;
-        Bin { voltage: sum.voltage * share, current: sum.current * share, ..sum }
+        sum.mean()
     }
 
     /// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.

@@ -55,8 +55,8 @@ pub(super) struct Fitted {
     pub difference: f32,
     /// Rms of the residual, V.
     pub misfit: f32,
-    /// Standard deviations of r_s, e, R_R by what the fit leaves.
-    pub deviations: [f32; 3],
+    /// Standard deviations of r_s, e, R_R, L by what the fit leaves.
+    pub deviations: [f32; N],
     /// That of tau_r, s.
     pub tau_deviation: f32,
 }
@@ -143,31 +143,26 @@ impl Search {
             return Ok(None);
         }
         let (x, _) = self.best.ok_or(Refusal::SamplesLost)?;
-        if self.round + 1 == ROUNDS {
-            self.round = ROUNDS;
-            return Ok(None);
+        self.round += 1;
+        if self.round < ROUNDS {
+            let Self { steady, round, .. } = *self;
+            let begins = if round == 1 { begins(libm::expf(x)) } else { self.begins };
+            // From one spacing below the best to one above.
+            let (from, step) = (x - self.step, self.step * (2.0 / f32::from(CLOSER_POINTS - 1)));
+            *self = Self { steady, round, begins, from, step, ..Self::default() };
         }
-        if self.round == 0 {
-            self.begins = begins(libm::expf(x));
-        }
-        // From one spacing below the best to one above.
-        self.from = x - self.step;
-        self.step *= 2.0 / f32::from(CLOSER_POINTS - 1);
-        (self.round, self.point, self.best) = (self.round + 1, 0, None);
-        (self.after_best, self.last_left) = (false, 0.0);
         Ok(None)
     }
 
     fn fitted(&self, x: f32, best: &Candidate) -> Fitted {
         let [r_s, e, r_r, _] = best.values.map(|value| value as f32);
         let variance = best.left / (best.bins - N as f64);
-        let [d_r_s, d_e, d_r_r, _] = best.variances.map(|v| libm::sqrt(v * variance) as f32);
+        let deviations = best.variances.map(|v| libm::sqrt(v * variance) as f32);
         let tau_r = libm::expf(x);
         let step = f64::from(self.step);
         let curvature = (self.neighbours - 2.0 * best.left) / (step * step);
         let misfit = libm::sqrt(best.left / best.weight) as f32;
         let tau_deviation = tau_r * libm::sqrt(2.0 * variance / curvature.max(1e-12)) as f32;
-        let deviations = [d_r_s, d_e, d_r_r];
         let (magnetising, default) = (best.magnetising, Fitted::default());
         Fitted { r_s, e, r_r, tau_r, magnetising, misfit, deviations, tau_deviation, ..default }
     }
@@ -183,7 +178,7 @@ fn fit(
     across: Option<[f32; 2]>,
 ) -> Option<Candidate> {
     // Sums of the products of the four regressors and the voltage.
-    let (mut products, mut count) = ([[0.0_f64; N + 1]; N + 1], 0.0_f64);
+    let (mut products, mut count) = (Products::default(), 0.0_f64);
     // i_m' and i_w.
     let (mut beside, mut turning) = (0.0_f32, 0.0_f32);
     for half in 0..2 {
@@ -222,15 +217,14 @@ fn fit(
     if count <= N as f64 {
         return None;
     }
-    let inverse = inverse(&products)?;
-    let values = values(&inverse, &products);
+    let (inverse, values) = solved(&products)?;
     let explained: f64 = values.iter().zip(&products).map(|(a, row)| a * row[N]).sum();
     let left = (products[N][N] - explained).max(0.0);
     let variances = core::array::from_fn(|n| inverse[n][n]);
     Some(Candidate { left, values, variances, magnetising, weight: products[1][1], bins: count })
 }
 
-/// Sums of the products of the regressors and the voltage: the upper half, as [`inverse`] takes it.
+/// Sums of the products of the regressors and the voltage: the upper half, as [`solved`] takes it.
 type Products = [[f64; N + 1]; N + 1];
 
 /// Adds an equation of this weight.
@@ -244,32 +238,28 @@ fn add(products: &mut Products, x: [f64; N + 1], weight: f64) {
     }
 }
 
-/// The unknowns, by the inverse.
-fn values(inverse: &[[f64; N]; N], products: &Products) -> [f64; N] {
-    inverse.map(|row| row.iter().zip(products).map(|(a, row)| a * row[N]).sum())
-}
-
 /// Resistance r_s, ohm, e, V, and d, V A, of steady voltages r_s i + e - d/i at these currents, by least squares: those of an
 /// inverter whose current has to swing the capacitance of the nodes.
 pub(super) fn bent(points: &[(f32, f32)]) -> Result<[f32; 3], Refusal> {
-    let mut products = [[0.0; N + 1]; N + 1];
+    let mut products = Products::default();
     // There is no fourth.
     products[N - 1][N - 1] = 1.0;
     for &(i, v) in points {
         add(&mut products, [i, 1.0, -1.0 / i, 0.0, v].map(f64::from), 1.0);
     }
-    let inverse = inverse(&products).ok_or(Refusal::SamplesLost)?;
-    let [r_s, e, d, _] = values(&inverse, &products).map(|value| value as f32);
+    let (_, values) = solved(&products).ok_or(Refusal::SamplesLost)?;
+    let [r_s, e, d, _] = values.map(|value| value as f32);
     Ok([r_s, e, d])
 }
 
-/// The inverse of a positive definite matrix, given by its upper half, by Gauss and Jordan; none where it is not one.
-fn inverse(a: &Products) -> Option<[[f64; N]; N]> {
+/// The inverse of the matrix of the regressors, by Gauss and Jordan, and the unknowns by it; none where the matrix is not
+/// positive definite.
+fn solved(products: &Products) -> Option<([[f64; N]; N], [f64; N])> {
     // A and the identity beside it become the identity and the inverse.
     let mut rows = [[0.0; 2 * N]; N];
     for n in 0..N {
         for m in 0..N {
-            rows[n][m] = a[n.min(m)][n.max(m)];
+            rows[n][m] = products[n.min(m)][n.max(m)];
         }
         rows[n][N + n] = 1.0;
     }
@@ -285,5 +275,7 @@ fn inverse(a: &Products) -> Option<[[f64; N]; N]> {
         }
         rows[n] = own;
     }
-    Some(rows.map(|row| core::array::from_fn(|m| row[N + m])))
+    let inverse: [[f64; N]; N] = rows.map(|row| core::array::from_fn(|m| row[N + m]));
+    let value = |row: [f64; N]| row.iter().zip(products).map(|(a, sums)| a * sums[N]).sum();
+    Some((inverse, inverse.map(value)))
 }

@@ -101,8 +101,7 @@ impl Commissioning {
             let seen = sums.phasors();
             let (least, most) = self.plate.leakage;
             let range = (0.1 * least, 10.0 * most);
-            let [v_a, v_b, i_a, i_b] = seen;
-            let admittance = if axis == 0 { i_a / v_a } else { i_b / v_b };
+            let admittance = seen[2 + axis] / seen[axis];
             let admittance = libm::hypotf(admittance.re, admittance.im);
             let r = levels.r_s + levels.r_r;
             self.inductances[bias][axis] = inductance(admittance, r, self.plate.filter, range);

@@ -150,7 +150,7 @@ impl Commissioning {
     fn level_values(&self, limit: f32) -> Result<[Quantity; 7], Refusal> {
         let fit = &self.state.fitted;
         let (plate, levels) = (&self.plate, Levels::new(fit));
-        let ([d_r_s, d_e, d_r_r], d_tau_r) = (fit.deviations, fit.tau_deviation);
+        let ([d_r_s, d_e, d_r_r, _], d_tau_r) = (fit.deviations, fit.tau_deviation);
         Ok([
             Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).checked(plate.r_s, SIZE)?,
             Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).checked(plate.r_r, SIZE)?,

@@ -121,8 +121,8 @@ pub struct Rls {
     settings: RlsSettings,
     scale: [f32; 2],
     ud: Ud,
-    voltage: Filter,
-    current: Filter,
+    /// Input filters of voltage and current.
+    filters: [Filter; 2],
     /// Of voltage and current: increment one sample ago, value two samples ago, value one sample ago.
     history: [[Complex32; 3]; 2],
     /// Mean square of voltage and current.
@@ -167,8 +167,7 @@ impl Rls {
             settings,
             scale: [1.0 / voltage_base, 1.0 / current_base],
             ud: Ud::new(START, p0),
-            voltage: Filter::new(corner),
-            current: Filter::new(corner),
+            filters: [Filter::new(corner); 2],
             history: [[Complex32::ZERO; 3]; 2],
             power: [0.0; 2],
             axes: [0.0; 3],
@@ -191,8 +190,8 @@ impl Rls {
             self.settling = self.settle;
             return self.unused();
         }
-        let v = self.voltage.step(Complex32::from(voltage) * self.scale[0]);
-        let i = self.current.step(Complex32::from(current) * self.scale[1]);
+        let v = self.filters[0].step(Complex32::from(voltage) * self.scale[0]);
+        let i = self.filters[1].step(Complex32::from(current) * self.scale[1]);
         let [[dv, v2, _], [di, i2, _]] = self.history;
         for (history, x) in self.history.iter_mut().zip([v, i]) {
             *history = [x.change, history[2], x.value];

@@ -198,10 +198,8 @@ impl<S> Entry<S> {
 
     /// Whether two sets of settings have the same value in effect. A value that is not a number is never the same.
     pub fn same(&self, one: &S, other: &S) -> bool {
-        match self.number(one) {
-            Some(number) => Some(number) == self.number(other),
-            None => self.get(one) == self.get(other),
-        }
+        let in_effect = |settings| self.number(settings).map_or(self.get(settings), Value::Number);
+        in_effect(one) == in_effect(other)
     }
 }
 

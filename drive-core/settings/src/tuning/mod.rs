@@ -182,11 +182,8 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
     let (sin, cos) = libm::sincos(0.5 * low);
     let half_v_t = sin / cos;
     let z_c = zero_at(half_v_t / 4.0);
-    Ok(RuleDesign {
-        k_c: 1.0 / (pi_response(1.0, z_c, low) * plant.response(low)).norm(),
-        z_c,
-        v: 2.0 / period_s * half_v_t,
-    })
+    let k_c = 1.0 / (pi_response(1.0, z_c, low) * plant.response(low)).norm();
+    Ok(RuleDesign { k_c, z_c, v: 2.0 / period_s * half_v_t })
 }
 
 /// The interval that is left of one after `steps` bisections; `is_below` holds below the value that is sought.
@@ -273,9 +270,7 @@ pub fn design_current_loop(
         (k_c, margins_with(k_c)?)
     };
     let below_zero = no_crossover(margins.crossover_hz, z_c, period_s);
-    if margins.crossover_hz > below_zero.min {
-        Ok(CurrentLoopDesign { k_c, z_c, margins, rule_k_c, rule_margins })
-    } else {
-        Err(below_zero)
-    }
+    let design = CurrentLoopDesign { k_c, z_c, margins, rule_k_c, rule_margins };
+    let is_above_zero = margins.crossover_hz > below_zero.min;
+    is_above_zero.then_some(design).ok_or(below_zero)
 }
