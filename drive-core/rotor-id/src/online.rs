@@ -221,9 +221,8 @@ impl Online {
     /// Filters and decimates one control period. Not inlined: `cargo xtask cycles` finds it by its name.
     #[inline(never)]
     fn sample(&mut self, voltage: Complex32, current: Complex32) {
-        let [on_voltage, on_current] = &mut self.filters;
-        let v = on_voltage.step(voltage).value;
-        let i = on_current.step(current).value;
+        let v = self.filters[0].step(voltage).value;
+        let i = self.filters[1].step(current).value;
         if self.pushed == DECIMATION {
             let mean = self.sum * (1.0 / f32::from(DECIMATION));
             self.rls.step(mean.into(), self.sampled.into());

@@ -66,21 +66,12 @@ impl Ud {
         self.column::<1>(&x, inverse, &mut pass);
         self.column::<2>(&x, inverse, &mut pass);
         self.column::<3>(&x, inverse, &mut pass);
-        let mut error = y;
-        for (x, theta) in x.iter().zip(&self.theta) {
-            error -= *x * *theta;
-        }
+        let error = x.iter().zip(&self.theta).fold(y, |rest, (x, theta)| rest - x * theta);
         let step = error * pass.inverse;
+        let positive = self.d.iter().all(|d| *d > 0.0);
+        self.largest = self.d.into_iter().fold(0.0, |most, d| if d > most { d } else { most });
         // The sum is finite only if all summands are.
-        let (mut sum, mut positive) = (0.0, true);
-        self.largest = 0.0;
-        for d in self.d {
-            sum += d;
-            positive &= d > 0.0;
-            if d > self.largest {
-                self.largest = d;
-            }
-        }
+        let mut sum: f32 = self.d.iter().sum();
         for ((theta, lost), gain) in self.theta.iter_mut().zip(&mut self.lost).zip(&pass.gain) {
             let (old, change) = (*theta, *gain * step + *lost);
             *theta = old + change;
