@@ -143,11 +143,5 @@ pub enum SettingsError {
     Word(&'static str, &'static str, &'static str),
     /// The design of the controllers failed.
     #[error("controllers: {0}")]
-    Tuning(TuningError),
-}
-
-impl From<TuningError> for SettingsError {
-    fn from(error: TuningError) -> Self {
-        Self::Tuning(error)
-    }
+    Tuning(#[from] TuningError),
 }
