@@ -83,32 +83,48 @@ pub enum Accepted {
 }
 
 /// The reason of a refusal. A refused command changes nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refused {
     /// The value is not a number or infinite.
+    #[error("the value is not a finite number")]
     NotFinite,
     /// Not in this state.
+    #[error("not possible while the drive is {0}")]
     State(State),
     /// Only while the shaft stands.
+    #[error("the shaft turns: bring it to rest first")]
     Turning,
     /// The encoder is needed for this mode and the settings name another angle source.
+    #[error("this mode needs the encoder as angle source")]
     NeedsEncoder,
     /// The injection is needed as angle source; to learn, with a demodulation that tracks.
+    #[error("this needs the injection, demodulated by a way that tracks")]
     NeedsInjection,
     /// The direct current is the one that tables and lock monitor are for.
+    #[error("the direct current cannot change while the lock monitor watches the angle")]
     FluxIsFixed,
     /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
+    #[error(
+        "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
+    )]
     NotLearned,
     /// Rated frequency and speed of the nameplate are those of other pairs of poles.
+    #[error(
+        "nameplate.speed_rpm must be 0.85 to 1 times 60 nameplate.frequency_hz/motor.pole_pairs"
+    )]
     Nameplate,
     /// The precharge relay is open: the dc link is not charged yet, or too low.
+    #[error("the precharge relay is open: the dc link is too low, or not steady yet")]
     NotCharged,
     /// The settings do not want the rotor time constant tracked.
+    #[error("track_rotor is off in the settings")]
     RotorNotTracked,
     /// A fault is latched; clear it first.
+    #[error("fault {code} is latched: {0}", code = .0.code())]
     Fault(Fault),
     /// The value is outside the allowed range.
+    #[error("the value is outside the allowed range {min} to {max}")]
     OutOfRange {
         /// Smallest allowed value.
         min: f32,
@@ -116,45 +132,3 @@ pub enum Refused {
         max: f32,
     },
 }
-
-impl core::fmt::Display for Refused {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NotFinite => write!(f, "the value is not a finite number"),
-            Self::State(state) => write!(f, "not possible while the drive is {state}"),
-            Self::Turning => write!(f, "the shaft turns: bring it to rest first"),
-            Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
-            Self::NeedsInjection => {
-                write!(f, "this needs the injection, demodulated by a way that tracks")
-            }
-            Self::FluxIsFixed => {
-                write!(
-                    f,
-                    "the direct current cannot change while the lock monitor watches the angle"
-                )
-            }
-            Self::NotLearned => {
-                write!(
-                    f,
-                    "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
-                )
-            }
-            Self::Nameplate => {
-                write!(
-                    f,
-                    "nameplate.speed_rpm must be 0.85 to 1 times 60 nameplate.frequency_hz/motor.pole_pairs"
-                )
-            }
-            Self::NotCharged => {
-                write!(f, "the precharge relay is open: the dc link is too low, or not steady yet")
-            }
-            Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
-            Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
-            Self::OutOfRange { min, max } => {
-                write!(f, "the value is outside the allowed range {min} to {max}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Refused {}
