@@ -1,7 +1,7 @@
 //! Which command is taken in which state, whatever its value. [Control law](../../../docs/control-law.md) has the table.
 
 use crate::drive::command::{Command, Refused};
-use crate::drive::state::{Mode, State};
+use crate::drive::state::{Mode, Stage, State};
 
 /// Modes that regulate torque, speed or position.
 const REGULATING: &[Mode] = &[Mode::Torque, Mode::Speed, Mode::Position];
@@ -51,28 +51,16 @@ pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(),
         | Command::RotorTimeConstant(_) => Taken::from_start(REGULATING),
     };
     let of_mode = taken.modes.contains(&mode);
-    let is_taken = match state {
-        State::Fault(_) if taken.fault => true,
-        State::Fault(fault) => return Err(Refused::Fault(fault)),
-        State::Off => taken.off,
-        State::Calibrating
-        | State::Precharge
-        | State::CheckingWiring
-        | State::Catching
-        | State::Magnetising
-        | State::Verifying => {
-            if taken.starting && !of_mode {
-                return Err(Refused::State(State::of_mode(mode)));
-            }
-            taken.starting
+    let is_taken = match (state, state.stage()) {
+        (State::Fault(fault), _) if !taken.fault => return Err(Refused::Fault(fault)),
+        (_, Stage::Fault) => true,
+        (_, Stage::Off) => taken.off,
+        (_, Stage::Starting) if taken.starting && !of_mode => {
+            return Err(Refused::State(State::of_mode(mode)));
         }
-        State::Torque
-        | State::Speed
-        | State::Position
-        | State::VoltsPerHertz
-        | State::Learning
-        | State::Exciting => of_mode,
-        State::Braking | State::BrakingByFrequency | State::Stopping => false,
+        (_, Stage::Starting) => taken.starting,
+        (_, Stage::Running) => of_mode,
+        (_, Stage::Stopping) => false,
     };
     if is_taken { Ok(()) } else { Err(Refused::State(state)) }
 }
