@@ -24,43 +24,26 @@ impl Drive {
 
 impl Field {
     fn stop(&mut self, c: &Coefficients, k: &mut Kept, stop: Stop) {
-        match (&self.flux, &mut self.goal, stop) {
-            (_, Goal::Release, _) | (_, Goal::Brake { .. }, Stop::Ramp) => return,
-            (_, Goal::Brake { quick }, Stop::Quick) => {
+        let regulates = self.regulates();
+        match (&mut self.goal, stop) {
+            (Goal::Release, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
+            (Goal::Brake { quick }, Stop::Quick) => {
                 *quick = true;
                 return;
             }
-            (
-                FluxPhase::Ready(_),
-                Goal::Torque | Goal::Speed { .. } | Goal::Position { .. },
-                Stop::Ramp | Stop::Quick,
-            ) => {
+            (goal, Stop::Ramp | Stop::Quick) if regulates => {
                 // The speed loop takes over at the present speed and torque current.
                 let speed = k.seen.rotor_freq / c.freq_per_speed;
                 let (i_q, _) = k.limits.now.hold(k.references.current.q);
                 c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
-                self.goal = Goal::Brake { quick: stop == Stop::Quick };
+                *goal = Goal::Brake { quick: stop == Stop::Quick };
             }
-            (
-                FluxPhase::Search(_)
-                | FluxPhase::Asymmetry(_)
-                | FluxPhase::Build { .. }
-                | FluxPhase::Hold
-                | FluxPhase::Verify
-                | FluxPhase::Ready(_)
-                | FluxPhase::Learn(_),
-                Goal::Torque
-                | Goal::Speed { .. }
-                | Goal::Position { .. }
-                | Goal::Learn
-                | Goal::Brake { .. },
-                _,
-            ) => {
+            (goal, _) => {
                 // A torque that was asked for during the start has not come yet.
                 if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
                     k.references.current.q = 0.0;
                 }
-                self.goal = Goal::Release;
+                *goal = Goal::Release;
             }
         }
         self.enter(k, FluxPhase::ready());
