@@ -59,9 +59,7 @@ impl Drive {
             Command::Press(rpm, i_q) => {
                 finite(rpm)?;
                 let max = self.c.protection.i_q;
-                if !(0.0..=max).contains(&i_q) {
-                    return Err(Refused::OutOfRange { min: 0.0, max });
-                }
+                in_range(i_q, 0.0, max)?;
                 self.hold_present_position();
                 let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
                 if let Some(Goal::Position { press, .. }) = self.goal() {
@@ -72,9 +70,7 @@ impl Drive {
             Command::Home(here) => {
                 finite(here)?;
                 let max = self.c.motion.position_limit;
-                if here.abs() > max {
-                    return Err(Refused::OutOfRange { min: -max, max });
-                }
+                in_range(here, -max, max)?;
                 self.hold_present_position();
                 if let Phase::Field(field) = &mut self.phase {
                     let origin = self.c.motion.shift_origin(&mut field.motion, here);
@@ -110,10 +106,8 @@ impl Drive {
                 finite(voltage.d)?;
                 finite(voltage.q)?;
                 let max = self.c.largest_test_v;
-                let inside = |x: f32| (-max..=max).contains(&x);
-                if !(inside(voltage.d) && inside(voltage.q)) {
-                    return Err(Refused::OutOfRange { min: -max, max });
-                }
+                in_range(voltage.d, -max, max)?;
+                in_range(voltage.q, -max, max)?;
                 self.kept.references.test_voltage = voltage;
             }
             Command::RotorTimeConstant(tau_r) => {
@@ -185,16 +179,12 @@ impl Drive {
 
     pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
         match &job {
-            _ if !self.is_charged() => return Err(Refused::NotCharged),
-            Job::Field(Goal::Learn) if !self.can_learn() => return Err(Refused::NeedsInjection),
-            Job::Scalar { .. } if self.c.volts_per_hertz.is_none() => {
-                return Err(Refused::Nameplate);
-            }
-            Job::Field(goal) if goal.regulates() && self.c.unlearned => {
-                return Err(Refused::NotLearned);
-            }
-            Job::Field(_) | Job::Scalar { .. } | Job::Excite(_) => {}
-        }
+            _ if !self.is_charged() => Err(Refused::NotCharged),
+            Job::Field(Goal::Learn) if !self.can_learn() => Err(Refused::NeedsInjection),
+            Job::Scalar { .. } if self.c.volts_per_hertz.is_none() => Err(Refused::Nameplate),
+            Job::Field(goal) if goal.regulates() && self.c.unlearned => Err(Refused::NotLearned),
+            Job::Field(_) | Job::Scalar { .. } | Job::Excite(_) => Ok(()),
+        }?;
         self.prepare_for(job);
         Ok(Accepted::AsGiven)
     }
@@ -224,6 +214,11 @@ impl Drive {
 
 fn finite(value: f32) -> Result<(), Refused> {
     if value.is_finite() { Ok(()) } else { Err(Refused::NotFinite) }
+}
+
+/// Refuses a value that is not within `min` to `max`.
+fn in_range(value: f32, min: f32, max: f32) -> Result<(), Refused> {
+    if (min..=max).contains(&value) { Ok(()) } else { Err(Refused::OutOfRange { min, max }) }
 }
 
 fn accepted(asked: f32, taken: f32) -> Accepted {
