@@ -20,7 +20,7 @@ use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
 
 /// A drive that excites.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Excite {
     wanted: Excitation,
     low_pass: LpfState,
@@ -53,14 +53,7 @@ pub(super) fn next_bit(register: &mut u8) -> f32 {
 
 impl Excite {
     pub fn new(wanted: Excitation, left: Left) -> Self {
-        Self {
-            wanted,
-            low_pass: LpfState::default(),
-            control: Control::default(),
-            trains: 0,
-            pulses: WiringCheckState::default(),
-            left,
-        }
+        Self { wanted, left, ..Self::default() }
     }
 
     pub fn state(&self) -> State {
@@ -83,17 +76,13 @@ impl Excite {
         let mut duties = LOW_SIDES_ON;
         match self.wanted {
             Excitation::Pulses(pulses) => {
-                return Ok(
-                    match c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)? {
-                        Some(duties) => duties,
-                        None => {
-                            self.trains = self.trains.wrapping_add(1);
-                            (self.control, self.wanted) = (Control::default(), Excitation::Rest);
-                            k.elapsed = 0;
-                            LOW_SIDES_ON
-                        }
-                    },
-                );
+                let duties = c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)?;
+                if duties.is_none() {
+                    self.trains = self.trains.wrapping_add(1);
+                    (self.control, self.wanted) = (Control::default(), Excitation::Rest);
+                    k.elapsed = 0;
+                }
+                return Ok(duties.unwrap_or(LOW_SIDES_ON));
             }
             Excitation::Rest => {
                 LPF.step(&mut self.low_pass, current);

@@ -4,7 +4,7 @@ use super::Kept;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Measured};
-use crate::protect::wiring_check::{WiringAction, WiringCheck, WiringCheckState};
+use crate::protect::wiring_check::{Pulse, WiringCheck, WiringCheckState};
 
 impl Coefficients {
     /// Checks a sample, with the outputs on or about to be.
@@ -50,14 +50,12 @@ impl Coefficients {
         state: &mut WiringCheckState,
         measured: &Measured,
     ) -> Result<Option<[f32; 3]>, Fault> {
-        Ok(match pulses.step(state, measured.phases)? {
-            WiringAction::Apply { voltage, current } => {
-                let signs = self.dead_time.signs(current.to_abc());
-                let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
-                Some(self.modulator.step(voltage, compensation, measured.dc_link).duties)
-            }
-            WiringAction::Ended => None,
-        })
+        let Some(Pulse { voltage, current }) = pulses.step(state, measured.phases)? else {
+            return Ok(None);
+        };
+        let signs = self.dead_time.signs(current.to_abc());
+        let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
+        Ok(Some(self.modulator.step(voltage, compensation, measured.dc_link).duties))
     }
 }
 

@@ -60,10 +60,8 @@ impl Scalar {
         let demand = Demand { freq, quick, i_q: k.limits.now.i_q, largest_v };
         let turned = turning.step(s, current, &demand)?;
         if !(turned.voltage.d + turned.voltage.q + s.freq).is_finite() {
-            return Err(k
-                .not_finite(c, self.speed.is_finite())
-                .unwrap_or(Fault::NonFiniteState)
-                .into());
+            let fault = k.not_finite(c, self.speed.is_finite());
+            return Err(fault.unwrap_or(Fault::NonFiniteState).into());
         }
         let voltage = turned.voltage.to_alpha_beta(turned.applied);
         let flowing = turned.current.to_alpha_beta(turned.applied);

@@ -63,18 +63,13 @@ pub struct WiringCheckState {
     answers: [[f32; 2]; 3],
 }
 
-/// Action of the drive in the next control period.
+/// Part of a pulse in the next control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WiringAction {
-    /// Apply a voltage pulse.
-    Apply {
-        /// Voltage in the stator frame, V peak.
-        voltage: AlphaBeta,
-        /// Expected current in the stator frame, A peak, for the dead-time compensation.
-        current: AlphaBeta,
-    },
-    /// All pulses have been applied: [judge](WiringCheck::judge) the answers.
-    Ended,
+pub struct Pulse {
+    /// Voltage in the stator frame, V peak.
+    pub voltage: AlphaBeta,
+    /// Expected current in the stator frame, A peak, for the dead-time compensation.
+    pub current: AlphaBeta,
 }
 
 /// Unit vectors along phases a, b, c.
@@ -121,11 +116,12 @@ impl WiringCheck {
         Self { expected: s.expected_a, noise: s.noise_a, volts, rise }
     }
 
-    /// Processes one sample of the phase currents, A.
+    /// Processes one sample of the phase currents, A. `None` when all pulses have been applied: then
+    /// [judge](WiringCheck::judge) the answers.
     ///
     /// # Errors
     /// [`Fault::WiringCurrent`] when the current exceeds its bound.
-    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<WiringAction, Fault> {
+    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<Option<Pulse>, Fault> {
         // The voltage computed in period n acts from sample n + 1 on and shows in sample n + 2.
         let risen = state.period.saturating_sub(1);
         let share = if risen < self.rise { risen as f32 / self.rise as f32 } else { 1.0 };
@@ -150,10 +146,10 @@ impl WiringCheck {
             state.period = 0;
             state.pulse += 1;
             if state.pulse >= PULSES_PER_ROUND * ROUNDS {
-                return Ok(WiringAction::Ended);
+                return Ok(None);
             }
         }
-        Ok(WiringAction::Apply { voltage: AXES[leg] * volts, current: AXES[leg] * flowing })
+        Ok(Some(Pulse { voltage: AXES[leg] * volts, current: AXES[leg] * flowing }))
     }
 
     /// Evaluates the answers.
@@ -207,7 +203,7 @@ mod tests {
             let ends = (0..longest).any(|n| {
                 let current = |k: usize| f32::from_bits(bits[(n as usize + k) % 16]);
                 match check.step(&mut state, Abc::new(current(0), current(1), 0.0)) {
-                    Ok(WiringAction::Apply { voltage, .. }) => {
+                    Ok(Some(Pulse { voltage, .. })) => {
                         assert!(voltage.length_squared() <= HIGHEST_V * HIGHEST_V * 1.000_1);
                         false
                     }
@@ -235,7 +231,7 @@ mod tests {
         let mut acting = AlphaBeta::ZERO;
         loop {
             match check.step(&mut state, sensors(current.to_abc())) {
-                Ok(WiringAction::Apply { voltage, current: flowing }) => {
+                Ok(Some(Pulse { voltage, current: flowing })) => {
                     // The announced current flows while the voltage acts.
                     current += acting * (PERIOD_S / inductance);
                     if voltage != AlphaBeta::ZERO {
@@ -246,7 +242,7 @@ mod tests {
                     let Abc { a, b, c } = current.to_abc();
                     largest = largest.max(a.abs()).max(b.abs()).max(c.abs());
                 }
-                Ok(WiringAction::Ended) => return (check.judge(&state.answers()), largest),
+                Ok(None) => return (check.judge(&state.answers()), largest),
                 Err(fault) => return (Err(fault), largest),
             }
         }
