@@ -1,7 +1,7 @@
 //! Learning with the shaft locked, as a state of the drive.
 
 use super::{Drive, End, Field, FluxPhase, Kept, Phase};
-use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
+use crate::identify::learning::{Learned, LearningSample, Start, Verdict};
 use crate::math::limited;
 use crate::{Angle, AngleSource, Coefficients, Fault};
 
@@ -67,20 +67,13 @@ impl Field {
             flux_freq: k.seen.flux_freq,
             voltage: k.seen.voltage,
         };
-        match c.learning.step(learning, &sample) {
-            LearningAction::Operate(Operate { i_q, lead }) => {
-                let lead = Angle::from_radians(lead);
-                k.references.current.q = i_q;
-                if lead != self.lead {
-                    (self.lead, self.lead_axis) = (lead, lead.unit_vector());
-                }
-            }
-            LearningAction::Moved | LearningAction::Stuck => {
-                return Err(Fault::ShaftNotLocked.into());
-            }
-            LearningAction::Done => return Err(End::Measured),
+        let next = c.learning.step(learning, &sample)?.ok_or(End::Measured)?;
+        let lead = Angle::from_radians(next.lead);
+        if lead != self.lead {
+            (self.lead, self.lead_axis) = (lead, lead.unit_vector());
         }
-        Ok(k.references.current.q)
+        k.references.current.q = next.i_q;
+        Ok(next.i_q)
     }
 }
 

@@ -38,7 +38,7 @@ use core::f32::consts::{PI, TAU};
 
 use crate::carrier::Asymmetry;
 use crate::table::{Grid, POINTS};
-use crate::{Angle, Dq, Motor, PERIOD_S, periods};
+use crate::{Angle, Dq, Fault, Motor, PERIOD_S, periods};
 
 pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;
@@ -162,19 +162,6 @@ pub struct Operate {
     pub lead: f32,
 }
 
-/// Action of the drive in the next control period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LearningAction {
-    /// Regulate this.
-    Operate(Operate),
-    /// All points are measured.
-    Done,
-    /// The shaft is not locked.
-    Moved,
-    /// A point took too long: the flux does not rotate.
-    Stuck,
-}
-
 impl Learning {
     /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak. `normalised`: the
     /// signal is the saliency, not a current difference.
@@ -213,25 +200,29 @@ impl Learning {
         }
     }
 
-    fn operate(&self, point: Point) -> LearningAction {
+    fn operate(&self, point: Point) -> Operate {
         let sign = if point.mirrored { -1.0 } else { 1.0 };
         let lead = LEADS.get(point.lead).map_or(0.0, |lead| lead * self.lead);
-        LearningAction::Operate(Operate {
-            i_q: sign * self.grid.current(point.n),
-            lead: sign * lead,
-        })
+        Operate { i_q: sign * self.grid.current(point.n), lead: sign * lead }
     }
 
-    /// Processes one control period.
-    pub fn step(&self, state: &mut LearningState, sample: &LearningSample) -> LearningAction {
+    /// Processes one control period; returns the operating point of the next one, or `None` when all points are measured.
+    ///
+    /// # Errors
+    /// [`Fault::ShaftNotLocked`] when the shaft moved, or a point took too long: the flux does not rotate.
+    pub fn step(
+        &self,
+        state: &mut LearningState,
+        sample: &LearningSample,
+    ) -> Result<Option<Operate>, Fault> {
         if state.point >= self.points() {
-            return LearningAction::Done;
+            return Ok(None);
         }
         let point = self.point(state.point);
         let s = &mut state.sums;
         s.elapsed = s.elapsed.saturating_add(1);
         if s.elapsed <= periods(point.settle_s) {
-            return self.operate(point);
+            return Ok(Some(self.operate(point)));
         }
         let seen = sample.theta - Angle::within_turn(sample.flux_freq * LAG);
         let twice = (seen + seen).unit_vector();
@@ -249,25 +240,22 @@ impl Learning {
             let along = if self.normalised { known.along(twice) } else { 0.0 };
             s.carrier += sample.carrier_squared * (1.0 - 2.0 * along);
         }
-        if s.count > self.longest {
-            return LearningAction::Stuck;
-        }
+        Fault::ShaftNotLocked.unless(s.count <= self.longest)?;
         let half_turned = 2.0 * s.turned.abs() >= (s.halves + 1) as f32;
         s.halves += u32::from(half_turned);
-        let ends = s.count >= periods(point.average_s) && (half_turned || !point.turns);
-        if ends && !self.finish(state, point) {
-            return LearningAction::Moved;
+        if s.count >= periods(point.average_s) && (half_turned || !point.turns) {
+            self.finish(state, point)?;
         }
-        if state.point >= self.points() {
-            LearningAction::Done
-        } else {
-            self.operate(self.point(state.point))
-        }
+        let is_left = state.point < self.points();
+        Ok(is_left.then(|| self.operate(self.point(state.point))))
     }
 
-    /// Evaluates the sums of a completed point. False when the shaft moved.
+    /// Evaluates the sums of a completed point.
+    ///
+    /// # Errors
+    /// [`Fault::ShaftNotLocked`] when the shaft moved.
     #[cold]
-    fn finish(&self, state: &mut LearningState, point: Point) -> bool {
+    fn finish(&self, state: &mut LearningState, point: Point) -> Result<(), Fault> {
         let s = state.sums;
         state.sums = Sums::default();
         state.point += 1;
@@ -289,7 +277,7 @@ impl Learning {
         }
         if !point.mirrored {
             state.first_of_pair = (signal, voltage);
-            return true;
+            return Ok(());
         }
         let (first_signal, first_voltage) = state.first_of_pair;
         if let Some(q) = state.odd.get_mut(point.lead).and_then(|odd| odd.get_mut(point.n)) {
@@ -305,7 +293,7 @@ impl Learning {
         let even = (voltage + first_voltage) * 0.5;
         let follows = point.lead == 0 && self.follows(state, point, even.d, s.turned * mean);
         let flux = self.coupled * self.i_d;
-        even.q.abs() <= MOVED_RAD_PER_S * flux && !follows
+        Fault::ShaftNotLocked.unless(even.q.abs() <= MOVED_RAD_PER_S * flux && !follows)
     }
 
     /// Whether a free shaft follows the current, by the mean direct voltage, V, of a pair without lead and the slip, turns

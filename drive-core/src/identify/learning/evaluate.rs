@@ -28,20 +28,12 @@ pub struct Start {
     pub at_start: Option<Asymmetry>,
 }
 
-/// The slope over the torque current, that without it, and the largest current that it allows, A.
-struct Slope {
-    table: Option<SlopeTable>,
-    at_rest: f32,
-    limit_a: f32,
-}
-
 impl Learning {
     /// Evaluates all points. `start` is what the drive saw before.
     pub fn result(&self, state: &LearningState, start: &Start) -> Learned {
         let (asymmetry, gain_mismatch, spread) = self.asymmetry(state);
         let (reference, current_saliency) = self.reference(state);
-        let slope = self.slope(state);
-        let limit_a = slope.limit_a;
+        let (slope, slope_at_rest, limit_a) = self.slope(state);
         let ripple = fpu_sqrt::sqrtf(state.ripple);
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
@@ -49,14 +41,14 @@ impl Learning {
             Verdict::Uneven
         } else if !self.normalised {
             Verdict::Sound
-        } else if !Verdict::of_slope(slope.at_rest).is_accepted() {
+        } else if !Verdict::of_slope(slope_at_rest).is_accepted() {
             Verdict::SlopeTooSmall
-        } else if ripple > RIPPLE * slope.at_rest.abs() {
+        } else if ripple > RIPPLE * slope_at_rest.abs() {
             Verdict::Bent
-        } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.table.is_none() {
+        } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.is_none() {
             Verdict::LimitTooLow
         } else {
-            Verdict::of_slope(slope.at_rest)
+            Verdict::of_slope(slope_at_rest)
         };
         // The check and the baseline were taken with the asymmetry, with the flux along phase a.
         let all = gain_mismatch.with(&asymmetry);
@@ -70,8 +62,8 @@ impl Learning {
         let looked = start.looked.map_or(0.0, |q| seen(q, 0.0, SaliencyCheck::LOOK_AXIS).q);
         Learned {
             reference: reference.unwrap_or_default(),
-            slope: slope.table.filter(|_| verdict.is_accepted()),
-            slope_at_rest: slope.at_rest,
+            slope: slope.filter(|_| verdict.is_accepted()),
+            slope_at_rest,
             limit_a,
             carrier: self.carrier(state, baseline),
             points: self.points,
@@ -130,10 +122,10 @@ impl Learning {
         (ReferenceTable::from_points(self.grid, q), Fitted { value, misfit, accepted })
     }
 
-    /// The slope, and how far it goes.
-    fn slope(&self, state: &LearningState) -> Slope {
+    /// The slope over the torque current, that without it, 1/rad, and the largest current that it allows, A.
+    fn slope(&self, state: &LearningState) -> (Option<SlopeTable>, f32, f32) {
         if !self.normalised {
-            return Slope { table: None, at_rest: 0.0, limit_a: self.grid.current(self.points) };
+            return (None, 0.0, self.grid.current(self.points));
         }
         let [without, ahead, behind] = &state.odd;
         let per_lead = 1.0 / self.lead;
@@ -163,7 +155,7 @@ impl Learning {
             last = n;
         }
         let table = SlopeTable::from_points(self.grid, Self::held_beyond(&k, last));
-        Slope { table, at_rest, limit_a: self.grid.current(last) }
+        (table, at_rest, self.grid.current(last))
     }
 
     /// The carrier current over the torque current.

@@ -26,7 +26,7 @@ fn start() -> Start {
 fn learn(
     q: impl Fn(f64, f64, f64) -> f64,
     v: impl Fn(f32) -> Dq,
-) -> (LearningAction, LearningState) {
+) -> (Result<(), Fault>, LearningState) {
     let (learning, mut state) = (learning(), LearningState::default());
     let (mut point, mut theta) = (Operate { i_q: 0.0, lead: 0.0 }, 0.25_f64);
     for _ in 0..3_000_000 {
@@ -43,8 +43,9 @@ fn learn(
             voltage: v(point.i_q),
         };
         match learning.step(&mut state, &sample) {
-            LearningAction::Operate(next) => point = next,
-            other => return (other, state),
+            Ok(Some(next)) => point = next,
+            Ok(None) => return (Ok(()), state),
+            Err(fault) => return (Err(fault), state),
         }
     }
     panic!("it does not end");
@@ -79,7 +80,7 @@ fn splits_the_reference_from_slope_and_mismatch() {
     for mismatch in [0.0, 0.01, -0.05] {
         let q = |i_q, lead, theta| sound(i_q, lead, theta) + negative_sequence(mismatch, theta);
         let (next, state) = learn(q, locked);
-        assert_eq!(next, LearningAction::Done);
+        assert_eq!(next, Ok(()));
         // With the axis at 90° the carrier current of a is seen smaller.
         let baseline = CARRIER * CARRIER * (1.0 - mismatch as f32);
         let learned = learning().result(&state, &Start { baseline, ..start() });
@@ -201,9 +202,7 @@ fn the_flux_turns_at_every_point() {
         let (mut seen, mut magnetising, mut previous) = ([[0; POINTS]; 3], i_d, None);
         for number in 0..learning.points() {
             let point = learning.point(number);
-            let LearningAction::Operate(Operate { i_q, lead }) = learning.operate(point) else {
-                panic!()
-            };
+            let Operate { i_q, lead } = learning.operate(point);
             let slipping = i_q * lead.cos() - i_d * lead.sin();
             let least = f32::min(0.48 * learning.grid.step_a(), 0.19 * i_d);
             assert!(slipping.abs() > least, "{i_d}: {point:?}");
@@ -234,8 +233,8 @@ fn a_moving_shaft_is_noticed() {
     let q = sound;
     let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
     let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
-    assert_eq!(learn(q, turned).0, LearningAction::Moved);
-    assert_eq!(learn(q, free).0, LearningAction::Moved);
+    assert_eq!(learn(q, turned).0, Err(Fault::ShaftNotLocked));
+    assert_eq!(learn(q, free).0, Err(Fault::ShaftNotLocked));
 }
 
 #[test]
@@ -248,8 +247,8 @@ fn a_flux_that_does_not_turn_ends_it() {
         flux_freq: 0.0,
         voltage: Dq::ZERO,
     };
-    let stuck = (0..200_000).any(|_| learning.step(&mut state, &nothing) == LearningAction::Stuck);
-    assert!(stuck);
+    let ended = (0..200_000).find_map(|_| learning.step(&mut state, &nothing).err());
+    assert_eq!(ended, Some(Fault::ShaftNotLocked));
 }
 
 fn found() -> Learned {
