@@ -25,17 +25,11 @@ impl DemodulatorKind {
 
     /// Whether its signal follows the angle, so that the angle can be tracked or learned by it.
     pub const fn tracks(self) -> bool {
-        match self {
-            Self::Literal => false,
-            Self::Rectified | Self::RmsImpedance | Self::Envelope | Self::Synchronous => true,
-        }
+        !matches!(self, Self::Literal)
     }
 
     /// Whether the carrier is injected along the flux, not across it.
     pub const fn is_along_flux(self) -> bool {
-        match self {
-            Self::RmsImpedance => true,
-            Self::Literal | Self::Rectified | Self::Envelope | Self::Synchronous => false,
-        }
+        matches!(self, Self::RmsImpedance)
     }
 }

@@ -7,6 +7,7 @@
 use core::f32::consts::TAU;
 
 use crate::carrier::CARRIER_SAMPLES;
+use crate::math::limited;
 use crate::{Angle, Motor, PERIOD_S};
 
 /// Coefficients of the encoder and the slip.
@@ -118,14 +119,11 @@ impl Indirect {
         }
         let most = TAU_R_STEP * self.nominal_rate;
         let change = PERIOD_S / tau_r - self.rate;
-        if change > most {
-            self.rate += most;
-        } else if change < -most {
-            self.rate -= most;
-        } else {
+        if change.abs() <= most {
             self.rate = PERIOD_S / tau_r;
             return Ok(tau_r);
         }
+        self.rate += limited(change, most);
         Ok(PERIOD_S / self.rate)
     }
 

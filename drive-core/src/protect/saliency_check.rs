@@ -119,11 +119,8 @@ impl SaliencyCheck {
         q: f32,
     ) -> SaliencyCheckAction {
         let looked = self.settle + self.average;
-        if elapsed < self.settle {
-            state.sum = 0.0;
-            SaliencyCheckAction::Look
-        } else if elapsed < looked {
-            state.sum += q;
+        if elapsed < looked {
+            state.sum = if elapsed < self.settle { 0.0 } else { state.sum + q };
             SaliencyCheckAction::Look
         } else if elapsed < looked + self.restore {
             let mean = self.mean(state);
