@@ -233,8 +233,11 @@ fn a_moving_shaft_is_noticed() {
     let q = sound;
     let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
     let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
-    assert_eq!(learn(q, turned).0, Err(Fault::ShaftNotLocked));
-    assert_eq!(learn(q, free).0, Err(Fault::ShaftNotLocked));
+    for (ended, state) in [learn(q, turned), learn(q, free)] {
+        assert_eq!(ended, Err(Fault::ShaftNotLocked));
+        // A point was evaluated: it was not its length that ended it.
+        assert_eq!(state.sums.count, 0);
+    }
 }
 
 #[test]
@@ -249,6 +252,7 @@ fn a_flux_that_does_not_turn_ends_it() {
     };
     let ended = (0..200_000).find_map(|_| learning.step(&mut state, &nothing).err());
     assert_eq!(ended, Some(Fault::ShaftNotLocked));
+    assert!(state.sums.count > learning.longest, "by its length, not by a shaft that moved");
 }
 
 fn found() -> Learned {
