@@ -336,9 +336,9 @@ pub const RECORDED_PERIODS: usize = 32;
 const _: () = assert!(
     (RECORDED_PERIODS as u32 - 1) * WATCHDOG_HZ > (WATCHDOG_RELOAD as u32 + 1) * 4 * PWM_HZ
 );
-/// Longest wait for the answer to a command, us: the next period takes it, within 167 us.
-pub const ANSWER_TIMEOUT_US: u32 = 500;
-const _: () = assert!(ANSWER_TIMEOUT_US > 2 * 1_000_000 / PWM_HZ);
+/// Longest wait for the answer to a command, us: one period of ten takes it, within 1.7 ms.
+pub const ANSWER_TIMEOUT_US: u32 = 3000;
+const _: () = assert!(ANSWER_TIMEOUT_US > 11 * 1_000_000 / PWM_HZ);
 
 // Watchdog ------------------------------------------------------------------------------------
 

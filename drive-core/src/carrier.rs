@@ -3,7 +3,6 @@
 pub(crate) mod asymmetry;
 pub(crate) mod at_start;
 pub(crate) mod demodulator;
-pub(crate) mod drift;
 pub(crate) mod injection;
 mod kind;
 mod sample;

@@ -59,6 +59,7 @@ pub use coefficients::{Catching, Coefficients, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::Excite;
+use in_turn::COMMANDS_BEHIND;
 use limits::Limits;
 use prepare::Prepare;
 use scalar::Scalar;
@@ -388,6 +389,14 @@ impl Drive {
             Phase::Excite(excite) => excite.state(),
             Phase::Scalar(scalar) => scalar.state(),
             Phase::Field(field) => field.state(),
+        }
+    }
+
+    /// Whether the last period leaves time for a command: of a carrier period one does, so that the longest interrupt has none.
+    pub fn has_time(&self) -> bool {
+        match &self.phase {
+            Phase::Field(field) => field.carrier.is_behind(COMMANDS_BEHIND),
+            _ => true,
         }
     }
 

@@ -1,5 +1,6 @@
 //! Angle of the rotor flux: from encoder and slip, or from the saliency measured with the carrier.
 
+pub(crate) mod angle_filter;
 pub(crate) mod catch;
 pub(crate) mod estimator;
 pub(crate) mod hand_over;
@@ -9,12 +10,13 @@ pub(crate) mod schedule;
 pub(crate) mod tracker;
 pub(crate) mod volts_per_hertz;
 
+pub use angle_filter::AngleFilter;
 pub use catch::Path;
 pub use estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 pub use indirect::{Indirect, TAU_R_LIMITS};
 pub use observer::{Leakage, Observer};
 pub use schedule::GainSchedule;
-pub use tracker::{Pll, THIRD_POLE, Tracker};
+pub use tracker::Tracker;
 pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
 
 /// The source of the flux angle.

@@ -262,11 +262,13 @@ impl Running {
 
         // Between two steps: a command acts from the next step on.
         // There is room for the answer: the main loop takes the last one before it sends a command.
-        let answered = commands.take_with(|command| {
-            answers.send_with(|answer| *answer = drive.command(command));
-            adc.convert_both(drive.front_end().both_zero_vectors);
-        });
-        let commanded = answered.is_some();
+        let commanded = drive.has_time()
+            && commands
+                .take_with(|command| {
+                    answers.send_with(|answer| *answer = drive.command(command));
+                    adc.convert_both(drive.front_end().both_zero_vectors);
+                })
+                .is_some();
         IS_OFF.store(drive.is_off(), Ordering::Relaxed);
         let state = drive.state();
         let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());

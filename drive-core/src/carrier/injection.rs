@@ -76,7 +76,7 @@ impl Injection {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carrier {
     index: usize,
-    /// Share of the full amplitude in use, at most 1; lower where the fundamental leaves too little voltage.
+    /// Share of the full amplitude in use; lower where the fundamental leaves too little voltage, above 1 only without a current.
     pub share: f32,
     /// 1 / `share`^2.
     pub per_share_squared: f32,
@@ -147,10 +147,14 @@ impl Carrier {
         if share == self.share {
             self.unchanged = self.unchanged.saturating_add(1);
         } else {
-            self.unchanged = 0;
-            (self.share, self.per_share_squared) = (share, 1.0 / (share * share));
+            self.set(share);
         }
         Fault::CarrierNoRoom.unless(share >= LEAST_SHARE)
+    }
+
+    /// Sets the share; from above 1 it falls until it fits, and does not rise.
+    pub fn set(&mut self, share: f32) {
+        (self.share, self.per_share_squared, self.unchanged) = (share, 1.0 / (share * share), 0);
     }
 
     /// Whether the demodulation averages contain the present share only.
@@ -165,6 +169,11 @@ impl Carrier {
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
         index
+    }
+
+    /// Whether PWM period `index` of the carrier period was the last one.
+    pub fn is_behind(&self, index: usize) -> bool {
+        self.index == index + 1
     }
 
     /// The carrier in PWM period `index`.

@@ -121,7 +121,7 @@ impl Field {
         if k.elapsed.wrapping_sub(from) >= built {
             Fault::NotCaught.unless(c.prediction.sees_flux(&self.prediction))?;
             // At speed the carrier current without torque does not tell that under torque: what comes is the baseline.
-            if self.hand_over.weight > 0.0 {
+            if self.hand_over.leads {
                 self.lock = LockMonitorState::default();
             }
             c.motion.start(&mut self.motion, k.rotor_count);

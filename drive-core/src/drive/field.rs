@@ -4,7 +4,7 @@
 use super::catching::Residual;
 use super::in_turn::StepResults;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
-use crate::carrier::at_start::AtStartState;
+use crate::carrier::at_start::{AtStart, AtStartState};
 use crate::carrier::{CarrierPeriod, CarrierSample};
 use crate::current::{DIRECT_SHARE, DIRECT_SHARE_WITHOUT_CARRIER, inverter_drop::DropSample};
 use crate::drive::state::State;
@@ -36,7 +36,7 @@ impl Field {
         c.estimator.start(&mut self.estimator);
         // A learning begins anew.
         if self.frame != Frame::LockedShaft {
-            self.estimator.drift.at_start = left.asymmetry;
+            self.estimator.changed = left.asymmetry;
         }
         self.observer.start(c.observer.as_ref());
     }
@@ -74,7 +74,7 @@ impl Field {
         Left {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
-            asymmetry: self.estimator.drift.all(),
+            asymmetry: self.estimator.changed,
             residual,
         }
     }
@@ -317,6 +317,7 @@ impl Field {
     pub fn stand(&mut self, c: &Coefficients, k: &mut Kept, encoder: u32) {
         let learns = self.frame == Frame::LockedShaft;
         if c.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
+            self.carrier.set(AtStart::CARRIER_SHARE);
             self.enter(k, FluxPhase::Asymmetry(AtStartState::new(learns)));
         } else {
             self.hold(c, k, encoder);
@@ -337,9 +338,10 @@ impl Field {
             return Ok(Dq::ZERO);
         }
         k.references.injection_axis = c.injection_axis;
+        self.carrier.set(1.0);
         self.at_start = Some(state.found());
         if let (Frame::Tracked, Some(change)) = (self.frame, at_start.change(state)) {
-            let known = &mut self.estimator.drift.at_start;
+            let known = &mut self.estimator.changed;
             *known = known.plus(&change, 1.0);
             if known.size() > LARGEST_ASYMMETRY {
                 return Err(Fault::NothingLearned);

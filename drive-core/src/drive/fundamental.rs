@@ -5,11 +5,9 @@ use core::f32::consts::TAU;
 use super::Field;
 use super::in_turn::StepResults;
 use super::trust::Trust;
-use crate::flux::hand_over::Turning;
+use crate::flux::hand_over::{Source, Turning};
 use crate::{AlphaBeta, Coefficients, UnitVector};
 
-/// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
-const COMPARED_FROM: f32 = 0.3;
 /// Frequency of the stator up to which the flux shows the stator resistance, turns per period.
 const RESISTANCE_UP_TO: f32 = 6.0 * crate::io::PERIOD_S;
 
@@ -27,34 +25,69 @@ impl Coefficients {
     ) -> Turning {
         const PER_RADIAN: f32 = 1.0 / TAU;
         let Some(observer) = &self.observer else { return Turning::default() };
-        let (state, weight) = (&mut s.observer, s.hand_over.weight);
+        let (state, leads) = (&mut s.observer, s.hand_over.leads);
         let turned = if s.hand_over.advance_blanking() {
             state.skip(current);
             s.hand_over.mean_turn()
         } else {
-            observer.step(state, current, phi.turned_by(s.axes.before), weight);
+            observer.step(state, current, phi.turned_by(s.axes.before), leads);
             state.turned * PER_RADIAN
         };
-        let up_to = if weight == 0.0 { RESISTANCE_UP_TO } else { 0.0 };
-        if trust.resistance && flux_freq.abs() < up_to {
+        if trust.resistance && !leads && flux_freq.abs() < RESISTANCE_UP_TO {
             observer.track_resistance(state);
         }
         s.hand_over.turning(index, turned, state.slip * PER_RADIAN, observer.age)
     }
 
+    /// Whether the filter has the angle.
+    fn filters(&self, s: &Field, step: &StepResults) -> bool {
+        step.trust.turns && self.injects(s) && !s.hand_over.leads
+    }
+
+    /// Shows the filter the speed that the observer has seen in the carrier period.
+    pub(super) fn see_speed(&self, s: &mut Field, step: &StepResults) {
+        let Some(observer) = &self.observer else { return };
+        if step.trust.source == Source::Both && self.filters(s, step) {
+            let turn = s.hand_over.mean_turn();
+            if let Some(seen) = observer.seen_speed(&s.observer, turn, step.flux_freq) {
+                self.estimator.see_speed(&mut s.estimator, &seen);
+            }
+        }
+    }
+
+    /// Corrects the tracked angle, speed and resistance by what carrier and observer show.
+    pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
+        let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
+        let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
+        if let (Some(observer), true) = (&self.observer, step.trust.resistance) {
+            observer.turn_resistance(&mut s.observer, resistance);
+        }
+    }
+
+    /// Decides which source leads.
+    pub(super) fn hand_over(&self, s: &mut Field, step: &StepResults) {
+        if self.observer.is_some() && step.trust.observes() {
+            let led = s.hand_over.leads;
+            s.hand_over.update(step.flux_freq, step.trust.source);
+            if s.hand_over.leads && !led {
+                s.observer.lead();
+            }
+        }
+    }
+
     /// The slow part of the observer.
     pub(super) fn update_observer(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
-        let weight = s.hand_over.weight;
-        observer.update(&mut s.observer, step.rotor_freq);
-        if weight > COMPARED_FROM && s.hand_over.demodulates() && step.trust.resistance {
+        let (filters, leads) = (self.filters(s, step), s.hand_over.leads);
+        observer.update(&mut s.observer, step.rotor_freq, filters);
+        if leads && s.hand_over.demodulates() && step.trust.resistance {
             let error = s.estimator.angle_error;
-            observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
+            observer.compare_with_injection(&mut s.observer, error, step.flux_freq);
         }
         s.induced = observer.induced(&s.observer, step.flux_freq);
         // What another share changes, the controllers have been putting out.
-        let induced = s.induced.at(step.reference);
-        s.current_loop.back_calculate(induced * (s.induced_share - weight));
-        s.induced_share = weight;
+        let (induced, share) = (s.induced.at(step.reference), f32::from(u8::from(leads)));
+        s.current_loop.back_calculate(induced * (s.induced_share - share));
+        s.induced_share = share;
     }
 }

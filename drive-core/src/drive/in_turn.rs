@@ -3,16 +3,16 @@
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
-//! | 0 | saliency from the averages, correction of the tracked angle; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
+//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
 //! | 1 | torque that the dc link bears; voltages for the prediction at 3 | - |
-//! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads | magnetising current (0) |
+//! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads; covariance of the filter after the speed (9) | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | lock monitor | saliency (0) |
-//! | 5 | reference current of the saliency; the slowly turning axes; travel of the sensors | - |
+//! | 4 | lock monitor; carrier for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
+//! | 5 | reference current of the saliency; covariance of the filter after the carrier (4); the slowly turning axes; travel of the sensors | - |
 //! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
-//! | 7 | currents that the voltage allows; rotor voltage for the prediction at 8 | magnetising current (0) |
+//! | 7 | currents that the voltage allows; rotor voltage for the prediction at 8; prediction of the filter | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | averages of the demodulation; the sums begin anew | ten samples mixed |
+//! | 9 | averages of the demodulation; the sums begin anew; speed for the filter | ten samples mixed, ten turns summed |
 //!
 //! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
@@ -26,6 +26,9 @@ use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
 use crate::protect::Thermal;
 use crate::protect::plausibility::{Known, RotorFlux};
 use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
+
+/// Sample behind which a command is taken: its tasks and the command take less than the longest sample.
+pub(super) const COMMANDS_BEHIND: usize = 8;
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
 pub(super) struct StepResults<'a> {
@@ -64,8 +67,6 @@ impl Coefficients {
         match index {
             0 => {
                 self.estimator.update_saliency(&mut s.estimator, step.carrier_axis, step.flux_freq);
-                let acceleration = self.freq_per_speed * s.motion.acceleration;
-                self.estimator.update_correction(&mut s.estimator, acceleration);
                 self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
                 if self.source == AngleSource::Injection {
                     k.rotor_count = s.count_by_flux();
@@ -83,18 +84,21 @@ impl Coefficients {
                     k.load(self, step.measured, true)?;
                 }
                 self.predict(s, step);
+                s.estimator.filter.reduce();
                 self.watch_noise(s, 2, step.measured)
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
                 self.judge(s, step)
             }
-            4 => self.check_lock(s, step),
+            4 => {
+                self.correct_angle(s, step);
+                self.check_lock(s, step)
+            }
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.reference.q);
-                if self.observer.is_some() && step.trust.observes() {
-                    s.hand_over.update(step.flux_freq, step.trust.source);
-                }
+                s.estimator.filter.reduce();
+                self.hand_over(s, step);
                 let silent = s.hand_over.is_carrier_off();
                 self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
                 self.watch_travel(s, step)
@@ -106,6 +110,7 @@ impl Coefficients {
             }
             7 => {
                 self.limit_voltage(s, k, step);
+                self.estimator.predict(&mut s.estimator, step.reference.q);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.measured)
             }
@@ -118,6 +123,7 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
+                self.see_speed(s, step);
                 self.watch_noise(s, 5, step.measured)
             }
         }
@@ -180,7 +186,7 @@ impl Coefficients {
     }
 
     /// Whether the demodulation has a carrier.
-    fn injects(&self, s: &Field) -> bool {
+    pub(super) fn injects(&self, s: &Field) -> bool {
         self.inject && s.hand_over.demodulates()
     }
 
@@ -214,12 +220,7 @@ impl Coefficients {
             return Ok(());
         }
         let seen = s.estimator.synchronous.saliency;
-        // A drift of the gains since the start is not in what the start measured.
-        let scale = s.carrier.per_share_squared * s.estimator.drift.across_a();
-        if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, baseline)? {
-            self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
-        }
-        Ok(())
+        monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, baseline)
     }
 
     /// Checks that both current sensors see the carrier.

@@ -1,17 +1,18 @@
 //! Sensorless flux angle from the injected carrier: demodulation, reference, tracking.
 //!
 //! Each [demodulator](crate::carrier::demodulator) feeds one of two loops: the loop of the dissertation
-//! (reference of the current difference and PII controller) or, for the synchronous demodulation, a loop
-//! with learned reference, scheduled gain and slip feed-forward.
+//! (reference of the current difference and PII controller) or, for the synchronous demodulation, the
+//! [filter](super::angle_filter) with learned reference and slip feed-forward.
 
 use crate::carrier::demodulator::Demodulator;
-use crate::carrier::drift::GainDrift;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{Asymmetry, CarrierSample, DemodulatorKind, Saliency};
+use crate::flux::angle_filter::{AngleFilter, AngleFilterState, Correction};
 use crate::flux::hand_over::Turning;
 use crate::flux::indirect::FluxAngle;
+use crate::flux::observer::SeenSpeed;
 use crate::flux::schedule::GainSchedule;
-use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
+use crate::flux::tracker::{Tracker, TrackerState};
 use crate::learned::Learned;
 use crate::table::ReferenceTable;
 use crate::{Angle, UnitVector};
@@ -58,16 +59,14 @@ pub enum AngleLoop {
         /// Controller of the injection axis.
         tracker: Tracker,
     },
-    /// Type-3 loop for the synchronous demodulation.
-    Pll {
-        /// Reference of the saliency and gain schedule.
+    /// Filter for the synchronous demodulation.
+    Filter {
+        /// Reference and slope of the saliency.
         schedule: GainSchedule,
-        /// Controller of the injection axis.
-        pll: Pll,
+        /// Filter of the flux angle.
+        filter: AngleFilter,
         /// Learned asymmetry of sensors and stator.
         asymmetry: Asymmetry,
-        /// Largest drift of the sensors' gains since it was learned that is followed; 0 where nothing was learned.
-        largest_drift: f32,
     },
 }
 
@@ -107,9 +106,11 @@ pub struct EstimatorState {
     pub angle_error: f32,
     /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
     /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
-    correction: PllCorrection,
-    /// Drift of the sensors' gains.
-    pub drift: GainDrift,
+    correction: Correction,
+    /// State of the filter.
+    pub filter: AngleFilterState,
+    /// Asymmetry beyond the learned one that this start and those before have found.
+    pub changed: Asymmetry,
     demodulator: Demodulator,
 }
 
@@ -156,28 +157,27 @@ impl Estimator {
             delta_i,
             synchronous,
             correction,
+            filter,
             angle_error,
-            drift,
+            changed: _,
         } = state;
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
         *tracker = TrackerState::default();
         tracker.angle = Angle::QUARTER;
         demodulator.start(self.demodulator, self.rms_samples);
         (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
-        (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
-        (*drift, *angle_error) = (GainDrift::new(drift.at_start), 0.0);
+        (*synchronous, *correction) = (SynchronousState::default(), Correction::default());
+        *filter = AngleFilterState::default();
+        *angle_error = 0.0;
     }
 
     /// Takes an accepted result of a learning.
     pub fn take(&mut self, learned: &Learned) {
         match &mut self.angle_loop {
             AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
-            AngleLoop::Pll { schedule, asymmetry, largest_drift, .. } => {
-                let b = learned.current_saliency;
-                let b = b.accepted.then_some(b.value);
-                *schedule = schedule.with_learned(&learned.reference, learned.slope.as_ref(), b);
+            AngleLoop::Filter { schedule, asymmetry, .. } => {
+                *schedule = schedule.with_learned(&learned.reference, learned.slope.as_ref());
                 *asymmetry = learned.asymmetry;
-                *largest_drift = GainDrift::largest(learned.slope_at_rest);
             }
         }
     }
@@ -195,31 +195,47 @@ impl Estimator {
     /// called once per carrier period, after its last sample. `axis` is the injection axis of the present sample, delayed
     /// by [`lag`](Self::lag), `flux_freq` its frequency, electrical turns per period.
     pub fn update_saliency(&self, state: &mut EstimatorState, axis: UnitVector, flux_freq: f32) {
-        if let AngleLoop::Pll { asymmetry, .. } = &self.angle_loop {
+        if let AngleLoop::Filter { asymmetry, .. } = &self.angle_loop {
             let synchronous = &mut state.synchronous;
             synchronous.update_saliency();
             let seen = axis.turned_slightly(-flux_freq * AVERAGES_LAG);
-            let present = state.drift.on_top_of(asymmetry, seen);
-            present.take_out(&mut synchronous.saliency, seen);
+            asymmetry.plus(&state.changed, 1.0).take_out(&mut synchronous.saliency, seen);
         }
     }
 
-    /// Takes the deviation of the squared carrier current from that of the tables, relative to it, into the drift of the
-    /// gains. `flux_freq` is the frequency of the flux, electrical turns per period.
-    pub fn follow_gains(&self, state: &mut EstimatorState, deviation: f32, flux_freq: f32) {
-        if let AngleLoop::Pll { largest_drift, .. } = self.angle_loop {
-            state.drift.step(deviation, flux_freq, largest_drift);
+    /// Begins a carrier period of the filter, see [`AngleFilter`], with a reference of the quadrature current `i_q`, A.
+    pub fn predict(&self, state: &mut EstimatorState, i_q: f32) {
+        state.filter.follow(i_q);
+        if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
+            filter.predict(&mut state.filter);
         }
     }
 
-    /// Computes the correction from the saliency of the previous carrier period; called once per carrier
-    /// period. `acceleration` is the rotor's acceleration reference, electrical turns per period squared.
-    pub fn update_correction(&self, state: &mut EstimatorState, acceleration: f32) {
-        if let AngleLoop::Pll { schedule, pll, .. } = &self.angle_loop {
-            let (error, share) = schedule.angle_error(state.saliency());
-            state.angle_error = error;
-            state.correction = pll.correction(error, share, acceleration);
+    /// Takes what the observer has `seen` in the carrier period.
+    pub fn see_speed(&self, state: &mut EstimatorState, seen: &SeenSpeed) {
+        if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
+            // The tracked speed, as old as what was seen.
+            let tracked = state.rotor_freq - state.tracker.acceleration * seen.age;
+            filter.see_speed(&mut state.filter, seen, seen.rotor_freq - tracked);
         }
+    }
+
+    /// Computes the corrections from the saliency of the previous carrier period where the filter has the angle; called once per
+    /// carrier period. `known` is the rotor's acceleration reference, electrical turns per period squared, which is fed forward.
+    /// Returns the correction of the relative stator resistance.
+    pub fn update_correction(&self, state: &mut EstimatorState, filters: bool, known: f32) -> f32 {
+        let AngleLoop::Filter { schedule, filter, .. } = &self.angle_loop else { return 0.0 };
+        let saliency = &state.synchronous.saliency;
+        let point = schedule.at(saliency.i_q);
+        state.angle_error = point.angle_error(saliency.q);
+        let (correction, resistance) = if filters {
+            filter.see_carrier(&mut state.filter, state.angle_error, point.per_saliency)
+        } else {
+            state.filter.start();
+            (Correction::default(), 0.0)
+        };
+        state.correction = Correction { speed: correction.speed + known, ..correction };
+        resistance
     }
 
     /// Runs the selected demodulator, all but the synchronous one.
@@ -253,7 +269,7 @@ impl Estimator {
                 *rotor_freq += ROTOR_SMOOTHING * (axis.freq - slip_freq - *rotor_freq);
                 held
             }
-            AngleLoop::Pll { .. } => Pll::step(axis, rotor_freq, *correction, slip_freq, turning),
+            AngleLoop::Filter { .. } => axis.step(rotor_freq, correction, slip_freq, turning),
         };
         if held { Ok(()) } else { Err(TrackingLost) }
     }

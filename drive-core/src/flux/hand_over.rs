@@ -1,13 +1,10 @@
-//! Two sources for one angle: at low frequency of the stator the injection turns it, at high frequency the
-//! [observer](super::observer), and between both by a weight.
+//! Two sources for one angle: at low frequency of the stator the [filter](super::angle_filter) turns it, at high frequency the
+//! [observer](super::observer) leads.
 //!
-//! ```text
-//! w    = (f_s - 15 Hz)/(20 Hz - 15 Hz), within 0 .. 1
-//! phi += (1 - w) (turn by the tracking loop) + w (turn seen by the observer)
-//! ```
-//!
-//! Angles are not blended: nothing jumps at a hand-over, and nothing has to be preset. The carrier is off above
-//! 26 Hz and comes on below 24 Hz. For eight carrier periods the demodulation fills, and the observer keeps the angle.
+//! The observer leads from above 16 Hz until below 12 Hz. There is nothing between: a blend would show the filter a speed that is
+//! partly its own. Angles do not jump at a switch, and nothing has to be preset. The carrier is off above 26 Hz and comes on below
+//! 24 Hz, so that it goes on showing the stator resistance to the observer. For eight carrier periods the demodulation fills, and the
+//! observer leads.
 //!
 //! For three periods after the carrier has come on or gone off the current of a sample does not belong to the voltages before it;
 //! there the flux turns as in the last carrier period. (Without, the angle jumped by 4 degrees.)
@@ -18,9 +15,9 @@
 use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
 
-/// Frequencies of the stator between which the weight rises, turns per period.
-const INJECTION_ALONE_BELOW: f32 = 15.0 * PERIOD_S;
-const OBSERVER_ALONE_ABOVE: f32 = 20.0 * PERIOD_S;
+/// Frequencies of the stator above which the observer leads, and below which the injection does, turns per period.
+const OBSERVER_LEADS: f32 = 16.0 * PERIOD_S;
+const INJECTION_LEADS: f32 = 12.0 * PERIOD_S;
 /// Frequencies above which the carrier goes off, and below which it comes on, turns per period.
 const CARRIER_OFF: f32 = 26.0 * PERIOD_S;
 const CARRIER_ON: f32 = 24.0 * PERIOD_S;
@@ -28,7 +25,7 @@ const CARRIER_ON: f32 = 24.0 * PERIOD_S;
 const BLIND: u8 = 3;
 /// Carrier periods until the demodulation is filled.
 const FILLED: u8 = 8;
-/// Carrier periods with the injection alone until the noise is judged.
+/// Carrier periods in which the injection leads until the noise is judged.
 const NOISE_IS_JUDGED_AFTER: u8 = 120;
 /// Mean age of a turn that is averaged over a carrier period, samples.
 const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
@@ -59,8 +56,10 @@ enum CarrierState {
 /// State of the hand-over.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HandOver {
-    /// Share of the observer in the angle, 0 to 1.
-    pub weight: f32,
+    /// Whether the observer turns the angle.
+    pub leads: bool,
+    /// Whether the frequency is that of the observer.
+    is_fast: bool,
     carrier: CarrierState,
     /// Periods for which the observer sees nothing, and one.
     blind: u8,
@@ -72,11 +71,11 @@ pub struct HandOver {
     fresh: f32,
 }
 
-/// Turn of the flux as the observer sees it, for the tracking loop.
+/// Turn of the flux as the observer sees it, for the tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Turning {
-    /// Its share in the angle, 0 to 1.
-    pub weight: f32,
+    /// Whether the angle follows it.
+    pub leads: bool,
     /// Turn in a period, electrical turns.
     pub turned: f32,
     /// Slip in it, electrical turns.
@@ -86,12 +85,11 @@ pub struct Turning {
 }
 
 impl HandOver {
-    /// Updates weight and carrier at the stator frequency `flux_freq`, electrical turns per period, for a frame that this
+    /// Updates leading source and carrier at the stator frequency `flux_freq`, electrical turns per period, for a frame that this
     /// `source` may turn; once a carrier period.
     pub fn update(&mut self, flux_freq: f32, source: Source) {
         let freq = flux_freq.abs();
-        let share =
-            (freq - INJECTION_ALONE_BELOW) * (1.0 / (OBSERVER_ALONE_ABOVE - INJECTION_ALONE_BELOW));
+        self.is_fast = freq > if self.is_fast { INJECTION_LEADS } else { OBSERVER_LEADS };
         let goes_on = if self.is_carrier_off() { CARRIER_ON } else { CARRIER_OFF };
         self.switch(match self.carrier {
             _ if source == Source::Nothing || freq > goes_on => CarrierState::Off,
@@ -99,28 +97,19 @@ impl HandOver {
             CarrierState::On | CarrierState::Filling(..=1) => CarrierState::On,
             CarrierState::Filling(left) => CarrierState::Filling(left - 1),
         });
-        let weight = if !self.demodulates() || share > 1.0 {
-            1.0
-        } else if share > 0.0 {
-            share
-        } else {
-            0.0
-        };
-        self.periods_until_noise_is_judged = if weight > 0.0 {
+        let leads = self.is_fast || !self.demodulates();
+        self.periods_until_noise_is_judged = if leads {
             NOISE_IS_JUDGED_AFTER
         } else {
             self.periods_until_noise_is_judged.saturating_sub(1)
         };
-        self.weight = match source {
-            Source::Both | Source::Slip => weight,
-            Source::Injection | Source::Nothing => 0.0,
-        };
+        self.leads = leads && matches!(source, Source::Both | Source::Slip);
     }
 
     /// Turns the carrier off, and leaves the angle to itself.
     pub fn switch_carrier_off(&mut self) {
         self.switch(CarrierState::Off);
-        self.weight = 0.0;
+        self.leads = false;
     }
 
     fn switch(&mut self, carrier: CarrierState) {
@@ -141,7 +130,7 @@ impl HandOver {
         self.carrier == CarrierState::On
     }
 
-    /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it has the angle alone.
+    /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it leads.
     pub fn judges_noise(&self) -> bool {
         self.periods_until_noise_is_judged == 0
     }
@@ -157,7 +146,7 @@ impl HandOver {
         self.sum * (1.0 / CARRIER_SAMPLES as f32)
     }
 
-    /// The turn for the tracking loop from what the observer saw in the period of this `index` in the carrier period:
+    /// The turn for the tracking from what the observer saw in the period of this `index` in the carrier period:
     /// `turned` and `slip`, electrical turns, of a current of this `age`, samples.
     pub fn turning(&mut self, index: usize, turned: f32, slip: f32, age: f32) -> Turning {
         let carrier_is_off = self.is_carrier_off();
@@ -175,7 +164,7 @@ impl HandOver {
         } else {
             (self.mean_turn(), age + 1.0 + MEAN_AGE)
         };
-        Turning { weight: self.weight, turned, slip, age }
+        Turning { leads: self.leads, turned, slip, age }
     }
 }
 
@@ -183,8 +172,8 @@ impl HandOver {
 mod tests {
     use super::*;
 
-    /// The observer is blind for three periods after the carrier has gone off or come on, and not in between, whatever the
-    /// weight does.
+    /// The observer is blind for three periods after the carrier has gone off or come on, and not in between, whichever
+    /// source leads.
     #[test]
     fn the_observer_is_blind_after_a_change_of_the_carrier() {
         let mut state = HandOver::default();
@@ -197,7 +186,7 @@ mod tests {
         assert_eq!(blind, [0, 0, 3, 3]);
     }
 
-    /// Noise is judged where the injection has had the angle alone for so many carrier periods, and not where the observer has part of it.
+    /// Noise is judged where the injection has led for so many carrier periods, and not where the observer leads.
     #[test]
     fn noise_is_judged_some_time_after_the_observer_has_left() {
         let mut state = HandOver::default();
@@ -205,12 +194,10 @@ mod tests {
             state.update(hertz * PERIOD_S, Source::Both);
             state.judges_noise()
         };
-        let between = 0.5 * (INJECTION_ALONE_BELOW + OBSERVER_ALONE_ABOVE) / PERIOD_S;
         for _ in 0..3 {
-            assert!(!judged(&mut state, between));
-            assert!(state.weight > 0.0 && state.weight < 1.0);
+            assert!(!judged(&mut state, 16.1) && state.leads);
             let waited = (0..1000).take_while(|_| !judged(&mut state, 0.0)).count();
-            assert_eq!((state.weight, waited), (0.0, usize::from(NOISE_IS_JUDGED_AFTER) - 1));
+            assert_eq!((state.leads, waited), (false, usize::from(NOISE_IS_JUDGED_AFTER) - 1));
         }
     }
 }

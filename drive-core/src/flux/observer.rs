@@ -14,8 +14,8 @@
 //!
 //! `s` is the saliency that the injection sees, in the fundamental wave: without it the angle errs by 7 degrees. `n + m |i|` is
 //! the leakage of the fundamental wave relative to sigma L_s, which [`commission`](crate::commission) measures. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
-//! 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The length follows the current model by the
-//! share that the injection has of the angle, and the voltage by the rest.
+//! 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The length follows the current model while the
+//! injection has the angle, and the voltage while the observer leads.
 //!
 //! The current is the one before the low-pass filter, less the expected carrier: what the saliency adds to that turns the flux by
 //! 0.2 degrees at 600 Hz, which the mean over a carrier period takes out. (Behind the filter a step of the torque turns the
@@ -43,6 +43,13 @@ const LEAST_FLUX: f32 = 0.01;
 const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
+/// Least flux whose speed counts beside the injection, as a share of the nominal one.
+const COUNTS_FROM: f32 = 0.6;
+/// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
+/// sample, samples.
+const SEEN_AGE: f32 = 5.5;
+/// Share of the newest value in the mean resistance: 1 s of carrier periods.
+const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
 /// (The leakage is not tracked in this way: with both, the error of one hides in the other.)
 const FROM_INJECTION: f32 = 0.02;
@@ -109,6 +116,8 @@ pub struct ObserverState {
     flux_saliency: f32,
     /// Stator resistance relative to the settings, less one.
     pub resistance: f32,
+    /// Its mean over 1 s while the injection has the angle.
+    mean_resistance: f32,
 }
 
 /// Saliency and leakage of the fundamental wave.
@@ -122,6 +131,20 @@ pub struct Leakage {
     pub share: f32,
     /// Change of that share per ampere, 1/A.
     pub slope: f32,
+}
+
+/// Speed of the rotor that the observer sees: with an angle error e and a relative deviation r of the resistance, true speed +
+/// `per_angle` e + `per_resistance` r.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenSpeed {
+    /// Mean of a carrier period, electrical turns per period.
+    pub rotor_freq: f32,
+    /// Its age, samples.
+    pub age: f32,
+    /// `g w_r w_s`, rad/s per rad: the pull towards the flux of the observer's own model.
+    pub per_angle: f32,
+    /// `r_s (i_q - g w_r i_d)/psi`, rad/s.
+    pub per_resistance: f32,
 }
 
 /// Voltage that flux and leakage induce, for the feed-forward of the current loop.
@@ -139,6 +162,11 @@ impl ObserverState {
     pub fn start(&mut self, observer: Option<&Observer>) {
         let flux = observer.map_or(0.0, |observer| observer.least);
         *self = Self { flux, resistance: self.resistance, ..Self::default() };
+    }
+
+    /// Begins to lead, with the mean of the resistance.
+    pub fn lead(&mut self) {
+        self.resistance = self.mean_resistance;
     }
 
     /// Takes the voltage that a step puts out, without the carrier, V.
@@ -198,14 +226,14 @@ impl Observer {
     }
 
     /// One period, from the `current` of a sample, A, and the voltages that were put out before it. `frame` is the axis of the
-    /// flux when the current before flowed; `weight` the share of the observer in the angle.
+    /// flux when the current before flowed; `leads`: whether the observer has the angle.
     #[inline(always)] // a part of every period, with its values in registers
     pub fn step(
         &self,
         state: &mut ObserverState,
         current: AlphaBeta,
         frame: UnitVector,
-        weight: f32,
+        leads: bool,
     ) {
         let whole = self.age as usize;
         let (newer, older) = (state.before(whole + 1), state.before(whole + 2));
@@ -237,15 +265,15 @@ impl Observer {
         let x = limited((e.q + state.gain.q * state.deviation) * per_flux, LARGEST_TANGENT);
         state.turned = x - x * x * x * (1.0 / 3.0);
         state.slip = self.rate * self.coupled * mean.q * per_flux;
-        let by_current = state.flux + grown;
-        let by_voltage = flux * (1.0 + 0.5 * x * x);
-        state.flux = by_current + weight * (by_voltage - by_current);
+        state.flux = if leads { flux * (1.0 + 0.5 * x * x) } else { state.flux + grown };
         state.current = mean;
     }
 
     /// Computes the gains for a rotor of `rotor_freq`, electrical turns per period, and the saliency at the present flux; once a
-    /// carrier period.
-    pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
+    /// carrier period. Where the injection `filters` the resistance, its mean follows.
+    pub fn update(&self, state: &mut ObserverState, rotor_freq: f32, filters: bool) {
+        let share = if filters { RESISTANCE_SMOOTHING } else { 1.0 };
+        state.mean_resistance += share * (state.resistance - state.mean_resistance);
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
         state.gain = Dq { d: gain * a, q: gain * w };
@@ -258,21 +286,35 @@ impl Observer {
         self.turn_resistance(state, -self.resistance_gain * state.deviation);
     }
 
-    /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, with the observer's `weight` in the
-    /// angle at a flux of `flux_freq`, electrical turns per period; once a carrier period.
-    pub fn compare_with_injection(
-        &self,
-        state: &mut ObserverState,
-        error: f32,
-        weight: f32,
-        flux_freq: f32,
-    ) {
+    /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, at a flux of `flux_freq`, electrical turns
+    /// per period, while the observer leads; once a carrier period.
+    pub fn compare_with_injection(&self, state: &mut ObserverState, error: f32, flux_freq: f32) {
         let angle = self.r_s * self.i_d / (state.flux * flux_freq * TAU);
-        let share = FROM_INJECTION * weight * angle * limited(error, LARGEST_ERROR);
+        let share = FROM_INJECTION * angle * limited(error, LARGEST_ERROR);
         self.turn_resistance(state, share);
     }
 
-    fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
+    /// The speed of the rotor that it sees, for a mean `turn` of the flux in a carrier period, less the present slip, at a flux of
+    /// `flux_freq`, both electrical turns per period; none where there is too little flux.
+    pub fn seen_speed(
+        &self,
+        state: &ObserverState,
+        turn: f32,
+        flux_freq: f32,
+    ) -> Option<SeenSpeed> {
+        (state.flux > COUNTS_FROM * self.nominal).then(|| SeenSpeed {
+            rotor_freq: turn - state.slip * (1.0 / TAU),
+            age: self.age + SEEN_AGE,
+            per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
+            per_resistance: self.r_s
+                * (1.0 / PERIOD_S)
+                * (state.current.q - state.gain.q * state.current.d)
+                / state.flux,
+        })
+    }
+
+    /// Adds a change to the relative resistance.
+    pub fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
         let range = (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0);
         state.resistance = within(state.resistance + change, range);
     }
@@ -325,7 +367,7 @@ mod tests {
         let mut state = ObserverState::default();
         state.start(Some(&observer));
         state.current = Dq { d: 0.05, q: 0.0 };
-        observer.update(&mut state, 0.0);
+        observer.update(&mut state, 0.0, false);
         let change = 0.35;
         for n in 0..10 {
             let (before, after) = (change * n as f32, change * (n + 1) as f32);
@@ -337,9 +379,58 @@ mod tests {
             state.put_out(AlphaBeta { alpha, beta: 0.0 });
             state.put_out(AlphaBeta::ZERO);
             let current = AlphaBeta { alpha: after, beta: 0.0 };
-            observer.step(&mut state, current, UnitVector::default(), 1.0);
+            observer.step(&mut state, current, UnitVector::default(), true);
             let seen = fpu_sqrt::sqrtf(state.change.length_squared()) / (sigma * change);
             assert!(seen < 0.2, "{after} A: {seen}");
+        }
+    }
+
+    /// The observer in a frame that is `e` behind the flux, with a resistance that is `r` higher than it believes: the turn that it sees
+    /// of a flux that turns steadily, rad/s. Its current is regulated: the same in the frame, whatever the error.
+    fn seen_turn(stator: f32, rotor: f32, (e, r): (f32, f32), current: Dq) -> (f32, SeenSpeed) {
+        let motor = Motor::default();
+        let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
+        let observer = Observer::new(&motor, &leakage, 1.4, 0.0);
+        let (mut state, psi) = (ObserverState::default(), motor.coupled_inductance() * current.d);
+        state.start(Some(&observer));
+        state.flux = psi;
+        let angle = |n: i32| {
+            let turns = f64::from(stator) * f64::from(n) * f64::from(PERIOD_S) / f64::from(TAU);
+            crate::Angle::from_turns((turns % 1.0) as f32)
+        };
+        let frame = |n: i32| (angle(n) - crate::Angle::from_radians(e)).unit_vector();
+        state.last = current.to_alpha_beta(frame(0));
+        observer.update(&mut state, rotor * PERIOD_S / TAU, false);
+        for n in 0..2 {
+            let [before, after] = [n, n + 1].map(|n| current.to_alpha_beta(frame(n)));
+            let [flux, next] =
+                [n, n + 1].map(|n| Dq { d: psi, q: 0.0 }.to_alpha_beta(angle(n).unit_vector()));
+            let drop = (before + after) * (0.5 * PERIOD_S * motor.r_s * (1.0 + r));
+            let volt_seconds = drop + (after - before) * motor.sigma_l_s() + (next - flux);
+            state.put_out(volt_seconds * (1.0 / PERIOD_S));
+            state.put_out(AlphaBeta::ZERO);
+            observer.step(&mut state, after, frame(n), false);
+        }
+        let freq = stator * PERIOD_S / TAU;
+        (state.turned / PERIOD_S, observer.seen_speed(&state, 0.0, freq).unwrap())
+    }
+
+    /// Size and sign of what the filter takes for an angle error and for the resistance, against finite differences of a machine.
+    #[test]
+    fn the_seen_speed_depends_on_angle_and_resistance_as_the_filter_takes_it() {
+        for stator in [-80.0, -20.0, 10.0, 60.0] {
+            for i_q in [-2.0, 0.5, 2.5] {
+                let (current, rotor) = (Dq { d: 1.4, q: i_q }, stator - 4.0 * i_q);
+                let at = |error| seen_turn(stator, rotor, error, current);
+                let (_, model) = at((0.0, 0.0));
+                let slope = |ahead, behind, by: f32| (at(ahead).0 - at(behind).0) / (2.0 * by);
+                let by_angle = slope((0.02, 0.0), (-0.02, 0.0), 0.02);
+                let by_resistance = slope((0.0, 0.05), (0.0, -0.05), 0.05);
+                let close =
+                    |found: f32, model: f32| (found - model).abs() < 0.03 * model.abs() + 0.5;
+                assert!(close(by_angle, model.per_angle), "{by_angle} {model:?}");
+                assert!(close(by_resistance, model.per_resistance), "{by_resistance} {model:?}");
+            }
         }
     }
 }

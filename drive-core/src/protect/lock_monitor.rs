@@ -160,8 +160,6 @@ impl LockMonitor {
     /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held` by something else than
     /// the injection (magnetisation, or the observer), the flux lies along it, and the baseline is measured.
     ///
-    /// Returns the relative deviation of the squared carrier current from the expected one, where it was judged.
-    ///
     /// # Errors
     /// [`Fault::CarrierWeak`] after eight consecutive carrier periods with too little carrier current at any
     /// angle; [`Fault::LostLock`] when the mean loss exceeds the allowed one.
@@ -171,7 +169,7 @@ impl LockMonitor {
         saliency: &Saliency,
         per_share_squared: f32,
         held: bool,
-    ) -> Result<Option<f32>, Fault> {
+    ) -> Result<(), Fault> {
         let carrier = saliency.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
         Fault::CarrierWeak.unless(state.weak < WEAK_PERIODS)?;
@@ -189,21 +187,20 @@ impl LockMonitor {
                 allowance: ALLOWANCE.2,
                 ..LockMonitorState::default()
             };
-            return Ok(None);
+            return Ok(());
         }
         if state.per_baseline == 0.0 {
             state.per_baseline = 1.0 / state.baseline;
         }
         if self.rests(state, saliency.i_q) {
-            return Ok(None);
+            return Ok(());
         }
         let place = self.grid.place(saliency.i_q);
         let deviation = carrier * state.per_baseline * between(&self.inverse_square, place) - 1.0;
         let loss = -deviation * between(&self.per_change, place);
         state.loss += self.smoothing * (loss - state.loss);
         let least = -ALLOWED_GAIN[usize::from(self.is_positive)];
-        Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)?;
-        Ok(Some(deviation))
+        Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)
     }
 
     /// Whether the torque current `i_q`, A, has just moved, so that the loss is not judged.

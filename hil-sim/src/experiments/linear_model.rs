@@ -54,8 +54,6 @@ pub struct LinearModel {
     speed: MotionDesign,
     /// Natural frequency of the tracking loop, rad/s.
     w_n: f64,
-    /// Share of its proportional part.
-    share: f64,
     /// Apparent angle error per difference of the torque current, rad/A.
     apparent_angle: f64,
 }
@@ -84,12 +82,7 @@ impl LinearModel {
         let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
         let circuit = tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr };
         let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
-        let schedule = GainSchedule::new(
-            &settings.reference(),
-            &settings.slope(),
-            settings.current_saliency(),
-            settings.i_d(),
-        );
+        let schedule = GainSchedule::new(&settings.reference(), &settings.slope());
         // Over half the distance of the table's points to either side.
         let half = 0.5 * settings.reference().grid().step_a();
         let here = schedule.at(i_q as f32);
@@ -107,7 +100,6 @@ impl LinearModel {
             current: settings.current_loops().map_err(Error::refused)?[1],
             speed: settings.motion_loops().map_err(Error::refused)?,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
-            share: here.share.into(),
             apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference))
                 / 0.25,
         })
@@ -150,10 +142,10 @@ impl LinearModel {
             // Observed angle error, and the tracking loop.
             let x = e + self.apparent_angle * (r - current);
             let x = seen.iter_mut().fold(x, |x, average| average.step(x));
-            let (c, w_n) = (drive_core::flux::THIRD_POLE, self.w_n);
-            acceleration += t * c * w_n.powi(3) * x;
-            w_i += t * (acceleration + (1.0 + 2.0 * c) * w_n * w_n * x);
-            let rotor = w_i + (2.0 + c) * w_n * self.share * x;
+            let w_n = self.w_n;
+            acceleration += t * w_n.powi(3) * x;
+            w_i += t * (acceleration + 2.0 * w_n * w_n * x);
+            let rotor = w_i + 2.0 * w_n * x;
             moved += t * rotor;
             let fed_forward = r / (believed_t_r * i_d);
 

@@ -4,7 +4,6 @@ use core::f64::consts::{PI, TAU};
 
 use super::{TuningError, bisected, check, check_period, pi_response, zero_at};
 use drive_core::MotionGains;
-use drive_core::flux::THIRD_POLE;
 use num_complex::Complex64;
 
 /// Result of [`design_motion_loops`], with the plant it is for.
@@ -33,7 +32,7 @@ const CORNER: f64 = 2.0;
 /// phase is below -180° everywhere.) The crossover is where `phase_margin_deg` is met. The phase is exact:
 /// the current is held for a period and the speed is the mean over one, which gives the plant
 /// g T/2 (z + 1)/(z (z - 1)) with a phase of -90° - ωT. Without an encoder the tracking loop of the flux
-/// ([`THIRD_POLE`]) and a low-pass of the speed with its corner at 2 w_n are included.
+/// (Butterworth's poles at w_n) and a low-pass of the speed with its corner at 2 w_n are included.
 ///
 /// The position gain is a quarter of the crossover. Opened at the current, the position loop then has some
 /// 8° less phase margin.
@@ -82,12 +81,11 @@ pub fn design_motion_loops(
     Ok(design)
 }
 
-/// Response of the tracking loop, tracked over true rotor angle, 1 - s^3 / ((s + 1)^2 (s + c)); `omega`
+/// Response of the tracking loop, tracked over true rotor angle, 1 - s^3 / ((s + 1) (s^2 + s + 1)); `omega`
 /// relative to its natural frequency.
 fn tracked(omega: f64) -> Complex64 {
     let s = Complex64::new(0.0, omega);
-    let (pole, third) = (s + Complex64::ONE, s + Complex64::new(THIRD_POLE, 0.0));
-    Complex64::ONE - s * s * s / (pole * pole * third)
+    Complex64::ONE - s * s * s / ((s + Complex64::ONE) * (s * s + s + Complex64::ONE))
 }
 
 /// Response of a first-order low-pass, share / (1 - (1 - share) z^-1).

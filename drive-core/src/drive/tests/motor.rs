@@ -302,6 +302,8 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
         (-180.0, 8.0, false),
         (300.0, -7.0, false),
         (300.0, -13.0, false),
+        (300.0, -30.0, false),
+        (300.0, 40.0, false),
     ] {
         let mut bench = Bench::new(&settings);
         bench.motor.omega = rpm / 60.0 * 2.0 * core::f64::consts::TAU;

@@ -1,17 +1,32 @@
 //! The coefficients of the estimator of the flux angle.
 
+use core::f32::consts::{FRAC_1_SQRT_2, TAU};
+
 use num_complex::Complex64;
 
 use crate::settings::Settings;
-use drive_core::FirstOrder;
 use drive_core::carrier::{Asymmetry, CARRIER_SAMPLES, DemodulatorKind};
 use drive_core::flux::{
-    AngleLoop, ConstantReference, Estimator, GainSchedule, Pll, Reference, Tracker,
+    AngleFilter, AngleLoop, ConstantReference, Estimator, GainSchedule, Reference, Tracker,
 };
+use drive_core::{FirstOrder, PERIOD_S};
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
 const BPF_GROUP_DELAY: f32 = 8.83;
+
+/// Noise of a current sensor with the dissertation's sensors, A.
+const NOISE_A: f32 = 0.005;
+/// Deviation of the saliency relative to that noise over the carrier current, with the correlation of the averages.
+const AVERAGED_NOISE: f32 = 0.68;
+/// Deviation of the seen speed relative to that which the noise of one sample makes in a carrier period.
+const SEEN_NOISE: f32 = 2.8;
+/// Change of the load that comes once in a second, relative to the rated torque.
+const LOAD_STEP: f32 = 0.16;
+/// Share of a step of the torque current by which its reference of the saliency lags, in angle of the stator current.
+const REFERENCE_LAG: f32 = 0.14;
+/// Error of the leakage inductance.
+const LEAKAGE_ERROR: f32 = 0.1;
 
 /// Delay, samples, of the envelope of the carrier current behind that of its voltage: the group delay
 /// of the plant k / (z - p) at the carrier, less the half sample by which the voltage is held. The
@@ -36,18 +51,12 @@ impl Settings {
     ) -> Estimator {
         let limit = 1.5 * speed_limit;
         let inj = &self.injection;
-        let (p, t) = (&inj.printed, &inj.synchronous);
+        let p = &inj.printed;
         let angle_loop = if inj.demodulator == DemodulatorKind::Synchronous {
-            AngleLoop::Pll {
-                schedule: GainSchedule::new(
-                    &self.reference(),
-                    &self.slope(),
-                    self.current_saliency(),
-                    self.i_d(),
-                ),
-                pll: Pll::new(t.bandwidth_hz),
+            AngleLoop::Filter {
+                schedule: GainSchedule::new(&self.reference(), &self.slope()),
+                filter: self.angle_filter(carrier_a),
                 asymmetry: Asymmetry::default(),
-                largest_drift: 0.0,
             }
         } else {
             AngleLoop::Pii {
@@ -67,13 +76,39 @@ impl Settings {
             rms_samples: p.rms_samples,
             // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
             ampere_per_ohm: if carrier_v > 0.0 {
-                carrier_a * carrier_a / carrier_v * core::f32::consts::FRAC_1_SQRT_2
+                carrier_a * carrier_a / carrier_v * FRAC_1_SQRT_2
             } else {
                 0.0
             },
             angle_loop,
             lag: lag_share * carrier_lag,
             band_pass_lag: lag_share * BPF_GROUP_DELAY,
+        }
+    }
+
+    /// The variances of the filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the carrier current, A.
+    fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
+        const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
+        let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
+        let flux = m.coupled_inductance() * i_d;
+        // Speed that the observer sees for a change of the current.
+        let per_a = m.sigma_l_s() / (flux * CARRIER_S);
+        let saliency = AVERAGED_NOISE * noise_a / carrier_a;
+        let rate = if self.uses_observer() {
+            let rated = self.nameplate.power_w / (TAU / 60.0 * self.nameplate.speed_rpm);
+            LOAD_STEP * rated * f32::from(m.pole_pairs) / m.inertia
+        } else {
+            let angle = saliency / self.slope().at_rest();
+            let w = TAU * self.injection.synchronous.bandwidth_hz;
+            angle * libm::sqrtf(CARRIER_S) * w * w * w
+        };
+        let square = |x: f32| x * x;
+        AngleFilter {
+            rate: square(rate),
+            saliency: square(saliency),
+            angle_per_a: REFERENCE_LAG / i_d,
+            speed: square(SEEN_NOISE * noise_a * per_a),
+            speed_per_a: LEAKAGE_ERROR * per_a,
         }
     }
 }
