@@ -15,16 +15,16 @@ fn get(metrics: &Metrics, name: &str) -> f64 {
     metrics.get(name).unwrap_or(0.0)
 }
 
-/// An independent implementation found 1.86° rms and 10.1° at most on this motor, in 480 runs, with default tables and
-/// 1.88° and 10.6° with learned ones. Forty-eight runs scatter by a tenth; the largest error depends on the profiles.
+/// The tracking loop before the filter had 1.86° rms and 10.1° at most on this motor, in 480 runs, with default tables and 1.88° and
+/// 10.6° with learned ones. Forty-eight runs of the filter have 1.35° and 7.3°, 1.41° and 8.4°; the largest error depends on the profiles.
 #[test]
 fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     for learn in ["no", "yes"] {
         let (metrics, faults) = battery(&[&format!("prepare.learn={learn}"), "runs=48"]);
         let rms = get(&metrics, "angle_error_rms_deg");
-        assert!((rms - 1.86).abs() < 0.15, "{rms}");
-        assert!((4.0..6.0).contains(&get(&metrics, "angle_error_p99_deg")));
-        assert!(get(&metrics, "angle_error_max_deg") < 13.0);
+        assert!((rms - 1.38).abs() < 0.12, "{rms}");
+        assert!((3.5..5.0).contains(&get(&metrics, "angle_error_p99_deg")));
+        assert!(get(&metrics, "angle_error_max_deg") < 10.0);
         // Torque of sound runs: angle errors of 2° rms cost little at the mean.
         assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
         // At 0.7 A the slope allows a learned drive 2.25 A to 2.75 A of 3 A.
@@ -119,13 +119,13 @@ fn sound_runs_that_are_stopped_are_told_from_others() {
     let (sound, _) = battery(&["observer.enabled=no", "injection.tracked_rpm=100", "runs=12"]);
     assert!(get(&sound, "trips") >= 4.0, "{sound:?}");
     assert_eq!(get(&sound, "sound_runs_stopped"), get(&sound, "trips"));
-    let (wrong, _) = battery(&["saliency.a_psi=0", "injection.check=no", "runs=12"]);
-    assert!(get(&wrong, "trips") >= 6.0, "{wrong:?}");
+    let (wrong, _) = battery(&["saliency.a_psi=0", "injection.check=no", "runs=48"]);
+    assert!(get(&wrong, "trips") >= 8.0, "{wrong:?}");
     assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
 }
 
 /// The flux turned at once: the drive finds it again or stops. Without saliency, lock monitor and observer it stays wrong for
-/// seconds.
+/// a second.
 #[test]
 fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     let (watched, faults) = battery(&["battery.runs=forced", "runs=27"]);
@@ -142,7 +142,7 @@ fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     ];
     let (blind, _) = battery(&blind);
     let longest = get(&blind, "wrong_longest_s");
-    assert!(get(&blind, "silent_runs") >= 9.0 && longest > 2.0, "{blind:?}");
+    assert!(get(&blind, "silent_runs") >= 9.0 && longest > 1.0, "{blind:?}");
 }
 
 /// Commands that never rest neither hide a turned flux nor stop a sound drive: half of the runs turn it, and none of

@@ -40,24 +40,33 @@ impl Coefficients {
     }
 
     /// Whether the filter has the angle.
+    #[inline(never)] // twice in a carrier period
     fn filters(&self, s: &Field, step: &StepResults) -> bool {
-        step.trust.turns && self.injects(s) && !s.hand_over.leads
+        step.trust.turns
+            && self.injects(s)
+            && !s.hand_over.leads
+            // Flux that builds up shows no angle.
+            && (step.trust.resistance
+                || self.observer.as_ref().is_none_or(|observer| observer.has_flux(&s.observer)))
     }
 
     /// Shows the filter the speed that the observer has seen in the carrier period.
     pub(super) fn see_speed(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
-        if step.trust.source == Source::Both && self.filters(s, step) {
-            let turn = s.hand_over.mean_turn();
-            if let Some(seen) = observer.seen_speed(&s.observer, turn, step.flux_freq) {
-                self.estimator.see_speed(&mut s.estimator, &seen);
-            }
+        // Where the resistance does not follow the filter, neither does the speed.
+        let shows = step.trust.resistance && step.trust.source == Source::Both;
+        if shows && observer.has_flux(&s.observer) {
+            let seen = observer.seen_speed(&s.observer, s.hand_over.mean_turn(), step.flux_freq);
+            self.estimator.see_speed(&mut s.estimator, &seen);
         }
     }
 
     /// Corrects the tracked angle, speed and resistance by what carrier and observer show.
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
+        if !filters {
+            s.estimator.filter.start(s.inverter_drop.volts != 0.0);
+        }
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
         if let (Some(observer), true) = (&self.observer, step.trust.resistance) {
             observer.turn_resistance(&mut s.observer, resistance);

@@ -77,6 +77,7 @@ impl Coefficients {
             1 => {
                 self.limit_torque(k, step);
                 s.prediction.latch_voltage();
+                self.check_lock(s, step)?;
                 self.watch_noise(s, 1, step.measured)
             }
             2 => {
@@ -93,7 +94,7 @@ impl Coefficients {
             }
             4 => {
                 self.correct_angle(s, step);
-                self.check_lock(s, step)
+                Ok(())
             }
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.reference.q);
@@ -104,6 +105,7 @@ impl Coefficients {
                 self.watch_travel(s, step)
             }
             6 => {
+                self.estimator.predict_slip(&mut s.estimator);
                 self.update_observer(s, step);
                 s.prediction.latch_voltage();
                 self.check_both_channels(s, step)
@@ -209,6 +211,7 @@ impl Coefficients {
     }
 
     /// Checks that the tracked angle is that of the flux.
+    #[inline(never)] // smaller, and not in the longest sample
     fn check_lock(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
         let baseline = match step.trust.lock {

@@ -2,14 +2,16 @@
 //! its variance.
 //!
 //! ```text
-//! x  = (e, w, a, r, b)          w' = a      a' = noise      r' = noise      b' = -b/tau + noise
+//! x  = (e, w, a, r, b)          w' = a      a' = noise      r' = noise      b' = -b/tau - f e + noise
 //! z1 = e + n1                   once a carrier period, from the saliency
 //! z2 = l e + w + h r + b + n2   mean of (turned - slip) of the observer over a carrier period
 //! ```
 //!
 //! `e` is the angle error, flux less estimate, rad; `w` the electrical speed of the rotor, rad/s; `a` its rate; `r` the deviation of
 //! the stator resistance, relative; `b` another slow error of the seen speed, rad/s. `l` and `h` are those of the
-//! [observer](super::observer::SeenSpeed). The carrier errs while the torque current moves (its reference lags), and so does the
+//! [observer](super::observer::SeenSpeed). An angle error adds `i_q e` to the direct current, so that the flux grows within `tau_r`
+//! and the slip `i_q/(tau_r i_d)` decreases: `f = (i_q/(tau_r i_d))^2`. (Without it angle and flux oscillate where the torque current is
+//! four times the direct one.) The carrier errs while the torque current moves (its reference lags), and so does the
 //! observer (its leakage errs): both variances grow with the largest change of the current in a carrier period. A torque step is
 //! then known by inertia and slip, a load step by the voltage. `r` is learned from torque steps: `h r` jumps, `w` cannot.
 //!
@@ -17,8 +19,8 @@
 //! stay here. They begin anew where the filter does not have the angle: before the frame turns, while the observer leads, and
 //! while the demodulation fills.
 //!
-//! A carrier period has five parts, in five of its samples, so that none takes long: predict, see the speed, reduce P, see the carrier,
-//! reduce P.
+//! A carrier period has six parts, in six of its samples, so that none takes long: predict the slip, predict, see the speed, reduce
+//! P, see the carrier, reduce P.
 //!
 //! Without an observer there is z1 alone. At a steady covariance that is a loop of third order with Butterworth's poles at
 //! `w_n = (rate noise/(variance of z1 x T))^(1/6)`.
@@ -46,8 +48,12 @@ const SLOW: f32 = 1.5;
 const SLOW_S: f32 = 1.0;
 /// Share of the largest change of the current that still counts after a carrier period.
 const REMEMBERED: f32 = 0.7;
-/// Deviations of the five states at the beginning: rad, rad/s, rad/s^2, relative, rad/s.
-const FIRST: [f32; N] = [0.1, 5.0, 100.0, 0.03, SLOW];
+/// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
+const FIRST: [f32; N - 1] = [0.1, 5.0, 100.0, SLOW];
+/// Deviation of the resistance at the beginning, and where the drop of the inverter has not been measured: 0.27 of the voltage across
+/// it for model A at 0.7 A.
+const MEASURED: f32 = 0.03;
+const UNMEASURED: f32 = 0.3;
 
 /// Variances of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +68,8 @@ pub struct AngleFilter {
     pub speed: f32,
     /// Error of that speed per change of the torque current in a carrier period, rad/s/A.
     pub speed_per_a: f32,
+    /// Rate of the slip per angle error and square of the torque current, `1/(tau_r i_d)^2`, 1/(s A)^2.
+    pub slip_by_angle: f32,
 }
 
 /// State of the filter.
@@ -93,10 +101,11 @@ pub struct Correction {
 }
 
 impl AngleFilterState {
-    /// Begins anew.
-    pub fn start(&mut self) {
+    /// Begins anew; whether the drop of the inverter was measured, and with it the resistance.
+    pub fn start(&mut self, is_measured: bool) {
         *self = Self { i_q: self.i_q, moved: self.moved, ..Self::default() };
-        let [e, w, a, r, b] = FIRST.map(|deviation| deviation * deviation);
+        let r = if is_measured { MEASURED * MEASURED } else { UNMEASURED * UNMEASURED };
+        let [e, w, a, b] = FIRST.map(|deviation| deviation * deviation);
         self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r, 0.0, 0.0, 0.0, 0.0, b];
     }
 
@@ -129,7 +138,20 @@ impl AngleFilterState {
 }
 
 impl AngleFilter {
-    /// First part of a carrier period: `P = F P F' + Q`.
+    /// First part of a carrier period: the slip by the angle, of `P = F P F'`.
+    #[inline(never)]
+    pub fn predict_slip(&self, state: &mut AngleFilterState) {
+        let f = T * self.slip_by_angle * state.i_q * state.i_q;
+        let [ee, we, _, ae, _, _, re, _, _, _, be, bw, ba, br, bb] = &mut state.covariance;
+        let turned = *be - f * *ee;
+        *bb -= f * (*be + turned);
+        *be = turned;
+        *bw -= f * *we;
+        *ba -= f * *ae;
+        *br -= f * *re;
+    }
+
+    /// Second part: the rest of `P = F P F' + Q`.
     #[inline(never)] // in the flash, as all parts
     pub fn predict(&self, state: &mut AngleFilterState) {
         const KEPT: f32 = 1.0 - T / SLOW_S;
@@ -151,7 +173,7 @@ impl AngleFilter {
         state.slow *= KEPT;
     }
 
-    /// Second part: what the observer has `seen`, and by how much its speed is above the tracked one, electrical turns per period.
+    /// Third part: what the observer has `seen`, and by how much its speed is above the tracked one, electrical turns per period.
     #[inline(never)]
     pub fn see_speed(&self, state: &mut AngleFilterState, seen: &SeenSpeed, faster: f32) {
         let [ee, we, ww, ae, aw, _, re, rw, ra, rr, be, bw, ba, br, bb] = state.covariance;
@@ -211,6 +233,7 @@ mod tests {
         angle_per_a: 0.1,
         speed: 4.1,
         speed_per_a: 14.4,
+        slip_by_angle: 15.0,
     };
     const PER_SALIENCY: f32 = -14.3;
 
@@ -227,6 +250,7 @@ mod tests {
             per_saliency: f32,
             seen: Option<(&SeenSpeed, f32)>,
         ) -> (Correction, f32) {
+            self.predict_slip(state);
             self.predict(state);
             if let Some((seen, faster)) = seen {
                 self.see_speed(state, seen, faster);
@@ -239,8 +263,8 @@ mod tests {
     }
 
     fn started() -> AngleFilterState {
-        let mut state = AngleFilterState::default();
-        state.start();
+        let mut state = AngleFilterState { i_q: 1.5, ..AngleFilterState::default() };
+        state.start(true);
         state
     }
 
@@ -266,6 +290,9 @@ mod tests {
         let t = f64::from(T);
         let mut f = Matrix::identity();
         (f[(0, 1)], f[(1, 2)], f[(4, 4)]) = (t, t, 1.0 - t / f64::from(SLOW_S));
+        let mut slip = Matrix::identity();
+        slip[(4, 0)] = -t * f64::from(FILTER.slip_by_angle) * 1.5 * 1.5;
+        let f = f * slip;
         let slow = 2.0 / f64::from(SLOW_S) * f64::from(SLOW).powi(2);
         let noise = [0.0, f64::from(SPEED_NOISE), f64::from(FILTER.rate), 0.02 * 0.02, slow];
         let mut p = f * p * f.transpose()
@@ -319,10 +346,8 @@ mod tests {
     #[test]
     fn the_steady_covariance_is_that_of_double_precision() {
         for (l, h) in [(0.0, 50.0), (18.0, 1.0), (35.0, -11.0), (86.0, 18.0)] {
-            let (mut state, mut p) = (started(), Matrix::zeros());
-            for n in 0..N {
-                p[(n, n)] = f64::from(FIRST[n]).powi(2);
-            }
+            let mut state = started();
+            let mut p = covariance(&state);
             let seen = seen(l, h);
             for _ in 0..60_000 {
                 FILTER.step(&mut state, 0.0, PER_SALIENCY, Some((&seen, 0.0)));
@@ -358,8 +383,7 @@ mod tests {
     #[test]
     fn large_errors_and_moving_currents_count_less() {
         let after = |error: f32, amperes: f32| {
-            let mut state = started();
-            state.follow(0.0);
+            let mut state = AngleFilterState { i_q: 0.0, ..started() };
             state.follow(amperes);
             FILTER.step(&mut state, error, PER_SALIENCY, None).0.angle
         };
@@ -367,7 +391,7 @@ mod tests {
         assert_eq!(after(-0.6, 0.0), after(-9.0, 0.0));
         assert!(after(0.59, 0.0) < after(0.6, 0.0));
         assert!(after(0.1, 3.0) < 0.2 * after(0.1, 0.0));
-        let mut state = started();
+        let mut state = AngleFilterState { i_q: 0.0, ..started() };
         for i_q in [0.0, 1.0, 1.0, 1.0] {
             state.follow(i_q);
         }

@@ -203,7 +203,14 @@ impl Estimator {
         }
     }
 
-    /// Begins a carrier period of the filter, see [`AngleFilter`], with a reference of the quadrature current `i_q`, A.
+    /// Begins a carrier period of the filter, see [`AngleFilter`].
+    pub fn predict_slip(&self, state: &mut EstimatorState) {
+        if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
+            filter.predict_slip(&mut state.filter);
+        }
+    }
+
+    /// Goes on with it, with a reference of the quadrature current `i_q`, A.
     pub fn predict(&self, state: &mut EstimatorState, i_q: f32) {
         state.filter.follow(i_q);
         if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
@@ -231,7 +238,6 @@ impl Estimator {
         let (correction, resistance) = if filters {
             filter.see_carrier(&mut state.filter, state.angle_error, point.per_saliency)
         } else {
-            state.filter.start();
             (Correction::default(), 0.0)
         };
         state.correction = Correction { speed: correction.speed + known, ..correction };

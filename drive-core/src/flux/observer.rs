@@ -43,7 +43,7 @@ const LEAST_FLUX: f32 = 0.01;
 const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
-/// Least flux whose speed counts beside the injection, as a share of the nominal one.
+/// Least flux that shows an angle and a speed, as a share of the nominal one.
 const COUNTS_FROM: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
@@ -294,15 +294,15 @@ impl Observer {
         self.turn_resistance(state, share);
     }
 
+    /// Whether there is flux enough to show an angle and a speed.
+    pub fn has_flux(&self, state: &ObserverState) -> bool {
+        state.flux > COUNTS_FROM * self.nominal
+    }
+
     /// The speed of the rotor that it sees, for a mean `turn` of the flux in a carrier period, less the present slip, at a flux of
-    /// `flux_freq`, both electrical turns per period; none where there is too little flux.
-    pub fn seen_speed(
-        &self,
-        state: &ObserverState,
-        turn: f32,
-        flux_freq: f32,
-    ) -> Option<SeenSpeed> {
-        (state.flux > COUNTS_FROM * self.nominal).then(|| SeenSpeed {
+    /// `flux_freq`, both electrical turns per period.
+    pub fn seen_speed(&self, state: &ObserverState, turn: f32, flux_freq: f32) -> SeenSpeed {
+        SeenSpeed {
             rotor_freq: turn - state.slip * (1.0 / TAU),
             age: self.age + SEEN_AGE,
             per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
@@ -310,7 +310,7 @@ impl Observer {
                 * (1.0 / PERIOD_S)
                 * (state.current.q - state.gain.q * state.current.d)
                 / state.flux,
-        })
+        }
     }
 
     /// Adds a change to the relative resistance.
@@ -412,7 +412,7 @@ mod tests {
             observer.step(&mut state, after, frame(n), false);
         }
         let freq = stator * PERIOD_S / TAU;
-        (state.turned / PERIOD_S, observer.seen_speed(&state, 0.0, freq).unwrap())
+        (state.turned / PERIOD_S, observer.seen_speed(&state, 0.0, freq))
     }
 
     /// Size and sign of what the filter takes for an angle error and for the resistance, against finite differences of a machine.

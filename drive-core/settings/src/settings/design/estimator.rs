@@ -109,6 +109,7 @@ impl Settings {
             angle_per_a: REFERENCE_LAG / i_d,
             speed: square(SEEN_NOISE * noise_a * per_a),
             speed_per_a: LEAKAGE_ERROR * per_a,
+            slip_by_angle: 1.0 / square(m.tau_r() * i_d),
         }
     }
 }
