@@ -193,7 +193,7 @@ impl AngleFilter {
         state.x = state.ph.map(|ph| ph * share);
     }
 
-    /// Part after that of the speed was [reduced](AngleFilterState::reduce): the angle `error`, rad, of a demodulation that takes `per_saliency`, rad, for
+    /// Part behind the first reduction: the angle `error`, rad, of a demodulation that takes `per_saliency`, rad, for
     /// a saliency of 1. Returns the corrections, and that of the relative stator resistance.
     #[inline(never)]
     pub fn see_carrier(

@@ -275,7 +275,9 @@ settings! {
 
     /// Synchronous demodulation and its loop.
     SynchronousTracking "injection." [injection.synchronous] {
-        /// natural frequency of the tracking loop
+        /// natural frequency of the tracking without an observer
+        ///
+        /// Without an encoder the speed loop is designed for it in any case.
         bandwidth_hz: f32 = 3.5, number("Hz").from_to(0.1, 30.0);
         /// saliency fixed to the flux, until its slope is learned
         ///
@@ -288,7 +290,7 @@ settings! {
         allow_unlearned: bool = false, word();
         /// saliency per ampere of stator current
         ///
-        /// For the gain schedule until it is learned.
+        /// For the observer until it is learned.
         current_saliency: Option<f32> = None,
             auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
         /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
@@ -407,8 +409,6 @@ settings! {
         /// encoder it may be larger.
         limit_rpm: Option<f32> = None, auto("rpm", speed_limit_rpm: Settings::speed_limit_rule).beside(|s| (1.0, s.speed_trip_rpm()));
         /// largest acceleration that is asked for
-        ///
-        /// Without a sensor the angle lags by 5.7 degrees while the speed changes by 300 rpm/s (four poles, tracking loop of 4 Hz).
         ramp_rpm_per_s: Option<f32> = None, auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
         /// deceleration of a quick stop
         quick_rpm_per_s: Option<f32> = None,
