@@ -52,6 +52,8 @@ fn reading(pair: &mut Pair) -> Result<[f64; 2]> {
     let scales = pair.shadow.settings().scales;
     let line = scales.of_code(scales.current_a);
     let mut readings = Vec::new();
+    // The current of the run ends.
+    pair.run(10, |_, _| {})?;
     pair.run(12_000, |_, period| readings.push(f64::from(line.at(period.sample.current_a))))?;
     let mean = |of: &dyn Fn(f64) -> f64| {
         readings.iter().map(|r| of(*r)).sum::<f64>() / readings.len() as f64
