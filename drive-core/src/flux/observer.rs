@@ -48,6 +48,9 @@ const COUNTS_FROM: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
+/// Least current that shows the resistance as a speed, as a share of the nominal direct current: below it the sign of what it shows
+/// is not known. (Without it the resistance ran away in a slow reversal at the torque limit.)
+const SHOWS_FROM: f32 = 0.3;
 /// Share of the newest value in the mean resistance: 1 s of carrier periods.
 const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -143,7 +146,7 @@ pub struct SeenSpeed {
     pub age: f32,
     /// `g w_r w_s`, rad/s per rad: the pull towards the flux of the observer's own model.
     pub per_angle: f32,
-    /// `r_s (i_q - g w_r i_d)/psi`, rad/s.
+    /// `r_s (i_q - g w_r i_d)/psi`, rad/s; 0 where the two currents cancel.
     pub per_resistance: f32,
 }
 
@@ -302,14 +305,14 @@ impl Observer {
     /// The speed of the rotor that it sees, for a mean `turn` of the flux in a carrier period, less the present slip, at a flux of
     /// `flux_freq`, both electrical turns per period.
     pub fn seen_speed(&self, state: &ObserverState, turn: f32, flux_freq: f32) -> SeenSpeed {
+        let current = state.current.q - state.gain.q * state.current.d;
+        let per_current = self.r_s * (1.0 / PERIOD_S) / state.flux;
+        let shows = current.abs() > SHOWS_FROM * self.i_d;
         SeenSpeed {
             rotor_freq: turn - state.slip * (1.0 / TAU),
             age: self.age + SEEN_AGE,
             per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
-            per_resistance: self.r_s
-                * (1.0 / PERIOD_S)
-                * (state.current.q - state.gain.q * state.current.d)
-                / state.flux,
+            per_resistance: if shows { per_current * current } else { 0.0 },
         }
     }
 
@@ -418,6 +421,7 @@ mod tests {
     /// Size and sign of what the filter takes for an angle error and for the resistance, against finite differences of a machine.
     #[test]
     fn the_seen_speed_depends_on_angle_and_resistance_as_the_filter_takes_it() {
+        let mut cancelled = 0;
         for stator in [-80.0, -20.0, 10.0, 60.0] {
             for i_q in [-2.0, 0.5, 2.5] {
                 let (current, rotor) = (Dq { d: 1.4, q: i_q }, stator - 4.0 * i_q);
@@ -429,8 +433,15 @@ mod tests {
                 let close =
                     |found: f32, model: f32| (found - model).abs() < 0.03 * model.abs() + 0.5;
                 assert!(close(by_angle, model.per_angle), "{by_angle} {model:?}");
-                assert!(close(by_resistance, model.per_resistance), "{by_resistance} {model:?}");
+                // Where the two currents cancel it takes none.
+                let motor = Motor::default();
+                let least = SHOWS_FROM * motor.r_s / motor.coupled_inductance();
+                let shows = by_resistance.abs() > least;
+                cancelled += u32::from(!shows);
+                let taken = if shows { by_resistance } else { 0.0 };
+                assert!(close(taken, model.per_resistance), "{by_resistance} {model:?}");
             }
         }
+        assert_eq!(cancelled, 1);
     }
 }
