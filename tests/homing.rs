@@ -56,15 +56,15 @@ fn turns(rig: &mut Rig) -> f64 {
 }
 
 /// Position 0 is where the stop yields to the torque, and positions count from there. A heavy shaft swings at its elastic stop for
-/// longer than is waited: 0.0315 turns at most in 96 runs; without an encoder the position drifts under torque: 0.0096 turns at most in 96
-/// runs, and 0.0192 a turn away.
+/// longer than is waited: 0.0315 turns at most in 96 runs; without an encoder the position drifts under torque: 0.0139 turns at most in 192
+/// runs, and 0.0255 a turn away.
 #[test]
 fn the_stop_becomes_position_0() {
     let heavier = ["motor.inertia=0.06", "drive.motor.inertia=0.06"];
     for (source, heavier, accuracy) in [
         ("angle.source=encoder", &[][..], 0.002),
         ("angle.source=encoder", &heavier[..], 0.035),
-        ("angle.source=injection", &[][..], 0.012),
+        ("angle.source=injection", &[][..], 0.015),
     ] {
         let plans =
             [(30.0, 0.6), (-30.0, 0.6), (60.0, 1.0), (-60.0, 0.4), (60.0, 1.5), (10.0, 0.5)];
@@ -83,7 +83,7 @@ fn the_stop_becomes_position_0() {
             );
             assert!(wrong.abs() < accuracy, "{wrong}");
             // The position without an encoder drifts by some 3 degrees on the way.
-            assert!(there.abs() < accuracy + 0.01, "{there}");
+            assert!(there.abs() < accuracy + 0.013, "{there}");
         }
     }
 }

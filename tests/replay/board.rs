@@ -88,17 +88,17 @@ fn torque_steps_without_a_sensor() {
         hashes,
         [
             0xb4fe_f4ab_c64f_f1b7,
-            0x8635_65aa_657f_eed4,
-            0x53da_9541_7242_99f6,
-            0x60a7_41b2_9789_d717,
-            0xbcdd_e6d2_3fef_113b,
-            0xcbd2_44ea_3db0_f09c,
-            0x179e_ab7c_0b1b_bdd0,
-            0x5fc8_e503_6cc9_b677,
-            0xdae1_8f6b_a157_aadc,
-            0xdc59_175c_f728_8487,
-            0x0ce5_1377_3bb2_243a,
-            0xe4d1_9919_029d_a496
+            0x631f_0ef0_949f_15a1,
+            0xe132_65c5_30fc_8a83,
+            0x2202_5be6_3962_6148,
+            0xc98c_d6be_2758_fc00,
+            0x1767_ce5c_f2df_a677,
+            0xa77b_cbd6_08f5_f6e6,
+            0x6df0_7623_85a7_df5a,
+            0xb4fb_68f9_6946_de04,
+            0x5cf1_9157_3878_2a9f,
+            0x2570_2989_a6d0_b30e,
+            0xefbf_6580_645e_1f14
         ],
         "{hashes:#018x?}"
     );
@@ -112,10 +112,10 @@ fn position_steps_with_the_encoder() {
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0xa025_f79b_6d26_1a83,
-            0xed97_6c54_a9da_4361,
-            0x7594_eccb_5b01_1cb1,
-            0x69ae_c08e_3563_a420
+            0x992d_b3da_ab2e_132f,
+            0xfbd2_9fa1_802f_6a2b,
+            0x782c_c48b_d067_6d96,
+            0x1bbd_d6bb_a74b_d49d
         ],
         "{hashes:#018x?}"
     );

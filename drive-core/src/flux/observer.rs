@@ -48,9 +48,9 @@ const COUNTS_FROM: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
-/// Least current that shows the resistance as a speed, as a share of the nominal direct current: below it the sign of what it shows
-/// is not known. (Without it the resistance ran away in a slow reversal at the torque limit.)
-const SHOWS_FROM: f32 = 0.3;
+/// Least current that shows the resistance as a speed, `i_q - g w_r i_d`, as a share of `i_q`: where the two cancel the sign of what they
+/// show is not known. (Without it the resistance ran away in a slow reversal at the torque limit.)
+const SHOWS_FROM: f32 = 0.25;
 /// Share of the newest value in the mean resistance: 1 s of carrier periods.
 const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -306,13 +306,13 @@ impl Observer {
     /// `flux_freq`, both electrical turns per period.
     pub fn seen_speed(&self, state: &ObserverState, turn: f32, flux_freq: f32) -> SeenSpeed {
         let current = state.current.q - state.gain.q * state.current.d;
-        let per_current = self.r_s * (1.0 / PERIOD_S) / state.flux;
-        let shows = current.abs() > SHOWS_FROM * self.i_d;
+        let shows = current.abs() >= SHOWS_FROM * state.current.q.abs();
+        let current = if shows { current } else { 0.0 };
         SeenSpeed {
             rotor_freq: turn - state.slip * (1.0 / TAU),
             age: self.age + SEEN_AGE,
             per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
-            per_resistance: if shows { per_current * current } else { 0.0 },
+            per_resistance: self.r_s * (1.0 / PERIOD_S) * current / state.flux,
         }
     }
 
@@ -435,7 +435,7 @@ mod tests {
                 assert!(close(by_angle, model.per_angle), "{by_angle} {model:?}");
                 // Where the two currents cancel it takes none.
                 let motor = Motor::default();
-                let least = SHOWS_FROM * motor.r_s / motor.coupled_inductance();
+                let least = SHOWS_FROM * i_q.abs() * motor.r_s / (motor.coupled_inductance() * 1.4);
                 let shows = by_resistance.abs() > least;
                 cancelled += u32::from(!shows);
                 let taken = if shows { by_resistance } else { 0.0 };
