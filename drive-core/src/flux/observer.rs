@@ -48,8 +48,8 @@ const COUNTS_FROM: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
-/// Least current that shows the resistance as a speed, `i_q - g w_r i_d`, as a share of `i_q`: where the two cancel the sign of what they
-/// show is not known. (Without it the resistance ran away in a slow reversal at the torque limit.)
+/// The resistance is learned where `|i_q - g w_r i_d|` is at least this share of `|i_q|`. Nearer to zero the sign of that difference is
+/// uncertain. (Without this limit the resistance ran away in a slow reversal at the torque limit.)
 const SHOWS_FROM: f32 = 0.25;
 /// Share of the newest value in the mean resistance: 1 s of carrier periods.
 const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
