@@ -49,8 +49,9 @@ const COUNTS_FROM: f32 = 0.6;
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
 /// The resistance is learned where `|i_q - g w_r i_d|` is at least this share of `|i_q|`. Nearer to zero the sign of that difference is
-/// uncertain. (Without this limit the resistance ran away in a slow reversal at the torque limit.)
-const SHOWS_FROM: f32 = 0.25;
+/// uncertain. (Without this limit the resistance ran away in a slow reversal at the torque limit; with 0.25 in 1 of 4800 runs with wrong
+/// parameters.)
+const SHOWS_FROM: f32 = 0.5;
 /// Share of the newest value in the mean resistance: 1 s of carrier periods.
 const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -442,6 +443,6 @@ mod tests {
                 assert!(close(taken, model.per_resistance), "{by_resistance} {model:?}");
             }
         }
-        assert_eq!(cancelled, 1);
+        assert_eq!(cancelled, 3);
     }
 }
