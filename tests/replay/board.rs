@@ -88,17 +88,17 @@ fn torque_steps_without_a_sensor() {
         hashes,
         [
             0xb4fe_f4ab_c64f_f1b7,
-            0x631f_0ef0_949f_15a1,
-            0xe132_65c5_30fc_8a83,
-            0x2202_5be6_3962_6148,
-            0xc98c_d6be_2758_fc00,
-            0x1767_ce5c_f2df_a677,
-            0xa77b_cbd6_08f5_f6e6,
-            0x6df0_7623_85a7_df5a,
-            0xb4fb_68f9_6946_de04,
-            0x5cf1_9157_3878_2a9f,
-            0x2570_2989_a6d0_b30e,
-            0xefbf_6580_645e_1f14
+            0x0b38_9373_69ab_a44b,
+            0xcb36_2790_b1a6_2dc1,
+            0x80d1_06cc_6d73_16f0,
+            0x1334_738c_abbb_962f,
+            0xc13c_f07f_b912_cff4,
+            0xf897_7a4e_0c68_ea56,
+            0x5493_9882_77f5_f350,
+            0xa907_8ebc_30a1_f25d,
+            0x144f_95dc_ea32_facf,
+            0x8ad2_a530_e2ce_766d,
+            0xbc93_dfce_814c_3bf7
         ],
         "{hashes:#018x?}"
     );
