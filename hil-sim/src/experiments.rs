@@ -23,6 +23,7 @@ mod learn_reference;
 pub mod learning;
 mod linear_model;
 mod lock_monitor;
+mod losses;
 mod machines;
 pub mod measured_motors;
 mod modulation;
@@ -37,7 +38,6 @@ mod position;
 mod profile;
 mod record;
 pub mod saliency;
-mod saliency_check;
 mod sensorless_position;
 mod smallest_slope;
 mod speed_profile;
@@ -193,6 +193,7 @@ pub const DRIVE: &[&str] = &[
     "speed.",
     "observer.",
     "braking.",
+    "flux.",
     "vf.",
 ];
 /// Keys of the speed loop, which a drive that regulates torque does not use.
@@ -230,7 +231,6 @@ pub const EXPERIMENTS: &[Experiment] = &[
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
-    saliency_check::EXPERIMENT,
     position::EXPERIMENT,
     sensorless_position::EXPERIMENT,
     torque::STEPS,
@@ -245,6 +245,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     battery::EXPERIMENT,
     full_range::EXPERIMENT,
     torque_envelope::EXPERIMENT,
+    losses::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     record::EXPERIMENT,
     torque_rise::EXPERIMENT,
@@ -271,7 +272,6 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<battery::Battery>(),
     Statistical::of::<full_range::FullRange>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
-    Statistical::of::<saliency_check::SaliencyCheck>(),
     Statistical::of::<smallest_slope::SmallestSlope>(),
 ];
 

@@ -9,7 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 9] = [
+const SMALL: [(&str, &[&str]); 8] = [
     (
         "monte-carlo",
         &[
@@ -35,7 +35,6 @@ const SMALL: [(&str, &[&str]); 9] = [
         &["--set", "runs=1", "--set", "full_range.kind=constant", "--set", "angle_source=encoder"],
     ),
     ("lock-monitor", &["--set", "runs=1"]),
-    ("saliency-check", &["--set", "runs=2"]),
     ("smallest-slope", &["--set", "runs=1"]),
 ];
 

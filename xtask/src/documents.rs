@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 30] = [
+const ELSEWHERE: [(&str, &str); 29] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -27,7 +27,6 @@ const ELSEWHERE: [(&str, &str); 30] = [
     ("cargo sim run NAME", "a placeholder"),
     ("cargo sim run GROUP", "a placeholder"),
     ("cargo sim run lock-monitor --set runs", "long proof"),
-    ("cargo sim run saliency-check --set runs=1000", "long proof"),
     ("cargo sim run monte-carlo --set runs=1000", "long proof"),
     ("cargo sim run machines --set", "long proof"),
     (

@@ -76,6 +76,9 @@ impl Coefficients {
             }
             1 => {
                 self.limit_torque(k, step);
+                if self.voltage_limit.is_economical() {
+                    self.economise(s, k, step);
+                }
                 s.prediction.latch_voltage();
                 self.check_lock(s, step)?;
                 self.watch_noise(s, 1, step.measured)
@@ -178,6 +181,14 @@ impl Coefficients {
             added: k.limits.now.flux_a,
         };
         self.voltage_limit.step(&mut k.limits.voltage, &now);
+    }
+
+    /// Follows the direct current of the least loss.
+    #[cold] // in the flash
+    fn economise(&self, s: &Field, k: &mut Kept, step: &StepResults) {
+        let carrier = self.inject && !s.hand_over.is_carrier_off();
+        let i_d = &mut k.references.current.d;
+        *i_d = self.voltage_limit.least_loss(*i_d, step.reference.q, carrier);
     }
 
     /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.

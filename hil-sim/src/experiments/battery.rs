@@ -25,7 +25,7 @@ pub use trial::Trial;
 use drive_core::carrier::DemodulatorKind;
 use drive_core::{AngleSource, Drive};
 
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, built, check_model, plant_settings};
@@ -44,11 +44,6 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 /// Runs for which the drive learns anew.
 const GROUP: usize = KINDS.len();
-
-/// The seed of a run.
-pub fn seed_of(seed: u64, number: usize) -> u64 {
-    seed.wrapping_mul(1_000_003).wrapping_add(number as u64)
-}
 
 /// What is drawn beside the noise has seeds of its own.
 const LEARNING: u64 = 1 << 40;

@@ -12,7 +12,7 @@ use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plan
 use drive_settings::value::Words as _;
 use serde::{Deserialize, Serialize};
 
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
 use crate::config::{Config, PlantModel, built, plant_settings};
 use crate::error::Error;
@@ -173,12 +173,9 @@ impl Commission {
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
-        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
-        let config = match self.machines {
-            Some(_) => drawn(&self.config, seed),
-            None => self.config.clone(),
-        };
-        (config, seed)
+        let seed = seed_of(self.seed, number);
+        let draws = self.machines.is_some();
+        (if draws { drawn(&self.config, seed) } else { self.config.clone() }, seed)
     }
 }
 

@@ -17,9 +17,9 @@ use drive_settings::Flux;
 use case::Case;
 use trial::{Run, Trial};
 
-use super::battery::{Moment, learned, seed_of};
+use super::battery::{Moment, learned};
 use super::commission::commissioned;
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};

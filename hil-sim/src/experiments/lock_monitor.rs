@@ -5,7 +5,7 @@ mod trials;
 use serde::{Deserialize, Serialize};
 
 use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::Config;
@@ -90,10 +90,7 @@ impl Study for LockMonitor {
 
     fn run(&self, number: usize) -> Result<Trial, Error> {
         // Each part has seeds of its own.
-        let seed = |part: usize, n: usize| {
-            let first = self.seed.wrapping_mul(1_000_003).wrapping_add((part as u64) << 40);
-            first.wrapping_add(n as u64)
-        };
+        let seed = |part: usize, n| seed_of(self.seed, n).wrapping_add((part as u64) << 40);
         let mut n = number;
         if n < OFFSETS.len() * self.runs {
             let (offset, n) = (n / self.runs, n % self.runs);

@@ -4,7 +4,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
@@ -138,7 +138,7 @@ pub struct Machines {
 impl Machines {
     /// Configuration and seed of a machine.
     fn drawn(&self, number: usize) -> (Config, u64) {
-        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let seed = seed_of(self.seed, number);
         (if self.draws { drawn(&self.config, seed) } else { self.config.clone() }, seed)
     }
 }

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::statistics::{Study, whole};
+use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
@@ -68,7 +68,7 @@ impl Study for MonteCarlo {
 
     fn run(&self, number: usize) -> Result<SteadyRun, Error> {
         // A generator of its own for every run: each can be repeated alone by its seed.
-        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let seed = seed_of(self.seed, number);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
         let (least, most) = (self.config.amperes(IQ_A.0), self.config.amperes(IQ_A.1));

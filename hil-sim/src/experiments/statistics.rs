@@ -41,6 +41,11 @@ pub trait Study: Sized + Sync {
     fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error>;
 }
 
+/// The seed of a run of an experiment with this seed.
+pub fn seed_of(seed: u64, number: usize) -> u64 {
+    seed.wrapping_mul(1_000_003).wrapping_add(number as u64)
+}
+
 /// Does all runs on all cores.
 ///
 /// # Errors

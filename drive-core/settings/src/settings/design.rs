@@ -79,6 +79,7 @@ impl Settings {
             (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
         };
         let shunts = self.shunts();
+        let limit = VoltageLimit::new(m, i_d, current_limit);
         let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
         let dead_time = DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a());
         let leakage = Leakage {
@@ -146,7 +147,7 @@ impl Settings {
             unlearned: tracks && !t.allow_unlearned,
             prediction: Prediction::new(m, motor_plant, allowed_v, allowed_mean_v),
             catching: self.catching([d.k_c, q.k_c]),
-            voltage_limit: VoltageLimit::new(m, i_d, current_limit),
+            voltage_limit: if self.flux.economy { limit.economical(m) } else { limit },
             dc_link: DcLink::new(&self.dc_link_limits()),
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),

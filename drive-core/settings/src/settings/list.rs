@@ -220,6 +220,8 @@ settings! {
         speed: SpeedSettings = SpeedSettings::DEFAULT;
         /// The limits by the dc link.
         braking: BrakingSettings = BrakingSettings::DEFAULT;
+        /// The flux beside the torque.
+        flux: FluxSettings = FluxSettings::DEFAULT;
         /// The supply of the dc link.
         supply: SupplySettings = SupplySettings::DEFAULT;
         /// The mode for a motor that nobody has identified.
@@ -396,6 +398,15 @@ settings! {
         ///
         /// For 0.25 s, without an encoder.
         catch: bool = true, word();
+    }
+
+    /// The flux beside the torque; see `drive_core::current::voltage_limit`.
+    FluxSettings "flux." [flux] {
+        /// whether the flux is that of the least loss where there is no carrier
+        ///
+        /// Half of that of `sequence.i_d` to all of it. A torque current gives less torque then, and a torque step beyond the present flux
+        /// takes a rotor time constant.
+        economy: bool = false, word();
     }
 
     /// The speed loop, and the position loop around it. Unset values follow [`rules`](super::rules).

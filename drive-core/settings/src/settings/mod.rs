@@ -20,9 +20,9 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::{AngleSource, Line, PERIOD_S};
 
 pub use list::{
-    BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Nameplate,
-    Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
-    SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
+    BrakingSettings, CurrentPlant, FluxSettings, IdentifiedPlant, InjectionSettings, Inverter,
+    Limits, Nameplate, Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings,
+    SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
 };
 
 words! {

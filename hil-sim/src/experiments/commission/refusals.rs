@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use super::super::statistics::{Study, whole};
+use super::super::statistics::{Study, seed_of, whole};
 use super::super::{BENCH, Context, DRIVE, Experiment};
 use super::machine::drawn;
 use super::session::{Abort, Session, unaware};
@@ -159,7 +159,7 @@ impl Study for Refusals {
 
     fn run(&self, number: usize) -> Result<Record, Error> {
         let defect = &DEFECTS[number / self.runs];
-        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let seed = seed_of(self.seed, number);
         let mut config = drawn(&self.config, seed);
         (defect.make)(&mut config);
         config.calibrate();

@@ -1,0 +1,107 @@
+//! Copper loss of the motor against the least one that its torque can have, with and without `flux.economy`.
+
+use drive_core::{Command, Drive, Mode};
+
+use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up};
+use super::full_range::for_the_range;
+use super::torque::assumptions;
+use super::torque_limit::learned_limit;
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
+use crate::config::{Config, plant_settings};
+use crate::error::Error;
+use crate::outcome::{Cell, Outcome, Table};
+use crate::plant::{Load, MachineSettings};
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "losses",
+    stands_for: "beyond the dissertation",
+    about: "Copper loss against the least one for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT],
+    run,
+};
+
+/// Speed, rpm on four poles: beyond the carrier, short of field weakening.
+const RPM: f64 = 1200.0;
+const SHARES: [f64; 3] = [0.25, 0.5, 1.0];
+/// Corrections of the torque current until it gives the torque, and the time of each, s.
+const CORRECTIONS: u32 = 6;
+const CORRECTED_S: f64 = 1.5;
+/// Samples of the mean, and the time between two, s.
+const SAMPLES: u32 = 50;
+const SAMPLE_S: f64 = 0.01;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let mut outcome = Outcome::default();
+    let mut table = Table::new("Copper loss", &[]);
+    let mut config = for_the_range(context.config)?;
+    for economy in [false, true] {
+        config.drive.flux.economy = economy;
+        let (drive, limit) = learned_limit(&config, context.seed)?;
+        let points = SHARES.map(|share| (share * limit.nm, share * limit.i_q));
+        let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
+            measure(&config, &drive, point, context.seed.wrapping_add(number))
+        })?;
+        let word = if economy { "economy" } else { "setting" };
+        for (percent, [i_d, nm, loss]) in SHARES.map(|share| 100.0 * share).iter().zip(measured) {
+            let least = least_loss(&plant_settings(&config).machine, nm);
+            outcome.metrics.set(format!("loss_{word}_{percent}_pct_of_least"), loss / least);
+            table.record([
+                ("flux", Cell::from(word)),
+                ("torque (% of the limit)", Cell::fixed(*percent, 0)),
+                ("torque (Nm)", Cell::fixed(nm, 2)),
+                ("direct current (A)", Cell::fixed(i_d, 2)),
+                ("loss (W)", Cell::fixed(loss, 1)),
+                ("least (W)", Cell::fixed(least, 1)),
+                ("loss of least", Cell::fixed(loss / least, 3)),
+            ]);
+        }
+    }
+    outcome.tables.push(table);
+    outcome.remarks = assumptions(&config);
+    outcome.remark("Least: stator and rotor of a machine without iron losses and saturation, over all direct currents.");
+    Ok(outcome)
+}
+
+/// Least copper loss at a torque, W: `1.5 (r_s i_d^2 + (r_s + R_R) i_q^2)` with `i_d = i_q sqrt((r_s + R_R)/r_s)`.
+fn least_loss(machine: &MachineSettings, nm: f64) -> f64 {
+    let k = machine.lm / (machine.lm + machine.llr);
+    let both = machine.rs + k * k * machine.rr;
+    2.0 * nm * (machine.rs * both).sqrt() / (f64::from(machine.pole_pairs) * k * machine.lm)
+}
+
+/// Mean direct current, A, torque, Nm, and copper loss, W, at a torque and the torque current that it may need.
+fn measure(
+    config: &Config,
+    drive: &Drive,
+    (nm, mut i_q): (f64, f64),
+    seed: u64,
+) -> Result<[f64; 3], Error> {
+    let on = |regulates: bool| {
+        let lost = || Error::Refused(format!("the drive did not regulate {nm:.2} Nm"));
+        regulates.then_some(()).ok_or_else(lost)
+    };
+    let plant = plant_settings(config);
+    let mut bench = Bench::new(config, &plant, drive, Load::Speed { speed: 0.0 }, seed)?;
+    bench.rig.command(&Command::Start(Mode::Torque))?;
+    on(bench.wait(LONGEST_START_S).regulates())?;
+    on(bring_up(&mut bench, Shaft::Held(RPM), config)?)?;
+    for _ in 0..CORRECTIONS {
+        bench.torque(i_q as f32)?;
+        on(bench.watch(CORRECTED_S))?;
+        // The torque grows with the current or its square.
+        i_q *= (nm / bench.rig.plant.torque()).sqrt();
+    }
+    let mut mean = [0.0; 3];
+    for _ in 0..SAMPLES {
+        on(bench.watch(SAMPLE_S))?;
+        let (plant, machine) = (&bench.rig.plant, &plant.machine);
+        let (psi, i) = (plant.rotor_flux(), plant.current());
+        let rotor = (psi - i * machine.lm) / (machine.lm + machine.llr);
+        let loss = 1.5 * (machine.rs * i.norm_sqr() + machine.rr * rotor.norm_sqr());
+        let now = [psi.norm() / machine.lm, plant.torque(), loss];
+        mean.iter_mut().zip(now).for_each(|(mean, now)| *mean += now / f64::from(SAMPLES));
+    }
+    Ok(mean)
+}
