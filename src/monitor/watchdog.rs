@@ -2,32 +2,32 @@
 
 use crate::board;
 
-/// Core cycles from one feeding to the next, at least: 12 control periods, 2 ms.
-const FEED_CYCLES: u32 = 12 * PERIOD_CYCLES;
+/// Core cycles over which the rate of the control interrupt is judged, at least: 12 control periods, 2 ms.
+pub const WINDOW_CYCLES: u32 = 12 * PERIOD_CYCLES;
 const PERIOD_CYCLES: u32 = 2 * board::PWM_TOP as u32;
 // The tolerance of a tenth covers one interrupt more or less, which depends on the instant of the count.
-const _: () = assert!(FEED_CYCLES / 10 > PERIOD_CYCLES);
-// Fed at half its time: the main loop may be late by the same time.
-const _: () = assert!(FEED_CYCLES / board::CYCLES_PER_US * 2 < board::WATCHDOG_US);
+const _: () = assert!(WINDOW_CYCLES / 10 > PERIOD_CYCLES);
+// A rate that is wrong is noticed in half the time of the watchdog.
+const _: () = assert!(WINDOW_CYCLES / board::CYCLES_PER_US * 2 < board::WATCHDOG_US);
 
 /// Result of the rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Nothing yet.
+    /// Not now: the control interrupt is late.
     Wait,
     /// Feed the watchdog.
     Feed,
     /// Never feed it again: the control interrupt missed a deadline or does not come at its rate.
     Refuse {
-        /// Control periods since the last feeding.
+        /// Control periods in the window.
         periods: u32,
-        /// Core cycles since then.
+        /// Core cycles in it.
         cycles: u32,
     },
 }
 
-/// The rule, evaluated at the end of each pass of the main loop. It allows feeding only if, since the last feeding, the
-/// control interrupt came at its rate within a tenth, and no deadline was missed.
+/// The rule, evaluated in each pass of the main loop and around what takes long in it. It allows feeding while the control interrupt
+/// comes, to one period, and no deadline was missed. Over each window its rate must be right within a tenth.
 #[derive(Clone, Copy, Debug)]
 pub struct FeedRule {
     cycles: u32,
@@ -50,19 +50,17 @@ impl FeedRule {
     pub fn judge(&mut self, cycles: u32, periods: u32, missed: bool) -> Verdict {
         let elapsed = cycles.wrapping_sub(self.cycles);
         let came = periods.wrapping_sub(self.periods);
-        if elapsed < FEED_CYCLES && !missed && !self.refused {
-            return Verdict::Wait;
-        }
-        let accounted = u64::from(came) * u64::from(PERIOD_CYCLES);
-        if self.refused
-            || missed
-            || accounted.abs_diff(u64::from(elapsed)) * 10 > u64::from(elapsed)
-        {
-            self.refused = true;
+        let off = (u64::from(came) * u64::from(PERIOD_CYCLES)).abs_diff(u64::from(elapsed));
+        let is_whole = elapsed >= WINDOW_CYCLES;
+        self.refused |= missed || (is_whole && off * 10 > u64::from(elapsed));
+        if self.refused {
             return Verdict::Refuse { periods: came, cycles: elapsed };
         }
-        *self = Self::new(cycles, periods);
-        Verdict::Feed
+        if is_whole {
+            *self = Self::new(cycles, periods);
+        }
+        let comes = is_whole || off <= u64::from(PERIOD_CYCLES);
+        if comes { Verdict::Feed } else { Verdict::Wait }
     }
 }
 
@@ -73,48 +71,54 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_fed_when_all_is_well_and_not_too_often() {
+    fn it_is_fed_when_all_is_well() {
         let mut rule = FeedRule::new(u32::MAX - 5, u32::MAX);
-        let mut fed = 0;
         for period in 0..1200_u32 {
             let cycles = (u32::MAX - 5).wrapping_add(period.wrapping_mul(PERIOD_CYCLES) + 700);
-            match rule.judge(cycles, u32::MAX.wrapping_add(period), false) {
-                Verdict::Feed => fed += 1,
-                Verdict::Wait => {}
-                refused => panic!("{refused:?}"),
-            }
+            let verdict = rule.judge(cycles, u32::MAX.wrapping_add(period), false);
+            assert_eq!(verdict, Verdict::Feed, "{period}");
         }
-        assert!((99..=100).contains(&fed), "{fed}");
+    }
+
+    /// Within a window an interrupt that is late stops the feeding, and at its end for good.
+    #[test]
+    fn it_waits_for_an_interrupt_that_is_late() {
+        let mut rule = FeedRule::new(0, 0);
+        assert_eq!(rule.judge(3 * PERIOD_CYCLES, 2, false), Verdict::Feed);
+        assert_eq!(rule.judge(5 * PERIOD_CYCLES, 3, false), Verdict::Wait);
+        assert_eq!(rule.judge(6 * PERIOD_CYCLES, 6, false), Verdict::Feed);
+        assert_eq!(rule.judge(8 * PERIOD_CYCLES, 6, false), Verdict::Wait);
+        assert!(matches!(rule.judge(12 * PERIOD_CYCLES, 6, false), Verdict::Refuse { .. }));
     }
 
     #[test]
     fn a_missed_deadline_ends_it_at_once_and_for_good() {
         let mut rule = FeedRule::new(0, 0);
         assert!(matches!(rule.judge(10, 0, true), Verdict::Refuse { .. }));
-        assert!(matches!(rule.judge(FEED_CYCLES, 12, false), Verdict::Refuse { .. }));
+        assert!(matches!(rule.judge(WINDOW_CYCLES, 12, false), Verdict::Refuse { .. }));
     }
 
     #[test]
     fn a_pause_that_was_meant_is_not_counted_but_heals_nothing() {
         let mut rule = FeedRule::new(0, 0);
-        rule.restart(50 * FEED_CYCLES, 3);
-        assert_eq!(rule.judge(51 * FEED_CYCLES, 15, false), Verdict::Feed);
-        assert!(matches!(rule.judge(51 * FEED_CYCLES, 15, true), Verdict::Refuse { .. }));
-        rule.restart(60 * FEED_CYCLES, 15);
-        assert!(matches!(rule.judge(61 * FEED_CYCLES, 27, false), Verdict::Refuse { .. }));
+        rule.restart(50 * WINDOW_CYCLES, 3);
+        assert_eq!(rule.judge(51 * WINDOW_CYCLES, 15, false), Verdict::Feed);
+        assert!(matches!(rule.judge(51 * WINDOW_CYCLES, 15, true), Verdict::Refuse { .. }));
+        rule.restart(60 * WINDOW_CYCLES, 15);
+        assert!(matches!(rule.judge(61 * WINDOW_CYCLES, 27, false), Verdict::Refuse { .. }));
     }
 
     #[test]
     fn an_interrupt_that_does_not_come_ends_it() {
         let mut rule = FeedRule::new(0, 0);
-        assert_eq!(rule.judge(FEED_CYCLES - 1, 0, false), Verdict::Wait);
-        let cycles = FEED_CYCLES;
+        assert_eq!(rule.judge(WINDOW_CYCLES - 1, 0, false), Verdict::Wait);
+        let cycles = WINDOW_CYCLES;
         assert_eq!(rule.judge(cycles, 0, false), Verdict::Refuse { periods: 0, cycles });
     }
 
     proptest! {
         #[test]
-        fn a_tenth_more_or_less_is_the_limit(periods in 0_u32..40_000, cycles in FEED_CYCLES..1_000_000_000) {
+        fn a_tenth_more_or_less_is_the_limit(periods in 0_u32..40_000, cycles in WINDOW_CYCLES..1_000_000_000) {
             let ratio = f64::from(periods) * f64::from(PERIOD_CYCLES) / f64::from(cycles);
             prop_assume!((ratio - 0.9).abs() > 1e-6 && (ratio - 1.1).abs() > 1e-6);
             let fed = FeedRule::new(7, 9).judge(cycles + 7, periods + 9, false) == Verdict::Feed;

@@ -28,7 +28,7 @@ use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
-use induction_drive::monitor::watchdog::{FeedRule, Verdict};
+use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
@@ -229,12 +229,12 @@ fn comes_at_its_rate() -> bool {
     let (began, periods) = now();
     let mut rule = FeedRule::new(began, periods);
     loop {
+        asm::delay(WINDOW_CYCLES);
         let (cycles, periods) = now();
-        match rule.judge(cycles, periods, false) {
-            Verdict::Feed => return true,
-            Verdict::Wait => {}
-            Verdict::Refuse { .. } => rule = FeedRule::new(cycles, periods),
+        if rule.judge(cycles, periods, false) == Verdict::Feed {
+            return true;
         }
+        rule = FeedRule::new(cycles, periods);
         if cycles.wrapping_sub(began) > board::INTERRUPT_TIMEOUT_US * board::CYCLES_PER_US {
             return false;
         }

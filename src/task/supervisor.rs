@@ -150,8 +150,8 @@ impl Supervisor {
         self.commission();
         // It designs for seconds: the console needs the time behind it.
         self.clock.update();
-        let (now, off, pages) = (self.clock.ms, self.is_off(), self.chip.saved.flash());
-        self.hours.count(now, off, &mut self.guard, pages);
+        let now = self.clock.ms;
+        self.hours.count(now, self.is_off(), &mut self.guard, self.chip.saved.flash());
         self.link.iter_mut().for_each(|link| link.sources.watch(now));
         self.clock.ms
     }
@@ -209,8 +209,10 @@ impl Supervisor {
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
         control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
+        // A search takes most of the time of the watchdog, and so may the console before it, with the periods that came meanwhile. The
+        // drive answers a command within a period.
+        self.feed_watchdog();
         let action = self.commissioning.poll(&excited);
-        // A search takes most of the time of the watchdog, and the drive answers a command within a period.
         self.feed_watchdog();
         match action {
             None => {}

@@ -133,6 +133,30 @@ fn a_stop_or_a_new_setting_leaves_everything_as_it_was() -> Result<()> {
     Ok(())
 }
 
+/// The searches take most of the time of the watchdog: a host that says much must not add to it. (It reset the chip while the
+/// outputs were on.)
+#[test]
+fn a_host_that_says_much_resets_nothing() -> Result<()> {
+    let mut console = Console::new(&Config::default(), 1)?;
+    console.say("stream i_q_a i_q_ref_a i_d_a speed_rpm phi_deg 200", "ok")?;
+    console.say("commission", "wiring: sound")?;
+    let mut told = String::new();
+    for burst in 0..200 {
+        console.board.run_periods(307)?;
+        console.board.type_line("status");
+        (0..burst % 41).for_each(|_| console.board.type_line(""));
+        told += &console.board.take_console();
+        while console.board.next_period().is_some() {}
+        if told.contains("levels: sound") {
+            break;
+        }
+    }
+    assert!(told.contains("levels: sound"), "{told}");
+    let log = console.board.take_log()?;
+    assert!(!log.iter().any(|line| line.contains("watchdog")), "{log:#?}");
+    Ok(())
+}
+
 #[test]
 fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
     let mut config = Config::default();
