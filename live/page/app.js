@@ -65,7 +65,13 @@ function greet(now) {
   if (now.signals.length) restream();
   loadSettings();
 }
-function lost(why) { gone = why; state('not connected'); alarm('gone', [why]); }
+function lost(why) {
+  gone = why;
+  state('not connected');
+  alarm('gone', [why]);
+  // What the drive says meanwhile is not heard: a step of the set-up that waits for it ends.
+  announced(`stopped: ${why}`);
+}
 /** A line of the console: an announcement. */
 function announced(line) {
   listeners.forEach(listener => listener(line));

@@ -317,6 +317,15 @@ fn sets_up(page: &mut Page<'_>, folder: &Path) {
     // The page hears of the stop before the outputs are off.
     std::thread::sleep(Duration::from_secs(6));
     state(page, "off");
+    // So does one whose connection is lost, which stops the drive.
+    step(page, 2, "Commission", "sensors: sound", PATIENCE);
+    page.value("socket.close()");
+    page.until(
+        "/^not done: stopped: the program that serves/.test($('steps').children[2].querySelector('strong').textContent)",
+        PATIENCE,
+    );
+    std::thread::sleep(Duration::from_secs(6));
+    state(page, "off");
     step(page, 2, "Commission", "^done: commissioning: ended; .accept.", PATIENCE);
     assert_eq!(page.value("$('steps').children[2].querySelector('progress').value"), 7.0);
     step(page, 2, "Accept", "^ok", PATIENCE);

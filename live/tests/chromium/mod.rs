@@ -117,8 +117,10 @@ impl Page<'_> {
                 return;
             }
             if began.elapsed() > patience {
-                let shown = self.value("document.body?.innerText.slice(0, 1500)");
-                panic!("not in time: {expression}: {result}\n{shown}");
+                let shown = self.value("document.body?.innerText.slice(-3000)");
+                let log =
+                    self.value("document.getElementById('log')?.textContent.slice(-3000) ?? ''");
+                panic!("not in time: {expression}: {result}\n{shown}\nlog: {log}");
             }
             std::thread::sleep(Duration::from_millis(100));
         }
