@@ -149,7 +149,7 @@ impl Field {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, &trust, flux.freq, rest, phi);
+            let turning = c.observe_fundamental(s, index, rest, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
             if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());

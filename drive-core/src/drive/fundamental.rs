@@ -4,12 +4,8 @@ use core::f32::consts::TAU;
 
 use super::Field;
 use super::in_turn::StepResults;
-use super::trust::Trust;
 use crate::flux::hand_over::{Source, Turning};
 use crate::{AlphaBeta, Coefficients, UnitVector};
-
-/// Frequency of the stator up to which the flux shows the stator resistance, turns per period.
-const RESISTANCE_UP_TO: f32 = 6.0 * crate::io::PERIOD_S;
 
 impl Coefficients {
     /// One period of the observer; the turn of the flux that it sees. `current` is the measured one without the expected carrier, `phi`
@@ -18,24 +14,19 @@ impl Coefficients {
         &self,
         s: &mut Field,
         index: usize,
-        trust: &Trust,
-        flux_freq: f32,
         current: AlphaBeta,
         phi: UnitVector,
     ) -> Turning {
         const PER_RADIAN: f32 = 1.0 / TAU;
         let Some(observer) = &self.observer else { return Turning::default() };
-        let (state, leads) = (&mut s.observer, s.hand_over.leads);
+        let state = &mut s.observer;
         let turned = if s.hand_over.advance_blanking() {
             state.skip(current);
             s.hand_over.mean_turn()
         } else {
-            observer.step(state, current, phi.turned_by(s.axes.before), leads);
+            observer.step(state, current, phi.turned_by(s.axes.before), s.hand_over.leads);
             state.turned * PER_RADIAN
         };
-        if trust.resistance && !leads && flux_freq.abs() < RESISTANCE_UP_TO {
-            observer.track_resistance(state);
-        }
         s.hand_over.turning(index, turned, state.slip * PER_RADIAN, observer.age)
     }
 

@@ -22,8 +22,8 @@
 //! flux by 7 degrees more, for the voltage does not pass the filter.)
 //!
 //! Errors of the parameters turn the angle (simulated, 0.7 A of direct current): a stator resistance 20 % off by 7 degrees at
-//! 300 rpm and 1.2 at 1800; a leakage 20 % off by 12 degrees at any speed. So the resistance is tracked, and
-//! the leakage must be right within 3 %.
+//! 300 rpm and 1.2 at 1800; a leakage 20 % off by 12 degrees at any speed. So the [filter](super::angle_filter) tracks the resistance
+//! with the angle, and the leakage must be right within 3 %.
 
 use core::f32::consts::TAU;
 
@@ -38,9 +38,6 @@ const WITH_SPEED: f32 = 0.4;
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
 const LEAST_FLUX: f32 = 0.01;
-/// Time constant in which the stator resistance is tracked at low speed, s. (The flux also shows an angle error where it turns:
-/// a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
-const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Least flux that shows an angle and a speed, as a share of the nominal one.
@@ -86,8 +83,6 @@ pub struct Observer {
     nominal: f32,
     /// Least flux, V s.
     least: f32,
-    /// Share of the resistance per V s of `eps` in a period.
-    resistance_gain: f32,
     /// Age of the current, samples; less than 6.
     pub age: f32,
 }
@@ -105,8 +100,6 @@ pub struct ObserverState {
     current: Dq,
     /// Change of the flux in the last period by the voltage, V s.
     pub change: Dq,
-    /// Deviation of the flux from that of the current model in the period, V s.
-    deviation: f32,
     /// Angle by which the flux turned in the last period, rad.
     pub turned: f32,
     /// Angle that the slip had in it, rad.
@@ -207,7 +200,6 @@ impl Observer {
             i_d,
             nominal: coupled * i_d,
             least: LEAST_FLUX * (coupled * i_d),
-            resistance_gain: 1.0 / (RESISTANCE_S * motor.r_s * i_d),
             age,
         }
     }
@@ -262,11 +254,11 @@ impl Observer {
         let e = voltage * PERIOD_S - mean * r_s - leakage * self.leakage;
         state.change = e;
         let grown = self.rate * (self.coupled * mean.d - state.flux);
-        state.deviation = grown - e.d;
-        let flux = state.flux + e.d + state.gain.d * state.deviation;
+        let deviation = grown - e.d;
+        let flux = state.flux + e.d + state.gain.d * deviation;
         let flux = if flux < self.least { self.least } else { flux };
         let per_flux = 1.0 / flux;
-        let x = limited((e.q + state.gain.q * state.deviation) * per_flux, LARGEST_TANGENT);
+        let x = limited((e.q + state.gain.q * deviation) * per_flux, LARGEST_TANGENT);
         state.turned = x - x * x * x * (1.0 / 3.0);
         state.slip = self.rate * self.coupled * mean.q * per_flux;
         state.flux = if leads { flux * (1.0 + 0.5 * x * x) } else { state.flux + grown };
@@ -282,12 +274,6 @@ impl Observer {
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
         state.gain = Dq { d: gain * a, q: gain * w };
         state.flux_saliency = self.flux_saliency * (state.flux / self.nominal);
-    }
-
-    /// Tracks the stator resistance by the flux at low speed; every period. It starts from the one that the magnetisation
-    /// measured (see [`InverterDrop`](crate::current::inverter_drop::InverterDrop)).
-    pub fn track_resistance(&self, state: &mut ObserverState) {
-        self.turn_resistance(state, -self.resistance_gain * state.deviation);
     }
 
     /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, at a flux of `flux_freq`, electrical turns
