@@ -87,18 +87,18 @@ fn torque_steps_without_a_sensor() {
     assert_eq!(
         hashes,
         [
-            0xb4fe_f4ab_c64f_f1b7,
-            0x0b38_9373_69ab_a44b,
-            0xcb36_2790_b1a6_2dc1,
-            0x80d1_06cc_6d73_16f0,
-            0x1334_738c_abbb_962f,
-            0xc13c_f07f_b912_cff4,
-            0xf897_7a4e_0c68_ea56,
-            0x5493_9882_77f5_f350,
-            0xa907_8ebc_30a1_f25d,
-            0x144f_95dc_ea32_facf,
-            0x8ad2_a530_e2ce_766d,
-            0xbc93_dfce_814c_3bf7
+            0x980b_ced4_f848_e067,
+            0x3b2a_6745_d947_2990,
+            0x85c4_c690_851b_74da,
+            0xb520_c0f4_e5f3_954d,
+            0x871c_73ae_a045_1343,
+            0x4c32_d4b3_cbc0_4590,
+            0x3919_d77f_e9e9_d7f5,
+            0x2397_9ce3_6391_503f,
+            0x54a6_d925_1765_1fe9,
+            0x469b_aa2d_ea3c_ce3a,
+            0x0d93_1e03_e073_d098,
+            0x8303_2b62_6102_ddb7
         ],
         "{hashes:#018x?}"
     );
@@ -107,15 +107,15 @@ fn torque_steps_without_a_sensor() {
 #[test]
 fn position_steps_with_the_encoder() {
     let (hashes, interrupts) = replay("encoder");
-    assert_eq!(interrupts, 27_453);
+    assert_eq!(interrupts, 27_451);
     assert_eq!(
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0x992d_b3da_ab2e_132f,
-            0xfbd2_9fa1_802f_6a2b,
-            0x782c_c48b_d067_6d96,
-            0x1bbd_d6bb_a74b_d49d
+            0x89d9_ee8b_458b_8479,
+            0xe2b9_98a6_effc_1210,
+            0x0968_bb6d_6164_d870,
+            0xd0c8_5c63_5b8d_b8e4
         ],
         "{hashes:#018x?}"
     );
