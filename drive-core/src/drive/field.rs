@@ -197,7 +197,7 @@ impl Field {
                 dc_link: measured.dc_link,
             };
             if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, k.elapsed, &sample) {
-                s.observer.resistance = ratio - 1.0;
+                s.observer.take_resistance(ratio - 1.0);
             }
         }
 

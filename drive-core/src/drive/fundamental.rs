@@ -56,11 +56,13 @@ impl Coefficients {
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
         if !filters {
-            s.estimator.filter.start(s.inverter_drop.volts != 0.0);
+            s.estimator.filter.start(s.observer.resistance_drift().is_some());
         }
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
-        if let (Some(observer), true) = (&self.observer, step.trust.resistance) {
-            observer.turn_resistance(&mut s.observer, resistance);
+        if let (Some(observer), true) = (&self.observer, filters && step.trust.resistance) {
+            let drift = s.observer.resistance_drift().unwrap_or(0.0);
+            let decayed = s.estimator.filter.resistance_decay * drift;
+            observer.turn_resistance(&mut s.observer, resistance - decayed);
         }
     }
 

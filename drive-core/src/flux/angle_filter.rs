@@ -2,7 +2,7 @@
 //! its variance.
 //!
 //! ```text
-//! x  = (e, w, a, r, b)          w' = a      a' = noise      r' = noise      b' = -b/tau - f e + noise
+//! x  = (e, w, a, r, b)          w' = a      a' = noise      r' = -r/tau_s + noise      b' = -b/tau - f e + noise
 //! z1 = e + n1                   once a carrier period, from the saliency
 //! z2 = l e + w + h r + b + n2   mean of (turned - slip) of the observer over a carrier period
 //! ```
@@ -40,12 +40,16 @@ const T: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 const LARGEST_ERROR: f32 = 0.6;
 /// Variance of the speed that comes in a second, (rad/s)^2: slip by another rotor resistance.
 const SPEED_NOISE: f32 = 4.0;
-/// Variance of the resistance that comes in a second: heating by 2 %.
-const RESISTANCE_NOISE: f32 = 0.02 * 0.02;
+/// Variance of the resistance that comes in a second: heating by 1 %.
+const RESISTANCE_NOISE: f32 = 0.01 * 0.01;
+/// Time in which a deviation from the measured resistance decays, s. Without this decay all of a lasting error of the seen speed ends in
+/// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
+/// well, with 7 s it comes to 19 %.
+const RESISTANCE_S: f32 = 5.0;
 /// Deviation and time constant of the slow error, rad/s and s: slip by another rotor resistance, and the voltage of the inverter, a
 /// thousandth of the dc link over the flux. Motors of one rated frequency have about the same.
 const SLOW: f32 = 1.5;
-const SLOW_S: f32 = 1.0;
+const SLOW_S: f32 = 2.0;
 /// Share of the largest change of the current that still counts after a carrier period.
 const REMEMBERED: f32 = 0.7;
 /// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
@@ -84,6 +88,8 @@ pub struct AngleFilterState {
     x: [f32; N],
     /// Slow error of the seen speed, rad/s.
     slow: f32,
+    /// Share of the deviation from the measured resistance that decays in a carrier period; 0 where it has not been measured.
+    pub resistance_decay: f32,
     /// Torque current of the last carrier period, and its largest change lately, A.
     i_q: f32,
     moved: f32,
@@ -104,9 +110,10 @@ impl AngleFilterState {
     /// Begins anew; whether the drop of the inverter was measured, and with it the resistance.
     pub fn start(&mut self, is_measured: bool) {
         *self = Self { i_q: self.i_q, moved: self.moved, ..Self::default() };
-        let r = if is_measured { MEASURED * MEASURED } else { UNMEASURED * UNMEASURED };
+        let (r, decay) = if is_measured { (MEASURED, T / RESISTANCE_S) } else { (UNMEASURED, 0.0) };
+        self.resistance_decay = decay;
         let [e, w, a, b] = FIRST.map(|deviation| deviation * deviation);
-        self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r, 0.0, 0.0, 0.0, 0.0, b];
+        self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r * r, 0.0, 0.0, 0.0, 0.0, b];
     }
 
     /// Takes the torque current of a carrier period, A.
@@ -155,20 +162,22 @@ impl AngleFilter {
     #[inline(never)]
     pub fn predict(&self, state: &mut AngleFilterState) {
         const KEPT: f32 = 1.0 - T / SLOW_S;
+        let r_kept = 1.0 - state.resistance_decay;
         let [ee, we, ww, ae, aw, aa, re, rw, ra, rr, be, bw, ba, br, bb] = &mut state.covariance;
         *ee += T * (2.0 * *we + T * *ww);
         *we += T * (*ww + *ae + T * *aw);
         *ae += T * *aw;
-        *re += T * *rw;
+        *re = r_kept * (*re + T * *rw);
         *be = KEPT * (*be + T * *bw);
         *ww += T * (2.0 * *aw + T * *aa + SPEED_NOISE);
         *aw += T * *aa;
-        *rw += T * *ra;
+        *rw = r_kept * (*rw + T * *ra);
+        *ra *= r_kept;
         *bw = KEPT * (*bw + T * *ba);
         *aa += T * self.rate;
         *ba *= KEPT;
-        *rr += T * RESISTANCE_NOISE;
-        *br *= KEPT;
+        *rr = r_kept * r_kept * *rr + T * RESISTANCE_NOISE;
+        *br *= KEPT * r_kept;
         *bb = KEPT * KEPT * *bb + T * (2.0 / SLOW_S * SLOW * SLOW);
         state.slow *= KEPT;
     }
@@ -290,11 +299,12 @@ mod tests {
         let t = f64::from(T);
         let mut f = Matrix::identity();
         (f[(0, 1)], f[(1, 2)], f[(4, 4)]) = (t, t, 1.0 - t / f64::from(SLOW_S));
+        f[(3, 3)] = 1.0 - t / f64::from(RESISTANCE_S);
         let mut slip = Matrix::identity();
         slip[(4, 0)] = -t * f64::from(FILTER.slip_by_angle) * 1.5 * 1.5;
         let f = f * slip;
         let slow = 2.0 / f64::from(SLOW_S) * f64::from(SLOW).powi(2);
-        let noise = [0.0, f64::from(SPEED_NOISE), f64::from(FILTER.rate), 0.02 * 0.02, slow];
+        let noise = [0.0, f64::from(SPEED_NOISE), f64::from(FILTER.rate), 0.01 * 0.01, slow];
         let mut p = f * p * f.transpose()
             + Matrix::from_diagonal(&(t * nalgebra::SVector::<f64, N>::from(noise)));
         let mut gain = [0.0; N];
