@@ -196,9 +196,7 @@ impl Field {
                 signs: signs.to_abc().to_alpha_beta().to_dq(applied),
                 dc_link: measured.dc_link,
             };
-            if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, k.elapsed, &sample) {
-                s.observer.take_resistance(ratio - 1.0);
-            }
+            s.measure_drop(c, k.elapsed, &sample);
         }
 
         // No output from a state that is not finite. (The voltage contains current and reference of the step
@@ -223,6 +221,15 @@ impl Field {
         };
         c.in_turn(s, k, index, &results)?;
         Ok(modulated.duties)
+    }
+
+    /// Measures the drop of the inverter, and with it the stator resistance.
+    #[cold]
+    fn measure_drop(&mut self, c: &Coefficients, elapsed: u32, sample: &DropSample) {
+        if let Some(ratio) = c.inverter_drop.step(&mut self.inverter_drop, elapsed, sample) {
+            self.observer.take_resistance(ratio - 1.0);
+            self.estimator.filter.start(true);
+        }
     }
 
     /// Shows the state of the demodulation, the checks and the position.

@@ -56,32 +56,26 @@ impl Coefficients {
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
         if !filters {
-            s.estimator.filter.start(s.observer.resistance_drift().is_some());
+            s.estimator.filter.start(s.observer.resistance_decay > 0.0);
         }
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
         if let (Some(observer), true) = (&self.observer, filters && step.trust.resistance) {
-            let drift = s.observer.resistance_drift().unwrap_or(0.0);
-            let decayed = s.estimator.filter.resistance_decay * drift;
-            observer.turn_resistance(&mut s.observer, resistance - decayed);
+            observer.correct_resistance(&mut s.observer, resistance);
         }
     }
 
     /// Decides which source leads.
     pub(super) fn hand_over(&self, s: &mut Field, step: &StepResults) {
         if self.observer.is_some() && step.trust.observes() {
-            let led = s.hand_over.leads;
             s.hand_over.update(step.flux_freq, step.trust.source);
-            if s.hand_over.leads && !led {
-                s.observer.lead();
-            }
         }
     }
 
     /// The slow part of the observer.
     pub(super) fn update_observer(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
-        let (filters, leads) = (self.filters(s, step), s.hand_over.leads);
-        observer.update(&mut s.observer, step.rotor_freq, filters);
+        let leads = s.hand_over.leads;
+        observer.update(&mut s.observer, step.rotor_freq);
         if leads && s.hand_over.demodulates() && step.trust.resistance {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, step.flux_freq);

@@ -4,13 +4,13 @@
 //! | sample | task | needs before it |
 //! |---|---|---|
 //! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
-//! | 1 | torque that the dc link bears; voltages for the prediction at 3 | - |
+//! | 1 | torque that the dc link bears; direct current of the least loss; voltages for the prediction at 3; lock monitor | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads; covariance of the filter after the speed (9) | magnetising current (0) |
-//! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | lock monitor; carrier for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
+//! | 3 | room for the carrier; currents that the voltage allows; judgement of the prediction | voltages (1), rotor voltage (2) |
+//! | 4 | carrier for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
 //! | 5 | reference current of the saliency; covariance of the filter after the carrier (4); the slowly turning axes; travel of the sensors | - |
 //! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
-//! | 7 | currents that the voltage allows; rotor voltage for the prediction at 8; prediction of the filter | magnetising current (0) |
+//! | 7 | rotor voltage for the prediction at 8; prediction of the filter | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
 //! | 9 | averages of the demodulation; the sums begin anew; speed for the filter | ten samples mixed, ten turns summed |
 //!
@@ -93,6 +93,7 @@ impl Coefficients {
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
+                self.limit_voltage(s, k, step);
                 self.judge(s, step)
             }
             4 => {
@@ -114,8 +115,8 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
-                self.limit_voltage(s, k, step);
-                self.estimator.predict(&mut s.estimator, step.reference.q);
+                let decay = s.observer.resistance_decay;
+                self.estimator.predict(&mut s.estimator, step.reference.q, decay);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.measured)
             }

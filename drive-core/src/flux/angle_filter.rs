@@ -42,10 +42,6 @@ const LARGEST_ERROR: f32 = 0.6;
 const SPEED_NOISE: f32 = 4.0;
 /// Variance of the resistance that comes in a second: heating by 1 %.
 const RESISTANCE_NOISE: f32 = 0.01 * 0.01;
-/// Time in which a deviation from the measured resistance decays, s. Without this decay all of a lasting error of the seen speed ends in
-/// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
-/// well, with 7 s it comes to 19 %.
-const RESISTANCE_S: f32 = 5.0;
 /// Deviation and time constant of the slow error, rad/s and s: slip by another rotor resistance, and the voltage of the inverter, a
 /// thousandth of the dc link over the flux. Motors of one rated frequency have about the same.
 const SLOW: f32 = 1.5;
@@ -88,8 +84,6 @@ pub struct AngleFilterState {
     x: [f32; N],
     /// Slow error of the seen speed, rad/s.
     slow: f32,
-    /// Share of the deviation from the measured resistance that decays in a carrier period; 0 where it has not been measured.
-    pub resistance_decay: f32,
     /// Torque current of the last carrier period, and its largest change lately, A.
     i_q: f32,
     moved: f32,
@@ -108,10 +102,10 @@ pub struct Correction {
 
 impl AngleFilterState {
     /// Begins anew; whether the drop of the inverter was measured, and with it the resistance.
+    #[cold] // in the flash
     pub fn start(&mut self, is_measured: bool) {
         *self = Self { i_q: self.i_q, moved: self.moved, ..Self::default() };
-        let (r, decay) = if is_measured { (MEASURED, T / RESISTANCE_S) } else { (UNMEASURED, 0.0) };
-        self.resistance_decay = decay;
+        let r = if is_measured { MEASURED } else { UNMEASURED };
         let [e, w, a, b] = FIRST.map(|deviation| deviation * deviation);
         self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r * r, 0.0, 0.0, 0.0, 0.0, b];
     }
@@ -158,11 +152,11 @@ impl AngleFilter {
         *br -= f * *re;
     }
 
-    /// Second part: the rest of `P = F P F' + Q`.
+    /// Second part: the rest of `P = F P F' + Q`, for a deviation of the resistance that decays by this share in a carrier period.
     #[inline(never)]
-    pub fn predict(&self, state: &mut AngleFilterState) {
+    pub fn predict(&self, state: &mut AngleFilterState, resistance_decay: f32) {
         const KEPT: f32 = 1.0 - T / SLOW_S;
-        let r_kept = 1.0 - state.resistance_decay;
+        let r_kept = 1.0 - resistance_decay;
         let [ee, we, ww, ae, aw, aa, re, rw, ra, rr, be, bw, ba, br, bb] = &mut state.covariance;
         *ee += T * (2.0 * *we + T * *ww);
         *we += T * (*ww + *ae + T * *aw);
@@ -245,6 +239,7 @@ mod tests {
         slip_by_angle: 15.0,
     };
     const PER_SALIENCY: f32 = -14.3;
+    const RESISTANCE_DECAY: f32 = T / 5.0;
 
     fn seen(per_angle: f32, per_resistance: f32) -> SeenSpeed {
         SeenSpeed { rotor_freq: 0.0, age: 0.0, per_angle, per_resistance }
@@ -260,7 +255,7 @@ mod tests {
             seen: Option<(&SeenSpeed, f32)>,
         ) -> (Correction, f32) {
             self.predict_slip(state);
-            self.predict(state);
+            self.predict(state, RESISTANCE_DECAY);
             if let Some((seen, faster)) = seen {
                 self.see_speed(state, seen, faster);
             }
@@ -299,7 +294,7 @@ mod tests {
         let t = f64::from(T);
         let mut f = Matrix::identity();
         (f[(0, 1)], f[(1, 2)], f[(4, 4)]) = (t, t, 1.0 - t / f64::from(SLOW_S));
-        f[(3, 3)] = 1.0 - t / f64::from(RESISTANCE_S);
+        f[(3, 3)] = 1.0 - f64::from(RESISTANCE_DECAY);
         let mut slip = Matrix::identity();
         slip[(4, 0)] = -t * f64::from(FILTER.slip_by_angle) * 1.5 * 1.5;
         let f = f * slip;

@@ -27,6 +27,7 @@
 
 use core::f32::consts::TAU;
 
+use crate::carrier::CARRIER_SAMPLES;
 use crate::learned::Learned;
 use crate::math::{limited, within};
 use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
@@ -45,8 +46,11 @@ const COUNTS_FROM: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
-/// Share of the newest value in the mean resistance: 1 s of carrier periods.
-const RESISTANCE_SMOOTHING: f32 = 10.0 * PERIOD_S;
+/// Time in which a deviation from a measured resistance decays, s. Without this decay all of a lasting error of the seen speed ends in
+/// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
+/// well, with 7 s it comes to 19 %.
+const RESISTANCE_S: f32 = 5.0;
+const RESISTANCE_DECAY: f32 = CARRIER_SAMPLES as f32 * PERIOD_S / RESISTANCE_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
 /// (The leakage is not tracked in this way: with both, the error of one hides in the other.)
 const FROM_INJECTION: f32 = 0.02;
@@ -109,10 +113,10 @@ pub struct ObserverState {
     flux_saliency: f32,
     /// Stator resistance relative to the settings, less one.
     pub resistance: f32,
-    /// The same, as this start has measured it.
-    measured_resistance: Option<f32>,
-    /// Its mean over 1 s while the injection has the angle.
-    mean_resistance: f32,
+    /// The same, as this start has measured it, and the share of the deviation from that which decays in a carrier period; 0
+    /// until then.
+    measured_resistance: f32,
+    pub resistance_decay: f32,
 }
 
 /// Saliency and leakage of the fundamental wave.
@@ -161,17 +165,8 @@ impl ObserverState {
 
     /// Takes a measured resistance, relative to the settings, less one.
     pub fn take_resistance(&mut self, measured: f32) {
-        (self.resistance, self.measured_resistance) = (measured, Some(measured));
-    }
-
-    /// Deviation of the resistance from the measured one, where this start has measured it.
-    pub fn resistance_drift(&self) -> Option<f32> {
-        self.measured_resistance.map(|measured| self.resistance - measured)
-    }
-
-    /// Begins to lead, with the mean of the resistance.
-    pub fn lead(&mut self) {
-        self.resistance = self.mean_resistance;
+        (self.resistance, self.measured_resistance) = (measured, measured);
+        self.resistance_decay = RESISTANCE_DECAY;
     }
 
     /// Takes the voltage that a step puts out, without the carrier, V.
@@ -274,10 +269,8 @@ impl Observer {
     }
 
     /// Computes the gains for a rotor of `rotor_freq`, electrical turns per period, and the saliency at the present flux; once a
-    /// carrier period. Where the injection `filters` the resistance, its mean follows.
-    pub fn update(&self, state: &mut ObserverState, rotor_freq: f32, filters: bool) {
-        let share = if filters { RESISTANCE_SMOOTHING } else { 1.0 };
-        state.mean_resistance += share * (state.resistance - state.mean_resistance);
+    /// carrier period.
+    pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
         state.gain = Dq { d: gain * a, q: gain * w };
@@ -309,8 +302,14 @@ impl Observer {
         }
     }
 
+    /// Adds a correction of the filter to the relative resistance, whose deviation from the measured one decays.
+    pub fn correct_resistance(&self, state: &mut ObserverState, correction: f32) {
+        let drift = state.resistance - state.measured_resistance;
+        self.turn_resistance(state, correction - state.resistance_decay * drift);
+    }
+
     /// Adds a change to the relative resistance.
-    pub fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
+    fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
         let range = (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0);
         state.resistance = within(state.resistance + change, range);
     }
@@ -363,7 +362,7 @@ mod tests {
         let mut state = ObserverState::default();
         state.start(Some(&observer));
         state.current = Dq { d: 0.05, q: 0.0 };
-        observer.update(&mut state, 0.0, false);
+        observer.update(&mut state, 0.0);
         let change = 0.35;
         for n in 0..10 {
             let (before, after) = (change * n as f32, change * (n + 1) as f32);
@@ -396,7 +395,7 @@ mod tests {
         };
         let frame = |n: i32| (angle(n) - crate::Angle::from_radians(e)).unit_vector();
         state.last = current.to_alpha_beta(frame(0));
-        observer.update(&mut state, rotor * PERIOD_S / TAU, false);
+        observer.update(&mut state, rotor * PERIOD_S / TAU);
         for n in 0..2 {
             let [before, after] = [n, n + 1].map(|n| current.to_alpha_beta(frame(n)));
             let [flux, next] =
