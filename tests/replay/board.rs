@@ -9,7 +9,8 @@
 //! * a start without an encoder looks for a turning shaft with half of the current at once;
 //! * duties took the place of timer counts in the modulator: a count differs here and there by one;
 //! * tasks of the carrier period moved to other samples, so that no sample has much more to do than another;
-//! * a filter took the place of the tracking loop, and a command is taken behind one sample of ten.
+//! * a filter took the place of the tracking loop, and a command is taken behind one sample of ten;
+//! * the voltage limit moved to another sample, and the resistance returns to the measured one.
 
 use std::fs;
 
@@ -88,17 +89,17 @@ fn torque_steps_without_a_sensor() {
         hashes,
         [
             0x980b_ced4_f848_e067,
-            0x3b2a_6745_d947_2990,
-            0x85c4_c690_851b_74da,
-            0xb520_c0f4_e5f3_954d,
-            0x871c_73ae_a045_1343,
-            0x4c32_d4b3_cbc0_4590,
-            0x3919_d77f_e9e9_d7f5,
-            0x2397_9ce3_6391_503f,
-            0x54a6_d925_1765_1fe9,
-            0x469b_aa2d_ea3c_ce3a,
-            0x0d93_1e03_e073_d098,
-            0x8303_2b62_6102_ddb7
+            0x3214_849f_80fb_0f33,
+            0xe626_6b98_97f6_72a5,
+            0xaea4_92b6_caf2_aaa1,
+            0x8986_fc93_2333_759d,
+            0x6523_b277_5e00_9e0c,
+            0x9e66_e436_b73d_56f5,
+            0x304f_5c21_dea5_7932,
+            0x6c67_8f41_cb4b_a3be,
+            0x4e4f_676b_fee1_7615,
+            0x7c15_9b88_1aff_ed78,
+            0x1e2f_0a35_2f0e_56ef
         ],
         "{hashes:#018x?}"
     );
@@ -112,10 +113,10 @@ fn position_steps_with_the_encoder() {
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0x89d9_ee8b_458b_8479,
-            0xe2b9_98a6_effc_1210,
-            0x0968_bb6d_6164_d870,
-            0xd0c8_5c63_5b8d_b8e4
+            0x6a73_ee64_474e_c22b,
+            0x71be_f114_e87a_8563,
+            0xe65b_d80d_cb4c_1a31,
+            0xaead_2632_cdbb_233d
         ],
         "{hashes:#018x?}"
     );
