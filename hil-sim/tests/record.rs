@@ -55,6 +55,19 @@ fn the_angle_does_not_creep_at_zero_stator_frequency() {
     assert!(drift < 0.5, "{drift}");
 }
 
+/// A slow reversal at the torque limit: from 150 rpm on `i_q` and `g w_r i_d` nearly cancel, and the voltage shows next to nothing of the stator
+/// resistance for half a minute, while the slip of iron errs. Where the resistance did not return to the measured one it went to its
+/// limit, 40 % off, and fault 41 stopped all three.
+#[test]
+fn a_slow_reversal_at_the_torque_limit_is_borne() {
+    for plant in ["plant=r", "plant=g7", "plant=m4b"] {
+        let high = ["flux_level=high", "sequence.flux=high", "record.reversal_s=60"];
+        let metrics = record(&[&[plant], high.as_slice()].concat());
+        assert_eq!(metrics.get("reversal_lost"), Some(0.0), "{plant}");
+        assert!(metrics.get("reversal_error_mean_deg").is_some_and(|mean| mean < 2.0), "{plant}");
+    }
+}
+
 /// With an encoder and a rotor resistance believed twice too large the drive imposes twice the slip, 251 rpm with the 3.43 A that
 /// 3.5 A leave beside 0.7 A, and the flux stands at atan(i_q/i_d) - atan(2 i_q/i_d) = -5.72 degrees from where the drive believes it, held or not.
 #[test]

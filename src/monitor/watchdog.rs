@@ -57,7 +57,7 @@ impl FeedRule {
             return Verdict::Refuse { periods: came, cycles: elapsed };
         }
         if is_whole {
-            *self = Self::new(cycles, periods);
+            self.restart(cycles, periods);
         }
         let comes = is_whole || off <= u64::from(PERIOD_CYCLES);
         if comes { Verdict::Feed } else { Verdict::Wait }

@@ -349,6 +349,28 @@ mod tests {
         assert!(observer.age < (VOLTAGES - 2) as f32, "{}", observer.age);
     }
 
+    /// A deviation from the measured resistance decays; one from that of the run before does not.
+    #[test]
+    fn the_resistance_returns_to_the_measured_one() {
+        let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
+        let observer = Observer::new(&Motor::default(), &leakage, 1.4, 0.0);
+        let after = |measured: Option<f32>, seconds: f32| {
+            let mut state = ObserverState { resistance: 0.2, ..ObserverState::default() };
+            state.start(Some(&observer));
+            if let Some(measured) = measured {
+                state.take_resistance(measured);
+            }
+            observer.correct_resistance(&mut state, 0.1);
+            for _ in 0..(600.0 * seconds) as usize {
+                observer.correct_resistance(&mut state, 0.0);
+            }
+            state.resistance
+        };
+        assert!((after(None, 60.0) - 0.3).abs() < 1e-3);
+        assert!((after(Some(-0.1), 0.0) - 0.0).abs() < 1e-3);
+        assert!((after(Some(-0.1), RESISTANCE_S) - (0.1 / 2.718 - 0.1)).abs() < 1e-3);
+    }
+
     /// A current that was near zero at the last update and grows to 3.5 A before the next: its saliency is wrong by no more than that of
     /// the nominal current, and the flux is seen to stand. (With `b/|i|` of the last update half of the leakage's voltage is seen as
     /// flux at 1 A already.)
