@@ -16,14 +16,14 @@ fn get(metrics: &Metrics, name: &str) -> f64 {
 }
 
 /// The tracking loop before the filter had 1.86° rms and 10.1° at most on this motor, in 480 runs, with default tables and 1.88° and
-/// 10.6° with learned ones. Forty-eight runs of the filter have 1.35° and 7.3°, 1.41° and 8.4°; the largest error depends on the profiles.
+/// 10.6° with learned ones. Forty-eight runs of the filter have 1.14° and 7.5°, 1.16° and 6.9°; the largest error depends on the profiles.
 #[test]
 fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     for learn in ["no", "yes"] {
         let (metrics, faults) = battery(&[&format!("prepare.learn={learn}"), "runs=48"]);
         let rms = get(&metrics, "angle_error_rms_deg");
-        assert!((rms - 1.38).abs() < 0.12, "{rms}");
-        assert!((3.5..5.0).contains(&get(&metrics, "angle_error_p99_deg")));
+        assert!((rms - 1.15).abs() < 0.12, "{rms}");
+        assert!((3.0..4.2).contains(&get(&metrics, "angle_error_p99_deg")));
         assert!(get(&metrics, "angle_error_max_deg") < 10.0);
         // Torque of sound runs: angle errors of 2° rms cost little at the mean.
         assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
@@ -37,6 +37,17 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
         }
         assert_eq!((get(&metrics, "runs"), faults), (48.0, 0));
     }
+}
+
+/// At a torque current of three times the direct one an angle error changes the flux, and with that the speed that the voltage shows. Near the
+/// hand-over that oscillated until the angle was lost, in four of these runs.
+#[test]
+fn a_torque_current_of_three_times_the_direct_one_is_held_up_to_600_rpm() {
+    let set = ["load.speed_rpm=600", "runs=70"].map(str::to_owned);
+    let config = Config::load(None, None, &set).expect("allowed settings");
+    let metrics = experiments::run("monte-carlo", &config, 19322).expect("statistics").metrics;
+    assert_eq!(get(&metrics, "lost_runs"), 0.0, "{metrics:?}");
+    assert!(get(&metrics, "angle_error_rms_deg") < 1.1, "{metrics:?}");
 }
 
 /// Without saliency there is nothing to track: each start is refused by fault 25, and there is no error to show.
@@ -54,7 +65,7 @@ fn a_motor_without_saliency_is_refused() {
 fn a_drive_that_does_not_watch_is_wrong_for_long() {
     let unwatched = ["saliency.a_psi=0", "injection.check=no", "injection.monitor=no", "runs=12"];
     let (metrics, _) = battery(&unwatched);
-    assert!(get(&metrics, "lost_runs") >= 4.0 && get(&metrics, "wrong_runs") >= 6.0, "{metrics:?}");
+    assert!(get(&metrics, "lost_runs") >= 4.0 && get(&metrics, "wrong_runs") >= 4.0, "{metrics:?}");
     assert!(get(&metrics, "wrong_longest_s") > 1.0, "{metrics:?}");
 }
 

@@ -10,7 +10,7 @@
 //! * duties took the place of timer counts in the modulator: a count differs here and there by one;
 //! * tasks of the carrier period moved to other samples, so that no sample has much more to do than another;
 //! * a filter took the place of the tracking loop, and a command is taken behind one sample of ten;
-//! * the voltage limit moved to another sample, and the resistance returns to the measured one.
+//! * the voltage limit moved to another sample, the resistance returns to the measured one, and an angle error changes the flux.
 
 use std::fs;
 
@@ -90,16 +90,16 @@ fn torque_steps_without_a_sensor() {
         [
             0x980b_ced4_f848_e067,
             0x3214_849f_80fb_0f33,
-            0xe626_6b98_97f6_72a5,
-            0xaea4_92b6_caf2_aaa1,
-            0x8986_fc93_2333_759d,
-            0x6523_b277_5e00_9e0c,
-            0x9e66_e436_b73d_56f5,
-            0x304f_5c21_dea5_7932,
-            0x6c67_8f41_cb4b_a3be,
-            0x4e4f_676b_fee1_7615,
-            0x7c15_9b88_1aff_ed78,
-            0x1e2f_0a35_2f0e_56ef
+            0x3698_733b_d58e_f3e8,
+            0x28bc_56da_32f3_b134,
+            0xa972_1907_1473_dd4b,
+            0x2293_0a2b_ac74_b8bc,
+            0x9072_e610_7997_39e5,
+            0xbbb1_9b43_9740_fff0,
+            0x5af3_4e54_f5a6_9dbc,
+            0x7a44_4a20_92b7_7bc2,
+            0x0c89_3c09_362d_331a,
+            0x3756_3554_ba6b_4292
         ],
         "{hashes:#018x?}"
     );

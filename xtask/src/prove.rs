@@ -46,7 +46,7 @@ const PROOFS: [Proof; 7] = [
             let speed = format!("load.speed_rpm={}", [150, 300, 600][shard as usize]);
             simulation(&format!("monte-carlo --seed 19322 --set runs=1000 --set {speed}"))
         },
-        bounds: &[("lost_runs", 0.0, 0.0), ("angle_error_rms_deg", 1.6, 1.8)],
+        bounds: &[("lost_runs", 0.0, 0.0), ("angle_error_rms_deg", 0.8, 1.2)],
     },
     Proof {
         name: "campaign",

@@ -109,7 +109,7 @@ impl Coefficients {
                 self.watch_travel(s, step)
             }
             6 => {
-                self.estimator.predict_slip(&mut s.estimator);
+                self.estimator.predict_flux(&mut s.estimator);
                 self.update_observer(s, step);
                 s.prediction.latch_voltage();
                 self.check_both_channels(s, step)

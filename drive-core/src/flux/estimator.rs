@@ -204,9 +204,9 @@ impl Estimator {
     }
 
     /// Begins a carrier period of the filter, see [`AngleFilter`].
-    pub fn predict_slip(&self, state: &mut EstimatorState) {
+    pub fn predict_flux(&self, state: &mut EstimatorState) {
         if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
-            filter.predict_slip(&mut state.filter);
+            filter.predict_flux(&mut state.filter, state.rotor_freq);
         }
     }
 

@@ -25,6 +25,8 @@ const SEEN_NOISE: f32 = 2.8;
 const LOAD_STEP: f32 = 0.16;
 /// Share of a step of the torque current by which its reference of the saliency lags, in angle of the stator current.
 const REFERENCE_LAG: f32 = 0.14;
+/// Share of the change of the flux by an angle error that the filter reckons with, see `flux_by_angle`.
+const FLUX_SHARE: f32 = 0.5;
 /// Error of the leakage inductance.
 const LEAKAGE_ERROR: f32 = 0.1;
 
@@ -109,7 +111,7 @@ impl Settings {
             angle_per_a: REFERENCE_LAG / i_d,
             speed: square(SEEN_NOISE * noise_a * per_a),
             speed_per_a: LEAKAGE_ERROR * per_a,
-            slip_by_angle: 1.0 / square(m.tau_r() * i_d),
+            flux_by_angle: FLUX_SHARE / (m.tau_r() * i_d),
         }
     }
 }
