@@ -368,7 +368,9 @@ mod tests {
         };
         assert!((after(None, 60.0) - 0.3).abs() < 1e-3);
         assert!((after(Some(-0.1), 0.0) - 0.0).abs() < 1e-3);
-        assert!((after(Some(-0.1), RESISTANCE_S) - (0.1 / 2.718 - 0.1)).abs() < 1e-3);
+        assert!(
+            (after(Some(-0.1), RESISTANCE_S) - (0.1 / core::f32::consts::E - 0.1)).abs() < 1e-3
+        );
     }
 
     /// A current that was near zero at the last update and grows to 3.5 A before the next: its saliency is wrong by no more than that of
