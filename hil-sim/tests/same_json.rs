@@ -60,19 +60,14 @@ fn names(program: &Path) -> Vec<String> {
 fn difference(at: &str, now: &Value, then: &Value) -> Option<String> {
     match (now, then) {
         (Value::Object(now), Value::Object(then)) => {
-            let keys = now.keys().chain(then.keys());
-            keys.into_iter().find_map(|key| {
-                let of = |map: &serde_json::Map<String, Value>| {
-                    map.get(key).cloned().unwrap_or_default()
-                };
-                difference(&format!("{at}.{key}"), &of(now), &of(then))
+            now.keys().chain(then.keys()).find_map(|key| {
+                let [now, then] = [now, then].map(|map| map.get(key).unwrap_or(&Value::Null));
+                difference(&format!("{at}.{key}"), now, then)
             })
         }
         (Value::Array(now), Value::Array(then)) if now.len() == then.len() => {
-            let pairs = now.iter().zip(then).enumerate();
-            pairs
-                .into_iter()
-                .find_map(|(n, (now, then))| difference(&format!("{at}[{n}]"), now, then))
+            let mut pairs = now.iter().zip(then).enumerate();
+            pairs.find_map(|(n, (now, then))| difference(&format!("{at}[{n}]"), now, then))
         }
         _ if now == then => None,
         _ => {

@@ -13,8 +13,9 @@
 //! `tau_r` the flux grows by its share `d = i_q e/i_d` above the believed one: the voltage turns it by `d` faster than is seen, the slip is
 //! smaller by `d`, and `b` grows by `w d`. So `f = k w i_q/(tau_r i_d)`. The flux forgets within `tau_r`, `b` within 2 s: hence `k = 0.5`.
 //! (Without `f` angle and flux oscillate at 1 Hz where the torque current is three times the direct one; with `w` taken for the negative
-//! slip, as it is at zero stator frequency, 52 of 1000 runs at up to 600 rpm were lost, with `k = 0.2` 20 of 300. With `k = 1` iron errs by a quarter
-//! more with wrong parameters.) The carrier errs while the torque current moves (its reference lags), and so does the
+//! slip, as it is at zero stator frequency, 52 of 1000 runs at up to 600 rpm were lost, with `k = 0.2`
+//! 20 of 300. With `k = 1` iron errs by a quarter more with wrong parameters.) `r` returns to the resistance that the start measured
+//! within `tau_s`, 5 s, and does not where none was measured. The carrier errs while the torque current moves (its reference lags), and so does the
 //! observer (its leakage errs): both variances grow with the largest change of the current in a carrier period. A torque step is
 //! then known by inertia and slip, a load step by the voltage. `r` is learned from torque steps: `h r` jumps, `w` cannot.
 //!
@@ -33,12 +34,13 @@ use core::f32::consts::TAU;
 use super::observer::SeenSpeed;
 use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
+use crate::carrier::injection::CARRIER_S;
 use crate::math::limited;
 
 /// Number of states.
 const N: usize = 5;
 /// A carrier period, s.
-const T: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
+const T: f32 = CARRIER_S;
 /// Clamp of the angle error that the saliency shows, rad.
 const LARGEST_ERROR: f32 = 0.6;
 /// Variance of the speed that comes in a second, (rad/s)^2: slip by another rotor resistance.

@@ -27,7 +27,7 @@
 
 use core::f32::consts::TAU;
 
-use crate::carrier::CARRIER_SAMPLES;
+use crate::carrier::injection::CARRIER_S;
 use crate::learned::Learned;
 use crate::math::{limited, within};
 use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
@@ -50,7 +50,7 @@ const SEEN_AGE: f32 = 5.5;
 /// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
 /// well, with 7 s it comes to 19 %.
 const RESISTANCE_S: f32 = 5.0;
-const RESISTANCE_DECAY: f32 = CARRIER_SAMPLES as f32 * PERIOD_S / RESISTANCE_S;
+const RESISTANCE_DECAY: f32 = CARRIER_S / RESISTANCE_S;
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
 /// (The leakage is not tracked in this way: with both, the error of one hides in the other.)
 const FROM_INJECTION: f32 = 0.02;
