@@ -9,6 +9,7 @@ pub mod board;
 pub mod boards;
 pub mod commissioning;
 pub mod console;
+pub mod desk;
 mod hash;
 pub mod link;
 pub mod modbus;

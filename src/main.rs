@@ -44,12 +44,20 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)] // its stack comes in the place of that of the start
 fn run(board: task::bring_up::Board) -> ! {
-    let task::bring_up::Board { console, mut port, mut bus, supervisor } = board;
+    let task::bring_up::Board { desk, console, mut port, bus, mut line, supervisor } = board;
     console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        console.poll(&mut port, supervisor, now_ms);
-        console.serve(&mut bus, supervisor, now_ms);
+        desk.follow(supervisor);
+        console.poll(&mut port, desk, supervisor, now_ms);
+        bus.serve(&mut line, desk, supervisor, now_ms);
+        if desk.is_busy() && console.has_said_all() {
+            line.set_busy(Some(modbus::bus::own(desk.settings().in_force().bus.address)));
+            desk.go_on(supervisor, now_ms);
+            line.set_busy(None);
+        } else {
+            desk.watch_silence(supervisor, now_ms);
+        }
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

@@ -16,10 +16,13 @@ use super::*;
 use crate::boards;
 use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
+use crate::settings::FirmwareSettings;
 use crate::settings::keys;
-use doubles::{FakeDrive, FakePort, found};
+/// For the tests of the desk.
+pub(crate) use doubles::FakeDrive;
+use doubles::{FakePort, found};
 use drive_core::io::PERIOD_S;
-use drive_core::learned::Verdict;
+use drive_core::learned::{Learned, Verdict};
 use drive_core::{
     Command, Compare, Drive, Fault, FrontEndState, Hardware, Measured, Mode, Sample, State, Stop,
 };
@@ -32,6 +35,7 @@ fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Co
 }
 
 struct Talk {
+    desk: Desk,
     console: Console,
     drive: FakeDrive,
     port: FakePort,
@@ -50,7 +54,8 @@ impl Talk {
 
     fn with(settings: FirmwareSettings) -> Self {
         Self {
-            console: Console::new(settings),
+            desk: Desk::new(settings),
+            console: Console::new(),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
             now_ms: 0,
@@ -58,16 +63,29 @@ impl Talk {
     }
 
     fn poll(&mut self) {
-        self.console.poll(&mut self.port, &mut self.drive, self.now_ms);
+        self.desk.follow(&mut self.drive);
+        self.console.poll(&mut self.port, &mut self.desk, &mut self.drive, self.now_ms);
+        self.end_pass();
+    }
+
+    /// The rest of a pass of the main loop.
+    fn end_pass(&mut self) {
+        if self.desk.is_busy() && self.console.has_said_all() {
+            self.desk.go_on(&mut self.drive, self.now_ms);
+        } else {
+            self.desk.watch_silence(&mut self.drive, self.now_ms);
+        }
     }
 
     /// Sends bytes and gives the replies, until the console has nothing more to say.
     fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
         self.port.sent.extend(bytes.as_ref());
-        let mut said = usize::MAX;
-        while !self.port.sent.is_empty() || self.port.received.len() != said {
-            said = self.port.received.len();
+        // What happens at the end of a pass is told in the next.
+        let mut silent = 0;
+        while !self.port.sent.is_empty() || silent < 2 {
+            let said = self.port.received.len();
             self.poll();
+            silent = if self.port.received.len() == said { silent + 1 } else { 0 };
         }
         let text = std::mem::take(&mut self.port.received);
         text.split_terminator("\r\n").map(str::to_owned).collect()
@@ -174,7 +192,7 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     settings.drive.scales = drive_settings::Scales::default();
     settings.confirm_board();
     let mut talk = Talk::new();
-    talk.console = Console::new(settings);
+    talk.desk = Desk::new(settings);
     talk.drive.drive = Drive::new(settings.build().unwrap());
     let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
@@ -248,7 +266,7 @@ fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved()
     let mut talk = Talk::new();
     let mut settings = FirmwareSettings::of_the_board();
     settings.command.wiring_checked = true;
-    talk.console = Console::new(settings);
+    talk.desk = Desk::new(settings);
     for mode in ["", " speed", " position", " learning"] {
         let answer = talk.ask(&format!("start{mode}"));
         assert!(answer.starts_with("error: ") && answer.contains("`confirm board`"), "{answer}");

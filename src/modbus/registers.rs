@@ -77,6 +77,8 @@ pub struct View<'a> {
     pub faults: &'a FaultLog,
     /// Seconds since the start.
     pub seconds: u32,
+    /// Number of the last refusal of the bus, 0 for none.
+    pub refusal: u16,
 }
 
 /// The way to a value.
@@ -131,7 +133,7 @@ const fn written(row: Row) -> Row {
 }
 
 /// The registers but for settings and faults, by number.
-pub static ROWS: [Row; 29] = [
+pub static ROWS: [Row; 30] = [
     number(0x0100, 100, "Hz", |v| v.largest_hz(), "largest frequency that is asked for, as 0x211B"),
     written(word(
         COMMAND,
@@ -195,6 +197,11 @@ pub static ROWS: [Row; 29] = [
     double(0x5007, "s", |v| v.seconds, "time since the start"),
     word(0x5009, |v| v.settings.bus.commander.place() as u16, "who commands: 0 console, 1 bus"),
     word(0x500a, |v| v.settings.learned.is_some().into(), "1 if learned values are in force"),
+    word(
+        0x500b,
+        |v| v.refusal,
+        "reason of the last refused write since the start, see below; 0 for none",
+    ),
     word(0x603f, |v| v.error_code(), "fault as in CiA 402: 0xFF00 plus its number, 0 for none"),
     written(word(CONTROL, |v| v.control_word(), "control word of CiA 402, see below")),
     word(0x6041, |v| v.status_word(), "status word of CiA 402, see below"),

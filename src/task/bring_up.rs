@@ -23,10 +23,12 @@ use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
 use induction_drive::console::Console;
+use induction_drive::desk::Desk;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
+use induction_drive::modbus::bus::Bus;
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
 use induction_drive::settings::FirmwareSettings;
@@ -36,12 +38,16 @@ use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
 pub struct Board<'a> {
-    /// The console, with the saved settings, or the defaults.
+    /// The desk, with the saved settings, or the defaults.
+    pub desk: &'static mut Desk,
+    /// The console.
     pub console: &'static mut Console,
     /// The serial port of the console.
     pub port: Port,
-    /// The port of the field bus, if the board has one.
-    pub bus: Option<rs485::Port>,
+    /// The field bus.
+    pub bus: &'static mut Bus,
+    /// Its port, if the board has one.
+    pub line: Option<rs485::Port>,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -96,12 +102,14 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
     let pins = (a.pa2, a.pa3);
     let port = Port::new(chip.LPUART1, pins, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
-    let bus = SELECTED
+    let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     // Before the control runs: these are made with the interrupts masked.
-    let console = singleton!(: MaybeUninit<Console> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let desk = singleton!(: MaybeUninit<Desk> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let console = singleton!(: Console = Console::new()).ok_or(TWICE)?;
+    let bus = singleton!(: Bus = Bus::default()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
@@ -132,7 +140,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
     start.settings.boot_pin_counts = board::boot_pin_counts(options);
-    let console = make(console, || Console::new(start.settings));
+    let desk = make(desk, || Desk::new(start.settings));
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
@@ -142,7 +150,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let drive = &settings.drive;
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
-    Ok(Board { console, port, bus, supervisor })
+    Ok(Board { desk, console, port, bus, line, supervisor })
 }
 
 /// Makes a value in its place, with a stack that comes in the place of those of other functions.

@@ -4,6 +4,7 @@ use drive_core::AngleSource;
 use hil_sim::rig::Rig;
 
 use super::*;
+use crate::desk::news::News;
 
 /// Bytes a second of the wire.
 const BYTES_PER_S: f64 = 11_520.0;
@@ -131,11 +132,11 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
 #[test]
 fn every_fault_fits_a_line() {
     for fault in Fault::ALL {
-        let text = announce::News::Fault(*fault).to_string();
-        assert!(
-            text.len() + 2 < line::OUTPUT - line::LONGEST && text.ends_with("type 'clear'"),
-            "{text}"
-        );
+        let mut console = Console::new();
+        console.tell(News::Fault(*fault), &Desk::new(FirmwareSettings::of_the_board()));
+        let text = console.out.as_str();
+        let fits = text.len() < line::OUTPUT - line::LONGEST;
+        assert!(fits && text.ends_with("type 'clear'\r\n"), "{text}");
     }
 }
 

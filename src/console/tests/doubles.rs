@@ -12,7 +12,8 @@ use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
 use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
-use induction_drive::console::handle::{CommandError, DriveHandle, Port};
+use induction_drive::console::handle::{Firmware, Port};
+use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
@@ -113,9 +114,6 @@ impl DriveHandle for FakeDrive {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
     }
-    fn tracking(&self) -> Option<Report> {
-        self.tracking.as_ref().map(Tracking::report)
-    }
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -125,6 +123,20 @@ impl DriveHandle for FakeDrive {
         }
         self.saved = Some(*settings);
         Ok(())
+    }
+    fn reboot(&mut self) {
+        self.reboots += 1;
+    }
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        if let Some(found) = self.found.take() {
+            show(&found);
+        }
+    }
+}
+
+impl Firmware for FakeDrive {
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
     fn history(&self) -> &History {
         &self.history
@@ -154,14 +166,6 @@ impl DriveHandle for FakeDrive {
     }
     fn sampled(&mut self) -> Option<Record> {
         self.streamed.1.pop_front()
-    }
-    fn reboot(&mut self) {
-        self.reboots += 1;
-    }
-    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
-        if let Some(found) = self.found.take() {
-            show(&found);
-        }
     }
     fn set_log_level(&mut self, _: Level) {}
     fn stack(&self) -> (usize, usize) {

@@ -144,8 +144,7 @@ fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
     talk.ask("stream i_q_a 2000 alive 0.4");
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
     talk.port.sent.extend(b"apply\n\n\n");
-    // One poll takes the line, the next designs.
-    talk.poll();
+    // One pass takes the line and designs at its end.
     talk.poll();
     talk.now_ms += 3000;
     let answer = talk.say("");
