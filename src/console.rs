@@ -28,6 +28,7 @@ use crate::commissioning::News;
 use crate::desk::Desk;
 use crate::link::trace::Plan;
 use crate::settings::bus::Commander;
+use crate::settings::staging::Applied;
 use grammar::ParseError;
 use handle::{Firmware, Port};
 use line::{LineError, LineReader, OutputLine};
@@ -111,9 +112,12 @@ impl Console {
             self.line_ms = None;
         }
         if self.flushed(port)
-            && let Some(answer) = desk.take_done()
+            && let Some((applied, answer)) = desk.take_done()
         {
-            self.reply(answer, desk);
+            if applied != Applied::default() {
+                self.out.news(format_args!("applied{applied}"));
+            }
+            self.reply(&answer);
         }
         if self.flushed(port) {
             self.announce(desk, drive, now_ms);

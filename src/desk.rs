@@ -40,10 +40,8 @@ pub struct Desk {
     foreign: Option<&'static str>,
     /// A task that waits until its answer is on the way, and who has ordered it.
     task: Option<(Commander, Task)>,
-    /// How the console's last task has ended, until the console takes it.
-    done: Option<Answer>,
-    /// Remarks on the settings that a task of the console has put in force, until the console takes them.
-    applied: Option<Applied>,
+    /// How the console's last task has ended, until the console takes it; and remarks on the settings that it has put in force.
+    done: Option<(Applied, Answer)>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
     designs: u32,
     announcer: Announcer,
@@ -73,7 +71,6 @@ impl Desk {
             foreign: None,
             task: None,
             done: None,
-            applied: None,
             designs: 0,
             announcer: Announcer::new(),
             heard_ms: None,
@@ -109,14 +106,9 @@ impl Desk {
         self.designs
     }
 
-    /// How the console's last task has ended, once.
-    pub fn take_done(&mut self) -> Option<Answer> {
+    /// How the console's last task has ended, and remarks on the settings that it has put in force, once.
+    pub fn take_done(&mut self) -> Option<(Applied, Answer)> {
         self.done.take()
-    }
-
-    /// Remarks on the settings that the console's last order has put in force, once.
-    pub fn take_applied(&mut self) -> Option<Applied> {
-        self.applied.take()
     }
 
     /// The last refusal of the bus.
@@ -372,49 +364,45 @@ impl Desk {
             self.task = Some((from, task));
             return Ok(Reply::Designing);
         }
-        self.perform(from, task, drive)
+        self.perform(task, drive).1
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of the front ends
     pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        let answer = match self.task {
-            None => return,
-            Some((from, Task::Reboot(since))) => {
-                let since = since.unwrap_or(now_ms);
-                self.task = Some((from, Task::Reboot(Some(since))));
-                if now_ms.wrapping_sub(since) >= REBOOT_MS {
-                    self.task = None;
-                    drive.reboot();
-                }
-                return;
+        let Some((from, task)) = self.task.take() else { return };
+        if let Task::Reboot(since) = task {
+            let since = since.unwrap_or(now_ms);
+            self.task = Some((from, Task::Reboot(Some(since))));
+            if now_ms.wrapping_sub(since) >= REBOOT_MS {
+                self.task = None;
+                drive.reboot();
             }
-            Some((from, task)) => (from, self.perform(from, task, drive)),
-        };
-        self.task = None;
-        match answer {
-            (Commander::Console, answer) => self.done = Some(answer),
-            (Commander::Bus, Err(why)) => self.note_refusal(why),
-            (Commander::Bus, Ok(_)) => {}
+            return;
+        }
+        match (from, self.perform(task, drive)) {
+            (Commander::Console, done) => self.done = Some(done),
+            (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
+            (Commander::Bus, _) => {}
         }
     }
 
-    fn perform(&mut self, from: Commander, task: Task, drive: &mut impl DriveHandle) -> Answer {
+    /// Performs a task; remarks on the settings that it has put in force, and the answer.
+    fn perform(&mut self, task: Task, drive: &mut impl DriveHandle) -> (Applied, Answer) {
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
-        let applied = self.apply(drive)?;
-        if matches!(task, Task::Apply) {
-            return Ok(Reply::Applied(applied));
-        }
-        if from == Commander::Console && applied != Applied::default() {
-            self.applied = Some(applied);
-        }
-        match task {
+        let applied = match self.apply(drive) {
+            Ok(applied) => applied,
+            Err(why) => return (Applied::default(), Err(why)),
+        };
+        let answer = match task {
+            Task::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
             Task::Start(mode) => self.start(mode, drive),
             Task::Learn { again } => self.learn(again, drive),
             Task::Commission(first, last) => self.commission(first, last, drive),
-            Task::Apply | Task::Save | Task::Reboot(_) => self.save(Reply::Done, drive),
-        }
+            Task::Save | Task::Reboot(_) => self.save(Reply::Done, drive),
+        };
+        (applied, answer)
     }
 
     /// Saves the settings in force.

@@ -24,8 +24,7 @@ impl Console {
         let settings = desk.settings();
         match request {
             Request::Order(order) => {
-                let answer = desk.order(Commander::Console, order, drive);
-                self.reply(answer, desk);
+                self.reply(&desk.order(Commander::Console, order, drive));
             }
             Request::Help => self.begin(ListKind::Help),
             Request::Status => self.status(desk, drive),
@@ -77,14 +76,11 @@ impl Console {
     }
 
     /// Answers with the desk's answer.
-    pub(super) fn reply(&mut self, answer: Answer, desk: &mut Desk) {
-        if let Some(applied) = desk.take_applied() {
-            self.out.news(format_args!("applied{applied}"));
-        }
+    pub(super) fn reply(&mut self, answer: &Answer) {
         match answer {
             Ok(Reply::Designing) => self.out.news(format_args!("designing...")),
-            Ok(reply) => self.out.answer(format_args!("ok{}", remark(reply))),
-            Err(why) => self.error(&why),
+            Ok(reply) => self.out.answer(format_args!("ok{}", remark(*reply))),
+            Err(why) => self.error(why),
         }
     }
 
@@ -95,10 +91,7 @@ impl Console {
             return self.error(&why);
         }
         match self.restore.finish(check, both) {
-            Ok(learned) => {
-                let answer = desk.restore(learned, drive);
-                self.reply(answer, desk);
-            }
+            Ok(learned) => self.reply(&desk.restore(learned, drive)),
             Err(why) => self.error(&why),
         }
     }

@@ -72,29 +72,18 @@ impl Order {
         if from == Commander::Bus {
             return !matches!(self, Self::Stop(_));
         }
-        match self {
+        matches!(
+            self,
             Self::Start(_)
-            | Self::Learn { .. }
-            | Self::Commission(..)
-            | Self::Relock
-            | Self::Torque(_)
-            | Self::Speed(_)
-            | Self::Jog(_)
-            | Self::Position(_)
-            | Self::Home(_) => true,
-            Self::Accept
-            | Self::Stop(_)
-            | Self::Clear
-            | Self::Set(_)
-            | Self::Defaults
-            | Self::Apply
-            | Self::Revert
-            | Self::Save
-            | Self::Echo(_)
-            | Self::Reboot(_)
-            | Self::BoardIs(_)
-            | Self::Confirm => false,
-        }
+                | Self::Learn { .. }
+                | Self::Commission(..)
+                | Self::Relock
+                | Self::Torque(_)
+                | Self::Speed(_)
+                | Self::Jog(_)
+                | Self::Position(_)
+                | Self::Home(_)
+        )
     }
 }
 

@@ -38,7 +38,7 @@ enum Run {
     /// A start was taken; the controllers are being designed.
     Starting,
     /// The drive runs for the bus.
-    Run,
+    Running,
     /// The drive has stopped for another reason.
     Ended,
 }
@@ -96,9 +96,9 @@ impl Bus {
     fn follow_run(&mut self, desk: &mut Desk, drive: &mut impl DriveHandle) {
         let stopping = drive.status().is_some_and(|s| s.state.is_stopping());
         match self.run {
-            Run::Starting | Run::Run if drive.is_off() || stopping => self.run = Run::Ended,
-            Run::Starting | Run::Run => {
-                self.run = Run::Run;
+            Run::Starting | Run::Running if drive.is_off() || stopping => self.run = Run::Ended,
+            Run::Starting | Run::Running => {
+                self.run = Run::Running;
                 // The answer has been given; a refusal is announced.
                 let _ = self.send_reference(desk, drive);
             }
@@ -124,7 +124,7 @@ impl Bus {
 
     fn command(&self) -> u16 {
         let direction = if self.reverse { REVERSE } else { FORWARD };
-        if matches!(self.run, Run::Run | Run::Starting) { RUN | direction } else { STOP }
+        if matches!(self.run, Run::Running | Run::Starting) { RUN | direction } else { STOP }
     }
 }
 
@@ -185,7 +185,7 @@ impl<D: DriveHandle> Access<'_, D> {
         };
         match word & ACTION {
             RUN => self.run(),
-            _ if self.bus.run == Run::Run => self.send_reference(),
+            _ if self.bus.run == Run::Running => self.send_reference(),
             _ => Ok(()),
         }
     }
@@ -193,7 +193,7 @@ impl<D: DriveHandle> Access<'_, D> {
     fn run(&mut self) -> Result<(), Exception> {
         match self.bus.run {
             Run::Starting => Ok(()),
-            Run::Run => self.send_reference(),
+            Run::Running => self.send_reference(),
             Run::Ended => self.refuse(Refusal::Ended),
             Run::Stop => {
                 self.order(Order::Start(Mode::Speed))?;
@@ -222,7 +222,7 @@ impl<D: DriveHandle> Access<'_, D> {
     fn frequency(&mut self, word: u16) -> Result<(), Exception> {
         self.may_command()?;
         self.bus.frequency = word;
-        if self.bus.run == Run::Run { self.send_reference() } else { Ok(()) }
+        if self.bus.run == Run::Running { self.send_reference() } else { Ok(()) }
     }
 
     fn may_command(&mut self) -> Result<(), Exception> {

@@ -219,7 +219,7 @@ fn rows() -> String {
             _ => row.unit.to_owned(),
         };
         let kind = if matches!(row.shown, Shown::Double(_)) { "32 bits" } else { "16 bits" };
-        let access = if row.written { "read, write" } else { "read" };
+        let access = if row.is_written() { "read, write" } else { "read" };
         writeln!(text, "| `0x{:04X}` | {kind} | {unit} | {access} | {} |", row.at, row.help)
             .unwrap();
     }
