@@ -10,6 +10,7 @@ pub mod boards;
 pub mod commissioning;
 pub mod console;
 pub mod desk;
+pub mod front;
 mod hash;
 pub mod link;
 pub mod modbus;

@@ -14,13 +14,14 @@ mod wrong;
 use super::help::HELP;
 use super::*;
 use crate::boards;
+use crate::front::Front;
 use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;
 /// For the tests of the desk.
 pub(crate) use doubles::FakeDrive;
-use doubles::{FakePort, found};
+use doubles::{FakeBus, FakePort, found};
 use drive_core::io::PERIOD_S;
 use drive_core::learned::{Learned, Verdict};
 use drive_core::{
@@ -35,8 +36,7 @@ fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Co
 }
 
 struct Talk {
-    desk: Desk,
-    console: Console,
+    front: Front,
     drive: FakeDrive,
     port: FakePort,
     now_ms: u32,
@@ -54,8 +54,7 @@ impl Talk {
 
     fn with(settings: FirmwareSettings) -> Self {
         Self {
-            desk: Desk::new(settings),
-            console: Console::new(),
+            front: Front::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
             now_ms: 0,
@@ -63,18 +62,8 @@ impl Talk {
     }
 
     fn poll(&mut self) {
-        self.desk.follow(&mut self.drive);
-        self.console.poll(&mut self.port, &mut self.desk, &mut self.drive, self.now_ms);
-        self.end_pass();
-    }
-
-    /// The rest of a pass of the main loop.
-    fn end_pass(&mut self) {
-        if self.desk.is_busy() && self.console.has_said_all() {
-            self.desk.go_on(&mut self.drive, self.now_ms);
-        } else {
-            self.desk.watch_silence(&mut self.drive, self.now_ms);
-        }
+        let mut no_line = None::<FakeBus>;
+        self.front.pass(&mut self.port, &mut no_line, &mut self.drive, self.now_ms);
     }
 
     /// Sends bytes and gives the replies, until the console has nothing more to say.
@@ -103,7 +92,7 @@ impl Talk {
 #[test]
 fn says_at_the_start_who_it_is_and_what_ended_the_last_run() {
     let mut talk = Talk::new();
-    talk.console.greet(&talk.drive);
+    talk.front.console.greet(&talk.drive);
     assert_eq!(talk.say(""), ["* induction-drive version; last run: power-on"]);
 }
 
@@ -192,7 +181,7 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     settings.drive.scales = drive_settings::Scales::default();
     settings.confirm_board();
     let mut talk = Talk::new();
-    talk.desk = Desk::new(settings);
+    talk.front.desk = Desk::new(settings);
     talk.drive.drive = Drive::new(settings.build().unwrap());
     let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
@@ -266,7 +255,7 @@ fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved()
     let mut talk = Talk::new();
     let mut settings = FirmwareSettings::of_the_board();
     settings.command.wiring_checked = true;
-    talk.desk = Desk::new(settings);
+    talk.front.desk = Desk::new(settings);
     for mode in ["", " speed", " position", " learning"] {
         let answer = talk.ask(&format!("start{mode}"));
         assert!(answer.starts_with("error: ") && answer.contains("`confirm board`"), "{answer}");

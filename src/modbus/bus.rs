@@ -87,7 +87,7 @@ impl Bus {
         let Some(frame) = frame.filter(|_| !late) else { return };
         let mut access = Access { bus: self, desk, drive };
         // A master counts as alive by its writes: a panel that only reads does not stand in for it.
-        if slave::answer(&frame, own(settings.address), &mut access, |answer| port.send(answer)) {
+        if slave::answer(&frame, settings.own(), &mut access, |answer| port.send(answer)) {
             desk.note_activity(Commander::Bus, now_ms);
         }
     }
@@ -126,11 +126,6 @@ impl Bus {
         let direction = if self.reverse { REVERSE } else { FORWARD };
         if matches!(self.run, Run::Running | Run::Starting) { RUN | direction } else { STOP }
     }
-}
-
-/// The address of the drive; the setting is 1 to 247.
-pub const fn own(address: u32) -> u8 {
-    address as u8
 }
 
 /// A refusal is a failure of the device, except of a value.

@@ -22,13 +22,11 @@ use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
-use induction_drive::console::Console;
-use induction_drive::desk::Desk;
+use induction_drive::front::Front;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
-use induction_drive::modbus::bus::Bus;
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
 use induction_drive::settings::FirmwareSettings;
@@ -38,15 +36,11 @@ use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
 pub struct Board<'a> {
-    /// The desk, with the saved settings, or the defaults.
-    pub desk: &'static mut Desk,
-    /// The console.
-    pub console: &'static mut Console,
+    /// Desk, console and field bus, with the saved settings, or the defaults.
+    pub front: &'static mut Front,
     /// The serial port of the console.
     pub port: Port,
-    /// The field bus.
-    pub bus: &'static mut Bus,
-    /// Its port, if the board has one.
+    /// The port of the field bus, if the board has one.
     pub line: Option<rs485::Port>,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
@@ -107,9 +101,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     // Before the control runs: these are made with the interrupts masked.
-    let desk = singleton!(: MaybeUninit<Desk> = MaybeUninit::uninit()).ok_or(TWICE)?;
-    let console = singleton!(: Console = Console::new()).ok_or(TWICE)?;
-    let bus = singleton!(: Bus = Bus::default()).ok_or(TWICE)?;
+    let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
@@ -140,7 +132,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
     start.settings.boot_pin_counts = board::boot_pin_counts(options);
-    let desk = make(desk, || Desk::new(start.settings));
+    let front = make(front, || Front::new(start.settings));
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
@@ -150,7 +142,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let drive = &settings.drive;
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
-    Ok(Board { desk, console, port, bus, line, supervisor })
+    Ok(Board { front, port, line, supervisor })
 }
 
 /// Makes a value in its place, with a stack that comes in the place of those of other functions.

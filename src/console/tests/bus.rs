@@ -1,37 +1,12 @@
 //! The bus beside the console.
 
-use std::collections::VecDeque;
-
 use super::*;
-use crate::modbus::bus::Bus;
-use crate::modbus::{self, Frame};
+use crate::modbus::Frame;
 use crate::settings::bus::{Baud, Format};
-
-/// The port of the bus.
-#[derive(Default)]
-struct FakeBus {
-    asked: VecDeque<Frame>,
-    answers: VecDeque<Frame>,
-    line: Option<(Baud, Format)>,
-}
-
-impl modbus::Port for FakeBus {
-    fn set_line(&mut self, baud: Baud, format: Format) {
-        self.line = Some((baud, format));
-    }
-    fn receive(&mut self) -> Option<Frame> {
-        self.asked.pop_front()
-    }
-    fn send(&mut self, frame: &Frame) {
-        self.answers.push_back(frame.clone());
-    }
-    fn set_busy(&mut self, _: Option<u8>) {}
-}
 
 /// A console with a bus; the bus commands if `lines` say so.
 struct Both {
     talk: Talk,
-    front: Bus,
     bus: FakeBus,
 }
 
@@ -40,7 +15,7 @@ impl Both {
         let mut talk = Talk::new();
         talk.say(lines);
         talk.drive.commands.clear();
-        Self { talk, front: Bus::default(), bus: FakeBus::default() }
+        Self { talk, bus: FakeBus::default() }
     }
 
     fn by_bus() -> Self {
@@ -48,8 +23,8 @@ impl Both {
     }
 
     fn serve(&mut self) {
-        let Talk { desk, drive, now_ms, .. } = &mut self.talk;
-        self.front.serve(&mut self.bus, desk, drive, *now_ms);
+        let Talk { front, drive, now_ms, .. } = &mut self.talk;
+        front.bus.serve(&mut self.bus, &mut front.desk, drive, *now_ms);
     }
 
     /// The answer to a request: without address and checksum.

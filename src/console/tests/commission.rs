@@ -91,7 +91,7 @@ fn told(talk: &mut Talk) -> Vec<String> {
 #[test]
 fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     let mut talk = Talk::new();
-    let before = *talk.desk.settings().in_force();
+    let before = *talk.front.desk.settings().in_force();
     assert_eq!(talk.ask("accept"), "error: nothing new was found: `commission` first");
     assert_eq!(talk.drive.saved, None);
     talk.drive.session = found_on_a_motor(&before.drive);
@@ -100,7 +100,7 @@ fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     let answers = talk.say("accept\n");
     assert_eq!(answers.last().unwrap(), "ok", "{answers:?}");
     let saved = talk.drive.saved.expect("not saved");
-    assert_eq!(&saved, talk.desk.settings().in_force());
+    assert_eq!(&saved, talk.front.desk.settings().in_force());
     assert!((saved.drive.motor.r_s / 6.0 - 1.0).abs() < 0.01, "{}", saved.drive.motor.r_s);
     assert_eq!(saved.drive.motor.inertia, 0.02);
     assert_eq!(saved.drive.nameplate, before.drive.nameplate);

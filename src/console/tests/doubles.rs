@@ -17,8 +17,10 @@ use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
+use induction_drive::modbus;
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::bus::{Baud, Format};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
 
@@ -252,4 +254,28 @@ impl Port for FakePort {
         }
         !self.sending
     }
+}
+
+/// The port of the field bus.
+#[derive(Default)]
+pub struct FakeBus {
+    /// Requests on their way to the drive.
+    pub asked: VecDeque<modbus::Frame>,
+    /// Answers of the drive.
+    pub answers: VecDeque<modbus::Frame>,
+    /// Rate and format that were set.
+    pub line: Option<(Baud, Format)>,
+}
+
+impl modbus::Port for FakeBus {
+    fn set_line(&mut self, baud: Baud, format: Format) {
+        self.line = Some((baud, format));
+    }
+    fn receive(&mut self) -> Option<modbus::Frame> {
+        self.asked.pop_front()
+    }
+    fn send(&mut self, frame: &modbus::Frame) {
+        self.answers.push_back(frame.clone());
+    }
+    fn set_busy(&mut self, _: Option<u8>) {}
 }

@@ -88,7 +88,7 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     // The slots have turned: the difference to the first.
     let told = ends_with(&mut talk, result(-0.004, asymmetry(-0.001, 0.0, 0.006), 0.006));
     assert_eq!(told, "* learned: slope -0.0700 /rad, torque current up to 2.75 A; `save` keeps it");
-    let both = talk.desk.settings().in_force().learned.unwrap();
+    let both = talk.front.desk.settings().in_force().learned.unwrap();
     assert!((both.gain_mismatch.value - 0.008).abs() < 1e-6, "{both:?}");
     assert!(both.asymmetry.plus(&asymmetry(0.0015, 0.003, -0.001), -1.0).size() < 1e-6, "{both:?}");
     assert_eq!(both.positions, 2);
@@ -104,7 +104,7 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     assert_eq!(*configured(&talk), with(None));
     let third = result(0.002, Asymmetry::default(), 0.0);
     assert!(ends_with(&mut talk, third).ends_with("2.75 A; `save` keeps it"));
-    assert_eq!(talk.desk.settings().in_force().learned, Some(third));
+    assert_eq!(talk.front.desk.settings().in_force().learned, Some(third));
 }
 
 /// A learning that finds nothing leaves what was learned before in force.
@@ -129,7 +129,7 @@ fn after_a_refused_learning_the_result_before_holds() {
                 talk.say("clear\n");
             }
         }
-        assert_eq!(talk.desk.settings().in_force().learned, Some(found()));
+        assert_eq!(talk.front.desk.settings().in_force().learned, Some(found()));
         assert_eq!(talk.say("start\n").last().unwrap(), "ok", "{end}");
         assert_eq!(*configured(&talk), with(Some(found())), "{end}");
     }
