@@ -96,15 +96,18 @@ pub fn answer(
     writes
 }
 
-/// The answer of a slave with this address that is busy, exception 6, if the frame is whole and for it alone.
+/// The answer of a slave with this address that is busy, exception 6, if the frame is whole and for it alone. Without a panic, for an
+/// interrupt.
 pub fn busy(frame: &[u8], own: u8) -> Option<Frame> {
-    let (slave, pdu) = whole(frame)?;
-    if slave != own || pdu[0] > LAST_FUNCTION {
+    let (body, sum) = frame.split_last_chunk::<2>()?;
+    let [slave, function, ..] = *body else { return None };
+    if slave != own || function > LAST_FUNCTION || *sum != rtu::crc16(body).to_be_bytes() {
         return None;
     }
-    let mut answer =
-        Frame::from_slice(&[own, pdu[0] | 0x80, Exception::ServerDeviceBusy as u8]).ok()?;
-    answer.extend(rtu::crc16(&answer).to_be_bytes());
+    let mut answer = Frame::new();
+    let body = [own, function | 0x80, Exception::ServerDeviceBusy as u8];
+    answer.extend_from_slice(&body).ok()?;
+    answer.extend_from_slice(&rtu::crc16(&body).to_be_bytes()).ok()?;
     Some(answer)
 }
 

@@ -69,6 +69,24 @@ fn ask(frame: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
     Some(bytes.to_vec())
 }
 
+/// Exception 6 to a whole request for this slave alone; nothing to a damaged one, to others, to all, and to an exception.
+#[test]
+fn a_busy_slave_answers_whole_requests_for_it_alone() {
+    let busy = |frame: &[u8]| slave::busy(frame, 17).map(|answer| answer.to_vec());
+    let read = framed(&[17, 3, 0x20, 0x01, 0, 2]);
+    assert_eq!(busy(&read), Some(framed(&[17, 0x83, 6])));
+    assert_eq!(busy(&framed(&[17, 16, 0x20, 1, 0, 1, 2, 0, 9])), Some(framed(&[17, 0x90, 6])));
+    for at in 0..read.len() {
+        let mut damaged = read.clone();
+        damaged[at] ^= 1;
+        assert_eq!(busy(&damaged), None, "byte {at}");
+        assert_eq!(busy(&read[..at]), None, "{at} bytes");
+    }
+    for other in [&[18, 3, 0, 0, 0, 1][..], &[0, 6, 0x20, 1, 0, 1], &[17, 0x83, 2], &[17]] {
+        assert_eq!(busy(&framed(other)), None, "{other:?}");
+    }
+}
+
 #[test]
 fn frames_of_the_specification() {
     // Application protocol V1.1b3, 6.3, 6.6, 6.8, 6.12, with other addresses.
