@@ -7,6 +7,9 @@ mod protections;
 mod ranges;
 mod trust;
 
+#[path = "../../../tests/common/generated.rs"]
+mod generated;
+
 use super::*;
 use crate::filter::dissertation::LPF;
 use crate::flux::AngleSource;
