@@ -29,5 +29,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The pattern of the faults in a heading: `Fault 4: ...`, `Faults 1 to 3: ...`, `Faults 7, 8 and 38: ...`.
 fn codes(heading: &str) -> Option<String> {
     let (_, list) = heading.split_once(':')?.0.split_once(' ')?;
-    Some(list.replace(" to ", "..=").replace(" and ", "|").replace(", ", "|"))
+    let Some((first, last)) = list.split_once(" to ") else {
+        return Some(list.replace(" and ", "|").replace(", ", "|"));
+    };
+    let all = first.parse::<u8>().ok()?..=last.parse().ok()?;
+    Some(all.map(|code| code.to_string()).collect::<Vec<_>>().join("|"))
 }

@@ -7,12 +7,10 @@ mod protections;
 mod ranges;
 mod trust;
 
-#[path = "../../../tests/common/generated.rs"]
-mod generated;
-
 use super::*;
 use crate::filter::dissertation::LPF;
 use crate::flux::AngleSource;
+use crate::generated;
 use crate::math::frames::{Abc, AlphaBeta};
 
 use crate::carrier::{CARRIER_SAMPLES, DemodulatorKind};

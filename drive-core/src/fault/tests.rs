@@ -1,7 +1,5 @@
 use super::*;
-
-#[path = "../../../tests/common/generated.rs"]
-mod generated;
+use crate::generated;
 
 /// The numbers are in logs and manuals: this list may grow, nothing in it may change.
 #[test]
