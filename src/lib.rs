@@ -9,6 +9,8 @@ pub mod board;
 pub mod boards;
 pub mod commissioning;
 pub mod console;
+pub mod desk;
+pub mod front;
 mod hash;
 pub mod link;
 pub mod modbus;

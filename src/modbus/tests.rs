@@ -18,6 +18,10 @@ use crate::settings::bus::{Baud, Format};
 struct Memory(Vec<u16>);
 
 impl Registers for Memory {
+    fn is_busy(&self) -> bool {
+        false
+    }
+
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
         let word = self.0.get(usize::from(at).wrapping_sub(0x2000));
         word.copied().ok_or(Exception::IllegalDataAddress)
@@ -215,7 +219,7 @@ fn rows() -> String {
             _ => row.unit.to_owned(),
         };
         let kind = if matches!(row.shown, Shown::Double(_)) { "32 bits" } else { "16 bits" };
-        let access = if row.written { "read, write" } else { "read" };
+        let access = if row.is_written() { "read, write" } else { "read" };
         writeln!(text, "| `0x{:04X}` | {kind} | {unit} | {access} | {} |", row.at, row.help)
             .unwrap();
     }
