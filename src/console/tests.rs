@@ -1,6 +1,7 @@
 mod announcements;
 mod bus;
 mod commission;
+mod documents;
 mod doubles;
 mod learning;
 mod lists;

@@ -7,11 +7,11 @@ use modbus_core::Exception;
 
 use super::Frame;
 use super::cia402::Power;
-use super::registers::{FAULTS, ROWS, SETTINGS, Shown};
+use super::registers::{FAULTS, ROWS, Shown};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
+use crate::generated;
 use crate::settings::bus::{Baud, Format};
-use crate::settings::keys;
 
 /// Registers 0x2000 to 0x20ff, of which the last cannot be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -244,25 +244,6 @@ fn rows() -> String {
     text
 }
 
-fn settings() -> String {
-    let mut text = String::new();
-    for (n, key) in keys::all().enumerate() {
-        let words: Vec<_> =
-            key.words().iter().enumerate().map(|(n, word)| format!("{n} {word}")).collect();
-        let auto = if key.has_rule() { "NaN auto" } else { "" };
-        let at = usize::from(SETTINGS) + 2 * n;
-        writeln!(
-            text,
-            "| `0x{at:04X}` | `{}` | {} | {}{auto} |",
-            key.name(),
-            key.unit(),
-            words.join(", ")
-        )
-        .unwrap();
-    }
-    text
-}
-
 fn states() -> String {
     let mut text = String::new();
     for (place, (power, name, bits)) in Power::ALL.into_iter().enumerate() {
@@ -272,12 +253,13 @@ fn states() -> String {
     text
 }
 
-/// On a difference the message is the table as it should be.
 #[test]
 fn the_manual_lists_the_registers() {
-    let manual = include_str!("../../docs/modbus.md");
-    let mut missing = vec![rows(), settings(), states()];
-    missing.retain(|table| !manual.contains(table));
-    assert!(missing.is_empty(), "docs/modbus.md has to list:\n{}", missing.join("\n"));
+    let table = |name, head: &str, rows: String| {
+        let line = "|---".repeat(head.matches('|').count() - 1);
+        generated::check("modbus.md", name, &format!("{head}\n{line}|\n{rows}"));
+    };
+    table("registers", "| address | size | unit | | meaning |", rows());
+    table("states", "| state | bits |", states());
     assert_eq!(FAULTS, 0x5100);
 }

@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 29] = [
+const ELSEWHERE: [(&str, &str); 31] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -33,6 +33,8 @@ const ELSEWHERE: [(&str, &str); 29] = [
         "cargo sim run battery --plant r --set flux_level=high --set sequence.flux=high --set prepare.learn=yes --set battery.runs=dragged",
         "long; fails for the runs that the drive does not notice",
     ),
+    ("cargo sim run commission --set runs", "a file of results/; minutes"),
+    ("cargo sim run full-range", "a file of results/; minutes"),
     ("cargo sim merge", "the files are the reader's; a test merges shards"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
