@@ -9,6 +9,7 @@ pub mod error;
 pub mod experiment;
 pub mod learning;
 pub mod outcome;
+pub mod prelude;
 pub mod progress;
 pub mod rig;
 pub mod statistics;

@@ -1,8 +1,6 @@
 //! The calibration lines of the current sensors, from the printed readings.
 
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use sim_bench::prelude::*;
 use sim_bench::stats::StraightLine as Line;
 
 /// Table 4, Figure 17, Eq. 3.5.

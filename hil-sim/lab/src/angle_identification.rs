@@ -4,21 +4,17 @@
 mod measure;
 mod model;
 
-use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
-use crate::injection_map::PP;
+use std::f64::consts::{FRAC_2_PI, TAU};
+
 use drive_core::carrier::DemodulatorKind;
-use measure::{Record, SLOW, StepResponses};
-use model::{Model, PRINTED_PII, Pii, TABLE_6};
 use num_complex::Complex64;
 use sim_bench::bode::{Bode, frequencies, largest_pole, roots};
-use sim_bench::config::Config;
-use sim_bench::config::plant_settings;
-use sim_bench::error::Error;
-use sim_bench::experiment::assumptions;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::rig::RATE_HZ;
-use std::f64::consts::{FRAC_2_PI, TAU};
+use sim_bench::prelude::*;
+
+use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
+use crate::injection_map::PP;
+use measure::{Record, SLOW, StepResponses};
+use model::{Model, PRINTED_PII, Pii, TABLE_6};
 
 /// Section 3.11.
 pub const EXPERIMENT: Experiment = Experiment {

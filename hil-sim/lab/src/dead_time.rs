@@ -2,15 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode};
-
-use drive_core::AngleSource;
-use sim_bench::config::LoadMode;
-use sim_bench::error::Error;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::rig::{RATE_HZ, Rig, wrapped_degrees};
-use sim_bench::stats::Stats;
+use drive_core::{AngleSource, Command, Mode};
+use sim_bench::prelude::*;
+use sim_bench::rig::wrapped_degrees;
 
 /// Figures 28 and 29.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -5,16 +5,12 @@ mod signal;
 mod tracked;
 
 use rayon::prelude::*;
+use sim_bench::prelude::*;
+use sim_bench::steady::SteadyRun;
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
 use signal::SignalQuality;
-use sim_bench::config::Config;
-use sim_bench::error::Error;
-use sim_bench::experiment::assumptions;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::steady::SteadyRun;
 use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.

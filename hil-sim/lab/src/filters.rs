@@ -6,12 +6,10 @@ mod precision;
 
 use drive_core::filter::LPF;
 use num_complex::Complex64;
+use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
+use sim_bench::prelude::*;
 
 use compared::{ComparedFilter, filters};
-use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
 /// Figure 30, Tables 7 and 8.
 pub const EXPERIMENT: Experiment = Experiment {

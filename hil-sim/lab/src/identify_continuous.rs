@@ -1,13 +1,12 @@
 //! Models B, C, D and S on simulated measurements: Tables 2, 3 and 5 of Jacobina, Lima, Ribeiro
 //! 1996.
 
+use sim_bench::outcome::Entry;
+use sim_bench::prelude::*;
+
 use crate::identification::Parameters;
 use crate::identification::study::MODELS;
 use crate::identify_discrete::{NOTE, both, shares, table};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Entry, Outcome, Table};
-use sim_bench::stats::Stats;
 
 /// Tables 2, 3 and 5.
 pub const EXPERIMENT: Experiment = Experiment {

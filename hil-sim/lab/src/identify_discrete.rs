@@ -1,11 +1,11 @@
 //! Model A on simulated measurements: Tables 1 and 4 of Jacobina, Lima, Ribeiro 1996.
 
+use sim_bench::outcome::Entry;
+use sim_bench::prelude::*;
+
 use crate::identification::Parameters;
 use crate::identification::study::{Case, errors};
 use crate::identification::trial::Noise;
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Entry, Outcome, Table};
 
 /// Tables 1 and 4.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -1,10 +1,8 @@
 //! Which machine the tables of Jacobina, Lima, Ribeiro 1996 were made with.
 
-use crate::identification::Parameters;
-use crate::identification::ratios;
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Outcome, Table};
+use sim_bench::prelude::*;
+
+use crate::identification::{Parameters, ratios};
 
 /// Numbers that do not depend on the noise.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -3,15 +3,13 @@
 
 use drive_core::AlphaBeta;
 use rotor_id::rls::{Rls, RlsSettings};
+use sim_bench::prelude::*;
 
 use crate::identification::models::{Value, model_c};
 use crate::identification::recursive::Reference;
 use crate::identification::signals::{Filter, noise};
 use crate::identification::trial::{Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
 /// Figures 2 to 4.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -4,14 +4,12 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use rayon::prelude::*;
+use sim_bench::columns::Columns;
+use sim_bench::error::nearest;
+use sim_bench::prelude::*;
 
 use crate::identification::output_error::{OutputErrorFit, Record};
 use crate::identification::{Complex, Parameters};
-use sim_bench::Experiment;
-use sim_bench::columns::Columns;
-use sim_bench::config::Config;
-use sim_bench::error::{Error, nearest};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
 /// A command of its own, for its options; not in the list of experiments.
 pub const EXPERIMENT: Experiment = Experiment {

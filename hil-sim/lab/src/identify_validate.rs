@@ -1,14 +1,13 @@
 //! Measured against simulated current, with estimated and with classical parameters: Figure 5 and
 //! Tables 6 and 7 of Jacobina, Lima, Ribeiro 1996.
 
+use sim_bench::prelude::*;
+
 use crate::identification::models::model_c;
 use crate::identification::structured::model_s;
 use crate::identification::study::{Case, errors};
 use crate::identification::trial::Noise;
 use crate::identification::{Complex, Parameters, Signal, Trial};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
 /// Figure 5, Tables 6 and 7.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -1,14 +1,8 @@
 //! The current difference over the injection angle, Figure 19.
 
 use drive_core::Command;
-
 use drive_core::carrier::DemodulatorKind;
-use sim_bench::config::Config;
-use sim_bench::error::Error;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::rig::Rig;
-use sim_bench::stats::Stats;
+use sim_bench::prelude::*;
 
 /// Gain of the post-processing filter at dc.
 pub(super) const PP: f64 = 0.944_061;

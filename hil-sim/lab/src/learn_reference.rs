@@ -1,12 +1,8 @@
 //! The drive learns the reference of its angle tracking.
 
 use drive_core::learned::Fitted;
-
-use sim_bench::error::Error;
-use sim_bench::experiment::assumptions;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TURNING};
 use sim_bench::learning;
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use sim_bench::prelude::*;
 
 /// Section 5.2 asks for a detection that works at every operating point.
 pub const EXPERIMENT: Experiment = Experiment {

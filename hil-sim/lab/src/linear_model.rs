@@ -25,9 +25,8 @@ use drive_core::io::PERIOD_S;
 use drive_core::{AlphaBeta, FirstOrder, Motion};
 use drive_settings::Settings;
 use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign};
-
-use sim_bench::error::Error;
 use sim_bench::plant::{MachineSettings, MechanicsSettings};
+use sim_bench::prelude::*;
 
 /// A disturbance at time zero.
 #[derive(Clone, Copy, Debug, PartialEq)]

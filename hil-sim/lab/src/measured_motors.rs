@@ -4,14 +4,11 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use num_complex::Complex;
 use serde::Deserialize;
+use sim_bench::config::motors::Motor;
+use sim_bench::plant::{ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _};
+use sim_bench::prelude::*;
 
 use crate::saliency::steady::at_voltage;
-use sim_bench::config::motors::Motor;
-use sim_bench::config::{Config, plant_settings};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::plant::{ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _};
 
 /// Both comparisons.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -7,10 +7,7 @@ use std::f64::consts::TAU;
 use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
 use drive_core::{Abc, AlphaBeta};
-
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use sim_bench::prelude::*;
 
 /// Figures 4, 5 and 11, Table 2.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -1,10 +1,8 @@
 //! The tests that gave Table 5, on the simulated motor.
 
+use sim_bench::prelude::*;
+
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
-use sim_bench::config::plant_settings;
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment, TURNING};
-use sim_bench::outcome::{Cell, Outcome, Table};
 
 /// Section 3.6, Table 5.
 pub const EXPERIMENT: Experiment = Experiment {

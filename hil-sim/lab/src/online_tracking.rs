@@ -1,13 +1,10 @@
 //! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
-use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 use drive_core::AngleSource;
 use rotor_id::online::RotorEstimate;
-use sim_bench::config::Config;
-use sim_bench::error::Error;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use sim_bench::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
-use sim_bench::stats::Stats;
+use sim_bench::prelude::*;
+
+use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 
 /// Not in the sources: the recursive estimate in use.
 pub const EXPERIMENT: Experiment = Experiment {

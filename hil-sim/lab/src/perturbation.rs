@@ -1,20 +1,12 @@
 //! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
 //! and predicted.
 
-use drive_core::{Command, Mode};
+use drive_core::{AngleSource, Command, Mode};
 use rayon::prelude::*;
+use sim_bench::plant::Load;
+use sim_bench::prelude::*;
 
 use crate::linear_model::{Disturbance, LinearModel};
-use drive_core::AngleSource;
-use sim_bench::config::plant_settings;
-use sim_bench::config::{Config, LoadMode};
-use sim_bench::error::Error;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment};
-use sim_bench::experiment::{LOST_DEG, assumptions};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::plant::Load;
-use sim_bench::rig::{RATE_HZ, Rig};
-use sim_bench::stats::Stats;
 
 /// Section 5.2 names it as work to be done.
 pub const EXPERIMENT: Experiment = Experiment {

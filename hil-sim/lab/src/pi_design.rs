@@ -9,11 +9,9 @@ use drive_settings::tuning::{
     CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
 use num_complex::Complex64;
-
 use sim_bench::bode::{Bode, RATE, fictitious, frequencies, omega_t};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment, TURNING};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Style, Table};
+use sim_bench::outcome::Style;
+use sim_bench::prelude::*;
 
 /// Figures 23 to 25, section 3.8.
 pub const EXPERIMENT: Experiment = Experiment {

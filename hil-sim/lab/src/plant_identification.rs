@@ -2,17 +2,12 @@
 //! follow from them.
 
 use drive_core::filter::{LPF, LpfState};
-use drive_core::{AlphaBeta, Command, Dq, FirstOrder, Mode};
+use drive_core::{AlphaBeta, AngleSource, Command, Dq, FirstOrder, Mode};
 use drive_settings::tuning::{design_current_loop, motor_plant, rule_3_8};
+use sim_bench::prelude::*;
 
 use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
-use drive_core::AngleSource;
-use sim_bench::config::{Config, LoadMode};
-use sim_bench::error::Error;
-use sim_bench::experiment::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TRACKING, TURNING};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use sim_bench::rig::{RATE_HZ, Rig};
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
 pub const EXPERIMENT: Experiment = Experiment {

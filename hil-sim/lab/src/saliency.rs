@@ -5,12 +5,10 @@ pub(super) mod steady;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use num_complex::Complex;
-
-use sim_bench::config::{Config, PlantModel, check_model, flux_level_a, plant_settings};
-use sim_bench::error::Error;
-use sim_bench::experiment::{Context, Experiment};
-use sim_bench::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use sim_bench::config::{PlantModel, check_model, flux_level_a};
 use sim_bench::plant::{EnergyMachine, EnergyState, Machine, MachineSettings, MachineState};
+use sim_bench::prelude::*;
+
 use steady::Listed;
 
 /// The map.

@@ -2,17 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode};
+use drive_core::{AngleSource, Command, Mode};
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
+use sim_bench::plant::Load;
+use sim_bench::prelude::*;
 
 use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
-use drive_core::AngleSource;
-use sim_bench::config::plant_settings;
-use sim_bench::config::{Config, LoadMode};
-use sim_bench::error::Error;
-use sim_bench::plant::Load;
-use sim_bench::rig::{RATE_HZ, Rig};
 
 /// Calls of `refine` per second.
 const REFINES_PER_S: f64 = 10.0;

@@ -1,12 +1,11 @@
 //! Turning the injection axis, alone or with the current, while the encoder holds the orientation.
 
 use drive_core::Command;
+use drive_core::carrier::DemodulatorKind;
+use sim_bench::prelude::*;
+use sim_bench::rig::wrapped_degrees;
 
 use crate::identification::signals::Prbs;
-use drive_core::carrier::DemodulatorKind;
-use sim_bench::config::Config;
-use sim_bench::error::Error;
-use sim_bench::rig::{RATE_HZ, Rig, wrapped_degrees};
 
 /// The sequence: 8 bits as in section 3.10, each value held for 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no

@@ -1,13 +1,12 @@
 //! The demodulations that are compared, and the drives that use them.
 
-use crate::injection_map::PP;
+use drive_core::carrier::DemodulatorKind;
 use drive_core::table::ReferenceTable;
 use drive_settings::Settings;
-
-use drive_core::carrier::DemodulatorKind;
-use sim_bench::config::Config;
-use sim_bench::error::Error;
 use sim_bench::learning;
+use sim_bench::prelude::*;
+
+use crate::injection_map::PP;
 
 /// A demodulation.
 #[derive(Clone, Copy, Debug)]

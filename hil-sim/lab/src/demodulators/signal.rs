@@ -1,14 +1,10 @@
 //! Signal of a demodulation while the encoder holds the angle: mean, slope, noise, delay.
 
 use drive_core::Command;
+use sim_bench::plant::MeasurementSettings;
+use sim_bench::prelude::*;
 
 use super::demodulation::Demodulation;
-use sim_bench::config::Config;
-use sim_bench::config::plant_settings;
-use sim_bench::error::Error;
-use sim_bench::plant::MeasurementSettings;
-use sim_bench::rig::Rig;
-use sim_bench::stats::Stats;
 
 /// Half of the turn over which the slope is taken, degrees.
 const TURN_DEG: f64 = 4.0;

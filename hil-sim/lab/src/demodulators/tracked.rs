@@ -3,12 +3,7 @@
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Command, Mode};
 use drive_settings::Settings;
-
-use sim_bench::config::{Config, LoadMode};
-use sim_bench::error::Error;
-use sim_bench::experiment::LOST_DEG;
-use sim_bench::rig::{RATE_HZ, Rig};
-use sim_bench::stats::Stats;
+use sim_bench::prelude::*;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
 
 /// Levels of Figure 38, A, and the time at each, s.

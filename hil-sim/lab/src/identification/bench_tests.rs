@@ -3,11 +3,12 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use super::Complex;
 use sim_bench::plant::{
     Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel, PlantError,
     SaliencySettings,
 };
+
+use super::Complex;
 
 /// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
 /// values, rms.

@@ -1,6 +1,7 @@
 //! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
 use rayon::prelude::*;
+use sim_bench::outcome::Entry;
 
 use super::models::{model_b, model_c, model_d};
 use super::printed::{
@@ -9,7 +10,6 @@ use super::printed::{
 use super::structured::model_s;
 use super::trial::Noise;
 use super::{CurrentVoltage, Estimate, Parameters, Signal, Trial};
-use sim_bench::outcome::Entry;
 
 /// One column of the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,10 +8,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-
 use sim_bench::bode::{RATE, omega_t};
-use sim_bench::experiment::Context;
-use sim_bench::outcome::{Figure, Outcome, Panel, Series};
+use sim_bench::prelude::*;
 
 /// Samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
 const SAMPLES: usize = RATE as usize;

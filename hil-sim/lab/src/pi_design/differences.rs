@@ -2,10 +2,10 @@
 
 use drive_core::FirstOrder;
 use drive_settings::tuning::EquivalentCircuit;
+use sim_bench::bode::{RATE, largest_pole};
+use sim_bench::prelude::*;
 
 use super::PERIOD_S;
-use sim_bench::bode::{RATE, largest_pole};
-use sim_bench::outcome::{Cell, Table};
 
 /// The printed values beside those that the printed parameters give.
 pub fn table(motor: &EquivalentCircuit, physical: FirstOrder) -> Table {

@@ -1,11 +1,10 @@
 //! Steady states of a machine model, and its small-signal behaviour about them.
 
 use nalgebra::{Complex, DMatrix, DVector};
-
-use sim_bench::error::Error;
 use sim_bench::plant::{
     EnergyMachine, EnergyRate, EnergyState, Machine, MachineModel, MachineState, Rate,
 };
+use sim_bench::prelude::*;
 
 /// Step of the numeric derivatives, relative to the size of a state.
 const STEP: f64 = 1e-6;
