@@ -198,7 +198,8 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
     let mut rows = |name: &str, plants: &[Model], in_amperes: bool| {
         let design = plants[DESIGN_ROW].design();
         for ((iq, ..), plant) in TABLE_6.iter().zip(plants) {
-            let with = |pii: Pii| Cell::fixed(largest_pole(&plant.closed_loop(pii)), 5);
+            let with = |pii: Pii| largest_pole(&plant.closed_loop(pii));
+            let as_printed = |pii| Cell::fixed_or_dash(in_amperes.then(|| with(pii)), 5);
             let here = design.filter(|_| *iq == TABLE_6[DESIGN_ROW].0);
             let poles = here.map(|(pii, _)| roots(&plant.closed_loop(pii))).map(|poles| {
                 let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
@@ -207,21 +208,15 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
             table.record([
                 ("plant", Cell::from(name)),
                 ("iq (A)", Cell::fixed(*iq, 1)),
-                (
-                    "largest pole, printed k_s, z_s = 0.90",
-                    Cell::or_dash(in_amperes.then(|| with(PRINTED_PII))),
-                ),
-                ("printed k_s, z_s = 0.99", Cell::or_dash(in_amperes.then(|| with(LIKELY_PII)))),
-                ("designed for 1.5 A", Cell::or_dash(design.map(|(pii, _)| with(pii)))),
+                ("largest pole, printed k_s, z_s = 0.90", as_printed(PRINTED_PII)),
+                ("printed k_s, z_s = 0.99", as_printed(LIKELY_PII)),
+                ("designed for 1.5 A", Cell::fixed_or_dash(design.map(|(pii, _)| with(pii)), 5)),
                 (
                     "k_s (rad per signal)",
                     Cell::or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
                 ),
-                ("z_s", Cell::or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4)))),
-                (
-                    "crossover (Hz)",
-                    Cell::or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / TAU, 1))),
-                ),
+                ("z_s", Cell::fixed_or_dash(here.map(|(pii, _)| pii.z_s), 4)),
+                ("crossover (Hz)", Cell::fixed_or_dash(here.map(|(_, w)| w * RATE_HZ / TAU), 1)),
                 ("poles of the design", Cell::or_dash(poles.map(Cell::from))),
             ]);
         }

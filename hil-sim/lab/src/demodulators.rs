@@ -57,7 +57,7 @@ impl DemodulationResults {
     }
 
     fn delay_text(&self) -> Cell {
-        Cell::or_dash(self.delay.map(|delay| Cell::fixed(delay, 1)))
+        Cell::fixed_or_dash(self.delay, 1)
     }
 }
 
@@ -135,16 +135,13 @@ fn findings(
             .collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
     };
+    let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
     let mut found = DemodulationResults {
         maps: [map(true)?, map(false)?],
         seen: at_each(config)?,
         isotropic: at_each(&isotropic)?,
         delay: None,
-        tracked: [
-            track(ReferenceKind::Constant)?,
-            track(ReferenceKind::Learned)?,
-            track(ReferenceKind::Retuned)?,
-        ],
+        tracked: [constant?, with_table?, retuned?],
     };
     if found.isotropic_share() < 0.5 {
         found.delay = Some(signal::delay(demodulation, config, DELAY_IQ_A, seed)?);
@@ -215,14 +212,12 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {
-    let mut heads =
-        vec!["demodulation".to_owned(), "reference".to_owned(), "delay (samples)".to_owned()];
-    heads.push("torque steps, rms (°)".into());
-    heads.push("largest (°)".into());
-    for rpm in SPEEDS_RPM {
-        heads.push(format!("{rpm} rpm, mean (°)"));
-        heads.push(format!("{rpm} rpm, rms (°)"));
-    }
+    let fixed =
+        ["demodulation", "reference", "delay (samples)", "torque steps, rms (°)", "largest (°)"];
+    let by_speed = |rpm: f64| ["mean", "rms"].map(|of| format!("{rpm} rpm, {of} (°)"));
+    let heads =
+        fixed.map(String::from).into_iter().chain(SPEEDS_RPM.into_iter().flat_map(by_speed));
+    let heads = heads.collect();
     let mut table = Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
         .note(format!(
             "Steps: 1 A to 2 A, shaft locked. Speeds: a dynamometer brings the shaft there without torque, \
@@ -236,20 +231,12 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
         for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
             let Some(t) = tracked else { continue };
             let mut row = vec![Cell::from(demodulation.name), Cell::from(*kind), f.delay_text()];
-            if t.steps.lost {
-                row.extend([Cell::from("lost"), Cell::from("lost")]);
-            } else {
-                row.push(Cell::fixed(t.steps.stats.rms(), 2));
-                row.push(Cell::fixed(t.steps.stats.largest(), 2));
-            }
+            let mut add = |values: Option<[f64; 2]>| {
+                row.extend([0, 1].map(|k| values.map_or("lost".into(), |v| Cell::fixed(v[k], 2))));
+            };
+            add((!t.steps.lost).then(|| [t.steps.stats.rms(), t.steps.stats.largest()]));
             for run in &t.turning {
-                match run {
-                    Some(run) => row.extend([
-                        Cell::fixed(run.error.mean(), 2),
-                        Cell::fixed(run.error.rms(), 2),
-                    ]),
-                    None => row.extend([Cell::from("lost"), Cell::from("lost")]),
-                }
+                add(run.as_ref().map(|run| [run.error.mean(), run.error.rms()]));
             }
             table.row(row);
         }

@@ -48,45 +48,18 @@ const RECTIFIED: Variant = Variant {
     name: "rectified",
     title: "Rectified, delay compensated, motor with saliency",
     demodulator: DemodulatorKind::Rectified,
-    saliency: true,
-    inject: true,
     compensate: true,
+    ..LITERAL
 };
+#[rustfmt::skip] // a variant a line
 const VARIANTS: [Variant; 7] = [
     LITERAL,
-    Variant {
-        name: "literal_isotropic",
-        title: "As printed, motor without saliency",
-        saliency: false,
-        ..LITERAL
-    },
-    Variant {
-        name: "literal_silent",
-        title: "As printed, no saliency and no injection",
-        saliency: false,
-        inject: false,
-        ..LITERAL
-    },
+    Variant { name: "literal_isotropic", title: "As printed, motor without saliency", saliency: false, ..LITERAL },
+    Variant { name: "literal_silent", title: "As printed, no saliency and no injection", saliency: false, inject: false, ..LITERAL },
     RECTIFIED,
-    Variant {
-        name: "rectified_isotropic",
-        title: "Rectified, delay compensated, motor without saliency",
-        saliency: false,
-        ..RECTIFIED
-    },
-    Variant {
-        name: "rectified_delayed",
-        title: "Rectified, delay left in, motor with saliency",
-        compensate: false,
-        ..RECTIFIED
-    },
-    Variant {
-        name: "rectified_isotropic_delayed",
-        title: "Rectified, delay left in, motor without saliency",
-        saliency: false,
-        compensate: false,
-        ..RECTIFIED
-    },
+    Variant { name: "rectified_isotropic", title: "Rectified, delay compensated, motor without saliency", saliency: false, ..RECTIFIED },
+    Variant { name: "rectified_delayed", title: "Rectified, delay left in, motor with saliency", compensate: false, ..RECTIFIED },
+    Variant { name: "rectified_isotropic_delayed", title: "Rectified, delay left in, motor without saliency", saliency: false, compensate: false, ..RECTIFIED },
 ];
 
 /// delta_i in mA (of the synchronous demodulation: thousandths) over phi2 - theta in degrees.
@@ -196,18 +169,18 @@ fn table(curves: &[Curve], id: f64) -> Table {
          (In the source the 0.944 of the low-pass, which makes the real currents larger than \
          commanded, cancels that of PP: 9.9 mA.)",
     );
-    let n = IQ_A.len();
     for (k, iq) in IQ_A.iter().enumerate() {
+        let seen = |variant: usize, x: f64| at(&curves[variant * IQ_A.len() + k], x);
         table.record([
             ("iq (A)", Cell::fixed(*iq, 1)),
             ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP * id, 3)),
-            ("as printed, isotropic, at -90° (mA)", Cell::fixed(at(&curves[n + k], -90.0), 3)),
+            ("as printed, isotropic, at -90° (mA)", Cell::fixed(seen(1, -90.0), 3)),
             ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
-            ("zero found at (°)", Cell::fixed(zero(&curves[n + k]), 2)),
-            ("rectified, saliency, at 90° (mA)", Cell::fixed(at(&curves[3 * n + k], 90.0), 2)),
-            ("rectified, isotropic, at 90° (mA)", Cell::fixed(at(&curves[4 * n + k], 90.0), 2)),
-            ("delay left in, saliency, at 90° (mA)", Cell::fixed(at(&curves[5 * n + k], 90.0), 2)),
-            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(at(&curves[6 * n + k], 90.0), 2)),
+            ("zero found at (°)", Cell::fixed(zero(&curves[IQ_A.len() + k]), 2)),
+            ("rectified, saliency, at 90° (mA)", Cell::fixed(seen(3, 90.0), 2)),
+            ("rectified, isotropic, at 90° (mA)", Cell::fixed(seen(4, 90.0), 2)),
+            ("delay left in, saliency, at 90° (mA)", Cell::fixed(seen(5, 90.0), 2)),
+            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(seen(6, 90.0), 2)),
         ]);
     }
     table

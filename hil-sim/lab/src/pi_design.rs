@@ -35,25 +35,11 @@ struct Identified {
     printed: Option<[f64; 3]>,
 }
 
+#[rustfmt::skip] // a plant a line
 const IDENTIFIED: [Identified; 3] = [
-    Identified {
-        name: "Eq. 3.34",
-        key: "motor",
-        plant: FirstOrder { k: 0.0040532, p: 0.93916 },
-        printed: Some([204.5, 0.94786, 52.48]),
-    },
-    Identified {
-        name: "Eq. 3.41, d axis",
-        key: "d",
-        plant: FirstOrder { k: 0.002837, p: 0.9511 },
-        printed: None,
-    },
-    Identified {
-        name: "Eq. 3.42, q axis",
-        key: "q",
-        plant: FirstOrder { k: 0.003721, p: 0.9503 },
-        printed: None,
-    },
+    Identified { name: "Eq. 3.34", key: "motor", plant: FirstOrder { k: 0.0040532, p: 0.93916 }, printed: Some([204.5, 0.94786, 52.48]) },
+    Identified { name: "Eq. 3.41, d axis", key: "d", plant: FirstOrder { k: 0.002837, p: 0.9511 }, printed: None },
+    Identified { name: "Eq. 3.42, q axis", key: "q", plant: FirstOrder { k: 0.003721, p: 0.9503 }, printed: None },
 ];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -68,17 +54,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for (identified, rule) in &rules {
         let design =
             design_current_loop(identified.plant, physical, PERIOD_S).map_err(Error::refused)?;
-        let key = identified.key;
-        outcome.metrics.set(format!("{key}_kc_v_per_a"), rule.k_c);
-        outcome.metrics.set(format!("{key}_zc"), rule.z_c);
-        outcome.metrics.set(format!("{key}_crossover_fictitious_hz"), hz(rule.v));
-        outcome.metrics.set(format!("{key}_kc_reduced_v_per_a"), design.k_c);
-        outcome
-            .metrics
-            .set(format!("{key}_phase_margin_rule_deg"), design.rule_margins.phase_margin_deg);
-        outcome.metrics.set(format!("{key}_ms_rule"), design.rule_margins.ms);
-        outcome.metrics.set(format!("{key}_phase_margin_deg"), design.margins.phase_margin_deg);
-        outcome.metrics.set(format!("{key}_ms"), design.margins.ms);
+        for (name, value) in [
+            ("kc_v_per_a", rule.k_c),
+            ("zc", rule.z_c),
+            ("crossover_fictitious_hz", hz(rule.v)),
+            ("kc_reduced_v_per_a", design.k_c),
+            ("phase_margin_rule_deg", design.rule_margins.phase_margin_deg),
+            ("ms_rule", design.rule_margins.ms),
+            ("phase_margin_deg", design.margins.phase_margin_deg),
+            ("ms", design.margins.ms),
+        ] {
+            outcome.metrics.set(format!("{}_{name}", identified.key), value);
+        }
         designs.push((identified.name, design));
     }
     outcome.tables.push(margin_table(&designs));
@@ -127,23 +114,19 @@ fn rule_table(rules: &[(Identified, RuleDesign)]) -> Table {
             let w = 2.0 * (v_hz * std::f64::consts::PI * PERIOD_S).atan();
             (pi_response(1.0, z_c, w) * plant.response(w)).arg().to_degrees()
         };
-        table.row([
-            Cell::from(*name),
-            Cell::from("computed"),
-            Cell::fixed(hz(rule.v), 2),
-            Cell::fixed(rule.z_c, 6),
-            Cell::fixed(rule.k_c, 3),
-            Cell::fixed(phase(hz(rule.v), rule.z_c), 1),
-        ]);
-        if let Some([v, z_c, k_c]) = *printed {
+        let mut row = |how: &str, [v, z_c, k_c]: [f64; 3], decimals: [usize; 2]| {
             table.row([
                 Cell::from(*name),
-                Cell::from("printed"),
+                Cell::from(how),
                 Cell::fixed(v, 2),
-                Cell::fixed(z_c, 5),
-                Cell::fixed(k_c, 2),
+                Cell::fixed(z_c, decimals[0]),
+                Cell::fixed(k_c, decimals[1]),
                 Cell::fixed(phase(v, z_c), 1),
             ]);
+        };
+        row("computed", [hz(rule.v), rule.z_c, rule.k_c], [6, 3]);
+        if let Some(printed) = *printed {
+            row("printed", printed, [5, 2]);
         }
     }
     table.note(

@@ -85,41 +85,23 @@ struct Trial {
     key: &'static str,
     figure: &'static str,
     printed: FirstOrder,
-    /// k_c and z_c by the rule of section 3.8 for the printed plant.
     axis: Axis,
     record: fn(&mut Rig) -> Result<Record, Error>,
 }
 
+#[rustfmt::skip] // a trial a line
 const TRIALS: [Trial; 3] = [
-    Trial {
-        name: "steps 0, 2, -2, 0 A on q",
-        key: "steps",
-        figure: "Figure 22",
-        printed: FirstOrder { k: 0.004_053_2, p: 0.93916 },
-        axis: Axis::Q,
-        record: steps,
-    },
-    Trial {
-        name: "pseudo-random on d",
-        key: "d",
-        figure: "Figure 31",
-        printed: FirstOrder { k: 0.002_837, p: 0.9511 },
-        axis: Axis::D,
-        record: |rig| prbs(rig, Axis::D),
-    },
-    Trial {
-        name: "pseudo-random on q at 2 A",
-        key: "q",
-        figure: "Figure 32",
-        printed: FirstOrder { k: 0.003_721, p: 0.9503 },
-        axis: Axis::Q,
-        record: |rig| {
-            rig.command(&Command::Torque(2.0))?;
-            rig.run(1.0, |_| {});
-            prbs(rig, Axis::Q)
-        },
-    },
+    Trial { name: "steps 0, 2, -2, 0 A on q", key: "steps", figure: "Figure 22", printed: FirstOrder { k: 0.004_053_2, p: 0.93916 }, axis: Axis::Q, record: steps },
+    Trial { name: "pseudo-random on d", key: "d", figure: "Figure 31", printed: FirstOrder { k: 0.002_837, p: 0.9511 }, axis: Axis::D, record: |rig| prbs(rig, Axis::D) },
+    Trial { name: "pseudo-random on q at 2 A", key: "q", figure: "Figure 32", printed: FirstOrder { k: 0.003_721, p: 0.9503 }, axis: Axis::Q, record: at_2_a },
 ];
+
+/// Pseudo-random voltage on q, beside a torque current of 2 A.
+fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
+    rig.command(&Command::Torque(2.0))?;
+    rig.run(1.0, |_| {});
+    prbs(rig, Axis::Q)
+}
 
 fn steps(rig: &mut Rig) -> Result<Record, Error> {
     let mut record = Record::default();
@@ -296,15 +278,13 @@ fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
     for _ in 0..500 {
         still.push(&mut rig, Axis::Q);
     }
-    let constant = Record { u: vec![10.0; 500], y: vec![1.0; 500] };
-    let verdict = match fit(&constant.u, &constant.y, Orders { outputs: 1, inputs: 1, delay: 0 }) {
+    let orders = Orders { outputs: 1, inputs: 1, delay: 0 };
+    let verdict = match fit(&[10.0; 500], &[1.0; 500], orders) {
         Err(reason) => format!("refused ({reason})"),
         Ok(found) => format!("accepted, condition {:.1e}", found.condition),
     };
-    let noise = {
-        let still = still.without_mean();
-        first_order(&still.u, &still.y, 1, 0)?
-    };
+    let still = still.without_mean();
+    let noise = first_order(&still.u, &still.y, 1, 0)?;
     Ok(vec![
         format!("A constant voltage and current is {verdict}."),
         format!(

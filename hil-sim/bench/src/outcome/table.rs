@@ -24,6 +24,15 @@ impl Table {
         Self { title: title.into(), columns, ..Self::default() }
     }
 
+    /// With a row for each of these lists of cells, as [`Self::record`] adds it.
+    pub fn records<H: Into<String>, R: IntoIterator<Item = (H, Cell)>>(
+        mut self,
+        rows: impl IntoIterator<Item = R>,
+    ) -> Self {
+        rows.into_iter().for_each(|row| self.record(row));
+        self
+    }
+
     /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.rows.push(cells.into_iter().collect());
@@ -83,6 +92,11 @@ impl Cell {
     /// The cell, or a dash where there is none.
     pub fn or_dash(cell: Option<Self>) -> Self {
         cell.unwrap_or_else(|| "-".into())
+    }
+
+    /// A number with this many decimals, or a dash where there is none.
+    pub fn fixed_or_dash(value: Option<f64>, decimals: usize) -> Self {
+        Self::or_dash(value.map(|value| Self::fixed(value, decimals)))
     }
 
     /// A number with this many decimals.

@@ -25,37 +25,22 @@ pub fn table(motor: &EquivalentCircuit, physical: FirstOrder) -> Table {
         "What differs from print, with the motor of this configuration",
         &["quantity", "printed", "computed", "remark"],
     );
-    let rows: [(&str, f64, f64, &str); 11] = [
-        ("k_FT, Eq. 3.20 (A/V)", 0.01973, 1.0 / resistance, "1/(r_s + r_r (L_m/L_r)²)"),
-        ("σ, Eq. 3.21", 0.2515, sigma, ""),
-        ("T_FT, Eq. 3.22 (ms)", 1.0157, 1e3 * time_constant, "follows from k_FT"),
-        ("k_FTD, Eq. 3.33 (A/V)", 0.003237, PERIOD_S / (sigma * l_s), "k_FT cancels"),
-        ("p_FTD, Eq. 3.32", 0.8359, 1.0 - PERIOD_S / time_constant, "follows from T_FT"),
-        (
-            "gain with an exact hold (A/V)",
-            f64::NAN,
-            physical.k,
-            "Eq. 3.25 is the forward difference",
-        ),
-        ("pole with an exact hold", f64::NAN, physical.p, ""),
-        ("pole of 3.33, fictitious (Hz)", 1073.0, in_w(0.8359), "printed as Hz, is rad/s"),
-        ("pole of 3.34, fictitious (Hz)", 376.0, in_w(0.93916), "printed as Hz, is rad/s"),
-        (
-            "pole of 3.42, fictitious (Hz)",
-            300.88,
-            in_w(0.9503),
-            "printed as Hz, is rad/s; 3.41 has 300.75",
-        ),
-        (
-            "largest |z|, Eq. 4.1 under 4.2",
-            f64::NAN,
-            position_pole,
-            "the printed position loop is unstable",
-        ),
+    #[rustfmt::skip] // a row a line
+    let rows: [(&str, Option<f64>, f64, &str); 11] = [
+        ("k_FT, Eq. 3.20 (A/V)", Some(0.01973), 1.0 / resistance, "1/(r_s + r_r (L_m/L_r)²)"),
+        ("σ, Eq. 3.21", Some(0.2515), sigma, ""),
+        ("T_FT, Eq. 3.22 (ms)", Some(1.0157), 1e3 * time_constant, "follows from k_FT"),
+        ("k_FTD, Eq. 3.33 (A/V)", Some(0.003237), PERIOD_S / (sigma * l_s), "k_FT cancels"),
+        ("p_FTD, Eq. 3.32", Some(0.8359), 1.0 - PERIOD_S / time_constant, "follows from T_FT"),
+        ("gain with an exact hold (A/V)", None, physical.k, "Eq. 3.25 is the forward difference"),
+        ("pole with an exact hold", None, physical.p, ""),
+        ("pole of 3.33, fictitious (Hz)", Some(1073.0), in_w(0.8359), "printed as Hz, is rad/s"),
+        ("pole of 3.34, fictitious (Hz)", Some(376.0), in_w(0.93916), "printed as Hz, is rad/s"),
+        ("pole of 3.42, fictitious (Hz)", Some(300.88), in_w(0.9503), "printed as Hz, is rad/s; 3.41 has 300.75"),
+        ("largest |z|, Eq. 4.1 under 4.2", None, position_pole, "the printed position loop is unstable"),
     ];
     for (name, printed, computed, remark) in rows {
-        let printed =
-            if printed.is_nan() { Cell::from("-") } else { Cell::significant(printed, 5) };
+        let printed = Cell::or_dash(printed.map(|printed| Cell::significant(printed, 5)));
         table.row([name.into(), printed, Cell::significant(computed, 5), remark.into()]);
     }
     table
