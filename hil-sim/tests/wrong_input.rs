@@ -32,7 +32,7 @@ const CASES: [(&str, &[&str]); 54] = [
     ("rum torque-steps", &["rum", "run"]),
     ("run", &["<NAME>", "cargo sim run"]),
     ("run torque-step", &["`torque-step`", "did you mean `torque-steps`?", "`list`"]),
-    ("run xyzzy", &["`xyzzy`", "`list` shows all"]),
+    ("run xyzzy", &["`xyzzy`", "`list` and `list --lab` show all"]),
     ("run torque-steps extra", &["extra"]),
     ("run torque-steps --sed 1", &["--sed", "--seed"]),
     ("keys motr", &["`motr`", "did you mean `motor`?"]),

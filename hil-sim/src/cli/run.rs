@@ -118,7 +118,7 @@ pub fn run(
     let chosen: Vec<_> =
         names.iter().map(|name| experiments::find(name)).collect::<Result<_, _>>()?;
     if let Some(one) = chosen.first() {
-        one.check_file(file)?;
+        experiments::check_file(one, file)?;
     }
     let config = input.config()?;
     used::check(name, &chosen, input)?;

@@ -134,7 +134,7 @@ impl Profile {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    EXPERIMENT.check_file(context.file)?;
+    super::check_file(&EXPERIMENT, context.file)?;
     let profile = Profile::read(context.file.unwrap_or(Path::new("")))?;
     let reference = profile.reference;
     let mut config = context.config.clone();

@@ -4,14 +4,14 @@
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode};
 
-use crate::config::Config;
-use crate::config::plant_settings;
 use crate::error::Error;
 use crate::experiments::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
 use crate::rig::{Point, RATE_HZ, Rig, means_over};
 use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
+
+pub use sim_bench::experiment::{LOST_DEG, assumptions};
 
 /// Figure 38.
 pub const STEPS: Experiment = Experiment {
@@ -46,10 +46,6 @@ pub const REVERSAL: Experiment = Experiment {
 /// Seconds after the first torque reference that are not judged: the angle settles from the
 /// magnetising position.
 const SETTLING_S: f64 = 0.5;
-/// An error beyond this, degrees, is a lost angle: half way to where the saliency, which repeats
-/// every 180°, has the wrong sign.
-pub const LOST_DEG: f64 = 45.0;
-
 /// Levels of Figure 38, as multiples of `reference.iq_a`.
 const LEVELS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 /// Torque currents of the reversals one after another on the dissertation's motor, A.
@@ -242,16 +238,4 @@ fn eq_4_4(p: &Point) -> f64 {
     let gamma = p.iq.atan2(p.id);
     let length = p.iq.hypot(p.id);
     p.torque_per_flux_ampere * p.flux * length * (gamma - p.angle_error_deg.to_radians()).sin()
-}
-
-/// Assumptions of the simulated plant, for the remarks of an outcome.
-pub fn assumptions(config: &Config) -> Vec<String> {
-    let (s, motor) = (plant_settings(config).saliency, config.motor_text());
-    vec![format!(
-        "Simulated motor: {motor}, with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
-         %/A by the current. Nothing in the source measures the saliency: every angle error here is a \
-         statement about this simulated motor.",
-        s.a_psi * 100.0,
-        s.b1 * 100.0
-    )]
 }
