@@ -1,8 +1,6 @@
 //! What the command line promises: exit codes, messages, one JSON object, no half-written files.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, text};
+use crate::cli_common::{files, folder, hil_sim, text};
 
 #[test]
 fn a_run_prints_its_table_and_writes_its_page() {

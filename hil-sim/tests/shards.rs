@@ -1,12 +1,10 @@
 //! Statistics on many machines: shards that merge to the whole, byte for byte; runs that are continued; what is refused.
 
-mod cli_common;
-
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
-use cli_common::{files, folder, hil_sim, object, text};
+use crate::cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
 const SMALL: [(&str, &[&str]); 8] = [

@@ -2,15 +2,13 @@
 //!
 //! `cargo xtask pages` runs it: it needs Chromium and the virtual board. The pictures are in `target/pages`.
 
-mod chromium;
-
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use chromium::{Browser, Page};
+use crate::chromium::{Browser, Page};
 
 /// Simulated time may pass at a tenth of the clock's: a start takes 2 s, a design as long.
 const PATIENCE: Duration = Duration::from_secs(90);

@@ -18,7 +18,7 @@ use drive_core::{Command, Compare, Drive, FrontEndState, Sample};
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::settings::FirmwareSettings;
 
-use crate::player::{BLOCK, Fnv};
+use super::player::{BLOCK, Fnv};
 
 /// Hashes of the compare values, one for every [`BLOCK`] interrupts, and the number of interrupts.
 fn replay(name: &str) -> (Vec<u64>, usize) {

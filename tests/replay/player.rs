@@ -7,7 +7,7 @@ use drive_core::{Command, Compare, Drive, FrontEndState, Mode, Output, Sample, S
 use drive_settings::Settings;
 use induction_drive::console::grammar::{self, Request};
 
-use crate::scenes::Scene;
+use super::scenes::Scene;
 
 /// Periods to a hash, so that a difference is located.
 pub const BLOCK: usize = 6000;

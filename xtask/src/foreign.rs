@@ -45,7 +45,7 @@ pub fn test() -> Result<()> {
         let from = folder.join(TARGET).join("release").join(&name);
         fs::copy(from, programs.join(format!("embassy-{name}")))?;
     }
-    let mut test = run::cargo("test --release --package virtual-board --test foreign --");
+    let mut test = run::cargo("test --release --package virtual-board --test image foreign --");
     test.args(["--ignored", "--nocapture"]).env(FOLDER, programs);
     run::step("programs of others on the virtual board", &mut test)
 }

@@ -56,7 +56,7 @@ pub fn pages() -> Result<()> {
 fn live() -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let elf = image::build()?;
-    let test = "test --release --package drive-live --test browser -- --ignored --nocapture";
+    let test = "test --release --package drive-live --test page browser -- --ignored --nocapture";
     run::step("live page", run::cargo(test).env("LIVE_ELF", elf))
 }
 

@@ -87,7 +87,9 @@ const PROOFS: [Proof; 7] = [
         about: "1000 starts each: accepted with half of the saliency, refused with a tenth or none",
         shards: 1,
         command: |_| {
-            Ok(run::cargo("test --release --test saliency_check -- --ignored --nocapture"))
+            Ok(run::cargo(
+                "test --release --test procedures saliency_check -- --ignored --nocapture",
+            ))
         },
         bounds: &[],
     },

@@ -1,0 +1,5 @@
+//! The tests of the page and of its server.
+
+mod browser;
+mod chromium;
+mod server;
