@@ -34,6 +34,7 @@ mod record;
 mod saliency_families;
 mod same_json;
 mod shards;
+mod shown_commands;
 mod starts_after_a_run;
 mod torque_limit;
 mod torque_rise;

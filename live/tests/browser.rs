@@ -158,7 +158,10 @@ fn the_page_shows_and_drives_the_virtual_board() {
 
 fn begins(page: &mut Page<'_>) {
     state(page, "off");
-    page.until("hello && !hello.misfit && settings.length > 50", PATIENCE);
+    page.until(
+        "typeof $ == 'function' && hello && !hello.misfit && settings.length > 50",
+        PATIENCE,
+    );
 }
 
 /// The drive is started, the curves move, and a step of the torque shows in them and in the number.

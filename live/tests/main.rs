@@ -2,4 +2,5 @@
 
 mod browser;
 mod chromium;
+mod report_pages;
 mod server;

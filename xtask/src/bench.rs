@@ -48,7 +48,7 @@ fn difference(expected: &Register, found: u32) -> Option<String> {
 /// board with the same image.
 pub fn dump(elf: &Path, name: &str, chip: &str) -> Result<()> {
     run::probe_rs()?;
-    let text = run::said(board::program("dump", elf).args(["--board", name]))?;
+    let text = run::said(board::program("dump", elf)?.args(["--board", name]))?;
     let mut differences = 0;
     for line in text.lines() {
         let expected = register(line)?;

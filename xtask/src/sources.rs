@@ -1,4 +1,4 @@
-//! The Rust source files and the documents of the repository.
+//! The source files of the repository.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,6 @@ use crate::run;
 
 /// Directories with build results.
 const BUILT: [&str; 2] = ["target", "out"];
-
-/// All documents for readers of today; the change log speaks of the past.
-pub fn documents() -> Result<Vec<PathBuf>> {
-    let mut documents = files("md")?;
-    documents.retain(|path| !path.ends_with("CHANGELOG.md"));
-    Ok(documents)
-}
 
 /// All files below the root with this ending, sorted, as paths relative to it.
 pub fn files(extension: &str) -> Result<Vec<PathBuf>> {

@@ -4,6 +4,7 @@ mod bit_identity;
 mod board;
 mod boards;
 mod both_zero_vectors;
+mod bus_clients;
 mod campaign;
 mod commission;
 mod common;
