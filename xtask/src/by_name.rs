@@ -36,6 +36,15 @@ pub fn pages() -> Result<()> {
     Ok(())
 }
 
+/// Compares the registers of a real board with those of the virtual board that has this image.
+pub fn bench_dump(elf: &Path, name: &str) -> Result<()> {
+    run::probe_rs()?;
+    let mut test =
+        board::cargo("test --release --test image every_register -- --ignored --nocapture")?;
+    test.env(board::ELF, elf).env("BOARD", name).env("CHIP", image::CHIP);
+    run::step("registers of the board", &mut test)
+}
+
 /// Runs the clients of the field bus, those that are installed, with this image.
 pub fn bus(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;

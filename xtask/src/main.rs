@@ -1,6 +1,5 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
-mod bench;
 mod board;
 mod budget;
 mod by_name;
@@ -140,7 +139,7 @@ fn run(task: Task) -> Result<()> {
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
-        Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
+        Task::BenchDump(which) => by_name::bench_dump(&which.image()?, &which.board),
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Bus => by_name::bus(&image::build()?),

@@ -1,5 +1,6 @@
 //! The tests of the image on the virtual board: one program, a module a subject.
 
+mod bench_dump;
 mod bit_identity;
 mod board;
 mod boards;
