@@ -266,7 +266,7 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
     generated::check("cycles.md", "budgets", &list);
 }
 
-/// `RESULT=NAME cargo test --release -p hil-sim --test documents measure -- --ignored --nocapture`. With `TABLE=FILE` the rows
+/// `RESULT=NAME cargo test --release -p hil-sim documents::measure -- --ignored --nocapture`. With `TABLE=FILE` the rows
 /// are those of a Markdown table that another program has printed.
 #[test]
 #[ignore = "runs the commands of a file in results/; hours for some"]

@@ -19,7 +19,7 @@ use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::order::Order;
 use induction_drive::settings::FirmwareSettings;
 
-use crate::player::{BLOCK, Fnv};
+use super::player::{BLOCK, Fnv};
 
 /// Hashes of the compare values, one for every [`BLOCK`] interrupts, and the number of interrupts.
 fn replay(name: &str) -> (Vec<u64>, usize) {

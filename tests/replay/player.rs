@@ -8,7 +8,7 @@ use drive_settings::Settings;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::order::Order;
 
-use crate::scenes::Scene;
+use super::scenes::Scene;
 
 /// Periods to a hash, so that a difference is located.
 pub const BLOCK: usize = 6000;

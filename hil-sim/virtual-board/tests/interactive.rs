@@ -1,9 +1,6 @@
 //! `cargo sim board`: a program talks to the drive through the pseudo-terminal, and the rotor does what it
 //! was told.
 
-#[path = "common/program.rs"]
-mod program;
-
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -11,12 +8,12 @@ use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use crate::common::program::{command, folder};
 use hil_sim::Config;
 use hil_sim::console::answer::is_unasked;
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::Link;
 use hil_sim::console::session::{Flow, Session};
-use program::{command, folder};
 use serde_json::Value;
 
 /// Longest wait for an answer on a busy machine; an answer takes 20 ms of simulated time.
