@@ -221,6 +221,16 @@ fn pages() -> BTreeMap<String, String> {
 /// A table of results is that of its file, if a page shows it; the lists are those of the program.
 #[test]
 fn tables_of_the_pages_are_those_of_results_and_program() {
+    let mine = |text: &String| {
+        let blocks = text.split("<!-- generated: ").skip(1).map(str::to_owned);
+        blocks.filter(|block| block.contains("--test documents) -->")).collect::<Vec<_>>()
+    };
+    let mut known: Vec<_> = results().into_iter().map(|(name, _)| name).collect();
+    known.extend(["experiments", "motors-list", "budgets"].map(str::to_owned));
+    for block in pages().values().flat_map(mine) {
+        let name = block.split(' ').next().unwrap();
+        assert!(known.iter().any(|known| known == name), "nothing renders the block {name}");
+    }
     for (name, path) in results() {
         let marker = format!("<!-- generated: {name} (");
         let holds = |(_, text): &(_, String)| text.contains(&marker);
