@@ -6,7 +6,7 @@ mod tracked;
 
 use rayon::prelude::*;
 use sim_bench::prelude::*;
-use sim_bench::steady::SteadyRun;
+use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
@@ -129,10 +129,13 @@ fn findings(
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
         let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
-        let turning = SPEEDS_RPM
-            .par_iter()
-            .map(|&rpm| tracked::turning(&drive, config, rpm, RUN_IQ_A, seed))
-            .collect::<Result<_, _>>()?;
+        // One second at constant speed and torque; none where the angle is lost.
+        let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
+            let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
+            let run = steady_run_of(&drive, config, case, 1.0)?;
+            Ok::<_, Error>((!run.lost).then_some(run))
+        });
+        let turning = turning.collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
     };
     let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));

@@ -7,10 +7,9 @@ use sim_bench::rig::wrapped_degrees;
 
 use crate::identification::signals::Prbs;
 
-/// The sequence: 8 bits as in section 3.10, each value held for 10 ms, so that the excitation lies where
+/// Samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no
 /// term, decides the fit: 50 % and less, and gains that are wrong by half.)
-const BITS: u32 = 8;
 const HOLD: usize = 60;
 /// Periods of the sequence: one to settle, the rest averaged.
 const PERIODS: usize = 7;
@@ -64,8 +63,8 @@ pub fn sequence(
     seed: u64,
 ) -> Result<Record, Error> {
     let mut rig = oriented(config, demodulator, iq, seed)?;
-    let mut prbs = Prbs::new(BITS).ok_or_else(|| Error::Refused("no such sequence".into()))?;
-    let bits: Vec<f64> = (0..(1 << BITS) - 1).map(|_| TURN * prbs.step()).collect();
+    let mut prbs = Prbs::default();
+    let bits = [(); Prbs::PERIOD].map(|()| TURN * prbs.step());
     let mut y = vec![0.0; bits.len() * HOLD];
     for period in 0..PERIODS {
         for (n, &bit) in bits.iter().enumerate() {
@@ -142,22 +141,19 @@ fn alternate(
     mut one: impl FnMut(&mut Rig, f64, usize) -> Result<(f64, f64), Error>,
 ) -> Result<Vec<f64>, Error> {
     let (mut signal, mut angle) = (vec![0.0; STEP_SAMPLES], 0.0);
-    let mut before = vec![0.0; STEP_SAMPLES];
     for n in 0..2 * STEPS + 1 {
         let side = if n % 2 == 0 { 1.0 } else { -1.0 };
-        for k in 0..STEP_SAMPLES {
+        for (k, signal) in signal.iter_mut().enumerate() {
             let (y, x) = one(rig, side, k)?;
-            // The first step comes from the middle.
+            // The first step comes from the middle; of the others as many go up as down.
             if n > 0 {
-                signal[k] += side * y;
+                *signal += side * y;
                 if SLOW.contains(&k) {
                     angle += side * x;
                 }
-                before[k] += side;
             }
         }
     }
-    debug_assert!(before.iter().all(|&sides| sides == 0.0), "as many steps up as down");
     let angle = angle / SLOW.len() as f64;
     // From -y to y for angles from -x to x; before the step the signal is that of the other side.
     let end = SLOW.map(|k| signal[k]).sum::<f64>() / SLOW.len() as f64;
