@@ -1,8 +1,6 @@
 //! What the command line promises: exit codes, messages, one JSON object, no half-written files.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, text};
+use crate::cli_common::{files, folder, hil_sim, text};
 use hil_sim::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
 
 #[test]

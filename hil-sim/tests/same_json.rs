@@ -2,7 +2,7 @@
 //! experiments and is to change no figure.
 //!
 //! ```text
-//! OLD=PATH cargo test --release -p hil-sim --test same_json -- --ignored --nocapture
+//! OLD=PATH cargo test --release -p hil-sim same_json -- --ignored --nocapture
 //! ```
 //!
 //! `OLD` is the program as built before the change, `ONLY` a part of the names of the experiments. Experiments and keys that got another

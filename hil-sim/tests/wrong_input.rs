@@ -1,9 +1,7 @@
 //! Fifty wrong inputs of the command line: each message names the thing, the value and what is allowed; nothing is
 //! written.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, text};
+use crate::cli_common::{files, folder, hil_sim, text};
 
 /// Files of the tests: name and text.
 const FILES: [(&str, &str); 16] = [

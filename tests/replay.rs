@@ -64,7 +64,7 @@ fn every_scene_is_tested() {
 }
 
 /// Records the scenes whose names contain the value of `SCENE` anew:
-/// `SCENE=stops cargo test --release --test replay record_again -- --ignored`.
+/// `SCENE=stops cargo test --release --test procedures record_again -- --ignored`.
 #[test]
 #[ignore = "it replaces the yardstick"]
 fn record_again() {

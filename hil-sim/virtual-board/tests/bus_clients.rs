@@ -1,5 +1,5 @@
-//! `cargo xtask bus`: programs of others, unmodified, start, run, read and stop the drive over the bus of the virtual
-//! board. Those that are not installed are named and left out.
+//! Programs of others, unmodified, start, run, read and stop the drive over the bus of the virtual board. Those that are
+//! not installed are named and left out. `cargo xtask bus` runs this.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{run, toolchain};
+use crate::common::program::{command, folder};
 
 /// Frequency asked for: 5 Hz, 150 rpm of two pole pairs; and the tolerance of the speed, rpm, as a sensorless drive reaches.
 const HUNDREDTHS: &str = "500";
@@ -28,13 +28,9 @@ struct Board {
 }
 
 impl Board {
-    fn start(elf: &Path, out: &Path) -> Result<Self> {
-        let build = "build --release --package virtual-board --bin board";
-        run::step("virtual board", &mut run::cargo(build))?;
-        let mut command = run::command(run::target_dir()?.join("release/board"));
-        command.args(["--set", "load.mode=free", "--set", "injection.allow_unlearned=yes"]);
-        command.arg("--elf").arg(elf).arg("--out").arg(out);
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+    fn start(out: &Path) -> Result<Self> {
+        let load = ["--set", "load.mode=free", "--set", "injection.allow_unlearned=yes"];
+        let mut child = command(out, &load).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let (send, lines) = channel();
         let out = child.stdout.take().context("no output")?;
         thread::spawn(move || {
@@ -76,15 +72,15 @@ impl Drop for Board {
     }
 }
 
-/// Runs the clients that are there.
-pub fn test(elf: &Path) -> Result<()> {
-    toolchain::ensure_c_compiler()?;
-    let folder = run::folder("bus")?;
-    let mut board = Board::start(elf, &folder)?;
+#[test]
+#[ignore = "its clients are programs of others; cargo xtask bus runs it"]
+fn clients_start_run_read_and_stop_the_drive() -> Result<()> {
+    let folder = folder("bus-clients");
+    let mut board = Board::start(&folder)?;
     type Client = fn(&str, &Path) -> Result<f64>;
     let clients: [(&str, bool, Client); 3] = [
         ("mbpoll", there("mbpoll", "-V"), mbpoll),
-        ("pymodbus", run::succeeds(python().arg("import pymodbus, serial")), pymodbus),
+        ("pymodbus", said(python().arg("import pymodbus, serial")).is_ok(), pymodbus),
         ("vfdb_vfd", there("halcmd", "-V") && there("vfdb_vfd", "-h"), vfdb_vfd),
     ];
     for (name, installed, client) in clients {
@@ -102,7 +98,16 @@ pub fn test(elf: &Path) -> Result<()> {
 }
 
 fn there(program: &str, argument: &str) -> bool {
-    run::output(program, &[argument]).is_ok()
+    said(Command::new(program).arg(argument)).is_ok()
+}
+
+/// The output of a command that must succeed.
+fn said(command: &mut Command) -> Result<String> {
+    let output = command.output().with_context(|| format!("cannot run: {command:?}"))?;
+    let [text, errors] = [output.stdout, output.stderr]
+        .map(|bytes| String::from_utf8_lossy(&bytes).trim().to_owned());
+    ensure!(output.status.success(), "{}: {text}{errors}\n    {command:?}", output.status);
+    Ok(text)
 }
 
 fn python() -> Command {
@@ -115,7 +120,7 @@ fn mbpoll(bus: &str, _: &Path) -> Result<f64> {
     let ask = |options: &[&str], words: &[&str]| -> Result<String> {
         let mut command = Command::new("mbpoll");
         command.args(["-m", "rtu", "-b", "19200", "-P", "even", "-a", "1", "-0", "-t", "4", "-1"]);
-        run::said(command.args(options).arg(bus).arg("--").args(words))
+        said(command.args(options).arg(bus).arg("--").args(words))
     };
     ask(&["-r", "8192"], &["1"])?;
     ask(&["-r", "8192"], &["18", HUNDREDTHS])?;
@@ -148,14 +153,14 @@ print(page[12])
 
 fn pymodbus(bus: &str, _: &Path) -> Result<f64> {
     let seconds = RUN_UP.as_secs_f64().to_string();
-    Ok(run::said(python().arg(PYMODBUS).args([bus, HUNDREDTHS, &seconds]))?.parse()?)
+    Ok(said(python().arg(PYMODBUS).args([bus, HUNDREDTHS, &seconds]))?.parse()?)
 }
 
 fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
     let ini = folder.join("vfd.ini");
     let settings = "TYPE=rtu\nBAUD=19200\nBITS=8\nPARITY=even\nSTOPBITS=1\nTARGET=1";
     fs::write(&ini, format!("[VFD]\nDEVICE={bus}\n{settings}\n"))?;
-    let halcmd = |arguments: &[&str]| run::output("halcmd", arguments);
+    let halcmd = |arguments: &[&str]| said(Command::new("halcmd").args(arguments));
     let mut component = Command::new("vfdb_vfd");
     component.args(["-n", "vfd", "-S", "VFD", "-I"]).arg(&ini);
     let mut component = component.stdout(Stdio::null()).spawn()?;
@@ -181,7 +186,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
     };
     let rpm = session();
     // Asked to end, so that it gives its name in the HAL back.
-    let _ = run::output("kill", &[&component.id().to_string()]);
+    let _ = said(Command::new("kill").arg(component.id().to_string()));
     component.wait()?;
     rpm
 }
