@@ -98,9 +98,8 @@ fn t1_orderings() {
             }
             // Model S is below half a percent in the speed with S_s, and better than C in the mean.
             for k in 0..5 {
-                let mean = |model: usize| {
-                    errors.iter().map(|e| e.continuous[model][k]).sum::<f64>()
-                };
+                let mean =
+                    |model: usize| errors.iter().map(|e| e.continuous[model][k]).sum::<f64>();
                 assert!(mean(3) < mean(C), "{k}");
             }
         }

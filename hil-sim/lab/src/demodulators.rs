@@ -123,7 +123,7 @@ fn findings(
     };
     let at_each = |config: &Config| {
         IQ_A.par_iter()
-            .map(|&iq| signal::signal_quality(demodulation, config, iq, seed))
+            .map(|&iq| signal::signal_quality(signal::oriented(demodulation, config, iq, seed)?))
             .collect::<Result<Vec<_>, _>>()
     };
     let learned = demodulation.learn(config, seed)?;
@@ -190,14 +190,9 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResu
 }
 
 fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
-    let mut table = Table::new("What each sees at the right angle", &[]).note(
-        "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
-         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
-         should be seen; as angle: what that would shift the angle by.",
-    );
-    for (demodulation, f) in all {
-        for ((iq, s), i) in IQ_A.iter().zip(&f.seen).zip(&f.isotropic) {
-            table.record([
+    let rows = all.flat_map(|(demodulation, f)| {
+        IQ_A.iter().zip(&f.seen).zip(&f.isotropic).map(|((iq, s), i)| {
+            [
                 ("demodulation", Cell::from(demodulation.name)),
                 ("iq (A)", Cell::fixed(*iq, 1)),
                 ("unit", Cell::from(demodulation.unit())),
@@ -208,10 +203,14 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
                 ("signal without saliency", Cell::fixed(i.signal * 1e3, 2)),
                 ("as angle (°)", Cell::fixed(degrees(i.signal / s.slope), 1)),
                 ("slope without saliency", Cell::fixed(i.slope * 1e3, 1)),
-            ]);
-        }
-    }
-    table
+            ]
+        })
+    });
+    Table::new("What each sees at the right angle", &[]).records(rows).note(
+        "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
+         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
+         should be seen; as angle: what that would shift the angle by.",
+    )
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {

@@ -33,8 +33,11 @@ pub struct Record {
     pub y: Vec<f64>,
 }
 
-/// Orientation by the encoder, shaft locked, injection beside it, current settled.
-fn oriented(
+/// A drive that the encoder orients, shaft locked, injection beside it, current settled.
+///
+/// # Errors
+/// As [`Rig::oriented`].
+pub fn oriented(
     config: &Config,
     demodulator: DemodulatorKind,
     iq: f64,
@@ -55,14 +58,8 @@ fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
 /// Measures with the pseudo-random sequence on theta; the encoder orients the current.
 ///
 /// # Errors
-/// As [`Rig::oriented`].
-pub fn sequence(
-    config: &Config,
-    demodulator: DemodulatorKind,
-    iq: f64,
-    seed: u64,
-) -> Result<Record, Error> {
-    let mut rig = oriented(config, demodulator, iq, seed)?;
+/// When the drive refuses a command.
+pub fn sequence(mut rig: Rig) -> Result<Record, Error> {
     let mut prbs = Prbs::default();
     let bits = [(); Prbs::PERIOD].map(|()| TURN * prbs.step());
     let mut y = vec![0.0; bits.len() * HOLD];
@@ -95,14 +92,8 @@ pub struct StepResponses {
 /// Measures both step responses.
 ///
 /// # Errors
-/// As [`Rig::oriented`].
-pub fn steps(
-    config: &Config,
-    demodulator: DemodulatorKind,
-    iq: f64,
-    seed: u64,
-) -> Result<StepResponses, Error> {
-    let mut rig = oriented(config, demodulator, iq, seed)?;
+/// When the drive refuses a command.
+pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
     let size = f64::from(2 * STEP_COUNTS) * TURN_PER_COUNT;
     let alone = alternate(&mut rig, |rig, side, k| {
         if k == 0 {
@@ -166,7 +157,7 @@ mod tests {
 
     /// Slow gain with the axis alone and with the current, by the demodulation.
     fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
-        let responses = steps(&Config::default(), demodulator, iq, 5).unwrap();
+        let responses = steps(oriented(&Config::default(), demodulator, iq, 5).unwrap()).unwrap();
         [&responses.alone, &responses.with_current]
             .map(|r| r[SLOW].iter().sum::<f64>() / SLOW.len() as f64)
     }
