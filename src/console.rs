@@ -1,8 +1,10 @@
 //! The console: one line in, one line out, for people and for scripts.
 //!
 //! Replies begin with `ok` or `error:`, except for requests of data. Some requests answer with many lines and end with
-//! `ok`; the next line that comes in cuts them short. An invalid line changes nothing. Faults, changes of state, and the
-//! progress of a learning are announced unasked, between lines; see [`announce::ANNOUNCEMENTS`].
+//! `ok`; the next line that comes in cuts them short. An invalid line changes nothing.
+//!
+//! A request may carry a tag, `@17 speed 300`; the last line of its answer repeats it, `@17 ok`. Lines that come unasked (faults,
+//! changes of state, progress) begin with [`line::UNASKED`], which begins no answer and no request.
 
 pub mod announce;
 mod answer;
@@ -128,7 +130,7 @@ impl Console {
     pub fn greet(&mut self, drive: &impl DriveHandle) {
         let (version, last_run) =
             (fmt::from_fn(|f| drive.version(f)), fmt::from_fn(|f| drive.last_run(f)));
-        self.out.line(format_args!("induction-drive {version}; last run: {last_run}"));
+        self.out.news(format_args!("induction-drive {version}; last run: {last_run}"));
     }
 
     /// Reads received bytes and writes replies; never waits. `now_ms` wraps.
@@ -177,7 +179,7 @@ impl Console {
             Some(began) if now_ms.wrapping_sub(began) > LINE_MS => {
                 self.reader.forget();
                 self.began_ms = None;
-                self.error(&LineError::Unfinished);
+                self.out.news(format_args!("error: {}", LineError::Unfinished));
             }
             None if self.reader.begun() => self.began_ms = Some(now_ms),
             _ => {}
@@ -190,12 +192,12 @@ impl Console {
     }
 
     fn ok(&mut self) {
-        self.out.line(format_args!("ok"));
+        self.out.answer(format_args!("ok"));
     }
 
     fn error(&mut self, why: &dyn fmt::Display) {
         if !self.bus.takes_error(why) {
-            self.out.line(format_args!("error: {why}"));
+            self.out.answer(format_args!("error: {why}"));
         }
     }
 
@@ -221,29 +223,29 @@ impl Console {
         if core::mem::take(&mut self.ended) {
             let learned = self.settings.in_force().learned.as_ref();
             if let Some(result) = self.unbelievable.as_ref().or(learned) {
-                self.out.line(format_args!("{}", announce::outcome(result)));
+                self.out.news(format_args!("{}", announce::outcome(result)));
                 if let Some(tracked) = self.settings.in_force().drive.tracked(result) {
-                    self.out.line(format_args!("learned: {tracked}"));
+                    self.out.news(format_args!("learned: {tracked}"));
                 }
             }
         } else if let Some(news) =
             self.announcer.next(&status, &self.settings.in_force().drive, now_ms)
         {
-            self.out.line(format_args!("{news}"));
+            self.out.news(format_args!("{news}"));
         } else if let Some((news, line)) = self.commissioned {
             let (text, next) = commissioning::told(&news, line);
-            self.out.line(format_args!("commissioning: {text}"));
+            self.out.news(format_args!("commissioning: {text}"));
             self.commissioned = next.map(|line| (news, line));
         } else if let Some(homed) = self.homed.take() {
             match homed {
-                Ok(()) => self.out.line(format_args!("homing: position 0 is at the stop")),
-                Err(why) => self.out.line(format_args!("homing: {why}")),
+                Ok(()) => self.out.news(format_args!("homing: position 0 is at the stop")),
+                Err(why) => self.out.news(format_args!("homing: {why}")),
             }
         } else if self.armed && !drive.tracing() {
             self.armed = false;
-            self.out.line(format_args!("trace: recorded; `trace` prints it"));
+            self.out.news(format_args!("trace: recorded; `trace` prints it"));
         } else if let Some(why) = self.bus.news() {
-            self.out.line(format_args!("bus: refused: {why}"));
+            self.out.news(format_args!("bus: refused: {why}"));
         }
         if self.out.as_str().len() == empty {
             self.out.clear();
@@ -274,12 +276,20 @@ impl Console {
         let Some(line) = self.reader.push(byte).transpose() else { return };
         // The next line has its own time.
         (self.list, self.began_ms) = (None, None);
+        self.out.begin_answer(None);
         let mut line = match line {
             Ok(line) => line,
             Err(why) => return self.error(&why),
         };
-        line.make_ascii_lowercase();
-        match grammar::parse(&line) {
+        let request = match grammar::tagged(&mut line) {
+            Ok((tag, request)) => {
+                self.out.begin_answer(tag);
+                request
+            }
+            Err(why) => return self.error(&why),
+        };
+        request.make_ascii_lowercase();
+        match grammar::parse(request) {
             Ok(request) => {
                 self.heard(Commander::Console, now_ms);
                 if self.is_for_the_bus(&request) {

@@ -5,8 +5,8 @@
 use std::sync::{LazyLock, OnceLock};
 
 use induction_drive::console::Console;
-use induction_drive::console::announce::ANNOUNCEMENTS;
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
+use induction_drive::console::line::UNASKED;
 use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
@@ -61,9 +61,7 @@ fuzz_target!(|bytes: &[u8]| {
         now_ms = now_ms.wrapping_add(1);
         console.poll(&mut port, &mut drive, now_ms);
     }
-    let mut lines = port.received.lines().filter(|line| {
-        !ANNOUNCEMENTS.iter().any(|first| line.starts_with(first))
-    });
+    let mut lines = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);
     let running = !matches!(drive.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", drive.drive.state());

@@ -8,25 +8,6 @@ use drive_settings::Settings;
 
 use crate::link::Status;
 
-/// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
-/// for an answer passes over them.
-pub const ANNOUNCEMENTS: [&str; 14] = [
-    "fault ",
-    "running: ",
-    "off: ",
-    "stopped: ",
-    "learning: ",
-    "learned: ",
-    "commissioning: ",
-    "homing: ",
-    "refused: ",
-    "trace: ",
-    "link: ",
-    "bus: ",
-    "applied: ",
-    "designing...",
-];
-
 /// Longest silence while the drive learns, ms.
 const PROGRESS_MS: u32 = 5000;
 

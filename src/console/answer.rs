@@ -73,19 +73,19 @@ impl Console {
                 }
             }
             Request::Apply if !self.settings.is_staged() => {
-                self.out.line(format_args!("ok: nothing staged"));
+                self.out.answer(format_args!("ok: nothing staged"));
             }
             Request::Apply => self.design_for(Task::Apply, drive),
             Request::Revert => {
                 self.foreign = None;
                 let count = self.settings.count();
                 self.settings.revert();
-                self.out.line(format_args!("ok: {count} staged values dropped"));
+                self.out.answer(format_args!("ok: {count} staged values dropped"));
             }
             Request::Save => self.design_for(Task::Save, drive),
             Request::Get(key) => {
                 let setting = reply::Setting::new(key, &self.settings);
-                self.out.line(format_args!("{setting}; {}", key.help()));
+                self.out.answer(format_args!("{setting}; {}", key.help()));
             }
             Request::List(prefix) => self.begin(ListKind::Settings(prefix)),
             Request::Describe(prefix) => self.begin(ListKind::Describe(prefix)),
@@ -95,7 +95,7 @@ impl Console {
                 if self.unbelievable.is_some() || self.settings.in_force().learned.is_some() {
                     self.begin(ListKind::Learned);
                 } else {
-                    self.out.line(format_args!("ok: nothing learned with these settings"));
+                    self.out.answer(format_args!("ok: nothing learned with these settings"));
                 }
             }
             Request::Restore(index, words) => match self.restore.take(index, &words) {
@@ -161,7 +161,7 @@ impl Console {
             }
             Request::Version => {
                 let version = fmt::from_fn(|f| drive.version(f));
-                self.out.line(format_args!("{version}"));
+                self.out.answer(format_args!("{version}"));
             }
         }
     }
@@ -172,7 +172,7 @@ impl Console {
             Ok(Accepted::AsGiven) => self.ok(),
             Ok(Accepted::Limited(value)) => {
                 let value = Significant(value, DIGITS);
-                self.out.line(format_args!("ok: limited to {value} {unit}"));
+                self.out.answer(format_args!("ok: limited to {value} {unit}"));
             }
             Err(why) => self.error(&why),
         }
@@ -200,15 +200,15 @@ impl Console {
             Err(why) => self.error(&why),
             Ok(true) => {
                 let what = "what was restored belongs to other settings and is dropped";
-                self.out.line(format_args!("ok: staged; {what}"));
+                self.out.answer(format_args!("ok: staged; {what}"));
             }
             Ok(false) => match late {
                 Some((key, _)) if self.settings.is_staged() => {
                     let when = "takes effect at the next reset, if saved";
-                    self.out.line(format_args!("ok: staged; {} {when}", key.name()));
+                    self.out.answer(format_args!("ok: staged; {} {when}", key.name()));
                 }
                 _ if confirmed && !self.settings.latest().board_is_confirmed() => {
-                    self.out.line(format_args!("ok: staged; {UNCONFIRMED}"));
+                    self.out.answer(format_args!("ok: staged; {UNCONFIRMED}"));
                 }
                 _ => self.staged(),
             },
@@ -217,7 +217,7 @@ impl Console {
 
     fn staged(&mut self) {
         let text = if self.settings.is_staged() { "staged" } else { "as in force" };
-        self.out.line(format_args!("ok: {text}"));
+        self.out.answer(format_args!("ok: {text}"));
     }
 
     /// Performs a task that needs the staged settings in force. The design of the controllers takes more than a moment:
@@ -229,7 +229,7 @@ impl Console {
             Task::Learn { .. } if !drive.is_off() => self.start(Mode::Learning, drive),
             _ if !self.may_begin(task, drive) => {}
             _ if self.designs(task) && drive.status().is_some() => {
-                self.out.line(format_args!("designing..."));
+                self.out.news(format_args!("designing..."));
                 self.task = Some(task);
             }
             _ => self.perform(task, drive, 0),
@@ -276,10 +276,10 @@ impl Console {
         (self.heard_ms, self.line_ms) = (None, None);
         let Some(applied) = self.apply(drive) else { return };
         if matches!(task, Task::Apply) {
-            return self.out.line(format_args!("ok{applied}"));
+            return self.out.answer(format_args!("ok{applied}"));
         }
         if applied != Applied::default() {
-            self.out.line(format_args!("applied{applied}"));
+            self.out.news(format_args!("applied{applied}"));
         }
         match task {
             Task::Start(mode) => self.start(mode, drive),
@@ -294,7 +294,7 @@ impl Console {
         match drive.save(self.settings.in_force()) {
             Ok(()) => {
                 self.unsaved = false;
-                self.out.line(format_args!("ok{note}"));
+                self.out.answer(format_args!("ok{note}"));
             }
             Err(why) => self.error(&why),
         }
@@ -331,7 +331,7 @@ impl Console {
         {
             Ok(_) => {
                 self.checking = began;
-                self.out.line(format_args!("ok: the wiring is checked first"));
+                self.out.answer(format_args!("ok: the wiring is checked first"));
             }
             Err(why) => self.error(&why),
         }
@@ -349,7 +349,7 @@ impl Console {
                 self.out.line(format_args!("latched: fault {code}, {fault}; last run: {last_run}"));
                 self.begin(ListKind::Fault(fault));
             }
-            _ => self.out.line(format_args!("none latched; last run: {last_run}")),
+            _ => self.out.answer(format_args!("none latched; last run: {last_run}")),
         }
     }
 
@@ -374,7 +374,7 @@ impl Console {
             self.begin(ListKind::Trace);
         } else {
             self.armed = true;
-            self.out.line(format_args!("ok: recording until the trigger"));
+            self.out.answer(format_args!("ok: recording until the trigger"));
         }
         self.traced = Some(plan);
     }
@@ -387,7 +387,7 @@ impl Console {
                 &"settings that were not saved would be lost: `save` first, or `reboot now`",
             );
         } else {
-            self.out.line(format_args!("ok: rebooting"));
+            self.out.answer(format_args!("ok: rebooting"));
             self.task = Some(Task::Reboot(None));
         }
     }

@@ -74,8 +74,8 @@ impl Console {
             self.heard_ms = Some(now_ms);
             self.announcer.stopping();
             match drive.command(Command::Stop(Stop::Coast)) {
-                Ok(_) => self.out.line(format_args!("stopped: no command for {limit} s")),
-                Err(why) => self.error(&format_args!("not stopped: {why}")),
+                Ok(_) => self.out.news(format_args!("stopped: no command for {limit} s")),
+                Err(why) => self.out.news(format_args!("error: not stopped: {why}")),
             }
         }
     }

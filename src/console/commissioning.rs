@@ -23,7 +23,7 @@ impl Console {
                 if last < Step::Inertia {
                     self.ok();
                 } else {
-                    self.out.line(format_args!(
+                    self.out.answer(format_args!(
                         "ok: the shaft is going to turn, at most two turns to and fro"
                     ));
                 }

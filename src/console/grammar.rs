@@ -13,6 +13,7 @@ use drive_commission::Step;
 use drive_core::{Fault, Mode, Stop, homing};
 use drive_settings::value::{self, Words as _};
 
+use super::line::Tag;
 use super::suggest::nearest;
 use crate::board;
 use crate::boards;
@@ -20,7 +21,7 @@ use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
 
 use backup::{hexadecimal, restore};
-pub use error::ParseError;
+pub use error::{ParseError, TagError};
 pub use recording::Stream;
 pub use request::{LEVELS, Level, Request, WORDS_IN_LINE};
 
@@ -64,7 +65,21 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Parses one line, in lower case.
+/// Splits the tag off a line: `@17 status` is the request `status` with the tag `17`.
+///
+/// # Errors
+/// A tag of no characters or of more than [`LONGEST_TAG`](super::line::LONGEST_TAG).
+pub fn tagged(line: &mut str) -> Result<(Option<Tag>, &mut str), TagError> {
+    if !line.starts_with('@') {
+        return Ok((None, line));
+    }
+    let end = line.find(' ').unwrap_or(line.len());
+    let (tag, request) = line.split_at_mut(end);
+    let tag = Tag::try_from(&tag[1..]).ok().filter(|tag| !tag.is_empty()).ok_or(TagError)?;
+    Ok((Some(tag), request))
+}
+
+/// Parses one request, in lower case.
 ///
 /// # Errors
 /// The first invalid or missing word. A line is valid as a whole or not at all.

@@ -5,10 +5,18 @@ use core::fmt;
 use heapless::String;
 use thiserror::Error;
 
-/// Longest line that is taken, characters without its end.
-pub const LONGEST: usize = 120;
+/// Longest tag of a request, characters.
+pub const LONGEST_TAG: usize = 8;
+/// Longest line that is taken, characters without its end: a request of 120 behind `@TAG `.
+pub const LONGEST: usize = 120 + LONGEST_TAG + 2;
 /// Room for text that goes out, bytes: the longest line, that of `status`, or one of `describe` and what was typed so far.
 pub const OUTPUT: usize = 504;
+
+/// Tag of a request.
+pub type Tag = String<LONGEST_TAG>;
+
+/// Beginning of each line that comes unasked, and of no other.
+pub const UNASKED: &str = "* ";
 
 const CTRL_C: u8 = 0x03;
 const BACKSPACE: u8 = 0x08;
@@ -136,6 +144,8 @@ impl LineReader {
 #[derive(Default)]
 pub struct OutputLine<const N: usize = OUTPUT> {
     text: String<N>,
+    /// Tag of the request whose answer has not ended.
+    tag: Option<Tag>,
     muted: bool,
 }
 
@@ -145,7 +155,25 @@ impl<const N: usize> OutputLine<N> {
         self.muted = muted;
     }
 
-    /// Adds a line.
+    /// Begins the answer to a request with this tag, if it has one.
+    pub fn begin_answer(&mut self, tag: Option<Tag>) {
+        self.tag = tag;
+    }
+
+    /// Adds the last line of an answer, behind the request's tag.
+    pub fn answer(&mut self, text: fmt::Arguments<'_>) {
+        match self.tag.take_if(|_| !self.muted) {
+            Some(tag) => self.line(format_args!("@{tag} {text}")),
+            None => self.line(text),
+        }
+    }
+
+    /// Adds a line that comes unasked.
+    pub fn news(&mut self, text: fmt::Arguments<'_>) {
+        self.line(format_args!("{UNASKED}{text}"));
+    }
+
+    /// Adds a line: of an answer, one that others follow.
     pub fn line(&mut self, text: fmt::Arguments<'_>) {
         const END: &str = "\r\n";
         if self.muted {

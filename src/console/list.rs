@@ -86,7 +86,7 @@ impl Console {
         };
         self.list = written.map(|next| List { kind, next });
         if written.is_none() {
-            self.out.line(format_args!("ok"));
+            self.ok();
         }
     }
 

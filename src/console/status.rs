@@ -31,7 +31,7 @@ impl Console {
             temperatures(f, status.stator_resistance, rotor, settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
-        self.out.line(format_args!("{line}"));
+        self.out.answer(format_args!("{line}"));
     }
 }
 

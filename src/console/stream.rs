@@ -85,14 +85,14 @@ impl Console {
         drive.stream(stream.divider);
         let (divider, baud, wanted) = (stream.divider, self.wire.baud, self.wire.wanted);
         self.wire = Wire { stream: Some(stream), baud, wanted, ..Wire::new() };
-        self.out.line(format_args!("ok: every {divider} periods"));
+        self.out.answer(format_args!("ok: every {divider} periods"));
     }
 
     /// Tells the state of the stream.
     pub(super) fn stream_state(&mut self) {
         let Wire { sent, dropped, .. } = self.wire;
         let on = if self.wire.stream.is_some() { "on" } else { "off" };
-        self.out.line(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
+        self.out.answer(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
     }
 
     /// Asks for a rate; a stream ends.
@@ -151,7 +151,7 @@ impl Console {
                 self.wire.baud = wanted;
                 self.line_ms = Some(now_ms);
                 if wanted == usual {
-                    self.out.line(format_args!("link: {usual} baud"));
+                    self.out.news(format_args!("link: {usual} baud"));
                 }
             }
         } else if self.wire.baud != usual

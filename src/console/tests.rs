@@ -6,11 +6,11 @@ mod learning;
 mod lists;
 mod staging;
 mod stream;
+mod tags;
 mod torque;
 mod typing;
 mod wrong;
 
-use super::announce::ANNOUNCEMENTS;
 use super::help::HELP;
 use super::*;
 use crate::boards;
@@ -76,7 +76,7 @@ impl Talk {
     /// Sends a line that has one reply, beside what comes unasked.
     fn ask(&mut self, line: &str) -> String {
         let mut replies = self.say(format!("{line}\n"));
-        replies.retain(|reply| !ANNOUNCEMENTS.iter().any(|first| reply.starts_with(first)));
+        replies.retain(|reply| !reply.starts_with(line::UNASKED));
         assert_eq!(replies.len(), 1, "{replies:?}");
         replies.into_iter().next().unwrap()
     }
@@ -86,7 +86,7 @@ impl Talk {
 fn says_at_the_start_who_it_is_and_what_ended_the_last_run() {
     let mut talk = Talk::new();
     talk.console.greet(&talk.drive);
-    assert_eq!(talk.say(""), ["induction-drive version; last run: power-on"]);
+    assert_eq!(talk.say(""), ["* induction-drive version; last run: power-on"]);
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn silence_stops_a_running_drive_once_and_only_if_asked_for() {
     // What is not understood does not count.
     talk.ask("rubbish");
     talk.now_ms += 200;
-    assert_eq!(talk.say(""), ["stopped: no command for 2 s"]);
+    assert_eq!(talk.say(""), ["* stopped: no command for 2 s"]);
     assert_eq!(talk.drive.drive.state(), State::Off);
     talk.now_ms += 5000;
     assert!(talk.say("").is_empty());
@@ -217,7 +217,7 @@ fn half_lines_are_dropped_in_time() {
     let mut talk = Talk::new();
     assert!(talk.say("start").is_empty());
     talk.now_ms += LINE_MS + 1;
-    assert_eq!(talk.say(""), ["error: the line was not finished"]);
+    assert_eq!(talk.say(""), ["* error: the line was not finished"]);
     assert_eq!(talk.say("\n"), [""; 0]);
     assert!(talk.drive.commands.is_empty());
 }
@@ -283,7 +283,7 @@ fn lines_of_another_board_are_refused_as_a_whole() {
     assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
     assert_eq!(talk.ask("revert"), "ok: 1 staged values dropped");
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
-    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("apply\n"), ["* designing...", "ok"]);
 }
 
 #[test]
@@ -367,7 +367,7 @@ fn what_is_not_believable_is_shown_and_not_used() {
     ] {
         talk.drive.found = Some(result);
         let list = talk.say("learned\n");
-        assert_eq!(list[0], format!("refused: {why}; nothing was changed"));
+        assert_eq!(list[0], format!("* refused: {why}; nothing was changed"));
         assert!(
             list[1].starts_with(&format!("not used: {why}; nothing was changed; ")),
             "{list:?}"

@@ -93,9 +93,8 @@ fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
     assert!(both.talk.drive.commands.is_empty());
     // A refusal that is repeated is told once.
     let said = both.talk.say("");
-    let words = "bus: refused: the console commands: `set bus.commands bus` lets the bus";
+    let words = "* bus: refused: the console commands: `set bus.commands bus` lets the bus";
     assert_eq!(said.iter().filter(|line| *line == words).count(), 1, "{said:?}");
-    assert!(ANNOUNCEMENTS.iter().any(|first| words.starts_with(first)));
     // Switch on disabled, and not remote.
     assert_eq!((both.read(0x6041) & 0x26f, both.read(0x5009)), (0x40, 0));
     // The release that LinuxCNC writes all the time does not stop the console's run; a stop does.
@@ -275,7 +274,7 @@ fn settings_of_the_hardware_are_not_for_the_bus() {
         assert_eq!(
             said,
             [format!(
-                "bus: refused: {} belongs to the hardware: set it at the console",
+                "* bus: refused: {} belongs to the hardware: set it at the console",
                 key.name()
             )]
         );

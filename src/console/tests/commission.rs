@@ -66,7 +66,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     let told = told(&mut talk);
     assert!(told.len() >= 4, "{told:?}");
     assert!(told[0].contains("nameplate: test current 3.578 A"), "{told:?}");
-    assert!(told.iter().any(|line| line == "commissioning: nameplate: sound"), "{told:?}");
+    assert!(told.iter().any(|line| line == "* commissioning: nameplate: sound"), "{told:?}");
     assert!(told.last().unwrap().contains("ended; `accept`"), "{told:?}");
 
     // A refusal names the step and the reason, and says that nothing has changed.
@@ -74,8 +74,8 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     assert_eq!(talk.ask("commission leakage"), "ok");
     talk.drive.session.refused(None);
     let told = self::told(&mut talk);
-    let why = format!("commissioning: leakage: refused: {}", Refusal::SamplesLost);
-    assert_eq!(told, [why.as_str(), "commissioning: ended; the settings are as they were"]);
+    let why = format!("* commissioning: leakage: refused: {}", Refusal::SamplesLost);
+    assert_eq!(told, [why.as_str(), "* commissioning: ended; the settings are as they were"]);
 }
 
 /// Lines that the console tells until the commissioning has ended.

@@ -50,7 +50,7 @@ fn staged_values_are_marked_and_designed_for_once() {
     assert_eq!(talk.ask("get motor.r_s"), in_force(get));
     assert_eq!(talk.say("get motor.r_s\n").len(), 1);
     assert!(talk.ask("status").ends_with("; 3 staged"));
-    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("apply\n"), ["* designing...", "ok"]);
     assert!(matches!(talk.drive.commands[..], [Command::Configure(_)]));
     assert_eq!(shown(&talk, "motor.r_r"), ("1.2".into(), "1.2".into()));
     // Back to the value in force: nothing is staged any more.
@@ -90,7 +90,7 @@ fn ranges_are_those_beside_the_staged_values() {
     let refused =
         "error: limits.current_a = 15: allowed is 0.01 to 10 A; not in force, still staged";
     for line in ["apply", "save"] {
-        assert_eq!(talk.say(format!("{line}\n")), ["designing...", refused]);
+        assert_eq!(talk.say(format!("{line}\n")), ["* designing...", refused]);
     }
     assert!(talk.ask("start").starts_with("error: the board's polarities"));
     assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
@@ -107,7 +107,7 @@ fn a_refused_design_names_the_reason_and_changes_nothing() {
     );
     let before = talk.console.settings.in_force().drive;
     let replies = talk.say("start\n");
-    assert_eq!((replies.len(), replies[0].as_str()), (2, "designing..."));
+    assert_eq!((replies.len(), replies[0].as_str()), (2, "* designing..."));
     assert!(
         replies[1].starts_with("error: ") && replies[1].ends_with("; not in force, still staged"),
         "{replies:?}"
@@ -124,7 +124,7 @@ fn a_refused_design_names_the_reason_and_changes_nothing() {
 fn start_and_save_put_staged_values_in_force_first() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
-    assert_eq!(talk.say("start speed\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("start speed\n"), ["* designing...", "ok"]);
     assert!(matches!(
         talk.drive.commands[..],
         [Command::Configure(_), Command::Start(Mode::Speed)]
@@ -140,8 +140,8 @@ fn start_and_save_put_staged_values_in_force_first() {
     assert_eq!(
         said,
         [
-            "designing...",
-            "applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
+            "* designing...",
+            "* applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
             "ok"
         ]
     );
@@ -158,7 +158,7 @@ fn a_start_after_a_design_is_not_stopped_for_silence() {
     talk.now_ms += 2000;
     talk.poll();
     talk.now_ms += 500;
-    assert_eq!(talk.say(""), ["designing...", "ok"]);
+    assert_eq!(talk.say(""), ["* designing...", "ok"]);
     assert_eq!(talk.drive.drive.state(), State::Calibrating);
 }
 
