@@ -115,8 +115,8 @@ const sayOfLoops = (text, bad) => { $('l-said').textContent = text; $('l-said').
 /** The figures that the settings give, staged ones included; or why there are none. */
 function showLoops(loops) {
   const cell = (value, unit) => make('td', { textContent: value == null ? '–' : `${+value.toPrecision(3)} ${unit}`.trim() });
-  $('loops').replaceChildren(...(loops.error ? [make('tr', {}, make('td', { colSpan: 5, className: 'error', textContent: loops.error }))] : loops.map(loop =>
-    make('tr', {}, make('th', { textContent: loop.loop }), cell(loop.crossover_hz, 'Hz'), cell(loop.margin_deg, '°'), cell(loop.ms, ''), make('td', { textContent: loop.gains })))));
+  $('loops').replaceChildren(...(loops.error ? [make('tr', {}, make('td', { colSpan: 5, className: 'error', textContent: loops.error }))] : loops.map(([name, crossover, margin, peak, gains]) =>
+    make('tr', {}, make('th', { textContent: name }), cell(crossover, 'Hz'), cell(margin, '°'), cell(peak, ''), make('td', { textContent: gains })))));
 }
 // By mode: the signal that triggers, the one that is judged, what else is recorded.
 const STEP = { torque: ['i_q_ref_a', 'i_q_a', 'i_d_a torque_nm'], speed: ['speed_rpm', 'speed_rpm', 'i_q_a i_q_ref_a'], position: ['turns', 'turns', 'speed_rpm i_q_a'] };
