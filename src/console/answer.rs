@@ -118,7 +118,9 @@ impl Console {
         {
             let drive_core::Line { gain, offset } = signal.line(&desk.settings().in_force().drive);
             if gain == 0.0 {
-                return self.error(&"this board has no such sensor");
+                return self.error(
+                    &"no trigger on it: the board lacks its sensor, or its scale is curved",
+                );
             }
             *level = (*level - offset) / gain;
             // A larger current has a smaller code.
