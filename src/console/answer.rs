@@ -9,7 +9,7 @@ use super::handle::Firmware;
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
-use crate::desk::order::{Reply, Unit};
+use crate::desk::order::Reply;
 use crate::desk::{Answer, Desk, may_stage};
 use crate::link::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::bus::Commander;
@@ -144,12 +144,6 @@ fn remark(reply: Reply) -> impl fmt::Display {
     fmt::from_fn(move |f| match reply {
         Reply::Done | Reply::Designing => Ok(()),
         Reply::Limited(value, unit) => {
-            let unit = match unit {
-                Unit::None => "",
-                Unit::Ampere => "A",
-                Unit::Rpm => "rpm",
-                Unit::Turns => "turns",
-            };
             write!(f, ": limited to {} {unit}", Significant(value, DIGITS))
         }
         Reply::WiringFirst => f.write_str(": the wiring is checked first"),
