@@ -22,7 +22,7 @@ use drive_settings::{CurrentSensors, Inverter, Scales, Sequence, Settings};
 
 use crate::boards::converter::REFERENCE_V;
 use crate::boards::pin::{self, Pin, pc};
-use crate::boards::{Board, Currents, SELECTED};
+use crate::boards::{Board, Currents, SELECTED, Shunts};
 
 // Clock ---------------------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ pub const UPPER_SAMPLE_AT: u32 = CURRENT_SAMPLING.ticks();
 /// From the top of the counter to the control interrupt, in ticks. A third current is converted after the first two.
 pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
     + SLOW_SAMPLING.ticks()
-    + if SELECTED.currents.c().is_some() { THIRD_CURRENT_TICKS } else { 0 };
+    + if SELECTED.currents.shunts.is_some() { THIRD_CURRENT_TICKS } else { 0 };
 /// Conversion of a third current, in ticks.
 const THIRD_CURRENT_TICKS: u32 = CURRENT_SAMPLING.ticks() + CONVERSION.ticks();
 // Its sampling ends before the low sides go off, which the modulator leaves on for a settling time and more.
@@ -404,10 +404,10 @@ pub fn settings() -> Settings {
 /// The drive's settings with the numbers of a board.
 pub fn settings_of(board: &Board) -> Settings {
     let defaults = Settings::default();
-    let [a, b] = board.currents.a_and_b();
-    let (sensors, shunt_settle_s) = match &board.currents {
-        Currents::InLine(_) => (CurrentSensors::InLine, defaults.scales.shunt_settle_s),
-        Currents::LowSide { settle_s, .. } => (CurrentSensors::LowSide, settle_s.value),
+    let Currents { a, b, shunts } = &board.currents;
+    let (sensors, c, shunt_settle_s) = match shunts {
+        None => (CurrentSensors::InLine, b, defaults.scales.shunt_settle_s),
+        Some(Shunts { c, settle_s }) => (CurrentSensors::LowSide, c, settle_s.value),
     };
     let inverter = Inverter {
         top: PWM_TOP,
@@ -418,7 +418,7 @@ pub fn settings_of(board: &Board) -> Settings {
     let scales = Scales {
         current_a: a.line.value,
         current_b: b.line.value,
-        current_c: board.currents.c().map_or(b, |c| c).line.value,
+        current_c: c.line.value,
         sensors,
         shunt_settle_s,
         dc_link: board.dc_link.line.value,

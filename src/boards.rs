@@ -155,34 +155,22 @@ pub struct Analog {
 
 /// The current sensors.
 #[derive(Clone, Copy, Debug)]
-pub enum Currents {
-    /// Sensors in the lines a and b: they measure at any time.
-    InLine([Analog; 2]),
-    /// Shunts below the low sides of a, b and c: each sees its current only while its low side is on.
-    LowSide {
-        /// The shunts.
-        shunts: [Analog; 3],
-        /// Time from the turn-on of a low side until its amplifier has settled, s, without the dead time.
-        settle_s: Stated<f32>,
-    },
+pub struct Currents {
+    /// Sensor of a.
+    pub a: Analog,
+    /// Sensor of b.
+    pub b: Analog,
+    /// Where all are shunts below the low sides: the rest of them. Without, a and b are measured in the lines, at any time.
+    pub shunts: Option<Shunts>,
 }
 
-impl Currents {
-    /// Sensors of a and b.
-    pub const fn a_and_b(&self) -> [Analog; 2] {
-        match self {
-            Self::InLine(sensors) => *sensors,
-            Self::LowSide { shunts: [a, b, _], .. } => [*a, *b],
-        }
-    }
-
-    /// Sensor of c, if there is one.
-    pub const fn c(&self) -> Option<Analog> {
-        match self {
-            Self::InLine(_) => None,
-            Self::LowSide { shunts: [_, _, c], .. } => Some(*c),
-        }
-    }
+/// Shunts below the low sides: each sees its current only while its low side is on.
+#[derive(Clone, Copy, Debug)]
+pub struct Shunts {
+    /// That of c.
+    pub c: Analog,
+    /// Time from the turn-on of a low side until its amplifier has settled, s, without the dead time.
+    pub settle_s: Stated<f32>,
 }
 
 /// A board: a NUCLEO-G474RE with its power stage.
@@ -256,9 +244,9 @@ impl Board {
 
     /// Whether the pin belongs to a signal of the board.
     const fn uses(&self, pin: Pin) -> bool {
-        let [a, b] = self.currents.a_and_b();
-        let c = match self.currents.c() {
-            Some(c) => c,
+        let Currents { a, b, shunts } = self.currents;
+        let c = match shunts {
+            Some(Shunts { c, .. }) => c,
             None => b,
         };
         let bus = match self.bus {
@@ -281,22 +269,17 @@ const WITHOUT_OVER_CURRENT_V: f32 = 60.0;
 
 /// Checks a board when compiling.
 const fn check(board: &Board) {
-    let [(high_1, high_2, high_3), (low_1, low_2, low_3)] = [
-        (board.high.pins[0], board.high.pins[1], board.high.pins[2]),
-        (board.low.pins[0], board.low.pins[1], board.low.pins[2]),
-    ];
-    assert!(
-        high_1.is(&pin::TIM1_CH1) && high_2.is(&pin::TIM1_CH2) && high_3.is(&pin::TIM1_CH3),
-        "a high side is not on the channel of its leg"
-    );
-    assert!(
-        low_1.is(&pin::TIM1_CH1N) && low_2.is(&pin::TIM1_CH2N) && low_3.is(&pin::TIM1_CH3N),
-        "a low side is not on the complementary channel of its leg"
-    );
+    let mut leg = 0;
+    while leg < 3 {
+        let (channel, complementary) = pin::TIM1_LEGS[leg];
+        assert!(board.high.pins[leg].is(channel), "a high side is not on its leg's channel");
+        assert!(board.low.pins[leg].is(complementary), "a low side is not on its leg's channel");
+        leg += 1;
+    }
     assert!(board.fault.pin.is(&pin::TIM1_BKIN), "the fault input is not a break input");
-    let [a, b] = board.currents.a_and_b();
+    let Currents { a, b, shunts } = board.currents;
     assert!(a.pin.adc1().is_some() && b.pin.adc2().is_some(), "a current has no converter");
-    if let Some(c) = board.currents.c() {
+    if let Some(Shunts { c, .. }) = shunts {
         assert!(c.pin.adc1().is_some(), "current c has no converter");
         assert!(!c.pin.equals(a.pin) && !c.pin.equals(b.pin), "two currents on one pin");
     }

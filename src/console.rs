@@ -184,14 +184,12 @@ impl Console {
             Ok(line) => line,
             Err(why) => return self.error(&why),
         };
-        let request = match grammar::tagged(&mut line) {
-            Ok((tag, request)) => {
-                self.out.begin_answer(tag);
-                request
-            }
+        match grammar::tagged(&line) {
+            Ok((tag, _)) => self.out.begin_answer(tag),
             Err(why) => return self.error(&why),
-        };
-        request.make_ascii_lowercase();
+        }
+        line.make_ascii_lowercase();
+        let request = grammar::tagged(&line).map_or("", |(_, request)| request);
         match grammar::parse(request) {
             Ok(request) => {
                 self.note_line(desk, now_ms);

@@ -14,7 +14,8 @@ mod flash;
 pub mod history;
 pub mod learned;
 
-use codec::{COMMIT, Rejected, SlotContent};
+use codec::{COMMIT, Rejected};
+use flash::{ERASED, newer};
 pub use flash::{Flash, FlashError, SLOT_WORDS, SLOTS};
 
 use crate::settings::FirmwareSettings;
@@ -45,25 +46,16 @@ pub struct Saved<F> {
 impl<F: Flash> Saved<F> {
     /// Reads both slots. Keys that the record does not hold keep their value of `defaults`.
     pub fn load(mut flash: F, defaults: &FirmwareSettings) -> (Self, Loaded) {
-        let contents = [0, 1].map(|slot| codec::inspect(&mut |word| flash.read(slot, word)));
-        let sequence = |slot: usize| match contents.get(slot) {
-            Some(SlotContent::Whole { sequence }) => Some(*sequence),
-            _ => None,
-        };
-        let newest = match (sequence(0), sequence(1)) {
-            // The numbers wrap; those of the two slots are adjacent.
-            (Some(a), Some(b)) if (b.wrapping_sub(a) as i32) < 0 => Some((0, a)),
-            (_, Some(b)) => Some((1, b)),
-            (Some(a), None) => Some((0, a)),
-            (None, None) => None,
-        };
+        let newest =
+            newer([0, 1].map(|slot| codec::whole_record(&mut |word| flash.read(slot, word))));
+        let blank =
+            [0, 1].map(|slot| (0..SLOT_WORDS).all(|word| flash.read(slot, word) == Some(ERASED)));
         let loaded = match newest {
             Some((slot, _)) => codec::settings(&mut |word| flash.read(slot, word), defaults)
                 .map_or_else(Loaded::Rejected, Loaded::Settings),
-            None if contents == [SlotContent::Blank; SLOTS] => Loaded::Nothing,
+            None if blank == [true; SLOTS] => Loaded::Nothing,
             None => Loaded::Rejected(Rejected::Broken),
         };
-        let blank = contents.map(|content| content == SlotContent::Blank);
         let free = usize::from(!blank[0] && blank[1]);
         (Self { flash, newest, free }, loaded)
     }
@@ -88,10 +80,7 @@ impl<F: Flash> Saved<F> {
         let others = (0..codec::length(&record)).filter(|word| *word != COMMIT);
         for word in others.chain([COMMIT]) {
             let Some(value) = record.get(word) else { continue };
-            self.flash.program(slot, word, *value)?;
-            if self.flash.read(slot, word) != Some(*value) {
-                return Err(FlashError::Verify(word));
-            }
+            self.flash.write(slot, word, *value)?;
         }
         self.newest = Some((slot, sequence));
         Ok(())

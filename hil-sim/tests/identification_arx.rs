@@ -19,7 +19,7 @@ fn output(u: &[f64]) -> Vec<f64> {
 }
 
 fn prbs() -> Vec<f64> {
-    let mut prbs = Prbs::new(8).unwrap();
+    let mut prbs = Prbs::default();
     (0..4 * 255).map(|_| 30.0 * prbs.step()).collect()
 }
 

@@ -1,6 +1,6 @@
 //! Assumptions of a board, and the number that confirms it.
 
-use super::{Board, Source};
+use super::{Board, Currents, Source};
 use crate::hash;
 
 impl Board {
@@ -14,11 +14,7 @@ impl Board {
 
     /// The items of the power stage with their sources; none for an item that the board does not have.
     pub fn sources(&self) -> [(&'static str, Option<Source>); 15] {
-        let [a, b] = self.currents.a_and_b();
-        let settle = match &self.currents {
-            super::Currents::LowSide { settle_s, .. } => Some(settle_s.source),
-            super::Currents::InLine(_) => None,
-        };
+        let Currents { a, b, shunts } = &self.currents;
         [
             ("high sides: level that switches on", Some(self.high.on_at.source)),
             ("low sides: level that switches on", Some(self.low.on_at.source)),
@@ -27,8 +23,8 @@ impl Board {
             ("dead time", Some(self.dead_time_s.source)),
             ("scale of current a", Some(a.line.source)),
             ("scale of current b", Some(b.line.source)),
-            ("scale of current c", self.currents.c().map(|c| c.line.source)),
-            ("settling of the shunts", settle),
+            ("scale of current c", shunts.map(|shunts| shunts.c.line.source)),
+            ("settling of the shunts", shunts.map(|shunts| shunts.settle_s.source)),
             ("scale of the dc link", Some(self.dc_link.line.source)),
             ("highest dc link in operation", Some(self.dc_link_limits.operation.source)),
             ("switches stand", Some(self.dc_link_limits.switches.source)),
@@ -41,16 +37,16 @@ impl Board {
     /// The number that a confirmation saves: of the board's name, its values, and the words that are `in_force` beside them,
     /// so that it does not hold for others. Never 0.
     pub fn confirmation(&self, in_force: impl Iterator<Item = u32>) -> u32 {
-        let [a, b] = self.currents.a_and_b();
+        let Currents { a, b, shunts } = &self.currents;
         let line = |sensor: &super::Analog| [sensor.line.value.gain, sensor.line.value.offset];
-        let c = self.currents.c().map_or([0.0; 2], |c| line(&c));
+        let c = shunts.map_or([0.0; 2], |shunts| line(&shunts.c));
         let levels = [self.high.on_at, self.low.on_at, self.fault.trips_at];
         let limits = &self.dc_link_limits;
         let numbers = [
             [self.dead_time_s.value, self.fault.pull_ohm.value],
             [limits.operation.value, limits.comparator_v()],
-            line(&a),
-            line(&b),
+            line(a),
+            line(b),
             c,
             line(&self.dc_link),
         ];

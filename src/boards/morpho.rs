@@ -6,7 +6,7 @@ use drive_settings::Ntc;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Currents, FaultInput, Level, Rs485, Stated, assumed};
+use super::{Analog, Currents, FaultInput, Level, Rs485, Shunts, Stated, assumed};
 
 /// High sides.
 pub const HIGH: [Pin; 3] = [pa(8), pa(9), pa(10)];
@@ -59,11 +59,13 @@ pub const fn shunts(v_per_a: Stated<f32>, zero_v: f32) -> Currents {
     let value = Line::of_sensor(v_per_a.value, zero_v, REFERENCE_V, CODES);
     let line = Stated { value, source: v_per_a.source };
     let [a, b, c] = CURRENTS;
-    Currents::LowSide {
-        shunts: [Analog { pin: a, line }, Analog { pin: b, line }, Analog { pin: c, line }],
-        settle_s: assumed(
-            2e-6,
-            "oscilloscope at PA0 beside the gate of low side a: settled within this time",
-        ),
+    let settle_s = assumed(
+        2e-6,
+        "oscilloscope at PA0 beside the gate of low side a: settled within this time",
+    );
+    Currents {
+        a: Analog { pin: a, line },
+        b: Analog { pin: b, line },
+        shunts: Some(Shunts { c: Analog { pin: c, line }, settle_s }),
     }
 }

@@ -39,18 +39,12 @@ pub const fn pc(number: u8) -> Pin {
 /// A pin and the number of the alternate function that connects it.
 pub type Reach = (Pin, u8);
 
-/// Output of channel 1 of TIM1.
-pub const TIM1_CH1: [Reach; 2] = [(pa(8), 6), (pc(0), 2)];
-/// Output of channel 2.
-pub const TIM1_CH2: [Reach; 2] = [(pa(9), 6), (pc(1), 2)];
-/// Output of channel 3.
-pub const TIM1_CH3: [Reach; 2] = [(pa(10), 6), (pc(2), 2)];
-/// Complementary output of channel 1.
-pub const TIM1_CH1N: [Reach; 4] = [(pa(7), 6), (pa(11), 6), (pb(13), 6), (pc(13), 4)];
-/// Complementary output of channel 2.
-pub const TIM1_CH2N: [Reach; 3] = [(pa(12), 6), (pb(0), 6), (pb(14), 6)];
-/// Complementary output of channel 3.
-pub const TIM1_CH3N: [Reach; 3] = [(pb(1), 6), (pb(9), 12), (pb(15), 4)];
+/// Outputs of channels 1 to 3 of TIM1, each with its complementary output.
+pub const TIM1_LEGS: [(&[Reach], &[Reach]); 3] = [
+    (&[(pa(8), 6), (pc(0), 2)], &[(pa(7), 6), (pa(11), 6), (pb(13), 6), (pc(13), 4)]),
+    (&[(pa(9), 6), (pc(1), 2)], &[(pa(12), 6), (pb(0), 6), (pb(14), 6)]),
+    (&[(pa(10), 6), (pc(2), 2)], &[(pb(1), 6), (pb(9), 12), (pb(15), 4)]),
+];
 /// Break input of TIM1.
 pub const TIM1_BKIN: [Reach; 6] =
     [(pa(6), 6), (pa(14), 6), (pb(8), 12), (pb(10), 12), (pb(12), 6), (pc(13), 2)];

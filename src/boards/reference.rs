@@ -29,16 +29,17 @@ pub const BOARD: Board = Board {
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
     // The need of slow power modules.
     dead_time_max_s: 6e-6,
-    currents: Currents::InLine([
-        Analog {
+    currents: Currents {
+        a: Analog {
             pin: morpho::CURRENTS[0],
             line: read(calibrated(Line::CHANNEL_A), "dissertation, Eq. 3.5 and 3.4"),
         },
-        Analog {
+        b: Analog {
             pin: morpho::CURRENTS[1],
             line: read(calibrated(Line::CHANNEL_B), "dissertation, Eq. 3.5 and 3.4"),
         },
-    ]),
+        shunts: None,
+    },
     current_delay_s: read(30e-6, "dissertation, Figure 16: a filter of 5305 Hz"),
     // A divider by 136.5, so that 450 V are full scale. The dissertation does not describe its own.
     dc_link: morpho::dc_link(assumed(

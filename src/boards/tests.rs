@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::{
-    ALL, Board, COMPARATOR_ERROR, Level, OF_SWITCHES, SENSING_ERROR, Source, check, morpho, pin,
+    ALL, Board, COMPARATOR_ERROR, Currents, Level, OF_SWITCHES, SENSING_ERROR, Source, check,
+    morpho, pin,
 };
 use crate::board::{protection, settings_of};
 use crate::generated;
@@ -16,7 +17,9 @@ fn section(board: &Board) -> String {
     let volts = |volts: f32| format!("{volts:.0} V");
     let list =
         |pins: &[pin::Pin]| pins.iter().map(|pin| pin.to_string()).collect::<Vec<_>>().join(" ");
-    let currents: Vec<_> = board.currents.a_and_b().into_iter().chain(board.currents.c()).collect();
+    let Currents { a, b, shunts } = &board.currents;
+    let currents: Vec<_> =
+        [a, b].into_iter().chain(shunts.as_ref().map(|three| &three.c)).collect();
     let lines: Vec<_> = currents.iter().map(|sensor| sensor.line.value).collect();
     let values = [
         ("high sides: level that switches on", level(board.high.on_at.value).to_owned()),
@@ -29,12 +32,11 @@ fn section(board: &Board) -> String {
     .chain(SCALES.into_iter().zip(&lines).map(|(name, line)| {
         (name, format!("{:.3} mA a code, {:.3} A at code 0", line.gain * 1e3, line.offset))
     }))
-    .chain(match &board.currents {
-        super::Currents::LowSide { settle_s, .. } => {
-            Some(("settling of the shunts", format!("{:.1} µs", settle_s.value * 1e6)))
-        }
-        super::Currents::InLine(_) => None,
-    })
+    .chain(
+        shunts.map(|shunts| {
+            ("settling of the shunts", format!("{:.1} µs", shunts.settle_s.value * 1e6))
+        }),
+    )
     .chain([
         ("scale of the dc link", format!("{:.3} V a code", board.dc_link.line.value.gain)),
         ("highest dc link in operation", volts(board.dc_link_limits.operation.value)),
@@ -80,7 +82,7 @@ fn shunts_refuse_both_zero_vectors() {
         settings.scales.both_zero_vectors = true;
         let checked = settings.check().map_err(|why| why.to_string());
         let why = "scales.both_zero_vectors = yes: shunts below the low sides see nothing in the upper zero vector; set it to no";
-        let in_line = matches!(board.currents, super::Currents::InLine(_));
+        let in_line = board.currents.shunts.is_none();
         assert_eq!(checked, if in_line { Ok(()) } else { Err(why.to_owned()) }, "{}", board.name);
     }
 }

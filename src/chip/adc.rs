@@ -14,7 +14,7 @@ use stm32g4xx_hal::rcc::Rcc;
 use super::clocks::clock_on;
 use super::{StartError, pins};
 use induction_drive::board;
-use induction_drive::boards::SELECTED;
+use induction_drive::boards::{Currents, SELECTED};
 
 /// Events of the converters.
 #[derive(Clone, Copy)]
@@ -56,8 +56,8 @@ impl Adc {
         rcc: &mut Rcc,
         protection: &board::Protection,
     ) -> Result<Self, StartError> {
-        let [a, b] = SELECTED.currents.a_and_b();
-        let c = SELECTED.currents.c();
+        let Currents { a, b, shunts } = SELECTED.currents;
+        let c = shunts.map(|shunts| shunts.c);
         let (dc_link, heat_sink) = (SELECTED.dc_link.pin, SELECTED.heat_sink);
         for pin in [a.pin, b.pin, dc_link, heat_sink].into_iter().chain(c.map(|c| c.pin)) {
             pins::analog(pin);
@@ -128,7 +128,7 @@ impl Adc {
             current_a = current_a.wrapping_add(self.one.dr().read().rdata().bits());
             current_b = current_b.wrapping_add(self.two.dr().read().rdata().bits());
         }
-        let third = SELECTED.currents.c().is_some();
+        let third = SELECTED.currents.shunts.is_some();
         let current_c = if third { self.one.jdr(1).read().jdata().bits() } else { 0 };
         let (dc_link, heat_sink) = data(if third { 2 } else { 1 });
         Sample { current_a, current_b, current_c, dc_link, heat_sink, ..Sample::default() }
@@ -203,7 +203,7 @@ fn prepare(
 /// The code of the chip's own reference, and the one that it had in the factory. For the main loop.
 pub fn own_reference() -> (u16, u16) {
     // Behind the dc link.
-    let rank = if SELECTED.currents.c().is_some() { 3 } else { 2 };
+    let rank = if SELECTED.currents.shunts.is_some() { 3 } else { 2 };
     let factory = board::REFERENCE_CALIBRATION as *const u16;
     // SAFETY: the converter always exists, and only a result is read; read-only memory of the chip, aligned.
     unsafe { ((*pac::ADC1::ptr()).jdr(rank).read().jdata().bits(), factory.read_volatile()) }

@@ -138,13 +138,8 @@ impl Pwm {
         // The pins follow last: they are driven off. The resistors hold them off as well, should the timer ever release
         // them.
         let off = |on_at: Level| if on_at == Level::Low { Level::High } else { Level::Low };
-        let functions: [(&[pin::Reach], &[pin::Reach]); 3] = [
-            (&pin::TIM1_CH1, &pin::TIM1_CH1N),
-            (&pin::TIM1_CH2, &pin::TIM1_CH2N),
-            (&pin::TIM1_CH3, &pin::TIM1_CH3N),
-        ];
-        for (leg, (positive, negative)) in functions.into_iter().enumerate() {
-            let (high_pin, low_pin) = (SELECTED.high.pins[leg], SELECTED.low.pins[leg]);
+        let gates = SELECTED.high.pins.into_iter().zip(SELECTED.low.pins);
+        for ((high_pin, low_pin), (positive, negative)) in gates.zip(pin::TIM1_LEGS) {
             pins::alternate(high_pin, high_pin.function(positive), Some(off(high)));
             pins::alternate(low_pin, low_pin.function(negative), Some(off(low)));
         }

@@ -16,39 +16,32 @@ use crate::chip::{flash, pwm};
 use induction_drive::board;
 use induction_drive::monitor::record::{Reason, Record, WORDS};
 
-/// RAM that keeps its contents over a reset.
-struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
+/// Words of RAM that keep their contents over a reset.
+struct Kept<const N: usize>(UnsafeCell<MaybeUninit<[u32; N]>>);
 
 // SAFETY: plain words, only read and written volatile, by start-up code and by handlers that do not
 // return. A handler may interrupt a write of the main loop; the hash of the record detects that.
-unsafe impl<T> Sync for Kept<T> {}
+unsafe impl<const N: usize> Sync for Kept<N> {}
 
 // SAFETY: the section that cortex-m-rt leaves as it is, which `MaybeUninit` allows for.
 #[unsafe(link_section = ".uninit.record")]
-static RECORD: Kept<[u32; WORDS]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+static RECORD: Kept<WORDS> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 /// Number of consecutive unintended resets, and its complement.
 // SAFETY: as above.
 #[unsafe(link_section = ".uninit.resets")]
-static RESETS: Kept<[u32; 2]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+static RESETS: Kept<2> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-impl<T: Copy> Kept<T> {
-    fn write(&self, value: T) {
+impl<const N: usize> Kept<N> {
+    fn write(&self, words: [u32; N]) {
         // SAFETY: see `Kept`.
-        unsafe { ptr::write_volatile(self.0.get().cast(), value) };
+        unsafe { ptr::write_volatile(self.0.get().cast(), words) };
     }
 
-    fn read(&self) -> T
-    where
-        T: Words,
-    {
+    fn read(&self) -> [u32; N] {
         // SAFETY: see `Kept`; any contents of the RAM are valid words.
         unsafe { ptr::read_volatile(self.0.get().cast()) }
     }
 }
-
-/// Types for which any contents of the RAM are a valid value.
-trait Words {}
-impl<const N: usize> Words for [u32; N] {}
 
 /// Keeps a record for the next boot.
 pub fn keep(reason: Reason, details: [u32; 4]) {

@@ -66,17 +66,14 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Splits the tag off a line: `@17 status` is the request `status` with the tag `17`.
+/// The tag of a line, and the request behind it: `@17 status` is the request `status` with the tag `17`.
 ///
 /// # Errors
 /// A tag of no characters or of more than [`LONGEST_TAG`](super::line::LONGEST_TAG).
-pub fn tagged(line: &mut str) -> Result<(Option<Tag>, &mut str), TagError> {
-    if !line.starts_with('@') {
-        return Ok((None, line));
-    }
-    let end = line.find(' ').unwrap_or(line.len());
-    let (tag, request) = line.split_at_mut(end);
-    let tag = Tag::try_from(&tag[1..]).ok().filter(|tag| !tag.is_empty()).ok_or(TagError)?;
+pub fn tagged(line: &str) -> Result<(Option<Tag>, &str), TagError> {
+    let Some(tagged) = line.strip_prefix('@') else { return Ok((None, line)) };
+    let (tag, request) = tagged.split_once(' ').unwrap_or((tagged, ""));
+    let tag = Tag::try_from(tag).ok().filter(|tag| !tag.is_empty()).ok_or(TagError)?;
     Ok((Some(tag), request))
 }
 

@@ -7,6 +7,7 @@
 //!
 //! Data that the interrupt writes in every period cannot be checked in this way; the drive's own checks cover them.
 
+use super::record::{Reason, Record};
 use crate::hash;
 
 /// Words of code compared in a pass of the main loop.
@@ -36,27 +37,6 @@ pub struct CheckedMemory<const N: usize> {
     pub changes: u32,
 }
 
-/// A flipped bit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BitFlip {
-    /// In a word of the code.
-    Code {
-        /// Address.
-        address: u32,
-        /// Its contents.
-        found: u32,
-        /// Contents of the flash.
-        copied: u32,
-    },
-    /// Among the constants.
-    Constants {
-        /// Hash now.
-        found: u32,
-        /// Hash before.
-        before: u32,
-    },
-}
-
 /// The check and its progress.
 #[derive(Clone, Debug)]
 pub struct MemoryCheck<const N: usize> {
@@ -83,27 +63,27 @@ impl<const N: usize> MemoryCheck<N> {
     /// Checks the next slices.
     ///
     /// # Errors
-    /// A flipped bit.
-    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), BitFlip> {
+    /// A flipped bit, of the code or of the constants, as the record of a run that it ends.
+    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Record> {
         self.compare_code(&read)?;
         self.hash_constants(&read)
     }
 
-    fn compare_code(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), BitFlip> {
+    fn compare_code(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), Record> {
         let CheckedMemory { code, source, .. } = self.memory;
         let end = (self.code + CODE_SLICE).min(code.words);
         for word in self.code..end {
             let (address, copied) = (code.address + 4 * word, read(source + 4 * word));
             let found = read(address);
             if found != copied {
-                return Err(BitFlip::Code { address, found, copied });
+                return Err(Record { reason: Reason::Code, details: [address, found, copied, 0] });
             }
         }
         self.code = if end == code.words { 0 } else { end };
         Ok(())
     }
 
-    fn hash_constants(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), BitFlip> {
+    fn hash_constants(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), Record> {
         let mut left = CONSTANTS_SLICE;
         while let Some(range) = self.memory.constants.get(self.range) {
             let end = (self.word + left).min(range.words);
@@ -125,7 +105,7 @@ impl<const N: usize> MemoryCheck<N> {
         }
         match self.sealed {
             Some((before, then)) if then == changes && before != found => {
-                Err(BitFlip::Constants { found, before })
+                Err(Record { reason: Reason::Coefficients, details: [found, before, 0, 0] })
             }
             _ => {
                 self.sealed = Some((found, changes));
@@ -180,7 +160,7 @@ mod tests {
         MemoryCheck::new(memory_map, |at| memory.read(at))
     }
 
-    fn run(check: &mut MemoryCheck<3>, memory: &Memory, passes: u32) -> Result<(), BitFlip> {
+    fn run(check: &mut MemoryCheck<3>, memory: &Memory, passes: u32) -> Result<(), Record> {
         (0..passes).try_for_each(|_| check.slice(|at| memory.read(at)))
     }
 
@@ -203,9 +183,10 @@ mod tests {
             if word < 1000 {
                 let copied = memory.read(SOURCE + address);
                 let found_word = memory.read(address);
-                prop_assert_eq!(found, Err(BitFlip::Code { address, found: found_word, copied }));
+                let details = [address, found_word, copied, 0];
+                prop_assert_eq!(found, Err(Record { reason: Reason::Code, details }));
             } else {
-                prop_assert!(matches!(found, Err(BitFlip::Constants { .. })), "{:?}", found);
+                prop_assert_eq!(found.map_err(|end| end.reason), Err(Reason::Coefficients));
             }
         }
 

@@ -3,6 +3,8 @@
 //! The lock of TIM1 keeps dead time, polarity and break from a program, not from a disturbance, and the divider of the dead
 //! time's clock (CKD) is not under it. The values after the start, which reads its settings back, are the reference.
 
+use super::record::{Reason, Record};
+
 /// Registers read in a pass of the main loop.
 const SLICE: usize = 8;
 
@@ -13,17 +15,6 @@ pub struct Register {
     pub address: u32,
     /// Bits.
     pub mask: u32,
-}
-
-/// A register that has changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Changed {
-    /// Address.
-    pub address: u32,
-    /// The checked bits now.
-    pub found: u32,
-    /// The same after the start.
-    pub expected: u32,
 }
 
 /// Direction of a counter.
@@ -143,14 +134,15 @@ impl RegisterCheck {
     /// Checks the next slice.
     ///
     /// # Errors
-    /// A register has changed.
-    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Changed> {
+    /// A register that has changed, as the record of a run that it ends.
+    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Record> {
         let both = addresses().zip(self.expected.iter());
         for (address, &expected) in both.skip(self.next).take(SLICE) {
             let Register { mask, .. } = register(address);
             let found = read(address) & mask;
             if found != expected {
-                return Err(Changed { address, found, expected });
+                let details = [address, found, expected, 0];
+                return Err(Record { reason: Reason::Register, details });
             }
         }
         self.next = if self.next + SLICE < COUNT { self.next + SLICE } else { 0 };
@@ -176,8 +168,8 @@ mod tests {
             let mut words = sound.clone();
             words[which] ^= 1 << bit;
             let Register { address, mask } = control().nth(which).unwrap();
-            let changed =
-                Changed { address, found: words[which] & mask, expected: sound[which] & mask };
+            let details = [address, words[which] & mask, sound[which] & mask, 0];
+            let changed = Record { reason: Reason::Register, details };
             let found = (0..WHOLE).try_for_each(|_| check.slice(|at| words[place(at)]));
             let stays = mask >> bit & 1 == 1;
             assert_eq!(found, if stays { Err(changed) } else { Ok(()) }, "bit {bit}");

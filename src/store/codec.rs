@@ -16,7 +16,7 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_settings::entry::Change;
 
-use super::flash::SLOT_WORDS;
+use super::flash::{ERASED, SLOT_WORDS, halves, pair};
 use super::learned;
 use crate::boards;
 use crate::settings::FirmwareSettings;
@@ -34,22 +34,7 @@ const FIRST: usize = 2;
 
 /// "idrv": marks a record.
 const MAGIC: u32 = 0x7672_6469;
-const ERASED: u64 = u64::MAX;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
-
-/// Contents of a slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SlotContent {
-    /// Erased throughout.
-    Blank,
-    /// Neither blank nor a whole record.
-    Broken,
-    /// A whole record.
-    Whole {
-        /// Its sequence number.
-        sequence: u32,
-    },
-}
 
 /// Reason why saved settings are rejected; numbered like the faults (see `monitor/record.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,14 +75,6 @@ impl fmt::Display for Rejected {
             Self::Board(name) => write!(f, "saved on the board {name}"),
         }
     }
-}
-
-fn pair(low: u32, high: u32) -> u64 {
-    u64::from(low) | u64::from(high) << 32
-}
-
-fn halves(word: u64) -> (u32, u32) {
-    (word as u32, (word >> 32) as u32)
 }
 
 /// The record of `settings`; the double words behind its [`length`] are erased.
@@ -142,19 +119,8 @@ fn header(word: u64) -> Option<(u16, usize)> {
     (magic == MAGIC && entries <= SLOT_WORDS - FIRST).then_some((version, entries))
 }
 
-/// The contents of the slot that `read` reads.
-pub fn inspect(read: &mut dyn FnMut(usize) -> Option<u64>) -> SlotContent {
-    if let Some(sequence) = whole_record(read) {
-        SlotContent::Whole { sequence }
-    } else if (0..SLOT_WORDS).all(|word| read(word) == Some(ERASED)) {
-        SlotContent::Blank
-    } else {
-        SlotContent::Broken
-    }
-}
-
-/// The sequence number, if the slot holds a record with the right checksum.
-fn whole_record(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<u32> {
+/// The sequence number, if the slot that `read` reads holds a record with the right checksum.
+pub fn whole_record(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<u32> {
     let first = read(0)?;
     let (_, entries) = header(first)?;
     let (sequence, written) = halves(read(COMMIT)?);

@@ -26,6 +26,39 @@ pub trait Flash {
     /// # Errors
     /// The flash reports an error or exceeds its time.
     fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), FlashError>;
+
+    /// Programs an erased double word and reads it back.
+    ///
+    /// # Errors
+    /// The flash reports an error, exceeds its time, or holds another value.
+    fn write(&mut self, slot: usize, word: usize, value: u64) -> Result<(), FlashError> {
+        self.program(slot, word, value)?;
+        let same = self.read(slot, word) == Some(value);
+        same.then_some(()).ok_or(FlashError::Verify(word))
+    }
+}
+
+/// Contents of an erased double word.
+pub const ERASED: u64 = u64::MAX;
+
+/// A double word of these two halves.
+pub const fn pair(low: u32, high: u32) -> u64 {
+    low as u64 | (high as u64) << 32
+}
+
+/// The two halves of a double word, the lower first.
+pub const fn halves(word: u64) -> (u32, u32) {
+    (word as u32, (word >> 32) as u32)
+}
+
+/// Of two slots that are written in turn, the one that counts and its sequence number, by the numbers of those that are whole:
+/// adjacent ones, which wrap.
+pub fn newer(sequences: [Option<u32>; 2]) -> Option<(usize, u32)> {
+    match sequences {
+        [Some(a), Some(b)] if (b.wrapping_sub(a) as i32) < 0 => Some((0, a)),
+        [_, Some(b)] => Some((1, b)),
+        [a, None] => Some((0, a?)),
+    }
 }
 
 /// A failed operation of the flash.

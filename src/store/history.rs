@@ -18,7 +18,7 @@
 
 use heapless::Deque;
 
-use super::flash::{Flash, FlashError, HISTORY, SLOT_WORDS};
+use super::flash::{ERASED, Flash, FlashError, HISTORY, SLOT_WORDS, halves, newer, pair};
 
 /// Faults that are remembered.
 pub const FAULTS: usize = 16;
@@ -39,7 +39,6 @@ const MAGIC: u32 = 0x6c68_6469;
 const TIME: u8 = 0x80;
 const STARTS: u8 = 0x81;
 const LAST_FAULT: u8 = 0x7f;
-const ERASED: u64 = u64::MAX;
 
 /// A fault of the past.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,31 +73,23 @@ pub struct History {
 }
 
 fn record(kind: u8, middle: u32, high: u32) -> u64 {
-    u64::from(high) << 32 | u64::from(middle << 8) | u64::from(kind)
+    pair(middle << 8 | u32::from(kind), high)
 }
 
 impl History {
     /// Reads the log.
     pub fn load(flash: &mut impl Flash) -> Self {
-        let header = |flash: &mut dyn FnMut(usize) -> Option<u64>, n: usize| {
-            flash(n).filter(|word| *word as u32 == MAGIC).map(|word| (word >> 32) as u32)
+        let newest = newer(HISTORY.map(|slot| {
+            let (magic, sequence) = halves(flash.read(slot, 0)?);
+            (magic == MAGIC).then_some(sequence)
+        }));
+        let Some((page, sequence)) = newest else {
+            return Self { next: SLOT_WORDS, ..Self::default() };
         };
-        let sequences = [0, 1].map(|n| header(&mut |n| flash.read(HISTORY[n], 0), n));
-        let page = match sequences {
-            // The numbers wrap; those of the two pages are adjacent.
-            [Some(a), Some(b)] => usize::from((b.wrapping_sub(a) as i32) > 0),
-            [None, Some(_)] => 1,
-            _ => 0,
-        };
-        let sequence = sequences[page].unwrap_or(0);
-        let mut history = Self { page, sequence, next: SLOT_WORDS, ..Self::default() };
-        if sequences[page].is_some() {
-            history.next = 1;
-            for word in 1..SLOT_WORDS {
-                let content = flash.read(HISTORY[page], word);
-                if content == Some(ERASED) {
-                    continue;
-                }
+        let mut history = Self { page, sequence, next: 1, ..Self::default() };
+        for word in 1..SLOT_WORDS {
+            let content = flash.read(HISTORY[page], word);
+            if content != Some(ERASED) {
                 history.next = word + 1;
                 history.take(content.unwrap_or(0));
             }
@@ -109,7 +100,8 @@ impl History {
 
     /// Takes a double word of the log.
     fn take(&mut self, word: u64) {
-        let (kind, middle, high) = (word as u8, word as u32 >> 8, (word >> 32) as u32);
+        let (low, high) = halves(word);
+        let (kind, middle) = (low as u8, low >> 8);
         match kind {
             STARTS => self.starts = high,
             TIME => (self.powered_s, self.running_s) = (60 * middle, high),
@@ -220,10 +212,10 @@ impl History {
             self.faults.iter().map(|fault| record(fault.code, fault.powered_min, fault.running_s));
         let mut next = 1;
         for word in head.into_iter().chain(faults) {
-            programmed(flash, page, next, word)?;
+            flash.write(HISTORY[page], next, word)?;
             next += 1;
         }
-        programmed(flash, page, 0, u64::from(sequence) << 32 | u64::from(MAGIC))?;
+        flash.write(HISTORY[page], 0, pair(MAGIC, sequence))?;
         (self.page, self.sequence, self.next) = (page, sequence, next);
         self.written = (self.starts, self.running_s, self.powered_s);
         Ok(())
@@ -232,21 +224,14 @@ impl History {
     /// Programs the next double word; the one behind it if that fails, for a power failure may have left it neither
     /// erased nor readable as written.
     fn append(&mut self, flash: &mut impl Flash, word: u64) -> Result<(), FlashError> {
-        let (first, page) = (self.next, self.page);
-        let mut result = Err(FlashError::Verify(first));
-        for at in (first..SLOT_WORDS).take(2) {
+        let mut result = Err(FlashError::Verify(self.next));
+        for at in (self.next..SLOT_WORDS).take(2) {
             self.next = at + 1;
-            result = programmed(flash, page, at, word);
+            result = flash.write(HISTORY[self.page], at, word);
             if result.is_ok() {
                 break;
             }
         }
         result
     }
-}
-
-fn programmed(flash: &mut impl Flash, page: usize, at: usize, word: u64) -> Result<(), FlashError> {
-    flash.program(HISTORY[page], at, word)?;
-    let same = flash.read(HISTORY[page], at) == Some(word);
-    if same { Ok(()) } else { Err(FlashError::Verify(at)) }
 }

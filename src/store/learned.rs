@@ -18,33 +18,43 @@
 //! All but number 36 are in single precision. An earlier firmware had none from 38 on; a drive with such a record has to learn
 //! again before it starts without an encoder. A later one had none from 58 on.
 
+use core::mem::{offset_of, transmute};
+
 use drive_core::carrier::Asymmetry;
 use drive_core::learned::{Fitted, Learned, Verdict};
 use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
 
 use crate::hash;
 
+/// The values in their order.
+#[repr(C)]
+struct Stored {
+    reference: [f32; POINTS - 1],
+    carrier: [f32; POINTS - 1],
+    spread: f32,
+    gain_mismatch: [f32; 2],
+    current_saliency: [f32; 2],
+    flux_saliency: f32,
+    flags: u32,
+    step_a: f32,
+    slope: [f32; POINTS],
+    limit_a: f32,
+    asymmetry: [f32; 3],
+    at_start: [f32; 3],
+}
+
 /// Number of values.
-pub const WORDS: usize = AT_START + 3;
+pub const WORDS: usize = size_of::<Stored>() / 4;
 /// A bit for each value that every firmware writes.
-const NEEDED: u64 = (1 << STEP) - 1;
+const NEEDED: u64 = bits_before(offset_of!(Stored, step_a));
 /// The same of those that wrote the distance of the points, of those that wrote the asymmetry, and of all.
-const WITH_STEP: u64 = (1 << SLOPE) - 1;
-const WITH_ASYMMETRY: u64 = (1 << AT_START) - 1;
-const ALL: u64 = (1 << WORDS) - 1;
+const WITH_STEP: u64 = bits_before(offset_of!(Stored, slope));
+const WITH_ASYMMETRY: u64 = bits_before(offset_of!(Stored, at_start));
+const ALL: u64 = bits_before(size_of::<Stored>());
 /// The name that their ids derive from, and that a rejection states.
 pub const NAME: &str = "learned";
 
-const REFERENCE: usize = 0;
-const CARRIER: usize = REFERENCE + POINTS - 1;
-const FITS: usize = CARRIER + POINTS - 1;
-const FLAGS: usize = FITS + 6;
-const STEP: usize = FLAGS + 1;
-const SLOPE: usize = STEP + 1;
-const LIMIT: usize = SLOPE + POINTS;
-const ASYMMETRY: usize = LIMIT + 1;
-const AT_START: usize = ASYMMETRY + 3;
-
+const FLAGS: usize = offset_of!(Stored, flags) / 4;
 /// Place of the rotor positions in their word.
 const POSITIONS: u32 = 16;
 const HAS_GAINS: u32 = 1 << 8;
@@ -53,6 +63,11 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
+
+/// A bit for each value before this offset, in bytes.
+const fn bits_before(offset: usize) -> u64 {
+    (1 << (offset / 4)) - 1
+}
 
 /// The id of a value: the hash of the name plus its index.
 pub fn id(index: usize) -> u32 {
@@ -77,98 +92,79 @@ pub fn in_both(words: &[u32; WORDS]) -> bool {
 
 /// The values of a result, and of whether it was learned with the currents of both zero vectors.
 pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
-    let (gains, current) = (learned.gain_mismatch, learned.current_saliency);
-    let fits = [
-        learned.spread,
-        gains.value,
-        gains.misfit,
-        current.value,
-        current.misfit,
-        learned.flux_saliency,
-    ];
-    let carrier = learned.carrier.map_or([0.0; POINTS], |table| *table.points());
-    let reference = learned.reference.points().iter().skip(1);
-    let values = reference.chain(carrier.iter().skip(1)).chain(&fits);
-    let mut words = [0; WORDS];
-    for (word, value) in words.iter_mut().zip(values) {
-        *word = value.to_bits();
-    }
     let flag = |set: bool, bit: u32| if set { bit } else { 0 };
-    words[FLAGS] = learned.points as u32
-        | u32::from(learned.positions) << POSITIONS
-        | flag(gains.accepted, HAS_GAINS)
-        | flag(current.accepted, HAS_CURRENT)
-        | flag(learned.carrier.is_some(), HAS_CARRIER)
-        | flag(learned.slope.is_some(), HAS_SLOPE)
-        | flag(learned.at_start.is_some(), HAS_START)
-        | flag(both, IN_BOTH);
-    let slope = learned.slope.map_or([0.0; POINTS], |table| *table.points());
-    let step = [learned.reference.grid().step_a()];
-    let asymmetries = [learned.asymmetry, learned.at_start.unwrap_or_default()];
-    let asymmetries = asymmetries.map(|Asymmetry { constant, sin, cos }| [constant, sin, cos]);
-    let rest =
-        step.iter().chain(&slope).chain([&learned.limit_a]).chain(asymmetries.as_flattened());
-    for (word, value) in words[STEP..].iter_mut().zip(rest) {
-        *word = value.to_bits();
-    }
-    words
+    let fitted = |Fitted { value, misfit, .. }| [value, misfit];
+    let asymmetry = |Asymmetry { constant, sin, cos }| [constant, sin, cos];
+    let [_, reference @ ..] = *learned.reference.points();
+    let [_, carrier @ ..] = learned.carrier.map_or([0.0; POINTS], |table| *table.points());
+    let stored = Stored {
+        reference,
+        carrier,
+        spread: learned.spread,
+        gain_mismatch: fitted(learned.gain_mismatch),
+        current_saliency: fitted(learned.current_saliency),
+        flux_saliency: learned.flux_saliency,
+        flags: learned.points as u32
+            | u32::from(learned.positions) << POSITIONS
+            | flag(learned.gain_mismatch.accepted, HAS_GAINS)
+            | flag(learned.current_saliency.accepted, HAS_CURRENT)
+            | flag(learned.carrier.is_some(), HAS_CARRIER)
+            | flag(learned.slope.is_some(), HAS_SLOPE)
+            | flag(learned.at_start.is_some(), HAS_START)
+            | flag(both, IN_BOTH),
+        step_a: learned.reference.grid().step_a(),
+        slope: learned.slope.map_or([0.0; POINTS], |table| *table.points()),
+        limit_a: learned.limit_a,
+        asymmetry: asymmetry(learned.asymmetry),
+        at_start: asymmetry(learned.at_start.unwrap_or_default()),
+    };
+    // SAFETY: numbers of four bytes each, without padding.
+    unsafe { transmute(stored) }
 }
 
 /// The result with these values, if it is one that a learning accepts. `present` has a bit for each value that was
 /// read.
 pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
-    let step = || Grid::of_step(f32::from_bits(words[STEP]));
-    let (grid, has_slope) = match present {
-        NEEDED => (Grid::REFERENCE, false),
-        WITH_STEP => (step()?, false),
-        WITH_ASYMMETRY | ALL => (step()?, true),
-        _ => return None,
-    };
-    let carrier = CarrierTable::from_points(grid, table(words, CARRIER, 1.0));
-    let value = |index: usize| f32::from_bits(words[index]);
-    let flags = words[FLAGS];
-    let fitted = |index, bit| Fitted {
-        value: value(index),
-        misfit: value(index + 1),
-        accepted: flags & bit != 0,
-    };
-    let points = (flags & 0xff) as usize;
-    let slope = match flags & HAS_SLOPE != 0 {
-        true if has_slope => {
-            Some(SlopeTable::from_points(grid, core::array::from_fn(|n| value(SLOPE + n)))?)
-        }
-        true => return None,
-        false => None,
-    };
-    let slope_at_rest = slope.map_or(0.0, |slope| slope.at_rest());
-    let asymmetry =
-        |index| Asymmetry { constant: value(index), sin: value(index + 1), cos: value(index + 2) };
+    // SAFETY: numbers of four bytes each, without padding, of which every value is valid.
+    let stored: Stored = unsafe { transmute(*words) };
+    let has = |flag: u32| stored.flags & flag != 0;
+    let with_slope = present >= WITH_ASYMMETRY;
+    if !is_whole(present) || (has(HAS_SLOPE) && !with_slope) {
+        return None;
+    }
+    let grid = if present == NEEDED { Grid::REFERENCE } else { Grid::of_step(stored.step_a)? };
+    let fitted = |[value, misfit]: [f32; 2], flag| Fitted { value, misfit, accepted: has(flag) };
+    let asymmetry = |[constant, sin, cos]: [f32; 3]| Asymmetry { constant, sin, cos };
+    let carrier = CarrierTable::from_points(grid, from_zero(1.0, &stored.carrier));
+    let slope = SlopeTable::from_points(grid, stored.slope);
+    if (has(HAS_CARRIER) && carrier.is_none()) || (has(HAS_SLOPE) && slope.is_none()) {
+        return None;
+    }
+    let slope = slope.filter(|_| has(HAS_SLOPE));
+    let points = (stored.flags & 0xff) as usize;
     let learned = Learned {
-        reference: ReferenceTable::from_points(grid, table(words, REFERENCE, 0.0))?,
-        carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
+        reference: ReferenceTable::from_points(grid, from_zero(0.0, &stored.reference))?,
+        carrier: carrier.filter(|_| has(HAS_CARRIER)),
         points,
         slope,
-        slope_at_rest,
-        limit_a: if has_slope { value(LIMIT) } else { grid.current(points) },
-        spread: value(FITS),
+        slope_at_rest: slope.map_or(0.0, |slope| slope.at_rest()),
+        limit_a: if with_slope { stored.limit_a } else { grid.current(points) },
+        spread: stored.spread,
         ripple: 0.0,
-        asymmetry: if has_slope { asymmetry(ASYMMETRY) } else { Asymmetry::default() },
-        at_start: (present == ALL && flags & HAS_START != 0).then(|| asymmetry(AT_START)),
-        positions: ((flags >> POSITIONS) as u8).max(1),
-        gain_mismatch: fitted(FITS + 1, HAS_GAINS),
-        current_saliency: fitted(FITS + 3, HAS_CURRENT),
-        flux_saliency: value(FITS + 5),
+        asymmetry: if with_slope { asymmetry(stored.asymmetry) } else { Asymmetry::default() },
+        at_start: (present == ALL && has(HAS_START)).then(|| asymmetry(stored.at_start)),
+        positions: ((stored.flags >> POSITIONS) as u8).max(1),
+        gain_mismatch: fitted(stored.gain_mismatch, HAS_GAINS),
+        current_saliency: fitted(stored.current_saliency, HAS_CURRENT),
+        flux_saliency: stored.flux_saliency,
         verdict: slope.map_or(Verdict::Sound, |slope| Verdict::of_slope(slope.at_rest())),
     };
-    let whole = learned.carrier.is_some() || flags & HAS_CARRIER == 0;
-    (whole && learned.is_believable()).then_some(learned)
+    learned.is_believable().then_some(learned)
 }
 
-/// The points of a table whose values but the first, `at_zero`, begin at index `first`.
-fn table(words: &[u32; WORDS], first: usize, at_zero: f32) -> [f32; POINTS] {
+/// The points of a table with this value at zero and the others behind.
+fn from_zero(at_zero: f32, others: &[f32; POINTS - 1]) -> [f32; POINTS] {
     let mut points = [at_zero; POINTS];
-    for (point, word) in points.iter_mut().skip(1).zip(words.iter().skip(first)) {
-        *point = f32::from_bits(*word);
-    }
+    points[1..].copy_from_slice(others);
     points
 }

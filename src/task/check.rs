@@ -4,9 +4,9 @@ use cortex_m::singleton;
 
 use crate::chip::{memory, stop};
 use crate::task::control;
-use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
-use induction_drive::monitor::record::Reason;
-use induction_drive::monitor::register_check::{COUNT, Changed, RegisterCheck};
+use induction_drive::monitor::memory_check::{CheckedMemory, MemoryCheck};
+use induction_drive::monitor::record::Record;
+use induction_drive::monitor::register_check::{COUNT, RegisterCheck};
 
 /// The check and its progress.
 pub struct Check {
@@ -30,17 +30,10 @@ impl Check {
     /// Checks a slice. A flipped bit ends the run: start-up copies the code, computes the coefficients and sets the
     /// registers up afresh.
     pub fn slice(&mut self) {
-        if let Err(Changed { address, found, expected }) = self.registers.slice(memory::word) {
-            stop::end(Reason::Register, [address, found, expected, 0]);
-        }
-        match self.memory.slice(memory::word) {
-            Err(BitFlip::Code { address, found, copied }) => {
-                stop::end(Reason::Code, [address, found, copied, 0]);
-            }
-            Err(BitFlip::Constants { found, before }) => {
-                stop::end(Reason::Coefficients, [found, before, 0, 0]);
-            }
-            Ok(()) => {}
+        let registers = self.registers.slice(memory::word);
+        let checked = registers.and_then(|()| self.memory.slice(memory::word));
+        if let Err(Record { reason, details }) = checked {
+            stop::end(reason, details);
         }
     }
 }

@@ -90,26 +90,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn memory_x_declares_the_memories_of_the_controller() {
-        let regions = regions(&sources::read("memory.x").unwrap());
-        let known: Vec<(&str, u64, u64)> =
-            regions.iter().map(|r| (r.name.as_str(), r.origin, r.length / 1024)).collect();
-        assert_eq!(
-            known,
-            [
-                ("FLASH", 0x0800_0000, 256),
-                ("CONTROL", 0x0804_0000, 32),
-                ("DESIGN", 0x0804_8000, 192),
-                // Overflows where there is no memory.
-                ("STACK", 0x2000_0000, 34),
-                // To 96, not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_8800, 62),
-                ("CCM", 0x1000_0000, 32),
-            ]
-        );
-    }
-
-    #[test]
     fn contents_take_the_memory_that_they_are_loaded_from() {
         let regions = regions(&sources::read("memory.x").unwrap());
         let map = " 80001d8  80001d8     faa0     8 .text

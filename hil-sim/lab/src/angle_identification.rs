@@ -61,9 +61,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Demodulation, f64)> =
         DEMODULATIONS.iter().flat_map(|s| TABLE_6.iter().map(move |row| (s, row.0))).collect();
     let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {
-        let (config, seed) = (context.config, context.seed);
-        let record = measure::sequence(config, demodulation.demodulator, iq, seed)?;
-        let steps = measure::steps(config, demodulation.demodulator, iq, seed)?;
+        let rig = || measure::oriented(context.config, demodulation.demodulator, iq, context.seed);
+        let (record, steps) = (measure::sequence(rig()?)?, measure::steps(rig()?)?);
         Ok(IdentifiedPoint { models: Model::identify(&record)?, record, steps })
     })?;
     let all = || DEMODULATIONS.iter().zip(points.chunks(TABLE_6.len()));
@@ -109,15 +108,10 @@ fn poles_text(model: &Model) -> String {
 fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table {
     let gain = format!("static gain ({} / rad)", demodulation.unit());
     let title = format!("Eq. 3.43 for {}, beside Table 6", demodulation.name);
-    let mut table = Table::new(title, &[]).note(
-        "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
-         least squares of Appendix A fits, which with noise on the output shifts poles and gain. Fit: \
-         100 % less rms error over rms signal, of the simulated output.",
-    );
-    for (row, p) in points.iter().enumerate() {
+    let rows = points.iter().enumerate().map(|(row, p)| {
         let [equation, model] = &p.models;
         let printed = Model::printed(row);
-        table.record([
+        [
             ("iq (A)", Cell::fixed(TABLE_6[row].0, 1)),
             ("k_φ × 10⁵", Cell::fixed(model.k * 1e5, 3)),
             ("printed", Cell::fixed(printed.k * 1e5, 3)),
@@ -129,9 +123,13 @@ fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table 
             ("ratio of gains", Cell::fixed(model.static_gain() / printed.static_gain(), 2)),
             ("fit (%)", Cell::fixed(model.fit(&p.record).1, 1)),
             ("fit of equation error (%)", Cell::fixed(equation.fit(&p.record).1, 1)),
-        ]);
-    }
-    table
+        ]
+    });
+    Table::new(title, &[]).records(rows).note(
+        "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
+         least squares of Appendix A fits, which with noise on the output shifts poles and gain. Fit: \
+         100 % less rms error over rms signal, of the simulated output.",
+    )
 }
 
 /// The gains of the axis alone and of axis and current together, measured and predicted.

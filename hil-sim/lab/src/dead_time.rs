@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use drive_core::{AngleSource, Command, Mode};
+use sim_bench::plant::Complex;
 use sim_bench::prelude::*;
 use sim_bench::rig::wrapped_degrees;
 
@@ -97,8 +98,8 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     let mut sums = [(0.0, 0.0, 0u32); BINS];
     let mut error_stats = Stats::default();
     // Mean of i e^(-j n angle) over the run: complex amplitude of harmonic n.
-    let mut amplitudes = [(0.0, 0.0); 5];
-    let mut wanted = (0.0, 0.0);
+    let mut amplitudes = [Complex::ZERO; 5];
+    let mut wanted = Complex::ZERO;
     // Whole turns of the flux, so that the fundamental leaks into no harmonic.
     let mut turned = 0.0;
     let mut last = rig.plant.rotor_flux_angle();
@@ -113,20 +114,16 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         }
         rig.step();
         // The voltage of this period was computed from the sample before.
-        let applied = rig.plant.applied_voltage();
-        let error = (applied.re - wanted.0, applied.im - wanted.1);
+        let error = rig.plant.applied_voltage() - wanted;
         let t = rig.drive.telemetry();
         let lead = TAU * (f64::from(t.phi.to_turns()) + 1.5 * f64::from(t.flux_freq));
-        let (v_d, v_q) = (f64::from(t.voltage.d), f64::from(t.voltage.q));
-        wanted = (v_d * lead.cos() - v_q * lead.sin(), v_d * lead.sin() + v_q * lead.cos());
+        wanted = Complex::new(t.voltage.d.into(), t.voltage.q.into()) * Complex::cis(lead);
 
-        error_stats.push(error.0.hypot(error.1));
+        error_stats.push(error.norm());
         let bin = &mut sums[((angle / TAU).rem_euclid(1.0) * BINS as f64) as usize % BINS];
-        *bin = (bin.0 + error.0, bin.1 + i.re, bin.2 + 1);
+        *bin = (bin.0 + error.re, bin.1 + i.re, bin.2 + 1);
         for (sum, n) in amplitudes.iter_mut().zip([1].iter().chain(&HARMONICS)) {
-            let (s, c) = (f64::from(*n) * phi).sin_cos();
-            sum.0 += i.re * c + i.im * s;
-            sum.1 += i.im * c - i.re * s;
+            *sum += i * Complex::cis(-f64::from(*n) * phi);
         }
     }
     let points = |of: fn(&(f64, f64, u32)) -> f64| {
@@ -134,12 +131,11 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         let bin = |k: usize| &sums[(k + BINS / 2) % BINS];
         (0..BINS).map(|k| (centre(k), of(bin(k)) / f64::from(bin(k).2))).collect()
     };
-    let length = |a: &(f64, f64)| a.0.hypot(a.1);
     Ok(Case {
         name,
         error: points(|b| b.0),
         current: points(|b| b.1),
         error_rms: error_stats.rms(),
-        harmonics: std::array::from_fn(|k| length(&amplitudes[k + 1]) / length(&amplitudes[0])),
+        harmonics: std::array::from_fn(|k| amplitudes[k + 1].norm() / amplitudes[0].norm()),
     })
 }

@@ -6,7 +6,7 @@ mod tracked;
 
 use rayon::prelude::*;
 use sim_bench::prelude::*;
-use sim_bench::steady::SteadyRun;
+use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
@@ -123,16 +123,19 @@ fn findings(
     };
     let at_each = |config: &Config| {
         IQ_A.par_iter()
-            .map(|&iq| signal::signal_quality(demodulation, config, iq, seed))
+            .map(|&iq| signal::signal_quality(signal::oriented(demodulation, config, iq, seed)?))
             .collect::<Result<Vec<_>, _>>()
     };
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
         let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
-        let turning = SPEEDS_RPM
-            .par_iter()
-            .map(|&rpm| tracked::turning(&drive, config, rpm, RUN_IQ_A, seed))
-            .collect::<Result<_, _>>()?;
+        // One second at constant speed and torque; none where the angle is lost.
+        let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
+            let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
+            let run = steady_run_of(&drive, config, case, 1.0)?;
+            Ok::<_, Error>((!run.lost).then_some(run))
+        });
+        let turning = turning.collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
     };
     let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
@@ -187,14 +190,9 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResu
 }
 
 fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
-    let mut table = Table::new("What each sees at the right angle", &[]).note(
-        "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
-         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
-         should be seen; as angle: what that would shift the angle by.",
-    );
-    for (demodulation, f) in all {
-        for ((iq, s), i) in IQ_A.iter().zip(&f.seen).zip(&f.isotropic) {
-            table.record([
+    let rows = all.flat_map(|(demodulation, f)| {
+        IQ_A.iter().zip(&f.seen).zip(&f.isotropic).map(|((iq, s), i)| {
+            [
                 ("demodulation", Cell::from(demodulation.name)),
                 ("iq (A)", Cell::fixed(*iq, 1)),
                 ("unit", Cell::from(demodulation.unit())),
@@ -205,10 +203,14 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
                 ("signal without saliency", Cell::fixed(i.signal * 1e3, 2)),
                 ("as angle (°)", Cell::fixed(degrees(i.signal / s.slope), 1)),
                 ("slope without saliency", Cell::fixed(i.slope * 1e3, 1)),
-            ]);
-        }
-    }
-    table
+            ]
+        })
+    });
+    Table::new("What each sees at the right angle", &[]).records(rows).note(
+        "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
+         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
+         should be seen; as angle: what that would shift the angle by.",
+    )
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {

@@ -30,7 +30,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let filters = filters();
     let mut outcome = Outcome::default();
     outcome.figures.push(bode(&filters));
-    outcome.figures.push(stop_band(filters[0].as_ref()));
+    outcome.figures.push(stop_band(&filters[0]));
     let table = characteristics(&filters, &mut outcome);
     outcome.tables.push(table);
     outcome.tables.push(edges(&filters));
@@ -61,17 +61,17 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn bode(filters: &[Box<dyn ComparedFilter + Send>]) -> Figure {
+fn bode(filters: &[ComparedFilter]) -> Figure {
     let hz = frequencies(10.0, 2990.0, 1500);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
     let (gain, phase) =
-        bode.panels(filters.iter().map(|f| (f.name(), |omega_t: f64| f.sections(omega_t))));
+        bode.panels(filters.iter().map(|f| (f.name, |omega_t: f64| f.sections(omega_t))));
     Figure::new("bode", "The digital filters, as the drive computes them", "Figure 30")
         .panel(gain.y_range(-100.0, 5.0))
         .panel(phase)
 }
 
-fn stop_band(lpf: &dyn ComparedFilter) -> Figure {
+fn stop_band(lpf: &ComparedFilter) -> Figure {
     let along = |response: &dyn Fn(f64) -> Complex64| {
         (0..=900)
             .map(|k| 440.0 + f64::from(k) * 0.25)
@@ -92,7 +92,7 @@ fn stop_band(lpf: &dyn ComparedFilter) -> Figure {
     .panel(panel)
 }
 
-fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Outcome) -> Table {
+fn characteristics(filters: &[ComparedFilter], outcome: &mut Outcome) -> Table {
     let mut table = Table::new("Responses", &[]);
     for filter in filters {
         let w = omega_t(600.0);
@@ -113,7 +113,7 @@ fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Out
         for (form, dc, carrier, delay, pole) in rows {
             let dc = Cell::fixed(dc.re, 5);
             table.record([
-                ("filter", filter.name().into()),
+                ("filter", filter.name.into()),
                 ("form", form.into()),
                 ("gain at dc", dc),
                 ("gain at 600 Hz (dB)", Cell::fixed(carrier, 2)),
@@ -121,7 +121,7 @@ fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Out
                 ("largest pole |z|", pole),
             ]);
         }
-        let key = filter.name().to_lowercase();
+        let key = filter.name.to_lowercase();
         outcome.metrics.set(format!("{key}_dc_gain"), filter.sections(0.0).re);
         outcome.metrics.set(format!("{key}_gain_600hz_db"), sections);
         outcome
@@ -135,7 +135,7 @@ fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Out
     ))
 }
 
-fn edges(filters: &[Box<dyn ComparedFilter + Send>]) -> Table {
+fn edges(filters: &[ComparedFilter]) -> Table {
     let levels = [-0.6, -3.0, -20.0, -40.0];
     let heads = ["filter", "-0.6 dB at (Hz)", "-3 dB at (Hz)", "-20 dB at (Hz)", "-40 dB at (Hz)"];
     let mut table = Table::new("Edges", &heads);
@@ -144,7 +144,7 @@ fn edges(filters: &[Box<dyn ComparedFilter + Send>]) -> Table {
             let found = crossings(|hz| decibels(filter.sections(omega_t(hz))) - level);
             Cell::from(found.iter().map(|hz| format!("{hz:.1}")).collect::<Vec<_>>().join(", "))
         });
-        table.row([Cell::from(filter.name())].into_iter().chain(crossings));
+        table.row([Cell::from(filter.name)].into_iter().chain(crossings));
     }
     table.note("The ripple of the pass bands is 0.5 dB: each filter is measured against 0 dB.")
 }

@@ -2,7 +2,8 @@
 
 use sim_bench::prelude::*;
 
-use crate::identification::{Parameters, ratios};
+use crate::identification::Parameters;
+use crate::identification::ratios::{self, Ratio};
 
 /// Numbers that do not depend on the noise.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -16,11 +17,15 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
-    let mut table = Table::new("Deterministic ratios", &[]);
     let mut outcome = Outcome::default();
-    let (mut px, mut rbv) = (0.0f64, 0.0f64);
-    for ratio in ratios::all() {
-        table.record([
+    let ratios = ratios::all();
+    let largest = |of: fn(&Ratio) -> f64| {
+        ratios.iter().map(|r| (of(r) / r.printed).ln().abs()).fold(0.0, f64::max).exp()
+    };
+    outcome.metrics.set("px_largest_factor", largest(|ratio| ratio.px));
+    outcome.metrics.set("rbv_largest_factor", largest(|ratio| ratio.rbv));
+    let table = Table::new("Deterministic ratios", &[]).records(ratios.iter().map(|ratio| {
+        [
             ("quantity", Cell::from(ratio.quantity)),
             ("h (µs)", Cell::fixed(1e6 * ratio.h, 0)),
             ("printed", Cell::significant(ratio.printed, 3)),
@@ -28,30 +33,25 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             ("PX/printed", Cell::fixed(ratio.px / ratio.printed, 3)),
             ("rbv", Cell::significant(ratio.rbv, 3)),
             ("rbv/printed", Cell::fixed(ratio.rbv / ratio.printed, 3)),
-        ]);
-        px = px.max((ratio.px / ratio.printed).ln().abs());
-        rbv = rbv.max((ratio.rbv / ratio.printed).ln().abs());
-    }
-    outcome.metrics.set("px_largest_factor", px.exp());
-    outcome.metrics.set("rbv_largest_factor", rbv.exp());
+        ]
+    }));
     outcome.tables.push(table.note(
         "h_0b / h_1b: both have the same absolute error, so their relative errors in Tables 1 and 4 \
          have the inverse ratio of their values. (1 - f_11)/2: what separates σ l_s by Models B \
          and C in Tables 2 and 3. The error of τ_r by Model B is almost all bias.",
     ));
-    let mut machines = Table::new("Machines", &[]);
-    for (name, machine) in [("PX", Parameters::PX), ("rbv", Parameters::RBV)] {
+    let machines = [("PX", Parameters::PX), ("rbv", Parameters::RBV)].map(|(name, machine)| {
         let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
-        machines.record([
+        [
             ("machine", Cell::from(name)),
             ("r_s (Ω)", Cell::fixed(r_s, 3)),
             ("τ_r (s)", Cell::fixed(tau_r, 5)),
             ("σ l_s (H)", Cell::fixed(sigma_l_s, 6)),
             ("l_s (H)", Cell::fixed(l_s, 4)),
             ("r_s/(σ l_s) (1/s)", Cell::fixed(r_s / sigma_l_s, 1)),
-        ]);
-    }
-    outcome.tables.push(machines);
+        ]
+    });
+    outcome.tables.push(Table::new("Machines", &[]).records(machines));
     outcome.remark(
         "The simulated tables were not made with the machine of Table 6 (rbv). PX is inferred from \
          the tables; the paper does not name it. Errors in % do not depend on the level of voltage \

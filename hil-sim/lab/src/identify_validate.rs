@@ -49,7 +49,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let [by_sg, by_ss] = Signal::ALL.map(|signal| data(signal).regression());
         let (by_sg, by_ss) = (by_sg.map_err(Error::refused)?, by_ss.map_err(Error::refused)?);
         let c = [&by_sg, &by_ss].map(|regression| model_c(&regression.delta, H).array());
-        let s = model_s(&by_ss, H, None).map(|fit| fit.parameters.array());
+        let s = model_s(&by_ss, H).map(|fit| fit.parameters.array());
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
             let value = |x: Option<f64>| Cell::or_dash(x.map(|x| Cell::significant(x, 3)));
             table.record([
@@ -77,7 +77,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {
         let case = Case { speed: 375.0, signal, period: 0 };
-        errors(Parameters::RBV, case, Noise::PRINTED, context.seed, 7).continuous[1][1].percent
+        errors(Parameters::RBV, case, Noise::PRINTED, context.seed, 7).continuous[1][1]
     });
     outcome.metrics.set("tau_r_error_of_rbv_sg_printed_noise_pct", sg);
     outcome.metrics.set("tau_r_error_of_rbv_ss_printed_noise_pct", ss);

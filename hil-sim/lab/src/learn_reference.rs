@@ -17,52 +17,38 @@ pub const EXPERIMENT: Experiment = Experiment {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let learned = learning::learned(context.config, context.seed)?;
     let mut outcome = Outcome::default();
-    let points: Vec<(f64, f64)> = learned
-        .reference
-        .points()
-        .iter()
-        .take(learned.points + 1)
-        .enumerate()
-        .map(|(n, &q)| (f64::from(learned.reference.grid().current(n)), f64::from(q)))
-        .collect();
-    let mut table = Table::new(
-        "Over the torque current",
-        &["iq (A)", "reference", "slope (1/rad)", "carrier ratio"],
-    )
-    .note("What the carrier shows at the right angle, odd in iq; the carrier current, as a ratio to that at 0 A, even.");
-    for (n, &(i_q, q)) in points.iter().enumerate() {
-        let ratio = learned.carrier.map_or(f64::NAN, |table| f64::from(table.points()[n]));
-        let slope = learned.slope.map_or(f64::NAN, |table| f64::from(table.points()[n]));
-        table.row([
-            Cell::fixed(i_q, 2),
-            Cell::fixed(q, 5),
-            Cell::fixed(slope, 5),
-            Cell::fixed(ratio, 5),
-        ]);
-    }
-    outcome.tables.push(table);
-
-    let mut table = Table::new("Other values", &["value", "found", "misfit", "used"]).note(
+    let reference = learned.reference.points().iter().take(learned.points + 1).enumerate();
+    let of = |(n, &q): (usize, &f32)| (learned.reference.grid().current(n).into(), q.into());
+    let points: Vec<(f64, f64)> = reference.map(of).collect();
+    let rows = points.iter().enumerate().map(|(n, &(i_q, q))| {
+        let ratio = learned.carrier.map_or(f64::NAN, |table| table.points()[n].into());
+        let slope = learned.slope.map_or(f64::NAN, |table| table.points()[n].into());
+        [
+            ("iq (A)", Cell::fixed(i_q, 2)),
+            ("reference", Cell::fixed(q, 5)),
+            ("slope (1/rad)", Cell::fixed(slope, 5)),
+            ("carrier ratio", Cell::fixed(ratio, 5)),
+        ]
+    });
+    outcome.tables.push(Table::new("Over the torque current", &[]).records(rows).note(
+        "What the carrier shows at the right angle, odd in iq; the carrier current, as a ratio to that at 0 A, even.",
+    ));
+    let row = |name: &str, value: f32, decimals, misfit: Cell, used: bool| {
+        let used = Cell::from(if used { "yes" } else { "no" });
+        let value = Cell::fixed(value.into(), decimals);
+        [("value", name.into()), ("found", value), ("misfit", misfit), ("used", used)]
+    };
+    let fitted =
+        |name: &str, f: Fitted| row(name, f.value, 5, Cell::fixed(f.misfit.into(), 5), f.accepted);
+    let rows = [
+        fitted("gain of sensor a over b, less one", learned.gain_mismatch),
+        fitted("saliency of the current (1/A)", learned.current_saliency),
+        row("saliency fixed to the flux", learned.flux_saliency, 4, "".into(), false),
+    ];
+    outcome.tables.push(Table::new("Other values", &[]).records(rows).note(
         "The saliency fixed to the flux is what the check at the start saw, within 5 %; it is for \
          the reader.",
-    );
-    let mut fitted = |name: &str, fitted: Fitted| {
-        table.row([
-            Cell::from(name),
-            Cell::fixed(f64::from(fitted.value), 5),
-            Cell::fixed(f64::from(fitted.misfit), 5),
-            Cell::from(if fitted.accepted { "yes" } else { "no" }),
-        ]);
-    };
-    fitted("gain of sensor a over b, less one", learned.gain_mismatch);
-    fitted("saliency of the current (1/A)", learned.current_saliency);
-    table.row([
-        Cell::from("saliency fixed to the flux"),
-        Cell::fixed(f64::from(learned.flux_saliency), 4),
-        Cell::from(""),
-        Cell::from("no"),
-    ]);
-    outcome.tables.push(table);
+    ));
 
     let m = &mut outcome.metrics;
     m.set("spread", learned.spread.into());

@@ -174,11 +174,10 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     outcome.tables.push(table);
-    for (name, value) in
-        ["current_percent", "speed_rpm", "efficiency_points"].into_iter().zip(worst)
-    {
-        outcome.metrics.set(format!("largest_difference_{name}"), value);
-    }
+    let [current, speed, efficiency] = worst;
+    outcome.metrics.set("largest_difference_current_percent", current);
+    outcome.metrics.set("largest_difference_speed_rpm", speed);
+    outcome.metrics.set("largest_difference_efficiency_points", efficiency);
     let over = |points: &[LoadPoint], of: fn(&LoadPoint) -> f64| -> Vec<(f64, f64)> {
         points.iter().map(|p| (1e-3 * p.power_w, of(p))).collect()
     };

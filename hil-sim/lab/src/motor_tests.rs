@@ -60,7 +60,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 fn readings_table(ours: &Readings) -> Table {
     let printed = Readings::PRINTED;
-    let mut table = Table::new("Readings", &[]);
     let rows = [
         ("direct current", "voltage (V)", printed.dc.0, ours.dc.0),
         ("", "current (A)", printed.dc.1, ours.dc.1),
@@ -72,39 +71,38 @@ fn readings_table(ours: &Readings) -> Table {
         ("", "current (A rms)", printed.no_load.2, ours.no_load.2),
         ("", "|z| (Ω)", printed.no_load_impedance(), ours.no_load_impedance()),
     ];
-    for (test, reading, printed, ours) in rows {
-        table.record([
+    let rows = rows.map(|(test, reading, printed, ours)| {
+        [
             ("test", Cell::from(test)),
             ("reading", Cell::from(reading)),
             ("printed", Cell::significant(printed, 4)),
             ("simulated motor", Cell::significant(ours, 4)),
             ("ratio", Cell::fixed(ours / printed, 3)),
-        ]);
-    }
-    table
+        ]
+    });
+    Table::new("Readings", &[])
+        .records(rows)
         .note("The supply is set to the printed currents, and to the printed voltage without load.")
 }
 
 fn circuit_table(readings: &Readings, motor: &Circuit) -> Table {
-    let mut table = Table::new("Equivalent circuit", &[]);
     let (printed, classical) = (Readings::PRINTED.as_printed(), readings.as_printed());
     let (exact, theirs) = (readings.exact(), Readings::PRINTED.exact());
-    for (k, name) in Circuit::NAMES.iter().enumerate() {
-        let (scale, unit, digits) = if k < 2 { (1.0, "Ω", 4) } else { (1000.0, "mH", 4) };
-        let value = |circuit: &Circuit| Cell::significant(scale * circuit.array()[k], digits);
-        table.record([
-            ("parameter", Cell::from(format!("{name} ({unit})"))),
-            ("Table 5", value(&Circuit::TABLE_5)),
-            ("from the printed readings", value(&printed)),
-            ("from ours, as in section 3.6", value(&classical)),
-            (
-                "ratio to Table 5",
-                Cell::fixed(classical.array()[k] / Circuit::TABLE_5.array()[k], 3),
-            ),
-            ("from ours, nothing neglected", value(&exact)),
-            ("ratio to the motor", Cell::fixed(exact.array()[k] / motor.array()[k], 3)),
-            ("from the printed readings, nothing neglected", value(&theirs)),
-        ]);
-    }
-    table
+    Table::new("Equivalent circuit", &[]).records(Circuit::NAMES.iter().enumerate().map(
+        |(k, name)| {
+            let (scale, unit) = if k < 2 { (1.0, "Ω") } else { (1000.0, "mH") };
+            let value = |circuit: &Circuit| Cell::significant(scale * circuit.array()[k], 4);
+            let ratio = |a: &Circuit, b: &Circuit| Cell::fixed(a.array()[k] / b.array()[k], 3);
+            [
+                ("parameter", Cell::from(format!("{name} ({unit})"))),
+                ("Table 5", value(&Circuit::TABLE_5)),
+                ("from the printed readings", value(&printed)),
+                ("from ours, as in section 3.6", value(&classical)),
+                ("ratio to Table 5", ratio(&classical, &Circuit::TABLE_5)),
+                ("from ours, nothing neglected", value(&exact)),
+                ("ratio to the motor", ratio(&exact, motor)),
+                ("from the printed readings, nothing neglected", value(&theirs)),
+            ]
+        },
+    ))
 }

@@ -36,6 +36,10 @@ struct StepCase {
 }
 
 impl StepCase {
+    fn is_load(&self) -> bool {
+        matches!(self.disturbance, Disturbance::Load(_))
+    }
+
     /// The case in proportion to the motor and the pole pairs of a configuration.
     fn scaled(self, config: &Config) -> Self {
         let (disturbance, from) = match self.disturbance {
@@ -99,26 +103,20 @@ fn configured(config: &Config, case: &StepCase) -> Config {
     config.motor.r_r *= case.warmer;
     config.drive.angle_source = AngleSource::Injection;
     config.load.torque_nm = None;
-    config.load.mode = match case.disturbance {
-        Disturbance::Load(_) => LoadMode::Free,
-        Disturbance::TorqueCurrent(_) => LoadMode::Locked,
-    };
+    config.load.mode = if case.is_load() { LoadMode::Free } else { LoadMode::Locked };
     config
 }
 
 /// Angle error and speed from the step on; the first value is the mean before it.
 fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
     let mut rig = Rig::from_config(config, seed)?;
-    match case.disturbance {
-        Disturbance::Load(_) => {
-            rig.start(Mode::Speed)?;
-            rig.command(&Command::Speed(case.from as f32))?;
-        }
-        Disturbance::TorqueCurrent(_) => {
-            rig.start(Mode::Torque)?;
-            rig.command(&Command::Torque(case.from as f32))?;
-        }
-    }
+    let reference = |value: f64| match case.disturbance {
+        Disturbance::Load(_) => Command::Speed(value as f32),
+        Disturbance::TorqueCurrent(_) => Command::Torque(value as f32),
+    };
+    let mode = if case.is_load() { Mode::Speed } else { Mode::Torque };
+    rig.start(mode)?;
+    rig.command(&reference(case.from))?;
     rig.run(2.0, |_| {});
     let (mut angle, mut speed) = (Stats::default(), Stats::default());
     rig.run(BEFORE_S, |p| {
@@ -127,9 +125,7 @@ fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f6
     });
     match case.disturbance {
         Disturbance::Load(nm) => rig.set_load(Load::Free { torque: nm })?,
-        Disturbance::TorqueCurrent(by) => {
-            rig.command(&Command::Torque((case.from + by) as f32))?;
-        }
+        Disturbance::TorqueCurrent(by) => rig.command(&reference(case.from + by)).map(|_| ())?,
     }
     let (mut points, mut largest) = (Vec::new(), 0.0_f64);
     rig.run(AFTER_S, |p| {
@@ -196,7 +192,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          taken away, but not from the largest single error, which has \
          noise and bias in it.",
     );
-    let is_load = |m: &&StepResponse| matches!(m.case.disturbance, Disturbance::Load(_));
+    let is_load = |m: &&StepResponse| m.case.is_load();
     for m in &results {
         table.record([
             ("step", Cell::from(m.case.name)),

@@ -136,14 +136,13 @@ fn rule_table(rules: &[(Identified, RuleDesign)]) -> Table {
 }
 
 fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
-    let mut table = Table::new("Margins on the motor, with LPF and one period of delay", &[]);
-    for (name, design) in designs {
-        let rows = [
+    let rows = designs.iter().flat_map(|(name, design)| {
+        [
             ("by the rule", design.rule_k_c, design.rule_margins),
             ("used", design.k_c, design.margins),
-        ];
-        for (label, k_c, margins) in rows {
-            table.record([
+        ]
+        .map(|(label, k_c, margins)| {
+            [
                 ("identified plant", Cell::from(*name)),
                 ("gain", Cell::from(label)),
                 ("kc (V/A)", Cell::fixed(k_c, 2)),
@@ -152,10 +151,10 @@ fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
                 ("Ms", Cell::fixed(margins.ms, 2)),
                 ("at (Hz)", Cell::fixed(margins.ms_hz, 0)),
                 ("gain margin", Cell::fixed(margins.gain_margin, 2)),
-            ]);
-        }
-    }
-    table.note(
+            ]
+        })
+    });
+    Table::new("Margins on the motor, with LPF and one period of delay", &[]).records(rows).note(
         "The rule sees neither the filter nor the delay. Where it leaves less than 45° or a \
          sensitivity peak Ms above 2.2, kc is lowered until both hold.",
     )

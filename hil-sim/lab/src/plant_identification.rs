@@ -23,8 +23,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Amplitude of the pseudo-random voltage, V: assumed, the source gives none. It moves the current by
 /// some 0.3 A.
 const PRBS_V: f32 = 30.0;
-/// Register and repetitions of the sequence.
-const PRBS_BITS: u32 = 8;
+/// Repetitions of the sequence.
 const PRBS_PERIODS: usize = 8;
 /// Length of each level of the steps, s.
 const LEVEL_S: f64 = 0.05;
@@ -115,10 +114,9 @@ fn steps(rig: &mut Rig) -> Result<Record, Error> {
 }
 
 fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
-    let sequence = Prbs::new(PRBS_BITS);
-    let mut sequence = sequence.ok_or_else(|| Error::Internal("no such register".to_owned()))?;
+    let mut sequence = Prbs::default();
     let mut record = Record::default();
-    for _ in 0..PRBS_PERIODS * ((1 << PRBS_BITS) - 1) {
+    for _ in 0..PRBS_PERIODS * Prbs::PERIOD {
         let volts = PRBS_V * sequence.step() as f32;
         let voltage = if axis == Axis::D { Dq::new(volts, 0.0) } else { Dq::new(0.0, volts) };
         rig.command(&Command::TestVoltage(voltage))?;

@@ -1,10 +1,8 @@
 //! The dc link against the energy of motor and shaft, and against an integrator of its own.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{T, compare, near, plant, settings};
+use crate::common::{T, compare, near, plant, settings};
 use drive_core::Compare;
 use motor_plant::{Complex, DcLinkSettings, InverterSettings, Load, Plant, PlantSettings};
 

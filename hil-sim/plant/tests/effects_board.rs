@@ -1,10 +1,8 @@
 //! Effects of inverter, dc link and sensors that can be switched on, by what they do to the physics.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{T, compare, held, near, plant, settings};
+use crate::common::{T, compare, held, near, plant, settings};
 use drive_core::Compare;
 use motor_plant::{
     Complex, DcLinkSettings, FAMILIES, InverterSettings, MeasurementSettings, Plant, PlantSettings,

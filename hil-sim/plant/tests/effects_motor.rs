@@ -1,10 +1,8 @@
 //! Effects of motor and shaft that can be switched on, by what they do to the physics.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{T, compare, held, near, plant, settings};
+use crate::common::{T, compare, held, near, plant, settings};
 use motor_plant::{
     Complex, ElectricalState as _, EnergyMachine, IronSettings, Load, MachineModel as _,
     MachineSettings, Mechanics, MechanicsSettings, MotorModel, WarmingSettings,

@@ -66,7 +66,8 @@ fn the_firmware_and_the_power_stage_agree() {
         let dead_time = f64::from(board.dead_time_s.value);
         assert!(dead_time > (1.0 - 1e-6) * stage.limits.dead_time_s, "{name}: {dead_time} s");
         // Pins.
-        let sensors = board.currents.a_and_b().into_iter().chain(board.currents.c());
+        let Currents { a, b, shunts } = board.currents;
+        let sensors = [a, b].into_iter().chain(shunts.map(|shunts| shunts.c));
         for (sensor, channel) in sensors.zip(channel::CURRENTS) {
             assert_eq!(sensor.pin.adc1().map(usize::from), Some(channel), "{name}");
         }

@@ -7,10 +7,9 @@ use sim_bench::rig::wrapped_degrees;
 
 use crate::identification::signals::Prbs;
 
-/// The sequence: 8 bits as in section 3.10, each value held for 10 ms, so that the excitation lies where
+/// Samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no
 /// term, decides the fit: 50 % and less, and gains that are wrong by half.)
-const BITS: u32 = 8;
 const HOLD: usize = 60;
 /// Periods of the sequence: one to settle, the rest averaged.
 const PERIODS: usize = 7;
@@ -34,8 +33,11 @@ pub struct Record {
     pub y: Vec<f64>,
 }
 
-/// Orientation by the encoder, shaft locked, injection beside it, current settled.
-fn oriented(
+/// A drive that the encoder orients, shaft locked, injection beside it, current settled.
+///
+/// # Errors
+/// As [`Rig::oriented`].
+pub fn oriented(
     config: &Config,
     demodulator: DemodulatorKind,
     iq: f64,
@@ -56,16 +58,10 @@ fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
 /// Measures with the pseudo-random sequence on theta; the encoder orients the current.
 ///
 /// # Errors
-/// As [`Rig::oriented`].
-pub fn sequence(
-    config: &Config,
-    demodulator: DemodulatorKind,
-    iq: f64,
-    seed: u64,
-) -> Result<Record, Error> {
-    let mut rig = oriented(config, demodulator, iq, seed)?;
-    let mut prbs = Prbs::new(BITS).ok_or_else(|| Error::Refused("no such sequence".into()))?;
-    let bits: Vec<f64> = (0..(1 << BITS) - 1).map(|_| TURN * prbs.step()).collect();
+/// When the drive refuses a command.
+pub fn sequence(mut rig: Rig) -> Result<Record, Error> {
+    let mut prbs = Prbs::default();
+    let bits = [(); Prbs::PERIOD].map(|()| TURN * prbs.step());
     let mut y = vec![0.0; bits.len() * HOLD];
     for period in 0..PERIODS {
         for (n, &bit) in bits.iter().enumerate() {
@@ -96,14 +92,8 @@ pub struct StepResponses {
 /// Measures both step responses.
 ///
 /// # Errors
-/// As [`Rig::oriented`].
-pub fn steps(
-    config: &Config,
-    demodulator: DemodulatorKind,
-    iq: f64,
-    seed: u64,
-) -> Result<StepResponses, Error> {
-    let mut rig = oriented(config, demodulator, iq, seed)?;
+/// When the drive refuses a command.
+pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
     let size = f64::from(2 * STEP_COUNTS) * TURN_PER_COUNT;
     let alone = alternate(&mut rig, |rig, side, k| {
         if k == 0 {
@@ -142,22 +132,19 @@ fn alternate(
     mut one: impl FnMut(&mut Rig, f64, usize) -> Result<(f64, f64), Error>,
 ) -> Result<Vec<f64>, Error> {
     let (mut signal, mut angle) = (vec![0.0; STEP_SAMPLES], 0.0);
-    let mut before = vec![0.0; STEP_SAMPLES];
     for n in 0..2 * STEPS + 1 {
         let side = if n % 2 == 0 { 1.0 } else { -1.0 };
-        for k in 0..STEP_SAMPLES {
+        for (k, signal) in signal.iter_mut().enumerate() {
             let (y, x) = one(rig, side, k)?;
-            // The first step comes from the middle.
+            // The first step comes from the middle; of the others as many go up as down.
             if n > 0 {
-                signal[k] += side * y;
+                *signal += side * y;
                 if SLOW.contains(&k) {
                     angle += side * x;
                 }
-                before[k] += side;
             }
         }
     }
-    debug_assert!(before.iter().all(|&sides| sides == 0.0), "as many steps up as down");
     let angle = angle / SLOW.len() as f64;
     // From -y to y for angles from -x to x; before the step the signal is that of the other side.
     let end = SLOW.map(|k| signal[k]).sum::<f64>() / SLOW.len() as f64;
@@ -170,7 +157,7 @@ mod tests {
 
     /// Slow gain with the axis alone and with the current, by the demodulation.
     fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
-        let responses = steps(&Config::default(), demodulator, iq, 5).unwrap();
+        let responses = steps(oriented(&Config::default(), demodulator, iq, 5).unwrap()).unwrap();
         [&responses.alone, &responses.with_current]
             .map(|r| r[SLOW].iter().sum::<f64>() / SLOW.len() as f64)
     }

@@ -118,7 +118,7 @@ impl Model {
 
     /// Frequency response at rad/sample.
     pub fn response(&self, omega_t: f64) -> Complex64 {
-        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let z = Complex64::cis(omega_t);
         let [a1, a2] = self.a.map(|a| Complex64::new(a, 0.0));
         Complex64::new(self.k, 0.0) / (z * z + a1 * z + a2)
     }
@@ -152,7 +152,7 @@ impl Model {
 
     /// Controller and plant at rad/sample.
     fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex64 {
-        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let z = Complex64::cis(omega_t);
         let integrator = z - Complex64::ONE;
         let controller = (z - Complex64::new(pii.z_s, 0.0)) / (integrator * integrator);
         controller * Complex64::new(pii.k_s, 0.0) * self.response(omega_t)
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn a_known_plant_is_found_and_stabilised() {
         let plant = Model::printed(2);
-        let mut prbs = Prbs::new(8).unwrap();
+        let mut prbs = Prbs::default();
         let bits: Vec<f64> = (0..255).map(|_| prbs.step()).collect();
         let u: Vec<f64> = bits.iter().flat_map(|&bit| [bit; 20]).collect();
         let y = plant.simulate(&u.repeat(3)).split_off(2 * u.len());

@@ -24,7 +24,10 @@ pub struct SignalQuality {
 }
 
 /// A drive that the encoder orients, with the shaft locked and the injection beside it.
-fn oriented(
+///
+/// # Errors
+/// As [`Rig::oriented`].
+pub fn oriented(
     demodulation: &Demodulation,
     config: &Config,
     iq: f64,
@@ -39,14 +42,8 @@ fn oriented(
 /// Measures at the true flux angle and 4° to either side.
 ///
 /// # Errors
-/// As [`Rig::oriented`].
-pub fn signal_quality(
-    demodulation: &Demodulation,
-    config: &Config,
-    iq: f64,
-    seed: u64,
-) -> Result<SignalQuality, Error> {
-    let mut rig = oriented(demodulation, config, iq, seed)?;
+/// When the drive refuses a command.
+pub fn signal_quality(mut rig: Rig) -> Result<SignalQuality, Error> {
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
         rig.command(&Command::TurnInjection(turn as f32))?;
         rig.run(SETTLE_S, |_| {});

@@ -4,7 +4,6 @@ use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Command, Mode};
 use drive_settings::Settings;
 use sim_bench::prelude::*;
-use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
 
 /// Levels of Figure 38, A, and the time at each, s.
 const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
@@ -54,19 +53,4 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, E
     }
     let lost = stats.largest() > LOST_DEG || rig.drive.state().fault().is_some();
     Ok(StepsRun { error, stats, lost })
-}
-
-/// One second at constant speed and torque; none where the angle is lost.
-///
-/// # Errors
-/// As [`Rig::new`] and [`Rig::start`].
-pub fn turning(
-    drive: &Settings,
-    config: &Config,
-    rpm: f64,
-    iq: f64,
-    seed: u64,
-) -> Result<Option<SteadyRun>, Error> {
-    let run = steady_run_of(drive, config, OperatingPoint { rpm, iq, seed }, 1.0)?;
-    Ok((!run.lost).then_some(run))
 }

@@ -3,60 +3,58 @@
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
 use num_complex::Complex64;
 use sim_bench::bode::largest_pole;
-use sim_bench::prelude::*;
+use sim_bench::stats::Stats;
 
-use super::direct;
+use super::direct::{self, Form};
 
 /// A filter whose forms are compared: responses, and the error of each form.
-pub trait ComparedFilter: Sync {
+pub struct ComparedFilter {
     /// Its name in the source.
-    fn name(&self) -> &'static str;
+    pub name: &'static str,
+    /// Numerator and denominator by Tables 7 and 8.
+    printed: [Vec<f64>; 2],
+    response: fn(f64) -> Complex64,
+    /// A filter of sections at rest, as the drive runs it.
+    at_rest: fn() -> Box<dyn FnMut(f32) -> f32>,
+}
+
+impl ComparedFilter {
     /// Frequency response of the sections the drive runs.
-    fn sections(&self, omega_t: f64) -> Complex64;
+    pub fn sections(&self, omega_t: f64) -> Complex64 {
+        (self.response)(omega_t)
+    }
+
     /// Frequency response by Tables 7 and 8.
-    fn direct(&self, omega_t: f64) -> Complex64;
+    pub fn direct(&self, omega_t: f64) -> Complex64 {
+        direct::response(&self.printed, omega_t)
+    }
+
     /// Likewise, with coefficients rounded to `f32`.
-    fn direct_rounded(&self, omega_t: f64) -> Complex64;
+    pub fn direct_rounded(&self, omega_t: f64) -> Complex64 {
+        direct::response(&direct::rounded(&self.printed), omega_t)
+    }
+
     /// Largest pole of the direct form: as printed, rounded to `f32`.
-    fn largest_poles(&self) -> [f64; 2];
+    pub fn largest_poles(&self) -> [f64; 2] {
+        let [_, rounded] = direct::rounded(&self.printed);
+        [&self.printed[1], &rounded].map(|a| largest_pole(&a[1..]))
+    }
+
     /// Group delay in samples.
-    fn group_delay(&self, omega_t: f64) -> f64;
+    pub fn group_delay(&self, omega_t: f64) -> f64 {
+        let h = 1e-5;
+        -(self.sections(omega_t + h) / self.sections(omega_t - h)).arg() / (2.0 * h)
+    }
+
     /// Errors against `f64`, A: for each form its name and statistics.
-    fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<(&'static str, Stats)>;
-}
-
-struct Filter<const SECTIONS: usize, const TAPS: usize> {
-    name: &'static str,
-    sections: Sos<SECTIONS>,
-    direct: [[f64; TAPS]; 2],
-}
-
-impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTIONS, TAPS> {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-    fn sections(&self, omega_t: f64) -> Complex64 {
-        self.sections.response(omega_t)
-    }
-    fn direct(&self, omega_t: f64) -> Complex64 {
-        direct::response(&self.direct, omega_t)
-    }
-    fn direct_rounded(&self, omega_t: f64) -> Complex64 {
-        direct::response(&direct::rounded(&self.direct), omega_t)
-    }
-    fn largest_poles(&self) -> [f64; 2] {
-        [self.direct, direct::rounded(&self.direct)].map(|[_, a]| largest_pole(&a[1..]))
-    }
-    fn group_delay(&self, omega_t: f64) -> f64 {
-        let (h, at) = (1e-5, |w| self.sections.response(w));
-        -(at(omega_t + h) / at(omega_t - h)).arg() / (2.0 * h)
-    }
-    fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<(&'static str, Stats)> {
-        let (sections, mut state) = (self.sections, SosState::default());
-        let sections = Box::new(move |x: f32| sections.step(&mut state, x));
-        let mut forms: Vec<direct::Form> = vec![(SECTIONS_F32, sections)];
-        forms.extend(direct::f32_forms(self.direct));
-        let mut reference = direct::reference(self.direct);
+    pub fn errors(
+        &self,
+        input: &mut dyn FnMut() -> f64,
+        samples: u64,
+    ) -> Vec<(&'static str, Stats)> {
+        let mut forms: Vec<Form> = vec![(SECTIONS_F32, (self.at_rest)())];
+        forms.extend(direct::f32_forms(&self.printed));
+        let mut reference = direct::reference(&self.printed);
         let mut errors = vec![Stats::default(); forms.len()];
         for _ in 0..samples {
             // All forms get the same f32 input.
@@ -73,11 +71,18 @@ impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTION
 /// The form the drive runs.
 pub const SECTIONS_F32: &str = "sections, f32 (the drive)";
 
+fn running<const SECTIONS: usize>(sections: Sos<SECTIONS>) -> Box<dyn FnMut(f32) -> f32> {
+    let mut state = SosState::default();
+    Box::new(move |x| sections.step(&mut state, x))
+}
+
 /// The three filters.
-pub fn filters() -> [Box<dyn ComparedFilter + Send>; 3] {
+#[rustfmt::skip] // a filter a line
+pub fn filters() -> [ComparedFilter; 3] {
+    let printed = |filter: &[&[f64]; 2]| filter.map(<[f64]>::to_vec);
     [
-        Box::new(Filter { name: "LPF", sections: LPF_AS_PRINTED, direct: direct::LPF }),
-        Box::new(Filter { name: "BPF", sections: BPF, direct: direct::BPF }),
-        Box::new(Filter { name: "PP", sections: PP, direct: direct::PP }),
+        ComparedFilter { name: "LPF", printed: printed(&direct::LPF), response: |w| LPF_AS_PRINTED.response(w), at_rest: || running(LPF_AS_PRINTED) },
+        ComparedFilter { name: "BPF", printed: printed(&direct::BPF), response: |w| BPF.response(w), at_rest: || running(BPF) },
+        ComparedFilter { name: "PP", printed: printed(&direct::PP), response: |w| PP.response(w), at_rest: || running(PP) },
     ]
 }

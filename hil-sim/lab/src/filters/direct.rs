@@ -5,13 +5,13 @@ use num_complex::Complex64;
 
 /// Table 7: numerator, denominator.
 #[rustfmt::skip] // a table
-pub const LPF: [[f64; 9]; 2] = [
-    [
+pub const LPF: [&[f64]; 2] = [
+    &[
         0.738615833587383, -4.971982137583815, 15.501482170609810,
         -28.984106346506920, 35.439076902595630, -28.984106346506920,
         15.501482170609810, -4.971982137583815, 0.738615833587383,
     ],
-    [
+    &[
         1.0, -6.311293551201974, 18.463310785092791,
         -32.436104849347807, 37.322148071647149, -28.775658178634401,
         14.536417936493200, -4.413169859261352, 0.621866049065974,
@@ -20,12 +20,12 @@ pub const LPF: [[f64; 9]; 2] = [
 
 /// Table 8: numerator, denominator.
 #[rustfmt::skip] // a table
-pub const BPF: [[f64; 5]; 2] = [
-    [
+pub const BPF: [&[f64]; 2] = [
+    &[
         0.02218769906303914, -0.02791079414758331, 0.01263993354917355,
         -0.02791079414758331, 0.02218769906303914,
     ],
-    [
+    &[
         1.0, -2.99899648142248898, 3.95706806169825098,
         -2.58302254497039918, 0.74432231301657747,
     ],
@@ -33,26 +33,26 @@ pub const BPF: [[f64; 5]; 2] = [
 
 /// Table 8: numerator, denominator.
 #[rustfmt::skip] // a table
-pub const PP: [[f64; 5]; 2] = [
-    [
+pub const PP: [&[f64]; 2] = [
+    &[
         0.00107990678715093, -0.00373680819442586, 0.00535736614345009,
         -0.00373680819442586, 0.00107990678715093,
     ],
-    [
+    &[
         1.0, -3.86437365668928701, 5.61267070060141027,
         -3.63099960015131895, 0.88274870085761437,
     ],
 ];
 
 /// Each coefficient rounded to `f32`.
-pub fn rounded<const N: usize>(filter: &[[f64; N]; 2]) -> [[f64; N]; 2] {
-    filter.map(|part| part.map(|c| f64::from(c as f32)))
+pub fn rounded(filter: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    filter.each_ref().map(|part| part.iter().map(|&c| f64::from(c as f32)).collect())
 }
 
 /// Frequency response, Eq. C.2.
-pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex64 {
+pub fn response(filter: &[Vec<f64>; 2], omega_t: f64) -> Complex64 {
     let delay = Complex64::cis(-omega_t);
-    let value = |part: &[f64; N]| {
+    let value = |part: &[f64]| {
         let zero = Complex64::new(0.0, 0.0);
         part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex64::new(c, 0.0))
     };
@@ -60,8 +60,8 @@ pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex
 }
 
 /// The reference: the filter in `f64`, direct form I.
-pub fn reference<const N: usize>(filter: [[f64; N]; 2]) -> impl FnMut(f64) -> f64 {
-    let ([b, a], mut x, mut y) = (filter, [0.0; N], [0.0; N]);
+pub fn reference([b, a]: &[Vec<f64>; 2]) -> impl FnMut(f64) -> f64 {
+    let (mut x, mut y) = (vec![0.0; b.len()], vec![0.0; b.len()]);
     move |input| {
         x.rotate_right(1);
         y.rotate_right(1);
@@ -78,17 +78,17 @@ pub fn reference<const N: usize>(filter: [[f64; N]; 2]) -> impl FnMut(f64) -> f6
 pub type Form = (&'static str, Box<dyn FnMut(f32) -> f32>);
 
 /// The three direct forms in `f32`.
-pub fn f32_forms<const N: usize>(filter: [[f64; N]; 2]) -> [Form; 3] {
-    let [b, a] = filter.map(|part| part.map(|c| c as f32));
+pub fn f32_forms(filter: &[Vec<f64>; 2]) -> [Form; 3] {
+    let [b, a] = filter.each_ref().map(|part| part.iter().map(|&c| c as f32).collect::<Vec<_>>());
     [
-        ("direct form I, f32", Box::new(form_1(b, a))),
-        ("direct form II, f32", Box::new(form_2(b, a))),
+        ("direct form I, f32", Box::new(form_1(b.clone(), a.clone()))),
+        ("direct form II, f32", Box::new(form_2(b.clone(), a.clone()))),
         ("transposed form II, f32", Box::new(form_2_transposed(b, a))),
     ]
 }
 
-fn form_1<const N: usize>(b: [f32; N], a: [f32; N]) -> impl FnMut(f32) -> f32 {
-    let (mut x, mut y) = ([0.0_f32; N], [0.0_f32; N]);
+fn form_1(b: Vec<f32>, a: Vec<f32>) -> impl FnMut(f32) -> f32 {
+    let (mut x, mut y) = (vec![0.0_f32; b.len()], vec![0.0_f32; b.len()]);
     move |input| {
         x.rotate_right(1);
         y.rotate_right(1);
@@ -99,8 +99,8 @@ fn form_1<const N: usize>(b: [f32; N], a: [f32; N]) -> impl FnMut(f32) -> f32 {
     }
 }
 
-fn form_2<const N: usize>(b: [f32; N], a: [f32; N]) -> impl FnMut(f32) -> f32 {
-    let mut w = [0.0_f32; N];
+fn form_2(b: Vec<f32>, a: Vec<f32>) -> impl FnMut(f32) -> f32 {
+    let mut w = vec![0.0_f32; b.len()];
     move |input| {
         w.rotate_right(1);
         w[0] = a.iter().zip(&w).skip(1).fold(input, |sum, (a, w)| sum - a * w);
@@ -108,14 +108,13 @@ fn form_2<const N: usize>(b: [f32; N], a: [f32; N]) -> impl FnMut(f32) -> f32 {
     }
 }
 
-fn form_2_transposed<const N: usize>(b: [f32; N], a: [f32; N]) -> impl FnMut(f32) -> f32 {
+fn form_2_transposed(b: Vec<f32>, a: Vec<f32>) -> impl FnMut(f32) -> f32 {
     // The last state is always zero.
-    let mut s = [0.0_f32; N];
+    let mut s = vec![0.0_f32; b.len()];
     move |input| {
         let output = b[0] * input + s[0];
-        for n in 1..N {
-            let next = if n + 1 < N { s[n] } else { 0.0 };
-            s[n - 1] = b[n] * input - a[n] * output + next;
+        for n in 1..b.len() {
+            s[n - 1] = b[n] * input - a[n] * output + s[n];
         }
         output
     }

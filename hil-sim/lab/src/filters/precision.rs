@@ -27,7 +27,7 @@ fn input(number: usize, seed: u64) -> Box<dyn FnMut() -> f64> {
 
 /// Feeds each filter with each input; adds the metrics and returns the table.
 pub fn errors(
-    filters: &[Box<dyn ComparedFilter + Send>],
+    filters: &[ComparedFilter],
     samples: u64,
     context: &Context<'_>,
     outcome: &mut Outcome,
@@ -51,7 +51,7 @@ pub fn errors(
             let rms = inputs.iter().map(|input| input[form].1.rms());
             let largest = inputs.iter().map(|input| input[form].1.largest()).fold(0.0, f64::max);
             let worst = rms.clone().fold(0.0, f64::max);
-            let key = filter.name().to_lowercase();
+            let key = filter.name.to_lowercase();
             let suffix = if name == SECTIONS_F32 {
                 "sections"
             } else {
@@ -60,7 +60,7 @@ pub fn errors(
             outcome.metrics.set(format!("{key}_{suffix}_error_rms_a"), worst);
             outcome.metrics.set(format!("{key}_{suffix}_error_max_a"), largest);
             let rms = rms.map(|rms| Cell::significant(1e3 * rms, 2));
-            let cells = [Cell::from(filter.name()), Cell::from(name)].into_iter().chain(rms);
+            let cells = [Cell::from(filter.name), Cell::from(name)].into_iter().chain(rms);
             table.row(cells.chain([Cell::significant(1e3 * largest, 2)]));
         }
     }

@@ -41,37 +41,25 @@ pub fn six_step_and_schroeder(amplitude: f64, hz: f64, t: f64) -> Complex {
     six_step(amplitude, hz, t) + Complex::new(r, r)
 }
 
-/// Feedback taps of registers of 2 to 32 bits with the longest possible period.
-#[rustfmt::skip] // a table
-const TAPS: [u32; 31] = [
-    0x3, 0x6, 0xC, 0x14, 0x30, 0x60, 0xB8, 0x110,
-    0x240, 0x500, 0xE08, 0x1C80, 0x3802, 0x6000, 0xD008, 0x12000,
-    0x20400, 0x72000, 0x9_0000, 0x14_0000, 0x30_0000, 0x42_0000, 0xE1_0000, 0x120_0000,
-    0x200_0023, 0x400_0013, 0x900_0000, 0x1400_0000, 0x2000_0029, 0x4800_0000, 0x8020_0003,
-];
-
-/// A pseudo-random binary sequence of a shift register with linear feedback: +1 or -1 with a period
-/// of 2^bits - 1.
+/// A pseudo-random binary sequence of a shift register of 8 bits with linear feedback: +1 or -1 with the longest period,
+/// [`Self::PERIOD`].
 #[derive(Clone, Copy, Debug)]
-pub struct Prbs {
-    register: u32,
-    taps: u32,
+pub struct Prbs(u8);
+
+impl Default for Prbs {
+    fn default() -> Self {
+        Self(1)
+    }
 }
 
 impl Prbs {
-    /// A register of this many bits, 2 to 32.
-    pub fn new(bits: u32) -> Option<Self> {
-        let taps = *TAPS.get(usize::try_from(bits.checked_sub(2)?).ok()?)?;
-        Some(Self { register: 1, taps })
-    }
+    /// Values after which it repeats.
+    pub const PERIOD: usize = 255;
 
     /// The next value.
     pub fn step(&mut self) -> f64 {
-        let out = self.register & 1;
-        self.register >>= 1;
-        if out == 1 {
-            self.register ^= self.taps;
-        }
+        let out = self.0 & 1;
+        self.0 = (self.0 >> 1) ^ (0xB8 * out);
         f64::from(out) * 2.0 - 1.0
     }
 }
@@ -118,21 +106,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_register_has_the_longest_period() {
-        assert!(Prbs::new(1).is_none() && Prbs::new(33).is_none() && Prbs::new(0).is_none());
-        for bits in 2..=20 {
-            let mut prbs = Prbs::new(bits).unwrap();
-            let (start, mut period, mut sum) = (prbs.register, 0u32, 0.0);
-            loop {
-                sum += prbs.step();
-                period += 1;
-                if prbs.register == start {
-                    break;
-                }
-            }
-            assert_eq!(period, (1 << bits) - 1, "{bits} bits");
-            assert_eq!(sum, 1.0, "one more +1 than -1");
-        }
+    fn the_sequence_has_the_longest_period() {
+        let mut prbs = Prbs::default();
+        let states = [(); Prbs::PERIOD].map(|()| {
+            prbs.step();
+            prbs.0
+        });
+        assert!((1..=255).all(|state| states.contains(&state)), "each state once");
+        assert_eq!((0..Prbs::PERIOD).map(|_| prbs.step()).sum::<f64>(), 1.0, "one more +1 than -1");
     }
 
     #[test]

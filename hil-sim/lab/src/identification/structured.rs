@@ -9,7 +9,7 @@
 use nalgebra::{SMatrix, SVector, Vector4};
 
 use super::models::{NotIdentifiable, model_c, model_d};
-use super::{Complex, Delta, Parameters, Regression};
+use super::{Delta, Parameters, Regression};
 
 /// Most steps from one start.
 const STEPS: u32 = 200;
@@ -35,8 +35,6 @@ pub struct Fit {
     pub parameters: Parameters,
     /// |R (theta - theta(p))|², the squared error of Model S above that of Model A, A².
     pub cost: f64,
-    /// Times the exact map was computed.
-    pub evaluations: u32,
 }
 
 /// Logarithms of r_s, tau_r, sigma_l_s and l_s/sigma_l_s - 1, and asinh of the speed: every vector
@@ -66,15 +64,13 @@ fn is_machine(p: &Parameters, h: f64) -> bool {
 struct Problem<'a> {
     regression: &'a Regression,
     h: f64,
-    evaluations: u32,
 }
 
 impl Problem<'_> {
-    fn residual(&mut self, x: &Unknowns) -> Option<Residual> {
+    fn residual(&self, x: &Unknowns) -> Option<Residual> {
         if x.iter().any(|x| x.abs() > LARGEST) {
             return None;
         }
-        self.evaluations += 1;
         let fitted = Vector4::from(machine(x).delta(self.h).array());
         let estimated = Vector4::from(self.regression.delta.array());
         let residual = self.regression.r * (estimated - fitted);
@@ -83,7 +79,7 @@ impl Problem<'_> {
         residual.iter().all(|x| x.is_finite()).then_some(residual)
     }
 
-    fn jacobian(&mut self, x: &Unknowns) -> Option<SMatrix<f64, 8, 5>> {
+    fn jacobian(&self, x: &Unknowns) -> Option<SMatrix<f64, 8, 5>> {
         const H: f64 = 1e-5;
         let mut jacobian = SMatrix::<f64, 8, 5>::zeros();
         for k in 0..5 {
@@ -98,8 +94,8 @@ impl Problem<'_> {
 }
 
 /// Model S from one start. Of 500 starts with every parameter five times too large or too small
-/// (noisy data, 4000 samples), 477 came to the best fit and 23 failed and said so; [`model_s`] with
-/// the same starts came to it in 498, and in 2 there was none: the noise put r_s below zero.
+/// (noisy data, 4000 samples), 477 came to the best fit and 23 failed and said so. [`model_s`] came to
+/// it in 498 of these; in 2 there is none: the noise puts r_s below zero.
 ///
 /// # Errors
 /// [`NotIdentifiable::NotConverged`].
@@ -116,7 +112,7 @@ const FAILED: NotIdentifiable = NotIdentifiable::NotConverged;
 
 /// Levenberg and Marquardt's method, to a minimum.
 fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, NotIdentifiable> {
-    let mut problem = Problem { regression, h, evaluations: 0 };
+    let problem = Problem { regression, h };
     let mut x = unknowns(start);
     let mut residual = problem.residual(&x).ok_or(FAILED)?;
     let mut jacobian = problem.jacobian(&x).ok_or(FAILED)?;
@@ -129,11 +125,7 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
         let flat = |limit: f64| {
             (0..5).all(|k| gradient[k].abs() <= limit * (scale[k] * residual.norm_squared()).sqrt())
         };
-        let here = Fit {
-            parameters: machine(&x),
-            cost: residual.norm_squared(),
-            evaluations: problem.evaluations,
-        };
+        let here = Fit { parameters: machine(&x), cost: residual.norm_squared() };
         if flat(FLAT) {
             return Ok(here);
         }
@@ -152,8 +144,7 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
         if let Some((next, there, step)) = taken {
             (x, residual) = (next, there);
             if step.amax() < TOLERANCE && damping < 1.0 {
-                let parameters = machine(&x);
-                return Ok(Fit { parameters, cost: residual.norm_squared(), ..here });
+                return Ok(Fit { parameters: machine(&x), cost: residual.norm_squared() });
             }
             jacobian = problem.jacobian(&x).ok_or(FAILED)?;
             damping = (damping * 0.2).max(1e-15);
@@ -189,24 +180,13 @@ pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
     starts
 }
 
-/// Model S: the best of the fits from `guess`, if there is one, and from [`starts`]. Speed error
-/// below 0.5 % on 4000 samples of S_s with the noise of section 5 halved, at all three periods.
+/// Model S: the best of the fits from [`starts`]. Speed error below 0.5 % on 4000 samples of S_s with the noise of section 5
+/// halved, at all three periods.
 ///
 /// # Errors
 /// [`NotIdentifiable::NotConverged`] when no start leads to a machine.
-pub fn model_s(
-    regression: &Regression,
-    h: f64,
-    guess: Option<&Parameters>,
-) -> Result<Fit, NotIdentifiable> {
+pub fn model_s(regression: &Regression, h: f64) -> Result<Fit, NotIdentifiable> {
     let starts = starts(&regression.delta, h);
-    let fits = guess.into_iter().chain(&starts).filter_map(|p| fit_from(regression, h, p).ok());
-    fits.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or(NotIdentifiable::NotConverged)
-}
-
-/// How far a machine is from a regression: |R (theta - theta(p))|², A².
-pub fn cost(regression: &Regression, h: f64, p: &Parameters) -> f64 {
-    let fitted = Vector4::from(p.delta(h).array());
-    let estimated: Vector4<Complex> = Vector4::from(regression.delta.array());
-    (regression.r * (estimated - fitted)).norm_squared()
+    let fits = starts.iter().filter_map(|start| fit_from(regression, h, start).ok());
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or(FAILED)
 }

@@ -43,35 +43,24 @@ impl Case {
 /// Models that give the five parameters.
 pub const MODELS: [&str; 4] = ["B", "C", "D", "S"];
 
-/// Mean absolute error of one number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mean {
-    /// In %, over the measurements in which it was identifiable.
-    pub percent: f64,
-    /// Measurements in which it was not.
-    pub missing: u32,
-}
-
 /// The errors of one column.
 #[derive(Clone, Copy, Debug)]
 pub struct Errors {
     /// The column.
     pub case: Case,
-    /// Model A, in the order of [`CurrentVoltage::NAMES`].
-    pub discrete: [Mean; 8],
-    /// [`MODELS`], each in the order of [`Parameters::NAMES`].
-    pub continuous: [[Mean; 5]; 4],
+    /// Mean absolute errors of Model A, %, in the order of [`CurrentVoltage::NAMES`].
+    pub discrete: [f64; 8],
+    /// Those of [`MODELS`], %, each in the order of [`Parameters::NAMES`].
+    pub continuous: [[f64; 5]; 4],
 }
 
-fn mean(errors: impl Iterator<Item = Option<f64>>) -> Mean {
-    let (mut sum, mut count, mut missing) = (0.0, 0u32, 0);
-    for error in errors {
-        match error {
-            Some(error) => (sum, count) = (sum + error.abs(), count + 1),
-            None => missing += 1,
-        }
+/// Mean of the errors, %, over the measurements that give one.
+fn mean(errors: impl Iterator<Item = Option<f64>>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0u32);
+    for error in errors.flatten() {
+        (sum, count) = (sum + error.abs(), count + 1);
     }
-    Mean { percent: if count > 0 { 100.0 * sum / f64::from(count) } else { 100.0 }, missing }
+    if count > 0 { 100.0 * sum / f64::from(count) } else { 100.0 }
 }
 
 /// The errors of one column over `trials` measurements of `machine`. Where no measurement gives a
@@ -88,7 +77,7 @@ pub fn errors(machine: Parameters, case: Case, noise: Noise, seed: u64, trials: 
             Err(reason) => return (None, [Estimate::none(reason); 4]),
         };
         let b = data.first_order().map(|theta| model_b(&theta, h));
-        let s = model_s(&regression, h, None).map(|fit| Estimate::from(fit.parameters));
+        let s = model_s(&regression, h).map(|fit| Estimate::from(fit.parameters));
         let estimates = [
             b.unwrap_or_else(Estimate::none),
             model_c(&regression.delta, h),
@@ -120,45 +109,35 @@ pub fn all(machine: Parameters, noise: Noise, seed: u64, trials: u64) -> Vec<Err
 }
 
 impl Errors {
-    fn entry(&self, model: &'static str, parameter: &'static str, ours: Mean) -> Entry {
-        Entry {
-            model,
-            signal: self.case.signal.name(),
-            speed_rad_s: self.case.speed,
-            h_us: (1e6 * self.case.h()).round(),
-            parameter,
-            printed_pct: None,
-            ours_pct: ours.percent,
-        }
-    }
-
-    /// Model A, beside Tables 1 and 4.
-    pub fn discrete_entries(&self) -> Vec<Entry> {
-        let table = if self.case.speed == SPEEDS[0] { &TABLE_1 } else { &TABLE_4 };
-        let column = column(self.case.signal, self.case.period);
-        let entry = |k: usize| Entry {
-            printed_pct: Some(table[k][column]),
-            ..self.entry("A", CurrentVoltage::NAMES[k], self.discrete[k])
-        };
-        (0..8).map(entry).collect()
-    }
-
-    /// Models B, C, D and S, beside Tables 2, 3 and 5.
-    pub fn continuous_entries(&self) -> Vec<Entry> {
-        let column = column(self.case.signal, self.case.period);
-        let mut entries = Vec::new();
-        for (index, model) in MODELS.into_iter().enumerate() {
-            let table = match (model, self.case.speed == SPEEDS[0]) {
+    /// The errors of some models (`A`, and those of [`MODELS`]), beside Tables 1 to 5.
+    pub fn entries(&self, models: &[&'static str]) -> Vec<Entry> {
+        let Case { speed, signal, period } = self.case;
+        let (is_fast, column) = (speed == SPEEDS[0], column(signal, period));
+        let of_model = |model: &&'static str| -> Vec<Entry> {
+            let place = MODELS.iter().position(|known| known == model);
+            let (names, errors): (&[&'static str], &[f64]) = match place {
+                Some(place) => (&Parameters::NAMES, &self.continuous[place]),
+                None => (&CurrentVoltage::NAMES, &self.discrete),
+            };
+            let table: Option<&[[f64; 6]]> = match (*model, is_fast) {
+                ("A", true) => Some(&TABLE_1),
+                ("A", false) => Some(&TABLE_4),
                 ("B", true) => Some(&TABLES_2_3_B),
                 ("C", true) => Some(&TABLES_2_3_C),
                 ("C", false) => Some(&TABLE_5),
                 _ => None,
             };
-            entries.extend((0..5).map(|k| Entry {
+            let entry = |(k, (&parameter, &ours_pct)): (usize, (&&'static str, &f64))| Entry {
+                model,
+                signal: signal.name(),
+                speed_rad_s: speed,
+                h_us: (1e6 * self.case.h()).round(),
+                parameter,
                 printed_pct: table.map(|table| table[k][column]),
-                ..self.entry(model, Parameters::NAMES[k], self.continuous[index][k])
-            }));
-        }
-        entries
+                ours_pct,
+            };
+            names.iter().zip(errors).enumerate().map(entry).collect()
+        };
+        models.iter().flat_map(of_model).collect()
     }
 }

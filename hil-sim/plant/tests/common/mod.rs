@@ -1,5 +1,4 @@
 //! What the tests of the effects share.
-#![allow(dead_code)] // not every test needs all of it
 
 use drive_core::Compare;
 use motor_plant::{
