@@ -223,7 +223,7 @@ fn pages() -> BTreeMap<String, String> {
 fn tables_of_the_pages_are_those_of_results_and_program() {
     let mine = |text: &String| {
         let blocks = text.split("<!-- generated: ").skip(1).map(str::to_owned);
-        blocks.filter(|block| block.contains("--test documents) -->")).collect::<Vec<_>>()
+        blocks.filter(|block| block.contains("hil-sim documents) -->")).collect::<Vec<_>>()
     };
     let mut known: Vec<_> = results().into_iter().map(|(name, _)| name).collect();
     known.extend(["experiments", "motors-list", "budgets"].map(str::to_owned));
