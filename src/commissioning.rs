@@ -22,16 +22,6 @@ pub enum News {
     },
 }
 
-/// What a commissioning asks for.
-#[allow(clippy::large_enum_variant)] // taken at once
-#[derive(Clone, Copy, Debug)]
-pub enum Action {
-    /// Give the drive this command; [`Session::refused`] if it does not take it.
-    Command(Command),
-    /// Call [`Session::design`].
-    Design,
-}
-
 /// A commissioning, and what it waits for.
 #[derive(Clone, Debug)]
 pub struct Session {
@@ -83,18 +73,23 @@ impl Session {
         self.sums.push_motion(signals.reference.q, signals.rotor_freq);
     }
 
-    /// Goes on; what is to be done now.
-    pub fn poll(&mut self, drive: &Excited) -> Option<Action> {
+    /// Goes on; the command for the drive, if there is one: [`refused`](Self::refused) if it does not take it. `design` designs the
+    /// current loop, which takes long, with the outputs off.
+    pub fn poll(
+        &mut self,
+        drive: &Excited,
+        design: impl FnOnce(&mut Commissioning),
+    ) -> Option<Command> {
         if !self.is_running() || self.news.is_some() {
             return None;
         }
         match self.commissioning.poll(drive, &mut self.sums) {
             Next::Wait => {}
-            Next::Excite(excitation) => return Some(Action::Command(Command::Excite(excitation))),
-            Next::Stop => return Some(Action::Command(Command::Stop(Stop::Coast))),
-            Next::Start => return Some(Action::Command(Command::Start(Mode::Torque))),
-            Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
-            Next::Design => return Some(Action::Design),
+            Next::Excite(excitation) => return Some(Command::Excite(excitation)),
+            Next::Stop => return Some(Command::Stop(Stop::Coast)),
+            Next::Start => return Some(Command::Start(Mode::Torque)),
+            Next::Torque(i_q) => return Some(Command::Torque(i_q)),
+            Next::Design => design(&mut self.commissioning),
             Next::Report(report) => self.news = Some(News::Report(report)),
             Next::Done => {
                 let (sound, step) = (self.commissioning.is_sound(), self.commissioning.step());
@@ -102,11 +97,6 @@ impl Session {
             }
         }
         None
-    }
-
-    /// Designs the current loop, which takes long; the outputs are off.
-    pub fn design(&mut self) {
-        self.commissioning.design();
     }
 
     /// Notes that the drive has not taken a command; `None`: it does not answer.

@@ -20,8 +20,8 @@ use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
 use crate::settings::staging::{Applied, Assignments, Staging};
 use handle::{CommandError, DriveHandle};
-use news::{Announcer, News, Stopped};
-use order::{Order, Refusal, Reply, Task, Unit};
+use news::{Announcer, News};
+use order::{Order, Refusal, Reply};
 
 /// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
 const BUS_SILENT_S: f32 = 1.0;
@@ -38,8 +38,10 @@ pub struct Desk {
     unsaved: bool,
     /// The board that lines belong to, if it is another than this one.
     foreign: Option<&'static str>,
-    /// A task that waits until its answer is on the way, and who has ordered it.
-    task: Option<(Commander, Task)>,
+    /// An order that takes long and waits until its answer is on the way, and who has given it.
+    task: Option<(Commander, Order)>,
+    /// Time of an order to reset the chip.
+    reboot_ms: Option<u32>,
     /// How the console's last task has ended, until the console takes it; and remarks on the settings that it has put in force.
     done: Option<(Applied, Answer)>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
@@ -47,7 +49,8 @@ pub struct Desk {
     announcer: Announcer,
     /// Time of the last sign of life of the one that commands; `None` to begin anew.
     heard_ms: Option<u32>,
-    stopped: Option<Stopped>,
+    /// A stop after this silence, s, or why the drive did not take it, until that is announced.
+    stopped: Option<Result<f32, CommandError>>,
     /// While the wiring is being checked: the periods of the status at its start.
     checking: Option<u32>,
     /// Result of the last learning, if it is not believable.
@@ -70,9 +73,10 @@ impl Desk {
             unsaved: false,
             foreign: None,
             task: None,
+            reboot_ms: None,
             done: None,
             designs: 0,
-            announcer: Announcer::new(),
+            announcer: Announcer::default(),
             heard_ms: None,
             stopped: None,
             checking: None,
@@ -170,8 +174,7 @@ impl Desk {
         if !drive.is_off() {
             self.heard_ms = Some(now_ms);
             self.announcer.stopping();
-            let stopped = drive.command(Command::Stop(Stop::Coast));
-            self.stopped = Some(Stopped { limit_s, refused: stopped.err() });
+            self.stopped = Some(drive.command(Command::Stop(Stop::Coast)).map(|_| limit_s));
         }
     }
 
@@ -245,50 +248,48 @@ impl Desk {
 
     fn carry_out(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
-            Order::Start(mode) => self.begin(from, Task::Start(mode), drive),
-            Order::Learn { again } => self.begin(from, Task::Learn { again }, drive),
-            Order::Commission(first, last) => {
-                self.begin(from, Task::Commission(first, last), drive)
-            }
+            Order::Apply if !self.settings.is_staged() => Ok(Reply::NothingStaged),
+            Order::Start(_)
+            | Order::Learn { .. }
+            | Order::Commission(..)
+            | Order::Apply
+            | Order::Save => self.begin(from, order, drive),
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
                 // Off is news for the console if the bus stops the drive.
                 if from == Commander::Console {
                     self.announcer.stopping();
                 }
-                give(Command::Stop(stop), Unit::None, drive)
+                give(Command::Stop(stop), "", drive)
             }
-            Order::Relock => give(Command::Relock, Unit::None, drive),
-            Order::Torque(i_q) => give(Command::Torque(i_q), Unit::Ampere, drive),
-            Order::Speed(rpm) => give(Command::Speed(rpm), Unit::Rpm, drive),
-            Order::Jog(rpm) => give(Command::Jog(rpm), Unit::Rpm, drive),
+            Order::Relock => give(Command::Relock, "", drive),
+            Order::Torque(i_q) => give(Command::Torque(i_q), "A", drive),
+            Order::Speed(rpm) => give(Command::Speed(rpm), "rpm", drive),
+            Order::Jog(rpm) => give(Command::Jog(rpm), "rpm", drive),
             Order::Position(turns) => {
                 self.homing = None;
-                give(Command::Position(turns), Unit::Turns, drive)
+                give(Command::Position(turns), "turns", drive)
             }
             Order::Home(plan) => self.home(plan, drive),
-            Order::Clear => give(Command::Clear, Unit::None, drive),
+            Order::Clear => give(Command::Clear, "", drive),
             Order::Set(values) => self.set(&values, drive),
             Order::Defaults => {
                 may_stage(drive)?;
                 self.settings.set_defaults();
                 Ok(self.staged())
             }
-            Order::Apply if !self.settings.is_staged() => Ok(Reply::NothingStaged),
-            Order::Apply => self.begin(from, Task::Apply, drive),
             Order::Revert => {
                 self.foreign = None;
                 let count = self.settings.count();
                 self.settings.revert();
                 Ok(Reply::Dropped(count))
             }
-            Order::Save => self.begin(from, Task::Save, drive),
             Order::Echo(on) => {
                 self.settings.note(|settings| settings.command.echo = on);
                 self.unsaved = true;
                 Ok(Reply::Done)
             }
-            Order::Reboot(now) => self.reboot(now, drive),
+            Order::Reboot(now) => self.reboot(from, now, drive),
             Order::BoardIs(board) => {
                 let own = self.settings.in_force().board;
                 self.foreign = (board != own).then_some(board.name);
@@ -345,62 +346,62 @@ impl Desk {
         if self.settings.is_staged() { Reply::Staged } else { Reply::AsInForce }
     }
 
-    /// Performs a task that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
-    fn begin(&mut self, from: Commander, task: Task, drive: &mut impl DriveHandle) -> Answer {
-        match task {
+    /// Performs an order that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
+    fn begin(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
+        match order {
             // The drive says why it does not start.
-            Task::Start(mode) if !drive.is_off() => return self.start(mode, drive),
-            Task::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
+            Order::Start(mode) if !drive.is_off() => return self.start(mode, drive),
+            Order::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
             _ => must_be_off(drive)?,
         }
         self.is_own_board()?;
-        let starts = matches!(task, Task::Start(_) | Task::Learn { .. } | Task::Commission(..));
-        if starts && !self.settings.latest().board_is_confirmed() {
+        if order.is_for_the_commander(Commander::Console)
+            && !self.settings.latest().board_is_confirmed()
+        {
             return Err(Refusal::NotConfirmed);
         }
         let learned = self.settings.in_force().learned.is_some();
-        let forgets = matches!(task, Task::Learn { again: false }) && learned;
+        let forgets = matches!(order, Order::Learn { again: false }) && learned;
         if (self.settings.needs_design() || forgets) && drive.status().is_some() {
-            self.task = Some((from, task));
+            self.task = Some((from, order));
             return Ok(Reply::Designing);
         }
-        self.perform(task, drive).1
+        self.perform(&order, drive).1
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of the front ends
     pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        let Some((from, task)) = self.task.take() else { return };
-        if let Task::Reboot(since) = task {
-            let since = since.unwrap_or(now_ms);
-            self.task = Some((from, Task::Reboot(Some(since))));
+        let Some((from, order)) = self.task.take() else { return };
+        if matches!(order, Order::Reboot(_)) {
+            let since = *self.reboot_ms.get_or_insert(now_ms);
             if now_ms.wrapping_sub(since) >= REBOOT_MS {
-                self.task = None;
-                drive.reboot();
+                return drive.reboot();
             }
+            self.task = Some((from, order));
             return;
         }
-        match (from, self.perform(task, drive)) {
+        match (from, self.perform(&order, drive)) {
             (Commander::Console, done) => self.done = Some(done),
             (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
             (Commander::Bus, _) => {}
         }
     }
 
-    /// Performs a task; remarks on the settings that it has put in force, and the answer.
-    fn perform(&mut self, task: Task, drive: &mut impl DriveHandle) -> (Applied, Answer) {
+    /// Performs an order with the staged settings in force; remarks on these, and the answer.
+    fn perform(&mut self, order: &Order, drive: &mut impl DriveHandle) -> (Applied, Answer) {
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
         let applied = match self.apply(drive) {
             Ok(applied) => applied,
             Err(why) => return (Applied::default(), Err(why)),
         };
-        let answer = match task {
-            Task::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
-            Task::Start(mode) => self.start(mode, drive),
-            Task::Learn { again } => self.learn(again, drive),
-            Task::Commission(first, last) => self.commission(first, last, drive),
-            Task::Save | Task::Reboot(_) => self.save(Reply::Done, drive),
+        let answer = match *order {
+            Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
+            Order::Start(mode) => self.start(mode, drive),
+            Order::Learn { again } => self.learn(again, drive),
+            Order::Commission(first, last) => self.commission(first, last, drive),
+            _ => self.save(Reply::Done, drive),
         };
         (applied, answer)
     }
@@ -432,7 +433,7 @@ impl Desk {
     /// boost is a check at every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
         if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
-            return give(Command::Start(mode), Unit::None, drive);
+            return give(Command::Start(mode), "", drive);
         }
         let began = drive.status().map(|status| status.periods);
         drive.command(Command::CheckWiring)?;
@@ -458,7 +459,7 @@ impl Desk {
         may_stage(drive)?;
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
-        self.begin(from, Task::Save, drive)
+        self.begin(from, Order::Save, drive)
     }
 
     /// Lets the drive learn: anew, or again on top of what it has learned.
@@ -482,18 +483,18 @@ impl Desk {
         Ok(Reply::Done)
     }
 
-    fn reboot(&mut self, now: bool, drive: &impl DriveHandle) -> Answer {
+    fn reboot(&mut self, from: Commander, now: bool, drive: &impl DriveHandle) -> Answer {
         must_be_off(drive)?;
         if !now && (self.unsaved || self.settings.is_staged()) {
             return Err(Refusal::Unsaved);
         }
-        self.task = Some((Commander::Console, Task::Reboot(None)));
+        (self.task, self.reboot_ms) = (Some((from, Order::Reboot(now))), None);
         Ok(Reply::Rebooting)
     }
 }
 
 /// Gives the drive a command; `unit` is that of its reference.
-fn give(command: Command, unit: Unit, drive: &mut impl DriveHandle) -> Answer {
+fn give(command: Command, unit: &'static str, drive: &mut impl DriveHandle) -> Answer {
     Ok(match drive.command(command)? {
         Accepted::AsGiven => Reply::Done,
         Accepted::Limited(value) => Reply::Limited(value, unit),

@@ -48,6 +48,7 @@ function heard(message) {
   if ('gone' in message) lost(message.gone);
   if ('stopped' in message) { log(`# stopped: ${message.stopped}`); announced(`stopped: ${message.stopped}`); }
   if ('refused' in message) log(`# refused: ${message.refused}`);
+  if (message.loops) showLoops(message.loops);
   const answer = answers.get(message.id);
   if (!answer) return;
   answers.delete(message.id);
@@ -82,8 +83,11 @@ function announced(said) {
   if (line.startsWith('link: ') || line.startsWith('induction-drive ')) request({ ask: [++number, 'version'] }).then(restream);
 }
 
+const views = [...document.querySelectorAll('main > section')];
+
 // --- head ----------------------------------------------------------------------------------------
-let alarms = {}, present = '';
+// The reference that this page has given last, by mode.
+let alarms = {}, present = '', asked = {};
 function alarm(name, lines) {
   alarms[name] = lines;
   const all = Object.values(alarms).filter(list => list.length);
@@ -92,12 +96,14 @@ function alarm(name, lines) {
     make('div', {}, first, rest.length ? make('ul', {}, ...rest.map(text => make('li', { textContent: text }))) : '')));
 }
 function state(text) {
+  const changed = present !== text;
   present = text;
   $('state').textContent = text;
   $('state').className = `state ${/fault|not conn/.test(text) ? 'fault' : /^off/.test(text) ? '' : 'run'}`;
+  if (changed) follow();
 }
-const NUMBERS = { torque: [/torque (-?[\d.]+) Nm/, 'Nm'], speed: [/speed (-?[\d.]+) rpm/, 'rpm'],
-  current: [/i_q (-?[\d.]+)/, 'A'], link: [/dc link (-?[\d.]+) V/, 'V'] };
+const NUMBERS = { torque: [/torque (-?[\d.]+) Nm/, 'Nm'], speed: [/speed (-?[\d.]+) rpm/, 'rpm'], current: [/i_q (-?[\d.]+)/, 'A'],
+  link: [/dc link (-?[\d.]+) V/, 'V'], heat: [/heat sink (-?[\d.]+)/, '°C'], stator: [/stator (-?[\d.]+)/, '°C'] };
 function showStatus(line) {
   const now = line.split(';')[0];
   heardStatus = performance.now();
@@ -110,7 +116,38 @@ function showStatus(line) {
     const found = line.match(pattern);
     $(id).textContent = found ? `${found[1]} ${unit}` : '–';
   }
+  $('limit').textContent = line.match(/limiting now, because: ([^;]*)/)?.[1] || '';
+  $('limit').parentElement.hidden = !$('limit').textContent;
+  $('reading').textContent = [/fault input trips/, /sensors .* A(?=, torque)/, /dc link [\d.]+ V/, /heat sink -?\d+ degC/].map(part => line.match(part)?.[0]).filter(Boolean).join(', ');
 }
+// What a control waits for, by its attribute data-when.
+const WHEN = {
+  off: [/^off/, 'the drive must be off'],
+  rest: [/^(off|in fault)/, 'the drive must be off'],
+  on: [/^[a-z]+ing\b(?<!connecting)/, 'the drive is off'],
+  running: [/^(regulating|turning)/, 'the drive does not run'],
+  regulating: [/^regulating/, 'the drive does not regulate'],
+  speed: [/^regulating speed/, 'the drive does not regulate the speed'],
+  position: [/^regulating position/, 'the drive does not regulate the position'],
+  fault: [/^in fault/, 'there is no fault'],
+};
+/** Controls that would be refused are disabled, and the view says why. */
+function follow() {
+  const mode = regulated();
+  if (mode && $('mode').value !== mode) { $('mode').value = mode; $('mode').onchange(); }
+  for (const section of views) {
+    const waiting = {};
+    for (const control of section.querySelectorAll('[data-when]')) {
+      const [pattern, reason] = WHEN[control.dataset.when], waits = !pattern.test(present);
+      control.disabled = waits;
+      control.title = waits ? `${reason}; it is: ${present}` : '';
+      if (waits && control.offsetParent) (waiting[reason] ||= new Set()).add(control.dataset.name || control.textContent);
+    }
+    section.querySelector('.why').textContent = Object.entries(waiting).map(([reason, names]) => `${[...names].join(', ')}: ${reason}`).join('; ');
+  }
+}
+/** The mode that the drive runs in, as of the console. */
+const regulated = () => present.match(/^regulating (\w+)/)?.[1] || (/^turning/.test(present) ? 'vf' : '');
 async function showFault() {
   try {
     const [head, ...rest] = await ask('faults');
@@ -120,7 +157,12 @@ async function showFault() {
 function say(text, bad) { $('said').textContent = text; $('said').className = bad ? 'error' : ''; }
 async function tell(line, to = say) {
   log(`> ${line}`);
-  try { const lines = await ask(line); to(lines.join(' ')); log(lines.join('\n')); return lines; }
+  try {
+    const lines = await ask(line), [word, value] = line.split(' ');
+    if (/^(start|torque|speed|position)$/.test(word)) asked = { [value && word === 'start' ? value : word]: +value || 0 };
+    to(lines.join(' ')); log(lines.join('\n'));
+    return lines;
+  }
   catch (error) { to(error.message, true); log(`error: ${error.message}`); throw error; }
 }
 const quiet = () => {};
@@ -128,8 +170,12 @@ const quiet = () => {};
 // --- frames --------------------------------------------------------------------------------------
 // Legible on white and on black.
 const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2', '#db2777', '#85888c'];
-const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°' };
+const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°', nm: 'Nm', c: '°C' };
+const WORDS = { state: ['off', 'starting', 'running', 'stopping'],
+  limit: ['none', 'voltage', 'heat sink', 'motor', 'inverter', 'dc link high', 'brake resistor', 'dc link low', 'ride-through'] };
 let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, plots = [], shown = 0, phi = null;
+/** The streamed signals, and the speed that was asked for beside the present one. */
+const plotted = () => streamed.concat(streamed.includes('speed_rpm') ? 'asked_rpm' : []);
 /** Keeps frames of ten little-endian words: period, sequence number, eight values. */
 function takeFrames(view) {
   for (let at = 0; at + 40 <= view.byteLength; at += 40) {
@@ -137,11 +183,11 @@ function takeFrames(view) {
     base ??= period;
     const time = ((period - base) >>> 0) * PERIOD_S;
     // The drive was reset.
-    if (time < times.at(-1)) { times = []; columns = streamed.map(() => []); }
+    if (time < times.at(-1)) { times = []; columns = columns.map(() => []); }
     const values = streamed.map((_, i) => view.getFloat32(at + 8 + 4 * i, true));
     times.push(time);
-    values.forEach((value, i) => columns[i].push(value));
-    if (streamed[0] && streamed.includes('phi_deg')) phi = values[streamed.indexOf('phi_deg')] / 360;
+    columns.forEach((column, i) => column.push(i < values.length ? values[i] : regulated() === 'speed' ? asked.speed : null));
+    if (streamed.includes('phi_deg')) phi = values[streamed.indexOf('phi_deg')] / 360;
     recorded?.rows.push(`${time.toFixed(6)},${view.getUint16(at + 4, true)},${values.map(value => +value.toPrecision(7)).join(',')}`);
   }
   const keep = 62 * +$('rate').value;
@@ -156,51 +202,57 @@ function watch(count) {
   if (now - heardStatus > 3000) state('no answer');
   if (streamed.length && now - flowed > 1500) { flowed = now; stream(streamed).catch(quiet); }
 }
-const stream = names => request({ stream: [++number, names, Math.round(+$('rate').value) || 200] });
+const stream = names => ask(`stream ${names.join(' ')} ${Math.round(+$('rate').value) || 200}`);
 function tick({ tick: [count, missing, damaged, skipped], flux }) {
   watch(count);
   $('count').textContent = streamed.length ? `${count} frames, ${missing} dropped${damaged ? `, ${damaged} damaged` : ''}${skipped ? `, ${skipped} skipped by the page` : ''}` : '';
   if (flux) drawFlux(flux[0], flux[1], flux[2]); else if (phi !== null && !truth) drawFlux(phi);
-  if (!paused && times.length !== shown) requestAnimationFrame(draw);
+  if (!paused && times.at(-1) !== shown) requestAnimationFrame(draw);
 }
+/** Draws the newest part, all samples of it: uPlot draws the least and the largest of those at one pixel. */
 function draw() {
   if (paused || !times.length) return;
-  shown = times.length;
-  const end = times.at(-1), begin = end - +$('window').value;
+  shown = times.at(-1);
+  const begin = shown - +$('window').value;
   let from = times.length - 1;
   while (from > 0 && times[from - 1] >= begin) from--;
-  // More points than twice the pixels are not seen.
-  const step = Math.max(1, Math.floor((times.length - from) / 1600));
-  const thin = list => { const out = []; for (let i = from; i < list.length; i += step) out.push(list[i]); return out; };
-  plots.forEach(({ plot, indices }) => plot.setData([thin(times), ...indices.map(i => thin(columns[i]))]));
+  const newest = times.slice(from);
+  for (const { plot, indices } of plots) {
+    plot.setData([newest, ...indices.map(i => columns[i].slice(from))]);
+    // Behind the plot's own update, which shows the values at the cursor.
+    if (plot.cursor.left < 0) queueMicrotask(() => plot.setLegend({ idx: newest.length - 1 }));
+  }
 }
-const unit = name => (u => SYMBOLS[u] || u || '')(hello?.signals.find(signal => signal.signal === name)?.unit);
-/** One plot a unit; they share the time at the cursor. */
+const unit = name => (u => SYMBOLS[u] || u)(name.match(/_([a-z]+)$/)?.[1] || '');
+const inWords = (name, v) => v == null || Number.isNaN(v) ? '–' : !(name in WORDS) ? v.toPrecision(4) : v >= 100 ? `fault ${v - 100}` : WORDS[name][v];
+/** One plot a unit; they share the time axis below the last one, and the time at the cursor. */
 function buildPlots(into, names, group) {
   into.replaceChildren();
-  const units = [...new Set(names.map(name => unit(name) || name))];
-  return units.map(u => {
-    const indices = names.flatMap((name, i) => (unit(name) || name) === u ? [i] : []);
-    const soft = getComputedStyle(document.documentElement).getPropertyValue('--soft'), line = getComputedStyle(document.documentElement).getPropertyValue('--line');
-    const axis = { stroke: soft, grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
+  const units = [...new Set(names.map(name => unit(name) || name))], style = getComputedStyle(document.documentElement);
+  return units.map((u, n) => {
+    const indices = names.flatMap((name, i) => (unit(name) || name) === u ? [i] : []), last = n === units.length - 1;
+    const line = style.getPropertyValue('--line'), axis = { stroke: style.getPropertyValue('--soft'), grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
+    const time = last ? { label: 's', labelSize: 16, size: 34 } : { size: 2, values: (_, splits) => splits.map(() => ''), ticks: { show: false } };
     const plot = new uPlot({
-      width: Math.max(240, into.clientWidth), height: innerWidth < 760 ? 190 : 220,
+      width: Math.max(240, into.clientWidth), height: (innerWidth < 760 ? 120 : 140) + (last ? 45 : 0),
       cursor: { sync: { key: group }, drag: { x: true, y: false } },
       scales: { x: { time: false } },
-      axes: [{ ...axis, label: 's', labelSize: 16, size: 34 }, { ...axis, label: u, labelSize: 18, size: 60 }],
+      axes: [{ ...axis, ...time }, { ...axis, label: u, labelSize: 18, size: 60 }],
       series: [{ label: 't', value: (_, v) => v == null ? '–' : `${v.toFixed(4)} s` }, ...indices.map(i => ({
-        label: names[i], stroke: COLOURS[i % 8], width: 1.5, dash: names[i].includes('_ref') ? [6, 4] : undefined, value: (_, v) => v == null ? '–' : v.toPrecision(4) }))],
+        label: names[i], stroke: COLOURS[i % 8], width: 1.5, dash: /_ref|asked/.test(names[i]) ? [6, 4] : undefined, value: (_, v) => inWords(names[i], v) }))],
     }, [[], ...indices.map(() => [])], into);
     return { plot, indices };
   });
 }
 function chosen() { return [...document.querySelectorAll('#signals input:checked')].map(box => box.value); }
+/** Currents first, then speed and torque; the angle, a sawtooth, last. */
+const ORDER = ['a', 'rpm', 'nm', 'v', 'c', 'hz', '', 'deg'];
 function signalsChoice() {
-  const usual = ['i_q_a', 'i_q_ref_a', 'i_d_a', 'speed_rpm', 'phi_deg'];
-  let kept; try { kept = JSON.parse(localStorage.getItem('signals')); } catch { kept = null; }
-  $('signals').replaceChildren(...hello.signals.map(({ signal }) => make('label', {},
-    make('input', { type: 'checkbox', value: signal, checked: (kept || usual).includes(signal), onchange: restream }), ` ${signal}`)));
-  $('t-signal').replaceChildren(...hello.signals.map(({ signal }) => make('option', { textContent: signal })));
+  const usual = ['i_q_a', 'i_q_ref_a', 'i_d_a', 'speed_rpm', 'torque_nm', 'phi_deg'], names = hello.signals.toSorted((a, b) => ORDER.indexOf(a.unit) - ORDER.indexOf(b.unit)).map(({ signal }) => signal);
+  let kept; try { kept = JSON.parse(localStorage.getItem('signals')).filter(name => names.includes(name)); } catch { kept = []; }
+  $('signals').replaceChildren(...names.map(signal => make('label', {},
+    make('input', { type: 'checkbox', value: signal, checked: (kept.length ? kept : usual).includes(signal), onchange: restream }), ` ${signal}`)));
+  $('t-signal').replaceChildren(...names.map(signal => make('option', { textContent: signal })));
 }
 async function restream() {
   const names = chosen();
@@ -209,8 +261,9 @@ async function restream() {
   endRecord();
   try {
     await stream(names);
-    [streamed, times, columns, base] = [names, [], names.map(() => []), null];
-    plots = buildPlots($('curves'), names, 'live');
+    [streamed, times, base] = [names, [], null];
+    columns = plotted().map(() => []);
+    plots = buildPlots($('curves'), plotted(), 'live');
   } catch (error) { say(error.message, true); }
 }
 function pause() {
@@ -261,6 +314,7 @@ const WHAT = { torque: 'current, A peak', speed: 'speed, rpm', position: 'positi
   const mode = $('mode').value;
   $('what').textContent = WHAT[mode];
   document.querySelectorAll('[data-mode]').forEach(part => { part.hidden = part.dataset.mode !== mode; });
+  follow();
 })();
 $('stop').onclick = stopDrive;
 $('start').onclick = () => tell(`start ${$('mode').value}`).catch(quiet);
@@ -290,6 +344,9 @@ addEventListener('keydown', event => {
   if (event.key === 'Escape') { event.preventDefault(); stopDrive(); }
   else if (event.key === 'p' && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) pause();
 }, true);
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { if (streamed.length) plots = buildPlots($('curves'), streamed, 'live'); if (traceText) plotTrace(traceText.split('\n').filter(line => line && !line.startsWith('#'))); });
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { 
+  if (streamed.length) plots = buildPlots($('curves'), plotted(), 'live');
+  if (traceText) plotTrace(traceText.split('\n').filter(line => line && !line.startsWith('#')));
+});
 addEventListener('resize', () => document.querySelectorAll('.curves').forEach(into =>
-  [...plots, ...tracePlots].forEach(({ plot }) => into.contains(plot.root) && into.clientWidth && plot.setSize({ width: Math.max(240, into.clientWidth), height: plot.height }))));
+  [...plots, ...tracePlots, ...stepPlots].forEach(({ plot }) => into.contains(plot.root) && into.clientWidth && plot.setSize({ width: Math.max(240, into.clientWidth), height: plot.height }))));

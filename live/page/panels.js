@@ -1,11 +1,11 @@
-// The views of settings, trace, set-up and console.
+// The views of settings, loops, trace, set-up and console.
 
 // --- views ---------------------------------------------------------------------------------------
-const views = [...document.querySelectorAll('main > section')];
 function view(id) {
   views.forEach(section => section.classList.toggle('shown', section.id === id));
   document.querySelectorAll('nav button').forEach(tab => tab.setAttribute('aria-selected', tab.dataset.view === id));
   dispatchEvent(new Event('resize'));
+  follow();
 }
 document.querySelector('nav').append(...views.map(section => {
   const tab = make('button', { textContent: section.dataset.name, onclick: () => view(section.id) });
@@ -35,20 +35,45 @@ function entry(s, to) {
 }
 const sayOfPlate = (text, bad) => { $('plate-said').textContent = text; $('plate-said').className = bad ? 'error' : ''; };
 const number7 = value => typeof value === 'number' ? +value.toPrecision(7) : value ?? '';
+/** A number with its unit, in thousands or thousandths where it is large or small. */
+function pretty(value, unit) {
+  const size = Math.abs(value);
+  if (typeof value !== 'number' || !/^(s|H|A|V|W|ohm|J)$/.test(unit) || !size || (size >= 0.01 && size < 1e5)) return `${number7(value)} ${unit}`.trim();
+  const power = Math.max(-3, Math.min(2, Math.floor(Math.log10(size) / 3)));
+  return `${+(value / 1000 ** power).toPrecision(5)} ${['n', 'µ', 'm', '', 'k', 'M'][power + 3]}${unit}`;
+}
+// What one sets first; in this order.
+const FIRST = ['nameplate.power_w', 'nameplate.voltage_v', 'nameplate.current_a', 'nameplate.frequency_hz', 'nameplate.speed_rpm', 'inverter.dc_link_v',
+  'angle_source', 'sequence.flux', 'limits.current_a', 'speed.limit_rpm', 'speed.ramp_rpm_per_s', 'bus.commands'];
+const TITLES = { first: 'Set these first', motor: 'Motor', inverter: 'Inverter', scales: 'Sensors', current_plant: 'Current loop', injection: 'Injection', observer: 'Observer', limits: 'Limits',
+  sequence: 'Start and stop', speed: 'Speed and position', braking: 'Braking', vf: 'Voltage and frequency', bus: 'Field bus', other: 'Other', board: 'Of the board' };
+const groupOf = s => FIRST.includes(s.name) ? 'first' : s.change === 'board' ? 'board' : s.name.split('.')[0] in TITLES ? s.name.split('.')[0] : 'other';
+const opened = new Set(['first']);
 function showSettings() {
   const wanted = $('filter').value.toLowerCase();
-  const rows = settings.filter(s => (s.name + s.help).toLowerCase().includes(wanted))
-    .filter(s => !$('changed').checked || s.value !== s.default || s.staged || compared.has(s.name)).map(s => {
-    const effective = s.value === 'auto' && s.effective != null ? ` = ${number7(s.effective)}` : '';
-    const range = s.min == null ? s.words.join(', ') : `${number7(s.min)} to ${number7(s.max)}${s.auto ? ', or auto' : ''}`;
+  const shown = settings.filter(s => (s.name + s.help).toLowerCase().includes(wanted))
+    .filter(s => !$('changed').checked || s.value !== s.default || s.staged || compared.has(s.name));
+  const row = s => {
+    const effective = s.value === 'auto' && s.effective != null ? s.effective : s.value, plain = `${number7(effective)} ${s.unit}`.trim();
+    const said = s.words.length || (s.value !== 'auto' && pretty(effective, s.unit) === plain) ? '' : ` = ${pretty(effective, s.unit)}`;
+    const range = s.min == null ? s.words.join(', ') : `${pretty(s.min, s.unit)} to ${pretty(s.max, s.unit)}${s.auto ? ', or auto' : ''}`;
     const note = [s.help, s.change === 'reset' ? 'from the next reset on' : '', s.learned ? 'a change forgets what was learned' : '',
       compared.has(s.name) ? `in the file: ${compared.get(s.name)}` : ''].filter(Boolean).join('; ');
-    return make('tr', { className: `${s.staged ? 'staged' : ''} ${compared.has(s.name) ? 'other' : ''}` }, make('td', { textContent: s.name }), make('td', {}, entry(s, sayOfSettings), effective),
-      ...[s.unit, range, number7(s.default), note].map(text => make('td', { textContent: text })));
-  });
-  document.querySelector('#settings tbody').replaceChildren(...rows);
-  $('nameplate').replaceChildren(...settings.filter(s => /^nameplate|^inverter.dc_link_v/.test(s.name)).map(s =>
-    make('label', {}, s.help.split(/[;,]/)[0], ' ', entry(s, sayOfPlate), ` ${s.unit}${s.staged ? ' (staged)' : ''}`)));
+    return make('tr', { className: `${s.staged ? 'staged' : ''} ${compared.has(s.name) ? 'other' : ''}` }, make('td', { textContent: s.name }), make('td', {}, entry(s, sayOfSettings), said),
+      ...[s.unit, range, pretty(s.default, s.unit), note].map(text => make('td', { textContent: text })));
+  };
+  $('settings').replaceChildren(...Object.entries(TITLES).flatMap(([group, title]) => {
+    const rows = shown.filter(s => groupOf(s) === group).sort((a, b) => FIRST.indexOf(a.name) - FIRST.indexOf(b.name)), staged = rows.filter(s => s.staged).length;
+    if (!rows.length) return [];
+    const head = make('thead', { innerHTML: '<tr><th>setting<th>value<th>unit<th>range<th>default<th>meaning' });
+    return make('details', { open: opened.has(group) || wanted || $('changed').checked || rows.some(s => compared.has(s.name)) },
+      make('summary', { textContent: `${title}: ${rows.length}${staged ? `, ${staged} staged` : ''}`, onclick: () => opened.delete(group) || opened.add(group) }),
+      make('div', { className: 'wide' }, make('table', {}, head, make('tbody', {}, ...rows.map(row)))));
+  }));
+  const fields = (names, to) => settings.filter(s => names.test(s.name)).map(s =>
+    make('label', {}, s.help.split(/[;,:]/)[0], ' ', entry(s, to), ` ${s.unit}${s.staged ? ' (staged)' : ''}`));
+  $('nameplate').replaceChildren(...fields(/^nameplate|^inverter.dc_link_v/, sayOfPlate));
+  $('knobs').replaceChildren(...fields(/^speed.phase_margin_deg|^motor.inertia|^injection.bandwidth_hz|^current_plant$/, sayOfLoops));
 }
 $('filter').oninput = $('changed').onchange = showSettings;
 $('to-file').onclick = async () => {
@@ -85,6 +110,41 @@ $('get-learned').onclick = async () => {
   try { $('learned').textContent = (await ask('learned')).join('\n'); } catch (error) { $('learned').textContent = error.message; }
 };
 
+// --- loops ---------------------------------------------------------------------------------------
+const sayOfLoops = (text, bad) => { $('l-said').textContent = text; $('l-said').className = bad ? 'error' : ''; };
+/** The figures that the settings give, staged ones included; or why there are none. */
+function showLoops(loops) {
+  const cell = (value, unit) => make('td', { textContent: value == null ? '–' : `${+value.toPrecision(3)} ${unit}`.trim() });
+  $('loops').replaceChildren(...(loops.error ? [make('tr', {}, make('td', { colSpan: 5, className: 'error', textContent: loops.error }))] : loops.map(([name, crossover, margin, peak, gains]) =>
+    make('tr', {}, make('th', { textContent: name }), cell(crossover, 'Hz'), cell(margin, '°'), cell(peak, ''), make('td', { textContent: gains })))));
+}
+// By mode: the signal that triggers, the one that is judged, what else is recorded.
+const STEP = { torque: ['i_q_ref_a', 'i_q_a', 'i_d_a torque_nm'], speed: ['speed_rpm', 'speed_rpm', 'i_q_a i_q_ref_a'], position: ['turns', 'turns', 'speed_rpm i_q_a'] };
+let stepping = null, stepPlots = [];
+$('step').onsubmit = async event => {
+  event.preventDefault();
+  const mode = regulated(), [trigger, judged, others] = STEP[mode], from = asked[mode] || 0, by = +$('l-by').value, divider = Math.ceil(12 * $('l-for').value);
+  try {
+    await ask('trace off').catch(quiet);
+    await ask(`trace 500 ${divider} ${[...new Set([judged, trigger])].join(' ')} ${others} on ${trigger} ${by > 0 ? 'above' : 'below'} ${+(from + 0.1 * by).toPrecision(5)}`);
+    stepping = { judged, from, by };
+    await tell(`${mode} ${from + by}`, sayOfLoops);
+    sayOfLoops(`from ${from} to ${from + by}: recording`);
+  } catch (error) { sayOfLoops(error.message, true); }
+};
+/** Shows the record of a step and its figures: the times are those of the value judged, less where it began, over the step. */
+function showStep(lines) {
+  const { judged, from, by } = stepping, names = [...lines[0].split(',').slice(1), `asked_${judged.match(/_(\w+)$/)?.[1] || 'turns'}`];
+  const rows = lines.slice(1, -1).map(line => line.split(',').map(Number)), y = rows.map(row => row[names.indexOf(judged) + 1]);
+  const begun = y.slice(0, 100).reduce((a, b) => a + b) / 100, share = y.map(value => (value - begun) / (from + by - begun));
+  const at = level => rows[share.findIndex(value => value >= level)]?.[0], end = share.slice(-50).reduce((a, b) => a + b) / 50;
+  stepPlots = buildPlots($('stepped'), names, 'step');
+  rows.forEach(row => row.push(from + (row[0] < 0 ? 0 : by)));
+  stepPlots.forEach(({ plot, indices }) => plot.setData([rows.map(row => row[0]), ...indices.map(i => rows.map(row => row[i + 1]))]));
+  sayOfLoops(`10 to 90 % in ${pretty(at(0.9) - at(0.1), 's')}, overshoot ${Math.max(0, 100 * (Math.max(...share) - 1)).toFixed(1)} %, at the end ${(100 * end).toFixed(1)} % of the step`);
+  stepping = null;
+}
+
 // --- trace ---------------------------------------------------------------------------------------
 let tracePlots = [], traceText = '';
 const sayOfTrace = (text, bad) => { $('t-said').textContent = text; $('t-said').className = bad ? 'error' : ''; };
@@ -102,10 +162,14 @@ function plotTrace(lines) {
 }
 async function showTrace() {
   sayOfTrace('reading the trace');
-  try { sayOfTrace(plotTrace(await ask('trace'))); } catch (error) { sayOfTrace(error.message, true); }
+  try {
+    const lines = await ask('trace');
+    stepping ? showStep(lines) : sayOfTrace(plotTrace(lines));
+  } catch (error) { sayOfTrace(error.message, true); }
 }
 $('trace').onsubmit = async event => {
   event.preventDefault();
+  stepping = null;
   const trigger = $('t-trigger').value;
   const on = trigger === 'fault' ? ' on fault' : trigger ? ` on ${$('t-signal').value} ${trigger} ${$('t-level').value}` : '';
   sayOfTrace(trigger ? 'waiting for the trigger' : 'recording');
@@ -118,44 +182,74 @@ $('t-off').onclick = () => tell('trace off', sayOfTrace).catch(quiet);
 $('t-csv').onclick = () => download('trace.csv', traceText);
 
 // --- set-up --------------------------------------------------------------------------------------
+const seconds = s => new Promise(resolve => setTimeout(resolve, 1000 * s));
+async function tenth() {
+  const amperes = +(settings.find(s => s.name === 'limits.current_a').effective / 10).toPrecision(3);
+  await tell(`torque ${amperes}`, quiet);
+  await seconds(3);
+  const [status] = await ask('status'), [torque, speed] = ['torque', 'speed'].map(id => status.match(NUMBERS[id][0])?.[0]);
+  await tell('stop', quiet);
+  if (!status.startsWith('regulating')) throw Error(status.split(';')[0]);
+  return `with ${amperes} A: ${torque}, ${speed}`;
+}
+const BOARD = { name: 'Check the board', about: 'Do the bench steps of the board with the power stage as the page "First power-up" says; the values that the drive reads stand below. "Confirm" notes that all were done: until then the drive does not start.',
+  lines: ['board'], after: [['Confirm', 'confirm board']] };
 const STEPS = [
-  { name: 'Check the wiring', about: 'The drive starts once with a check of the phases, the sensors and the encoder, and stops again. The shaft may turn a little.',
-    lines: ['set wiring_checked no', 'apply', 'start torque'], good: /^running: /, then: ['stop'], verdict: 'the wiring is as it should be' },
+  { name: 'Check the wiring', about: 'The drive starts once with a check of the phases and the current sensors, and stops again. The shaft may turn a little.',
+    lines: ['set wiring_checked no', 'apply', 'start torque'], good: /^running: /, then: () => tell('stop', quiet).then(() => 'the wiring is as it should be') },
   { name: 'Commission', about: 'The drive measures the motor at rest, from its nameplate, in ten seconds; the shaft stays still. "Accept" puts what was found in force and saves it.',
     lines: ['commission'], good: /^commissioning: ended; `accept`/, bad: /^commissioning: ended; the settings/, after: [['Accept', 'accept']] },
   { name: 'Learn', about: 'Lock the shaft. The drive learns how the angle follows from the carrier, about a minute. "Save" keeps it over a reset; "Learn again" at another rotor position adds to it.',
     lines: ['learn'], good: /^learned: /, bad: /^refused: /, after: [['Learn again', 'learn again'], ['Save', 'save']] },
+  { name: 'Start with a tenth of the current', about: 'The drive regulates a tenth of its current limit for three seconds, then stops. A free shaft turns: forwards, phase a towards b towards c.',
+    lines: ['start torque'], good: /^running: /, then: tenth },
   { name: 'Measure the inertia', about: 'Optional, for speed and position. Release the shaft: it turns, at most two turns to and fro.',
     lines: ['commission inertia'], good: /^commissioning: ended; `accept`/, bad: /^commissioning: ended; the settings/, after: [['Accept', 'accept']] },
 ];
 const MEASURED = ['nameplate', 'sensors', 'wiring', 'levels', 'leakage', 'staircase', 'current-loop'];
-$('steps').append(...STEPS.map(step => {
-  const bar = make('progress', { max: 1, value: 0, hidden: true }), verdict = make('strong'), lines = make('pre', { hidden: true });
-  const show = (text, bad) => { verdict.textContent = text; verdict.className = bad ? 'error' : ''; };
-  const note = text => { lines.hidden = false; lines.textContent += `${text}\n`; lines.scrollTop = lines.scrollHeight; };
+function guide(step) {
+  const bar = make('progress', { max: 1, value: 0, hidden: true }), verdict = make('strong'), lines = make('pre'), found = make('tbody');
+  const folded = make('details', { hidden: true }, make('summary', { textContent: 'lines of the drive' }), lines);
+  const table = make('table', { hidden: true }, make('thead', { innerHTML: '<tr><th>step<th>quantity<th>found<th>allowed' }), found);
+  const show = (text, bad) => { verdict.textContent = text.replace(/`(\w)(\w*)`/g, (_, a, rest) => `"${a.toUpperCase()}${rest}"`); verdict.className = bad ? 'error' : ''; };
+  const note = text => { folded.hidden = false; lines.textContent += `${text}\n`; lines.scrollTop = lines.scrollHeight; };
   const end = (text, bad) => { listeners = listeners.filter(known => known !== hear); bar.hidden = true; show(text, bad); };
+  const fail = error => end(`not done: ${error.message}`, true);
   function hear(line) {
     const point = line.match(/^learning: point (\d+) of (\d+), (.*)/);
     if (point) { bar.max = +point[2]; bar.value = +point[1]; return show(point[0]); }
     note(line);
-    const [, measured, found] = line.match(/^commissioning: ([a-z-]+): (sound|refused.*)/) || [];
+    const [, measured, text] = line.match(/^commissioning: ([a-z-]+): (.*)/) || [];
     if (MEASURED.includes(measured)) { bar.max = MEASURED.length; bar.value = MEASURED.indexOf(measured) + 1; }
-    if (found) show(`${measured}: ${found}`);
-    if (step.good.test(line)) { end(`done: ${step.verdict || line}`); (step.then || []).forEach(next => tell(next, show).then(() => show(`done: ${step.verdict}`), quiet)); }
+    if (/^(sound|refused)/.test(text)) show(`${measured}: ${text}`);
+    if (text) {
+      const [, quantity, value, allowed] = text.match(/^(.*?) (-?\d[^(]*)(?:\(allowed: (.*)\))?$/) || [, '', text, ''];
+      table.hidden = false;
+      found.append(make('tr', {}, ...[measured, quantity, value, allowed || ''].map(textContent => make('td', { textContent }))));
+    }
+    if (step.good.test(line)) { bar.hidden = true; (step.then ? step.then() : Promise.resolve(line)).then(text => listeners.includes(hear) && end(`done: ${text}`), fail); }
     else if (step.bad?.test(line) || /^(fault|stopped|off: the start)/.test(line)) end(`not done: ${line}`, true);
   }
   async function begin(all) {
     // It runs already.
     if (listeners.includes(hear)) return;
-    listeners = listeners.concat(hear);
-    lines.textContent = ''; bar.hidden = false; bar.removeAttribute('value'); show('running');
-    try { for (const line of all) await tell(line, text => note(`${line}: ${text}`)); } catch (error) { end(`not done: ${error.message}`, true); }
+    if (step.good) listeners = listeners.concat(hear);
+    lines.textContent = ''; found.replaceChildren(); table.hidden = true;
+    bar.hidden = false; bar.removeAttribute('value'); show('running');
+    try {
+      for (const line of all) for (const answer of await tell(line, quiet)) note(all.length > 1 ? `${line}: ${answer}` : answer);
+      if (!step.good) end(`done: ${lines.textContent.trim().split('\n').at(-2)}`);
+    } catch (error) { fail(error); }
   }
+  const button = (textContent, onclick, when) => { const made = make('button', { textContent, onclick }); made.dataset.when = when; return made; };
   return make('li', {}, make('h2', { textContent: step.name }), make('p', { textContent: step.about }),
-    make('div', { className: 'row' }, make('button', { textContent: step.name, onclick: () => begin(step.lines) }),
-      ...(step.after || []).map(([name, line]) => make('button', { textContent: name, onclick: () => line.startsWith('learn') ? begin([line]) : tell(line, show).then(loadSettings, quiet) })),
-      bar, verdict), lines);
-}));
+    make('div', { className: 'row' }, button(step.name, () => begin(step.lines), 'off'),
+      ...(step.after || []).map(([name, line]) => button(name, () => line.startsWith('learn') ? begin([line]) : tell(line, show).then(loadSettings, quiet), 'off')),
+      bar, verdict), make('div', { className: 'wide' }, table), folded);
+}
+$('steps').prepend(guide(BOARD));
+$('steps').append(...STEPS.map(guide));
+$('steps').firstChild.append(make('p', { id: 'reading', className: 'hint' }));
 
 // --- console -------------------------------------------------------------------------------------
 const past = [];

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use hil_sim::console::link::{Answer, Link, LinkError};
 use serde_json::{Value, json};
 
+use crate::loops;
 use crate::shared::{Ask, Shared};
 
 /// From one question about the drive's state to the next.
@@ -27,7 +28,7 @@ const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 
 ///
 /// # Errors
 /// The reason why it may not.
-pub fn checked(line: &str) -> Result<&str, String> {
+pub fn checked(line: &str) -> Result<String, String> {
     let line = line.trim();
     let word = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
     if line.is_empty() || line.len() > LONGEST || !line.bytes().all(|b| (b' '..=b'~').contains(&b))
@@ -38,14 +39,11 @@ pub fn checked(line: &str) -> Result<&str, String> {
         ));
     }
     match word.as_str() {
-        "stream" | "baud" => Err(format!("`{word}` is sent by this program itself")),
-        _ => Ok(line),
+        "baud" => Err("`baud` is sent by this program itself".to_owned()),
+        // With the time after which the firmware stops the drive of a program that is lost.
+        "stream" if line.contains(' ') => Ok(format!("{line} alive {ALIVE_S}")),
+        _ => Ok(line.to_owned()),
     }
-}
-
-/// The command for a stream of these signals, `rate` a second.
-pub fn stream(signals: &[String], rate: u32) -> String {
-    format!("stream {} {rate} alive {ALIVE_S}", signals.join(" "))
 }
 
 /// Sends signs of life while the page is there, and stops the drive when it is lost. Never returns.
@@ -99,7 +97,10 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
             Ok(Ask::Hello) => hello(shared, link),
             Ok(Ask::Line(id, line)) => {
                 let answer = match link.ask(&line, |_| ()) {
-                    Ok(answer) => json!({ "id": id, "lines": answer.lines }),
+                    Ok(Answer { lines }) => {
+                        let loops = (line == "describe").then(|| loops::of(&lines));
+                        json!({ "id": id, "lines": lines, "loops": loops })
+                    }
                     Err(why) => json!({ "id": id, "error": why.to_string() }),
                 };
                 // Its frames come behind the answer.
@@ -152,12 +153,10 @@ fn hello(shared: &Shared, link: &mut Link) {
                 "misfit": misfit(&described, &objects),
             }}));
         }
-        (Err(why), _) | (_, Err(why)) => shared.tell(silent(&why)),
+        (Err(why), _) | (_, Err(why)) => {
+            shared.tell(json!({ "gone": format!("the drive does not answer: {why}") }));
+        }
     }
-}
-
-fn silent(why: &LinkError) -> Value {
-    json!({ "gone": format!("the drive does not answer: {why}") })
 }
 
 /// Why firmware and page do not fit each other, in words.

@@ -1,6 +1,5 @@
 //! `cargo live`: see the library.
 
-use std::io::Write as _;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
@@ -64,13 +63,11 @@ async fn run(arguments: Arguments) -> Result<()> {
     let listener = TcpListener::bind(address).await;
     let listener = listener.with_context(|| format!("--listen {}: 127.0.0.1", arguments.listen))?;
     let (shared, asks) = Shared::new();
-    let board = match arguments.port {
-        Some(_) => None,
-        None => Some(VirtualBoard::start(&arguments.board, &shared)?),
-    };
+    let own = arguments.port.is_none();
+    let board = own.then(|| VirtualBoard::start(&arguments.board, &shared)).transpose()?;
     let port = arguments.port.or_else(|| board.as_ref().map(|board| board.port.clone()));
     let port = port.context("no port")?;
-    let (baud, real) = (arguments.baud, board.is_none());
+    let (baud, real) = (arguments.baud, !own);
     let used = port.clone();
     let worker = shared.clone();
     std::thread::spawn(move || {
@@ -82,7 +79,6 @@ async fn run(arguments: Arguments) -> Result<()> {
     let token = server::token().context("no random numbers")?;
     let url = format!("http://127.0.0.1:{}/?token={token}", listener.local_addr()?.port());
     println!("drive at {port}\npage: {url}\nCtrl-C ends it and stops the drive");
-    std::io::stdout().flush()?;
     if !arguments.no_browser
         && let Err(why) = open::that_detached(&url)
     {

@@ -3,6 +3,7 @@
 //! Refused are other hosts in the request (a name that somebody points to this computer), other origins, and requests
 //! without the token. Messages are short; one that is longer or not understood ends or changes nothing at the drive.
 
+use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -67,15 +68,10 @@ pub async fn serve(
     axum::serve(listener, router).await
 }
 
-#[derive(Deserialize)]
-struct Token {
-    token: Option<String>,
-}
-
 /// Lets requests pass that come from this page.
 async fn guard(
     State(access): State<Arc<Access>>,
-    Query(query): Query<Token>,
+    Query(query): Query<HashMap<String, String>>,
     headers: HeaderMap,
     request: Request,
     next: Next,
@@ -92,7 +88,7 @@ async fn guard(
     // A browser names the origin of every WebSocket; that of a page that is opened it does not name.
     let origin_is_due = request.uri().path() == "/ws" || headers.contains_key(ORIGIN);
     let refuse = |why: &'static str| (StatusCode::FORBIDDEN, why).into_response();
-    if query.token.as_deref() != Some(&*access.token) {
+    if query.get("token") != Some(&access.token) {
         refuse("the address needs the token that `cargo live` prints\n")
     } else if !own_host || (origin_is_due && !own_origin) {
         refuse("only the page that `cargo live` serves may connect\n")
@@ -141,8 +137,6 @@ enum Said {
     Stop,
     /// A line for the console, with a number for the answer.
     Ask(u64, String),
-    /// Stream these signals, so many times a second, with a number for the answer.
-    Stream(u64, Vec<String>, u32),
 }
 
 async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
@@ -172,9 +166,7 @@ async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
             }
             message = socket.recv() => match message {
                 Some(Ok(Message::Text(text))) => take(&shared, number, &text),
-                Some(Ok(Message::Binary(_))) => {
-                    shared.tell(json!({ "refused": "binary messages are not understood" }));
-                }
+                Some(Ok(Message::Binary(_))) => take(&shared, number, "bytes"),
                 Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
                 Some(Ok(Message::Close(_)) | Err(_)) | None => break,
             },
@@ -188,23 +180,13 @@ fn take(shared: &Shared, number: u64, text: &str) {
     if !shared.is_present(number) {
         return;
     }
-    let refuse = |id: u64, why: String| shared.tell(json!({ "id": id, "error": why }));
     match serde_json::from_str(text) {
         Ok(Said::Ack) => shared.page_answers(number),
         Ok(Said::Stop) => shared.stop("by the page"),
         Ok(Said::Ask(id, line)) => match drive::checked(&line) {
-            Ok(line) => shared.ask(Ask::Line(id, line.to_owned())),
-            Err(why) => refuse(id, why),
+            Ok(line) => shared.ask(Ask::Line(id, line)),
+            Err(why) => shared.tell(json!({ "id": id, "error": why })),
         },
-        Ok(Said::Stream(id, signals, rate)) => {
-            let plain = |name: &String| name.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
-            if signals.len() <= drive_stream::MOST_SIGNALS && signals.iter().all(plain) {
-                shared.ask(Ask::Line(id, drive::stream(&signals, rate)));
-            } else {
-                let most = drive_stream::MOST_SIGNALS;
-                refuse(id, format!("a stream has at most {most} signals, by their names"));
-            }
-        }
         Err(why) => shared.tell(json!({ "refused": format!("not understood: {why}") })),
     }
 }

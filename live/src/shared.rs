@@ -34,6 +34,7 @@ pub struct Shared {
     asks: Sender<Ask>,
 }
 
+#[derive(Default)]
 struct Inner {
     texts: VecDeque<Value>,
     frames: VecDeque<Frame>,
@@ -47,7 +48,7 @@ struct Inner {
     watched: bool,
     urgent: Option<Urgent>,
     /// When the drive has said something last.
-    heard: Instant,
+    heard: Option<Instant>,
 }
 
 /// Frames so far.
@@ -67,19 +68,7 @@ impl Shared {
     /// Nothing yet, and the end that takes the questions.
     pub fn new() -> (Arc<Self>, Receiver<Ask>) {
         let (asks, receive) = channel();
-        let inner = Inner {
-            texts: VecDeque::new(),
-            frames: VecDeque::new(),
-            counts: Counts::default(),
-            next: None,
-            flux: None,
-            page: 0,
-            answered: None,
-            watched: false,
-            urgent: None,
-            heard: Instant::now(),
-        };
-        (Arc::new(Self { inner: Mutex::new(inner), asks }), receive)
+        (Arc::new(Self { inner: Mutex::default(), asks }), receive)
     }
 
     /// A thread that panicked leaves whole texts and frames.
@@ -114,12 +103,12 @@ impl Shared {
 
     /// The drive has said something.
     pub fn heard(&self) {
-        self.inner().heard = Instant::now();
+        self.inner().heard = Some(Instant::now());
     }
 
     /// Whether the drive has said something of late.
     pub fn drive_listens(&self) -> bool {
-        self.inner().heard.elapsed() < BUSY
+        self.inner().heard.is_some_and(|heard| heard.elapsed() < BUSY)
     }
 
     /// A new stream begins: its signals are others.
@@ -154,8 +143,7 @@ impl Shared {
     /// A page has come; its number. It takes over from another one. The drive is stopped then: nobody is to drive what
     /// another has started.
     pub fn page_comes(&self) -> u64 {
-        let taken_over = self.inner().answered.is_some();
-        if taken_over {
+        if self.inner().answered.is_some() {
             self.stop("another page took over");
         }
         let mut inner = self.inner();

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use drive_live::shared::Shared;
-use drive_live::{drive, server};
+use drive_live::{drive, loops, server};
 use drive_stream::{Frame, LONGEST};
 use hil_sim::console::link::Link;
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ struct Served {
     shared: Arc<Shared>,
 }
 
-/// Answers as the console does.
+/// Answers as the console does, but for the tag.
 fn answer(line: &str) -> &'static str {
     match line {
         "describe stream" => {
@@ -51,7 +51,14 @@ fn served_with(answer: fn(&str) -> &'static str) -> Served {
     let reader = theirs.try_clone().unwrap();
     std::thread::spawn(move || {
         for line in BufReader::new(reader).lines().map_while(Result::ok) {
-            let _ = out.write_all(answer(&line).as_bytes());
+            let (tag, line) = match line.split_once(' ') {
+                Some((tag, line)) if tag.starts_with('@') => (format!("{tag} "), line.to_owned()),
+                _ => (String::new(), line),
+            };
+            // The last line of an answer repeats the tag.
+            let said = answer(&line);
+            let last = said.trim_end().rfind('\n').map_or(0, |at| at + 1);
+            let _ = write!(out, "{}{tag}{}", &said[..last], &said[last..]);
             heard.lock().unwrap().push((Instant::now(), line));
         }
     });
@@ -201,28 +208,19 @@ fn malformed_and_oversized_messages_reach_no_drive() {
     }
     page.send(Message::binary(vec![0; 100])).unwrap();
     until(&mut page, "refused");
-    for line in [
-        "",
-        " ",
-        "start\nstart",
-        "start\rstart",
-        "stärt",
-        "baud 9600",
-        "STREAM i_q_a 6000",
-        &"a".repeat(121),
-    ] {
+    for line in ["", " ", "start\nstart", "start\rstart", "stärt", "baud 9600", &"a".repeat(121)] {
         assert!(ask(&mut page, 7, line)["error"].is_string(), "{line:?}");
     }
-    page.send(Message::text(json!({ "stream": [9, ["i_q_a 6000 start"], 1] }).to_string()))
-        .unwrap();
-    assert!(until(&mut page, "id")["error"].as_str().unwrap().contains("by their names"));
+    // A stream ends the drive with this program.
+    assert_eq!(ask(&mut page, 9, "STREAM i_q_a 6000")["lines"], json!(["ok"]));
     assert_eq!(ask(&mut page, 8, "torque 1")["lines"], json!(["ok"]));
     // One that is too long ends the connection, and with it the drive.
     let sent = page.send(Message::text("x".repeat(server::LONGEST + 1)));
     let ended = sent.is_err() || (0..100).any(|_| page.read().is_err());
     assert!(ended, "it is still connected");
     served.waits_for("stop");
-    let known = ["", "stop", "status", "version", "describe stream", "torque 1"];
+    let stream = "STREAM i_q_a 6000 alive 0.4";
+    let known = ["", "stop", "status", "version", "describe stream", "torque 1", stream];
     let lines = served.lines.lock().unwrap();
     assert!(lines.iter().all(|(_, line)| known.contains(&&**line)), "{lines:?}");
 }
@@ -341,4 +339,27 @@ fn a_second_page_takes_over_a_drive_that_is_stopped() {
     });
     assert!(told.unwrap().contains("another page took over"));
     assert_eq!(ask(&mut second, 1, "torque 1")["lines"], json!(["ok"]));
+}
+
+fn set(key: &str, value: &str) -> String {
+    json!({ "name": key, "value": value }).to_string()
+}
+
+/// The loops of the dissertation's drive with an encoder: 60 degrees and 4.4 Hz (`design_motion_loops`), and a current loop
+/// whose gain is lowered to its margins.
+#[test]
+fn figures_of_the_loops_are_those_of_the_design() {
+    let loops = loops::of(&[set("angle_source", "encoder"), "ok".into()]);
+    let number = |row: usize, column: usize| loops[row][column].as_f64().unwrap();
+    assert!((number(2, 2) - 60.0).abs() < 0.1, "{loops}");
+    assert!((number(2, 1) - 4.4).abs() < 0.1, "{loops}");
+    assert!((number(3, 1) - 1.1).abs() < 0.05, "{loops}");
+    assert!(number(0, 2) >= 44.9 && number(0, 3) <= 2.21, "{loops}");
+    // More margin is slower; a value may come as a number, as `describe` prints it.
+    let margin = json!({ "name": "speed.phase_margin_deg", "value": 70 }).to_string();
+    let calm = loops::of(&[set("angle_source", "encoder"), margin]);
+    assert!((calm[2][2].as_f64().unwrap() - 70.0).abs() < 0.1, "{calm}");
+    assert!(calm[2][1].as_f64().unwrap() < 3.0, "{calm}");
+    let refused = loops::of(&[set("motor.r_s", "0")]);
+    assert!(refused["error"].as_str().unwrap().contains("r_s in ohm"), "{refused}");
 }

@@ -3,13 +3,13 @@
 //! The index is not used: the flux angle needs no absolute position, and the drive detects lost counts
 //! by itself (`Fault::Encoder`, and by the current that does not follow the voltage).
 
-use stm32g4xx_hal::gpio::{Debugger, PA15, PB3, Pull};
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
-use super::StartError;
 use super::clocks::clock_on;
+use super::{StartError, pins};
 use induction_drive::board;
+use induction_drive::boards::pin::{pa, pb};
 
 /// The counter of the encoder.
 pub struct Encoder {
@@ -21,17 +21,13 @@ impl Encoder {
     /// phase a towards phase b.
     ///
     /// Both pins belong to JTAG after reset; the two-wire debug port does not need them.
-    pub fn new(
-        timer: pac::TIM2,
-        a: PA15<Debugger>,
-        b: PB3<Debugger>,
-        rcc: &mut Rcc,
-    ) -> Result<Self, StartError> {
+    pub fn new(timer: pac::TIM2, rcc: &mut Rcc) -> Result<Self, StartError> {
         clock_on!(rcc.apb1enr1(), tim2en, "TIM2")?;
         // No resistors of the chip: with them on the pins do not stand the 5 V of a push-pull encoder (AN4899), and for an
         // open collector 40 kOhm are too slow. That one needs 1 to 4.7 kOhm to 3.3 V outside.
-        a.into_alternate::<{ board::ENCODER_AF }>().set_internal_resistor(Pull::None);
-        b.into_alternate::<{ board::ENCODER_AF }>().set_internal_resistor(Pull::None);
+        for track in [pa(15), pb(3)] {
+            pins::alternate(track, board::ENCODER_AF, None);
+        }
 
         timer.ccmr1_input().write(|w| {
             w.cc1s().ti1().ic1f().set(board::ENCODER_FILTER);

@@ -8,12 +8,14 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
-use stm32g4xx_hal::gpio::{Analog, PA2, PA3, Pull};
 use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
+use super::pins;
 use induction_drive::board;
+use induction_drive::boards::Level;
+use induction_drive::boards::pin::pa;
 use induction_drive::console::handle;
 
 type ReceiveQueue = Queue<u8, { board::SERIAL_RECEIVE }>;
@@ -58,22 +60,16 @@ static IN_FORCE: AtomicU32 = AtomicU32::new(0);
 
 impl Port {
     /// Sets the port up, with its clock in Hz; `None` on a second call.
-    pub fn new(
-        port: pac::LPUART1,
-        (transmit, receive): (PA2<Analog>, PA3<Analog>),
-        nvic: &mut NVIC,
-        rcc: &mut Rcc,
-        clock_hz: u32,
-    ) -> Option<Self> {
+    pub fn new(port: pac::LPUART1, nvic: &mut NVIC, rcc: &mut Rcc, clock_hz: u32) -> Option<Self> {
         let received = cortex_m::singleton!(: ReceiveQueue = Queue::new())?;
         let to_send = cortex_m::singleton!(: TransmitQueue = Queue::new())?;
         let (write_received, received) = received.split();
         let (to_send, read_to_send) = to_send.split();
 
         rcc.apb1enr2().modify(|_, w| w.lpuart1en().enabled());
-        transmit.into_alternate::<{ board::SERIAL_AF }>();
+        pins::alternate(pa(2), board::SERIAL_AF, None);
         // Pulled up: an open input stays idle.
-        receive.into_alternate::<{ board::SERIAL_AF }>().set_internal_resistor(Pull::Up);
+        pins::alternate(pa(3), board::SERIAL_AF, Some(Level::High));
 
         // The interrupt also at damaged bytes.
         port.cr3().write(|w| w.eie().enabled());

@@ -35,17 +35,14 @@ fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bo
         if !n.is_multiple_of(PASS) {
             continue;
         }
-        match session.poll(&rig.drive.excited()) {
-            None => {}
-            Some(Action::Design) => {
-                assert_eq!(rig.drive.state(), State::Off, "it takes a second");
-                session.design();
-            }
-            Some(Action::Command(command)) => {
-                if let Err(why) = rig.drive.command(&command) {
-                    session.refused(Some(why));
-                }
-            }
+        let command = session.poll(&rig.drive.excited(), |commissioning| {
+            assert_eq!(rig.drive.state(), State::Off, "it takes a second");
+            commissioning.design();
+        });
+        if let Some(command) = command
+            && let Err(why) = rig.drive.command(&command)
+        {
+            session.refused(Some(why));
         }
         told.extend(session.news());
         if let Some(News::Ended { .. }) = told.last() {
@@ -113,13 +110,9 @@ fn a_command_that_is_not_taken_ends_it() {
     let report = loop {
         // As far as the session knows, it is still off.
         let stale = Excited::default();
-        match session.poll(&stale) {
-            Some(Action::Command(command)) => {
-                let why = drive.command(&command).unwrap_err();
-                session.refused(Some(why));
-            }
-            Some(Action::Design) => panic!("too early"),
-            None => {}
+        if let Some(command) = session.poll(&stale, |_| panic!("too early")) {
+            let why = drive.command(&command).unwrap_err();
+            session.refused(Some(why));
         }
         match session.news() {
             Some(News::Report(report)) if report.refusal.is_some() => break report,

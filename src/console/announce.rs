@@ -77,10 +77,8 @@ impl Console {
             }
             News::Homed(Ok(())) => out.news(format_args!("homing: position 0 is at the stop")),
             News::Homed(Err(why)) => out.news(format_args!("homing: {why}")),
-            News::Stopped(stopped) => match stopped.refused {
-                None => out.news(format_args!("stopped: no command for {} s", stopped.limit_s)),
-                Some(why) => out.news(format_args!("error: not stopped: {why}")),
-            },
+            News::Stopped(Ok(s)) => out.news(format_args!("stopped: no command for {s} s")),
+            News::Stopped(Err(why)) => out.news(format_args!("error: not stopped: {why}")),
             News::BusRefused => {
                 if let Some(why) = desk.refusal() {
                     out.news(format_args!("bus: refused: {why}"));

@@ -9,7 +9,7 @@ use super::handle::Firmware;
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
-use crate::desk::order::{Reply, Unit};
+use crate::desk::order::Reply;
 use crate::desk::{Answer, Desk, may_stage};
 use crate::link::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::bus::Commander;
@@ -118,7 +118,9 @@ impl Console {
         {
             let drive_core::Line { gain, offset } = signal.line(&desk.settings().in_force().drive);
             if gain == 0.0 {
-                return self.error(&"this board has no such sensor");
+                return self.error(
+                    &"no trigger on it: the board lacks its sensor, or its scale is curved",
+                );
             }
             *level = (*level - offset) / gain;
             // A larger current has a smaller code.
@@ -142,12 +144,6 @@ fn remark(reply: Reply) -> impl fmt::Display {
     fmt::from_fn(move |f| match reply {
         Reply::Done | Reply::Designing => Ok(()),
         Reply::Limited(value, unit) => {
-            let unit = match unit {
-                Unit::None => "",
-                Unit::Ampere => "A",
-                Unit::Rpm => "rpm",
-                Unit::Turns => "turns",
-            };
             write!(f, ": limited to {} {unit}", Significant(value, DIGITS))
         }
         Reply::WiringFirst => f.write_str(": the wiring is checked first"),

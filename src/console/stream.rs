@@ -49,7 +49,7 @@ impl Wire {
     fn make(&mut self, record: &Record, settings: &Settings) {
         let Some(stream) = &self.stream else { return };
         let mut values = trace::Record::default();
-        stream.choice.record(&mut values, &record.telemetry, &record.codes);
+        stream.choice.record(&mut values, &trace::values(&record.telemetry, &record.sampled));
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
         // It has waited for less than a divider.

@@ -37,22 +37,14 @@ pub enum News {
     Commissioning(commissioning::News),
     /// A homing has ended.
     Homed(Result<(), Failure>),
-    /// Silence of the one that commands has stopped the drive.
-    Stopped(Stopped),
+    /// Silence of the one that commands, of this time, s, has stopped the drive; or the reason why not.
+    Stopped(Result<f32, CommandError>),
     /// The bus was refused something: [`Desk::refusal`](super::Desk::refusal).
     BusRefused,
 }
 
-/// A stop after silence.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stopped {
-    /// Time without a sign of life that is allowed, s.
-    pub limit_s: f32,
-    /// Why the drive did not take the stop, if it did not.
-    pub refused: Option<CommandError>,
-}
-
 /// Follows the state of the drive.
+#[derive(Default)]
 pub struct Announcer {
     /// The last state that was seen.
     state: Option<State>,
@@ -65,11 +57,6 @@ pub struct Announcer {
 }
 
 impl Announcer {
-    /// One that has seen nothing yet.
-    pub const fn new() -> Self {
-        Self { state: None, active: State::Off, stopped: false, progress: None, told_ms: 0 }
-    }
-
     /// Notes that the console, or silence, stops the drive: off is no news then, unless it takes a while.
     pub fn stopping(&mut self) {
         self.stopped = true;

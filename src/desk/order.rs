@@ -87,46 +87,13 @@ impl Order {
     }
 }
 
-/// Work that takes long, or has to wait until the answer is sent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Task {
-    /// Put the staged settings in force.
-    Apply,
-    /// The same, then start.
-    Start(Mode),
-    /// The same, then commission: from this step to that.
-    Commission(Step, Step),
-    /// The same, then learn: anew, or again at another rotor position.
-    Learn {
-        /// On top of what is learned.
-        again: bool,
-    },
-    /// The same, then save.
-    Save,
-    /// Reset the chip this long after the answer, since this time, ms.
-    Reboot(Option<u32>),
-}
-
-/// Unit of a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// No reference.
-    None,
-    /// A, of the current on the quadrature axis.
-    Ampere,
-    /// Mechanical rpm.
-    Rpm,
-    /// Mechanical turns.
-    Turns,
-}
-
 /// An order was carried out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply {
     /// As it was given.
     Done,
-    /// With this reference instead of the one that was given.
-    Limited(f32, Unit),
+    /// With this reference instead of the one that was given, and its unit.
+    Limited(f32, &'static str),
     /// It waits until the answer is on its way: controllers are designed for seconds. The answer follows.
     Designing,
     /// The drive starts with a check of the wiring.

@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use drive_core::Telemetry;
 
-use super::trace::CurrentCodes;
+use super::trace::Sampled;
 
 /// Signals of the drive in one control period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,8 +20,8 @@ pub struct Record {
     pub period: u32,
     /// The signals.
     pub telemetry: Telemetry,
-    /// Codes of the current sensors.
-    pub codes: CurrentCodes,
+    /// The rest of the signals.
+    pub sampled: Sampled,
     /// Whether it is for tracking and commissioning, which every period is while they observe.
     pub observed: bool,
     /// Whether it is for the stream.
@@ -230,11 +230,11 @@ mod tests {
             let (mut before, mut read) = (0, 0);
             while before < LAST {
                 (0..pause).for_each(|_| core::hint::spin_loop());
-                for Record { period, telemetry, codes, .. } in reader.by_ref() {
+                for Record { period, telemetry, sampled, .. } in reader.by_ref() {
                     assert!(period > before, "{period} after {before}");
                     let value = period as f32;
                     assert_eq!((telemetry.flux_freq, telemetry.turns), (value, value));
-                    assert_eq!(codes, [period as u16; 3]);
+                    assert_eq!(sampled.currents, [period as u16; 3]);
                     (before, read) = (period, read + 1);
                 }
             }
@@ -252,7 +252,7 @@ mod tests {
                     record.period = period;
                     record.telemetry.flux_freq = period as f32;
                     record.telemetry.turns = period as f32;
-                    record.codes = [period as u16; 3];
+                    record.sampled.currents = [period as u16; 3];
                 });
             }
             for reader in readers {

@@ -14,7 +14,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
 
-pub use signals::{CurrentCodes, MOST, Record, SIGNALS, Signal, SignalChoice, find};
+pub use signals::{MOST, Record, SIGNALS, Sampled, Signal, SignalChoice, Values, find, values};
 
 /// What starts the part of a trace that is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,26 +89,9 @@ pub struct Reader<'a, const N: usize>(&'a Trace<N>);
 impl<const N: usize> Trace<N> {
     /// An empty trace.
     pub const fn new() -> Self {
-        // Zeros only: otherwise 32 KiB of the flash would hold the initial contents.
-        let inner = Inner {
-            records: [[0.0; MOST]; N],
-            plan: Plan {
-                records: 0,
-                divider: 0,
-                choice: SignalChoice::none(),
-                trigger: Trigger::Now,
-            },
-            next: 0,
-            written: 0,
-            left: None,
-            behind: 0,
-            wait: 0,
-        };
-        Self {
-            taken: AtomicBool::new(false),
-            stage: AtomicU8::new(IDLE),
-            inner: UnsafeCell::new(inner),
-        }
+        // SAFETY: zeros are no records and a plan. Anything else would take 32 KiB of the flash as the initial contents.
+        let inner = UnsafeCell::new(unsafe { core::mem::zeroed() });
+        Self { taken: AtomicBool::new(false), stage: AtomicU8::new(IDLE), inner }
     }
 
     /// Its two ends; only the first time.
@@ -125,13 +108,12 @@ impl<const N: usize> Inner<N> {
     }
 
     /// Number of records behind that of the trigger, if it has come with the record just written.
-    fn triggered(&self, t: &Telemetry, codes: &CurrentCodes, fault: bool) -> Option<usize> {
+    fn triggered(&self, values: &Values, fault: bool) -> Option<usize> {
         let size = self.size();
         match self.plan.trigger {
             Trigger::Now => Some(size.saturating_sub(1)),
             Trigger::Fault => fault.then_some(0),
             Trigger::Level { signal, level, above } => {
-                let values = signals::values(t, codes);
                 let value = values.get(usize::from(signal)).copied().unwrap_or(0.0);
                 let beyond = if above { value > level } else { value < level };
                 let before = (size / 4).min(self.written.saturating_sub(1));
@@ -142,31 +124,31 @@ impl<const N: usize> Inner<N> {
 }
 
 impl<const N: usize> Recorder<'_, N> {
-    /// Records the present control period, if one is due, and tells whether it was; `fault` says whether the drive is in a
-    /// fault.
-    pub fn step(&mut self, fault: bool, codes: &CurrentCodes, t: &Telemetry) -> bool {
-        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, codes, t)
+    /// Records the present control period, if one is due, and tells whether it was.
+    pub fn step(&mut self, sampled: &Sampled, t: &Telemetry) -> bool {
+        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(sampled, t)
     }
 
-    fn record(&mut self, fault: bool, codes: &CurrentCodes, t: &Telemetry) -> bool {
+    fn record(&mut self, sampled: &Sampled, t: &Telemetry) -> bool {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         // A fault is recorded at once: what follows it stands still.
+        let fault = sampled.state >= signals::FAULT;
         if inner.wait > 0 && !(fault && inner.plan.trigger == Trigger::Fault) {
             inner.wait -= 1;
             return false;
         }
         inner.wait = inner.plan.divider.saturating_sub(1);
-        let size = inner.size();
+        let (size, values) = (inner.size(), values(t, sampled));
         if let Some(place) = inner.records.get_mut(inner.next) {
-            inner.plan.choice.record(place, t, codes);
+            inner.plan.choice.record(place, &values);
             inner.next = if inner.next + 1 < size { inner.next + 1 } else { 0 };
             inner.written = size.min(inner.written + 1);
         }
         match inner.left {
             Some(left) => inner.left = Some(left.saturating_sub(1)),
             None => {
-                inner.left = inner.triggered(t, codes, fault);
+                inner.left = inner.triggered(&values, fault);
                 inner.behind = inner.left.unwrap_or(0);
             }
         }

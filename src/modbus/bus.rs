@@ -269,17 +269,15 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
     }
 
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
-        let (settings, bus) = (self.desk.settings(), &*self.bus);
+        let (desk, bus) = (&*self.desk, &*self.bus);
         let view = View {
             status: self.drive.status(),
-            settings: settings.in_force(),
-            latest: settings.latest(),
-            staged: if at == STAGED { settings.count() } else { 0 },
+            desk,
+            settings: desk.settings().in_force(),
             command: bus.command(),
             frequency: bus.frequency,
             faults: &bus.faults,
             seconds: bus.seconds,
-            refusal: self.desk.refusal().map_or(0, Refusal::code),
         };
         view.read(at)
     }

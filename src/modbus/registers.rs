@@ -10,6 +10,8 @@ use modbus_core::Exception;
 use super::cia402::{self, Power};
 use super::faults::{self, FaultLog};
 use super::float::to_float;
+use crate::desk::Desk;
+use crate::desk::order::Refusal;
 use crate::hash;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
@@ -63,12 +65,10 @@ const REACHED: f32 = 0.01;
 pub struct View<'a> {
     /// Last report of the control; `None` if it does not run.
     pub status: Option<Status>,
+    /// The desk, with the settings.
+    pub desk: &'a Desk,
     /// The settings in force.
     pub settings: &'a FirmwareSettings,
-    /// Those with what is staged.
-    pub latest: &'a FirmwareSettings,
-    /// Number of staged settings.
-    pub staged: usize,
     /// The command in force, as it would be written.
     pub command: u16,
     /// The frequency asked for, 0.01 Hz.
@@ -77,8 +77,6 @@ pub struct View<'a> {
     pub faults: &'a FaultLog,
     /// Seconds since the start.
     pub seconds: u32,
-    /// Number of the last refusal of the bus, 0 for none.
-    pub refusal: u16,
 }
 
 use Shown::{Double, Number, Word};
@@ -130,7 +128,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x210c: Number(1, |v| v.rpm().abs()), "rpm", "speed of the shaft, magnitude";
     0x210e: Number(1, |v| v.heat_sink()), "degC", "heat sink, signed";
     0x211b: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for: `speed.limit_rpm` times pole pairs";
-    STAGED: Word(|v| v.staged as u16), "", "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them";
+    STAGED: Word(|v| v.desk.settings().count() as u16), "", "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them";
     0x5000: Word(|_| 1), "", "layout of the pages";
     0x5001: Double(|_| names()), "", "hash of the settings' names: the numbers of their registers hold for this value";
     0x5003: Word(|_| keys::COUNT as u16), "", "number of settings";
@@ -140,7 +138,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x5007: Double(|v| v.seconds), "s", "time since the start";
     0x5009: Word(|v| v.settings.bus.commander.place() as u16), "", "who commands: 0 console, 1 bus";
     0x500a: Word(|v| v.settings.learned.is_some().into()), "", "1 if learned values are in force";
-    0x500b: Word(|v| v.refusal), "", "reason of the last refused write since the start, see below; 0 for none";
+    0x500b: Word(|v| v.desk.refusal().map_or(0, Refusal::code)), "", "reason of the last refused write since the start, see below; 0 for none";
     0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";
     CONTROL: Word(|v| v.control_word()), "", "control word of CiA 402, see below";
     0x6041: Word(|v| v.status_word()), "", "status word of CiA 402, see below";
@@ -157,7 +155,7 @@ impl View<'_> {
         }
         if (SETTINGS..SETTINGS_END).contains(&at) {
             let key = keys::number(usize::from(at - SETTINGS) / 2);
-            let bits = key.map_or(0, |key| to_float(key, self.latest).to_bits());
+            let bits = key.map_or(0, |key| to_float(key, self.desk.settings().latest()).to_bits());
             return Ok(half(bits, at - SETTINGS));
         }
         if (FAULTS..FAULTS_END).contains(&at) {

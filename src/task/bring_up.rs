@@ -86,20 +86,19 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let mut start = load(Pages::new(chip.FLASH));
     let (dead_time_code, dead_time_s) = board::dead_time(start.settings.drive.inverter.dead_time_s);
 
-    let a = chip.GPIOA.split(&mut rcc);
-    let b = chip.GPIOB.split(&mut rcc);
-    // Port C as well: its clock.
-    let _ = chip.GPIOC.split(&mut rcc);
+    // The clocks of the ports; `pins` does the rest.
+    chip.GPIOA.split(&mut rcc);
+    chip.GPIOB.split(&mut rcc);
+    chip.GPIOC.split(&mut rcc);
     // First, because the drivers are switched off from here on.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
-    let pins = (a.pa2, a.pa3);
-    let port = Port::new(chip.LPUART1, pins, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
+    let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
     let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
-    let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
+    let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Before the control runs: these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;

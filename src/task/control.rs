@@ -26,7 +26,7 @@ use crate::chip::window::Window;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::ring::Writer;
-use induction_drive::link::trace::Recorder;
+use induction_drive::link::trace::{Recorder, Sampled};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
 
@@ -236,7 +236,6 @@ impl Running {
             }
         }
         let read = adc.read();
-        let codes = [read.current_a, read.current_b, read.current_c];
         let sample = Sample { encoder: encoder.count(), hardware, ..read };
 
         let put_out = &mut |compare| pwm.apply(compare);
@@ -271,7 +270,8 @@ impl Running {
                 .is_some();
         IS_OFF.store(drive.is_off(), Ordering::Relaxed);
         let state = drive.state();
-        let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
+        let sampled = Sampled::new(&read, state, drive.limiting());
+        let traced = trace.step(&sampled, drive.telemetry());
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
@@ -298,7 +298,7 @@ impl Running {
         let observed = drive.tracks_rotor() || drive.excites() || commissioned;
         if observed || streamed || part == 2 {
             signals.write(|record| {
-                (record.period, record.codes) = (self.periods, codes);
+                (record.period, record.sampled) = (self.periods, sampled);
                 (record.observed, record.streamed) = (observed, streamed);
                 record.set(drive.telemetry());
             });

@@ -57,12 +57,8 @@ impl Hours {
             return;
         }
         let history = &mut self.history;
-        let result = if history.is_full() {
-            extended(guard, || write(history, pages))
-        } else {
-            write(history, pages)
-        };
-        if let Err(why) = result {
+        let guard = if history.is_full() { guard } else { &mut None };
+        if let Err(why) = extended(guard, || write(history, pages)) {
             defmt::warn!("the history is not written: {}", Display2Format(&why));
         }
     }

@@ -20,7 +20,7 @@ use crate::task::guard::{Guard, extended};
 use crate::task::hours::Hours;
 use crate::task::sources::Sources;
 use induction_drive::board;
-use induction_drive::commissioning::{Action, Session};
+use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::Firmware;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
@@ -213,19 +213,17 @@ impl Supervisor {
         // A search takes most of the time of the watchdog, and so may the console before it, with the periods that came meanwhile. The
         // drive answers a command within a period.
         self.feed_watchdog();
-        let action = self.commissioning.poll(&excited);
+        let command = self.commissioning.poll(&excited, |commissioning| {
+            extended(&mut self.guard, || commissioning.design());
+        });
         self.feed_watchdog();
-        match action {
-            None => {}
-            Some(Action::Design) => extended(&mut self.guard, || self.commissioning.design()),
-            Some(Action::Command(command)) => {
-                if let Err(why) = self.command(command) {
-                    self.commissioning.refused(match why {
-                        CommandError::Refused(refused) => Some(refused),
-                        _ => None,
-                    });
-                }
-            }
+        if let Some(command) = command
+            && let Err(why) = self.command(command)
+        {
+            self.commissioning.refused(match why {
+                CommandError::Refused(refused) => Some(refused),
+                _ => None,
+            });
         }
     }
 

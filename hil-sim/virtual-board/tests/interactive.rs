@@ -312,7 +312,7 @@ fn the_console_program_understands_the_image() {
     session.enter("get command.timeout_s", |line| said.push(line.to_owned())).unwrap();
     assert!(said[0].starts_with("command.timeout_s = 77"), "{said:?}");
     let plot = folder.join("trace.svg");
-    assert_eq!(session.enter("trace 20 2 i_q dc_link", |_| ()).unwrap(), Flow::Next);
+    assert_eq!(session.enter("trace 20 2 i_q_a dc_link_v", |_| ()).unwrap(), Flow::Next);
     session.enter(&format!("!plot {}", plot.display()), |line| said.push(line.to_owned())).unwrap();
     assert!(said[1].starts_with("20 records in") && plot.exists(), "{said:?}");
     board.kill().unwrap();

@@ -48,7 +48,7 @@ fn saved_settings_outlast_reset_power_and_session() {
 fn frames_of_a_stream_are_no_text_of_the_session() {
     let folder = folder("stream");
     let script = "at 1: stream i_q_a speed_rpm 200\nexpect ok\n\
-                  wait 3: stream i_q_a 500\nexpect ok\nwait 2: stream\nexpect ok: on\n\
+                  wait 3: @1 stream i_q_a 500\nexpect ok\nwait 2: stream\nexpect ok: on\n\
                   wait 0.5: stream off\nexpect ok\nwait 0.2: status\nexpect off;\n\
                   wait 0.1: defaults\nexpect ok\nwait 0.2: start\nexpect error: nothing is learned\n";
     let (code, shown) = play(&folder, script, &[]);

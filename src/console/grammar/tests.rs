@@ -74,11 +74,11 @@ fn commands_are_understood() {
         ),
         ("trace 100", traced(100, 1, &[], now)),
         ("trace 1024 10", traced(1024, 10, &[], now)),
-        ("trace 5 i_q turns", traced(5, 1, &two, now)),
+        ("trace 5 i_q_a turns", traced(5, 1, &two, now)),
         ("trace 5 2 i_q_a turns", traced(5, 2, &two, now)),
-        ("trace 5 2 i_q turns on fault", traced(5, 2, &two, Trigger::Fault)),
+        ("trace 5 2 i_q_a turns on fault", traced(5, 2, &two, Trigger::Fault)),
         (
-            "trace 5 on rotor_step below -20",
+            "trace 5 on speed_rpm below -20",
             traced(5, 1, &[], Trigger::Level { signal: speed, level: -20.0, above: false }),
         ),
         ("trace", Request::ShowTrace),
@@ -132,7 +132,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("trace 1025", "the number of records = 1025: not a whole number from 1 to 1024"),
         ("trace 5 0", "the divider = 0: not a whole number from 1 to 1000"),
         ("trace -5", "the number of records = -5: not a whole number from 1 to 1024"),
-        ("trace 5 i_d i_d i_d i_d i_d i_d i_d i_d i_d", "more than 8 signals"),
+        ("trace 5 i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a i_d_a", "more than 8 signals"),
         ("trace 5 on", "fault, or a signal is missing"),
         ("trace 5 on i_q_a", "above or below is missing"),
         ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
@@ -154,7 +154,7 @@ fn what_is_half_wrong_is_refused_whole() {
     }
     let signals = parse("trace 5 i_x").unwrap_err().to_string();
     assert!(
-        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" i_c_a"),
+        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" limit"),
         "{signals}"
     );
     let near = parse("trace 5 sped_rpm").unwrap_err().to_string();

@@ -7,7 +7,7 @@ use hil_sim::config::{LoadMode, plant_settings};
 use hil_sim::rig::Rig;
 
 use super::*;
-use crate::commissioning::{Action, News, Session};
+use crate::commissioning::{News, Session};
 use crate::link::ring::Record;
 
 /// A session on a simulated motor of 6 ohm, which a drive with these settings has found.
@@ -25,7 +25,7 @@ fn found_on_a_motor(settings: &Settings) -> Session {
             let telemetry = *rig.drive.telemetry();
             session.take(&Record { period: n, telemetry, ..Record::default() });
         }
-        if let Some(Action::Command(command)) = session.poll(&rig.drive.excited()) {
+        if let Some(command) = session.poll(&rig.drive.excited(), |_| ()) {
             rig.drive.command(&command).unwrap();
         }
         match session.news() {
@@ -82,7 +82,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
 fn told(talk: &mut Talk) -> Vec<String> {
     let mut told = Vec::new();
     for _ in 0..20 {
-        talk.drive.session.poll(&talk.drive.drive.excited());
+        talk.drive.session.poll(&talk.drive.drive.excited(), |_| ());
         told.extend(talk.say(""));
     }
     told

@@ -33,7 +33,7 @@ fn a_trace_has_time_and_units_and_shows_standstill() {
     assert_eq!(trace[3], format!("0.000333{third}"));
     assert_eq!(trace.len(), 5);
     // 1/3 of an electrical turn a period of 1/6000 s is 2000 Hz, 60 000 rpm of four poles.
-    let trace = talk.say("trace 2 5 flux_step speed_rpm dc_link\n");
+    let trace = talk.say("trace 2 5 flux_hz speed_rpm dc_link_v\n");
     let header = "t_s,flux_hz,speed_rpm,dc_link_v";
     assert_eq!(trace[..2], [header, "0.000000,2000.00,60000.0,0.333333"]);
     assert!(trace[2].starts_with("0.000833,"), "{trace:?}");
@@ -43,7 +43,7 @@ fn a_trace_has_time_and_units_and_shows_standstill() {
 fn a_trace_with_a_trigger_is_announced_and_printed_when_asked_for() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("trace"), "error: no trace was recorded");
-    assert_eq!(talk.ask("trace 4 i_q on speed_rpm above 30"), "ok: recording until the trigger");
+    assert_eq!(talk.ask("trace 4 i_q_a on speed_rpm above 30"), "ok: recording until the trigger");
     // In the unit of the recorder: 30 rpm are one electrical turn a second.
     let Trigger::Level { level, .. } = talk.drive.plan.as_ref().unwrap().trigger else { panic!() };
     assert!((level - PERIOD_S).abs() < 1e-9, "{level}");
@@ -75,7 +75,9 @@ fn a_trigger_on_a_current_sensor_is_one_on_its_codes() {
         assert_eq!(above, line.gain > 0.0, "{}", board.name);
     }
     let mut talk = Talk::new();
-    assert_eq!(talk.ask("trace 4 on i_c_a above 1"), "error: this board has no such sensor");
+    let curved = "error: no trigger on it: the board lacks its sensor, or its scale is curved";
+    assert_eq!(talk.ask("trace 4 on i_c_a above 1"), curved);
+    assert_eq!(talk.ask("trace 4 on heat_sink_c above 40"), curved);
 }
 
 /// The object of a line of `describe`: names and texts of its values. They hold no commas between quotes but in help,

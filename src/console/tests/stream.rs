@@ -54,7 +54,7 @@ fn a_stream_is_refused_whole() {
         ("stream i_q_a 9999", "the frames a second = 9999: not a whole number from 1 to 6000"),
         ("stream i_q_a 2000", "the stream needs 30000 bytes/s; 115200 baud has room for 9216"),
         ("stream 100", "a signal is missing"),
-        ("stream i_q", "ok"),
+        ("stream i_q_a", "ok"),
         ("stream iq_a", "no such signal: iq_a; did you mean"),
         ("stream i_q_a alive 0", "the seconds without a line = 0: not one of: 0.1 to 10"),
         ("stream i_q_a alive", "the seconds is missing"),

@@ -1,7 +1,7 @@
 //! The signals that can be recorded.
 
 use drive_core::io::PERIOD_S;
-use drive_core::{Line, Telemetry};
+use drive_core::{Limiting, Line, Sample, State, Telemetry};
 use drive_settings::{CurrentSensors, Settings};
 use heapless::Vec;
 
@@ -9,84 +9,115 @@ use heapless::Vec;
 pub struct Signal {
     /// Name, which ends with the unit.
     pub name: &'static str,
-    /// Its name in earlier firmware.
-    old: &'static str,
-    unit: Unit,
 }
 
-/// Unit that a signal is recorded in.
-enum Unit {
-    /// That of its name.
-    Named,
-    /// Electrical turns per control period, shown in Hz.
-    Frequency,
-    /// Electrical turns per control period, shown in mechanical rpm.
-    Speed,
-    /// Code of a current sensor, shown in A without the offset that a start measures.
-    Sensor(usize),
+/// What a control period began with and led to, beside the [`Telemetry`]; also while the drive is off.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sampled {
+    /// Codes of the current sensors a, b and c; c is 0 where there is none.
+    pub currents: [u16; 3],
+    /// Code of the thermistor.
+    pub heat_sink: u16,
+    /// 0 off, 1 starting, 2 running, 3 stopping, [`FAULT`] + N in fault N.
+    pub state: u8,
+    /// Why the torque is smaller than asked for: number of the [`Limiting`].
+    pub limit: u8,
 }
 
-/// Codes of the current sensors a, b and c, also while the drive is off; c is 0 where there is none.
-pub type CurrentCodes = [u16; 3];
+/// Added to the number of a fault in [`Sampled::state`].
+pub const FAULT: u8 = 100;
+
+impl Sampled {
+    /// The signals of a control period with these samples, after which the drive is in this state.
+    #[inline]
+    pub fn new(read: &Sample, state: State, limiting: Limiting) -> Self {
+        Self {
+            currents: [read.current_a, read.current_b, read.current_c],
+            heat_sink: read.heat_sink,
+            state: state.fault().map_or(state.stage() as u8, |fault| FAULT + fault.code()),
+            limit: limiting as u8,
+        }
+    }
+}
 
 impl Signal {
-    const fn new(name: &'static str, old: &'static str) -> Self {
-        Self { name, old, unit: Unit::Named }
-    }
-
     /// The unit that the name ends with; empty if there is none.
     pub fn unit(&self) -> &'static str {
         self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 
-    /// The line from the recorded value to the unit of the name, with these settings; 0 for a sensor that there is not.
+    /// The line from the recorded value to the unit of the name, with these settings; 0 for a sensor that there is not, and where
+    /// it is no line.
     pub fn line(&self, settings: &Settings) -> Line {
-        let scales = &settings.scales;
-        let gain = match self.unit {
-            Unit::Named => 1.0,
-            Unit::Frequency => 1.0 / PERIOD_S,
-            Unit::Speed => 60.0 / PERIOD_S / f32::from(settings.motor.pole_pairs),
-            Unit::Sensor(0) => return scales.of_code(scales.current_a),
-            Unit::Sensor(1) => return scales.of_code(scales.current_b),
-            Unit::Sensor(_) if scales.sensors == CurrentSensors::LowSide => {
-                return scales.current_c;
-            }
-            Unit::Sensor(_) => 0.0,
+        let (scales, motor) = (&settings.scales, &settings.motor);
+        let gain = match self.name {
+            // Electrical turns per control period.
+            "flux_hz" => 1.0 / PERIOD_S,
+            "speed_rpm" => 60.0 / PERIOD_S / f32::from(motor.pole_pairs),
+            // The product of the two currents.
+            "torque_nm" => motor.torque_per_ampere(1.0),
+            // Codes, shown without the offset that a start measures.
+            "i_a_a" => return scales.of_code(scales.current_a),
+            "i_b_a" => return scales.of_code(scales.current_b),
+            "i_c_a" if scales.sensors == CurrentSensors::LowSide => return scales.current_c,
+            "i_c_a" | "heat_sink_c" => 0.0,
+            _ => 1.0,
         };
         Line { gain, offset: 0.0 }
     }
 
     /// The recorded value in the unit of the name.
     pub fn shown(&self, value: f32, settings: &Settings) -> f32 {
+        if self.name == "heat_sink_c" {
+            return settings.scales.ntc.celsius(value as u16);
+        }
         let Line { gain, offset } = self.line(settings);
         gain * value + offset
     }
 }
 
-/// Signals that can be recorded. The names end with the unit; a name of earlier firmware is understood, too.
-pub const SIGNALS: [Signal; 16] = [
-    Signal::new("phi_deg", ""),
-    Signal { name: "flux_hz", old: "flux_step", unit: Unit::Frequency },
-    Signal { name: "speed_rpm", old: "rotor_step", unit: Unit::Speed },
-    Signal::new("i_d_ref_a", "i_d_ref"),
-    Signal::new("i_q_ref_a", "i_q_ref"),
-    Signal::new("i_d_a", "i_d"),
-    Signal::new("i_q_a", "i_q"),
-    Signal::new("v_d_v", "v_d"),
-    Signal::new("v_q_v", "v_q"),
-    Signal::new("delta_i_a", "delta_i"),
-    Signal::new("saliency", ""),
-    Signal::new("dc_link_v", "dc_link"),
-    Signal::new("turns", ""),
-    Signal { name: "i_a_a", old: "i_a", unit: Unit::Sensor(0) },
-    Signal { name: "i_b_a", old: "i_b", unit: Unit::Sensor(1) },
-    Signal { name: "i_c_a", old: "i_c", unit: Unit::Sensor(2) },
-];
+/// A value for each of the [`SIGNALS`].
+pub type Values = [f32; SIGNALS.len()];
+
+/// The signals, each with its value as it is recorded.
+macro_rules! signals {
+    (|$t:ident, $s:ident| $($name:literal: $value:expr,)+) => {
+        /// Signals that can be recorded. The names end with the unit.
+        pub const SIGNALS: &[Signal] = &[$(Signal { name: $name }),+];
+
+        /// The values of all signals as they are recorded. All at once: the choice of one by its index costs more than its value.
+        pub fn values($t: &Telemetry, $s: &Sampled) -> Values {
+            [$($value),+]
+        }
+    };
+}
+
+signals! { |t, s|
+    "phi_deg": t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
+    "flux_hz": t.flux_freq,
+    "speed_rpm": t.rotor_freq,
+    "i_d_ref_a": t.reference.d,
+    "i_q_ref_a": t.reference.q,
+    "i_d_a": t.current.d,
+    "i_q_a": t.current.q,
+    "v_d_v": t.voltage.d,
+    "v_q_v": t.voltage.q,
+    "delta_i_a": t.delta_i,
+    "saliency": t.saliency,
+    "dc_link_v": t.dc_link,
+    "turns": t.turns,
+    "i_a_a": s.currents[0].into(),
+    "i_b_a": s.currents[1].into(),
+    "i_c_a": s.currents[2].into(),
+    "torque_nm": t.current.d * t.current.q,
+    "heat_sink_c": s.heat_sink.into(),
+    "state": s.state.into(),
+    "limit": s.limit.into(),
+}
 
 /// Index of the signal with this name.
 pub fn find(name: &str) -> Option<u8> {
-    let known = |signal: &Signal| signal.name == name || (signal.old == name && !name.is_empty());
-    SIGNALS.iter().position(known).map(|index| index as u8)
+    SIGNALS.iter().position(|signal| signal.name == name).map(|index| index as u8)
 }
 
 /// Most signals in one record.
@@ -123,23 +154,10 @@ impl SignalChoice {
         self.signals.iter().filter_map(|signal| SIGNALS.get(usize::from(*signal)))
     }
 
-    /// Writes the values of the signals.
-    pub fn record(&self, record: &mut Record, t: &Telemetry, codes: &CurrentCodes) {
-        let values = values(t, codes);
+    /// Writes the values of the signals, of those of all signals.
+    pub fn record(&self, record: &mut Record, values: &Values) {
         for (place, signal) in record.iter_mut().zip(&self.signals) {
             *place = values.get(usize::from(*signal)).copied().unwrap_or(0.0);
         }
     }
-}
-
-/// The values of all signals as they are recorded. All at once: the choice of one by its index costs more than its value.
-pub(super) fn values(t: &Telemetry, codes: &CurrentCodes) -> [f32; SIGNALS.len()] {
-    let (phi, [a, b, c]) =
-        (t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0), codes.map(f32::from));
-    let (r, i, v) = (t.reference, t.current, t.voltage);
-    let (flux, rotor) = (t.flux_freq, t.rotor_freq);
-    [
-        phi, flux, rotor, r.d, r.q, i.d, i.q, v.d, v.q, t.delta_i, t.saliency, t.dc_link, t.turns,
-        a, b, c,
-    ]
 }

@@ -1,4 +1,4 @@
-use drive_core::Telemetry;
+use drive_core::{Fault, Limiting, Sample, State, Telemetry};
 use drive_settings::{CurrentSensors, Settings};
 
 use super::*;
@@ -8,7 +8,8 @@ fn plan(records: u16, divider: u16, trigger: Trigger) -> Plan {
     Plan { records, divider, choice: SignalChoice::usual(), trigger }
 }
 
-const CODES: CurrentCodes = [13, 14, 15];
+const RUNNING: Sampled = Sampled { currents: [13, 14, 15], heat_sink: 17, state: 2, limit: 3 };
+const FAILED: Sampled = Sampled { state: 101, ..RUNNING };
 
 fn at(turns: f32) -> Telemetry {
     Telemetry { turns, ..Telemetry::default() }
@@ -29,9 +30,9 @@ fn records_every_nth_period_and_gives_them_back_when_done() {
     for period in 0..5 {
         assert!(reader.recording());
         assert_eq!(reader.get(0), None);
-        recorder.step(false, &CODES, &at(period as f32));
+        recorder.step(&RUNNING, &at(period as f32));
     }
-    recorder.step(false, &CODES, &Telemetry::default());
+    recorder.step(&RUNNING, &Telemetry::default());
     assert_eq!(all(&reader), [(0, 0.0), (1, 2.0), (2, 4.0)]);
 }
 
@@ -41,7 +42,7 @@ fn asks_for_no_more_than_there_is_room() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(100, 1, Trigger::Now)));
     for _ in 0..4 {
-        recorder.step(false, &CODES, &Telemetry::default());
+        recorder.step(&RUNNING, &Telemetry::default());
     }
     assert!(!reader.recording());
     assert!(reader.get(3).is_some() && reader.get(4).is_none());
@@ -53,17 +54,17 @@ fn a_trace_of_a_fault_ends_with_it() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 2, Trigger::Fault)));
     for period in 0..10 {
-        recorder.step(false, &CODES, &at(period as f32));
+        recorder.step(&RUNNING, &at(period as f32));
     }
     assert!(reader.recording());
     // In a period that would not be due.
-    recorder.step(false, &CODES, &at(10.0));
-    recorder.step(true, &CODES, &at(11.0));
+    recorder.step(&RUNNING, &at(10.0));
+    recorder.step(&FAILED, &at(11.0));
     assert_eq!(all(&reader), [(-3, 6.0), (-2, 8.0), (-1, 10.0), (0, 11.0)]);
     // One that comes before the ring is full.
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, &CODES, &at(1.0));
-    recorder.step(true, &CODES, &at(2.0));
+    recorder.step(&RUNNING, &at(1.0));
+    recorder.step(&FAILED, &at(2.0));
     assert_eq!(all(&reader), [(-1, 1.0), (0, 2.0)]);
 }
 
@@ -79,7 +80,7 @@ fn a_level_keeps_a_quarter_from_before_it() {
                 break;
             }
             let turns = if above { n } else { 40 - n };
-            recorder.step(false, &CODES, &at(turns as f32));
+            recorder.step(&RUNNING, &at(turns as f32));
         }
         all(reader)
     };
@@ -97,14 +98,14 @@ fn a_trace_that_waits_for_its_trigger_can_be_ended() {
     let trace = Trace::<4>::new();
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, &CODES, &Telemetry::default());
+    recorder.step(&RUNNING, &Telemetry::default());
     reader.cancel();
-    recorder.step(true, &CODES, &Telemetry::default());
+    recorder.step(&FAILED, &Telemetry::default());
     assert!(!reader.recording() && reader.get(0).is_none());
     assert!(reader.begin(&plan(1, 1, Trigger::Now)));
 }
 
-/// Every signal is its own, under its name and its old one.
+/// Every signal is its own, under its name.
 #[test]
 fn signals_are_recorded_as_they_were_chosen() {
     let telemetry = Telemetry {
@@ -120,37 +121,74 @@ fn signals_are_recorded_as_they_were_chosen() {
         turns: 12.0,
         ..Telemetry::default()
     };
-    let old = [
-        "phi_deg",
-        "flux_step",
-        "rotor_step",
-        "i_d_ref",
-        "i_q_ref",
-        "i_d",
-        "i_q",
-        "v_d",
-        "v_q",
-        "delta_i",
-        "saliency",
-        "dc_link",
-        "turns",
-        "i_a",
-        "i_b",
-        "i_c",
+    // Torque is recorded as the product of the currents.
+    let expected = [
+        ("phi_deg", 90.0),
+        ("flux_hz", 1.0),
+        ("speed_rpm", 2.0),
+        ("i_d_ref_a", 3.0),
+        ("i_q_ref_a", 4.0),
+        ("i_d_a", 5.0),
+        ("i_q_a", 6.0),
+        ("v_d_v", 7.0),
+        ("v_q_v", 8.0),
+        ("delta_i_a", 9.0),
+        ("saliency", 10.0),
+        ("dc_link_v", 11.0),
+        ("turns", 12.0),
+        ("i_a_a", 13.0),
+        ("i_b_a", 14.0),
+        ("i_c_a", 15.0),
+        ("torque_nm", 30.0),
+        ("heat_sink_c", 17.0),
+        ("state", 2.0),
+        ("limit", 3.0),
     ];
-    for (i, (signal, old)) in SIGNALS.iter().zip(old).enumerate() {
+    let names = SIGNALS.iter().map(|signal| signal.name);
+    assert!(names.eq(expected.iter().map(|(name, _)| *name)));
+    let record = |name: &str, sampled: &Sampled| {
         let mut choice = SignalChoice::none();
-        assert!(choice.add(find(signal.name).unwrap()) && choice.add(find("turns").unwrap()));
-        assert_eq!(find(old), find(signal.name), "{old}");
-        let expected = if i == 0 { 90.0 } else { i as f32 };
-        let mut record = Record::default();
-        choice.record(&mut record, &telemetry, &CODES);
-        assert_eq!(record[..2], [expected, 12.0], "{}", signal.name);
+        assert!(choice.add(find(name).unwrap()) && choice.add(find("turns").unwrap()));
         let names: Vec<&str> = choice.signals().map(|signal| signal.name).collect();
-        assert_eq!(names, [signal.name, "turns"]);
+        assert_eq!(names, [name, "turns"]);
+        let mut record = Record::default();
+        choice.record(&mut record, &values(&telemetry, sampled));
+        assert_eq!(record[1], 12.0);
+        record[0]
+    };
+    for (name, value) in expected {
+        assert_eq!(record(name, &RUNNING), value, "{name}");
     }
     let mut full = SignalChoice::usual();
     assert!(!full.add(0) && find("speed").is_none() && find("").is_none());
+}
+
+/// The numbers of state and limit, which programs rely on.
+#[test]
+fn state_and_limit_are_numbers() {
+    let read =
+        Sample { current_a: 13, current_b: 14, current_c: 15, heat_sink: 17, ..Sample::default() };
+    let sampled = |state, limiting| Sampled::new(&read, state, limiting);
+    assert_eq!(sampled(State::Torque, Limiting::Motor), RUNNING);
+    let failed = State::Fault(Fault::OverCurrentA);
+    for (state, number) in
+        [(State::Off, 0), (State::Magnetising, 1), (State::Braking, 3), (failed, 101)]
+    {
+        assert_eq!(sampled(state, Limiting::None).state, number, "{state}");
+    }
+    for (limiting, number) in [
+        (Limiting::None, 0),
+        (Limiting::Voltage, 1),
+        (Limiting::HeatSink, 2),
+        (Limiting::Motor, 3),
+        (Limiting::Inverter, 4),
+        (Limiting::DcLinkHigh, 5),
+        (Limiting::ResistorHot, 6),
+        (Limiting::DcLinkLow, 7),
+        (Limiting::RideThrough, 8),
+    ] {
+        assert_eq!(sampled(State::Torque, limiting).limit, number, "{limiting}");
+    }
 }
 
 /// 1/4 of a revolution of a four-pole shaft a second is 1/2 electrical turn a second, 15 rpm.
@@ -163,6 +201,8 @@ fn speeds_are_shown_in_the_unit_of_their_name() {
     assert!((factor("speed_rpm") * per_period - 15.0).abs() < 1e-4);
     assert!((factor("flux_hz") * per_period - 0.5).abs() < 1e-6);
     assert_eq!(factor("i_q_a"), 1.0);
+    // 1 A^2 of the currents is the torque of 1 A at 1 A.
+    assert_eq!(factor("torque_nm"), settings.motor.torque_per_ampere(1.0));
 }
 
 /// A code of a sensor is shown by the calibration of that sensor, also while the drive is off.
@@ -176,13 +216,14 @@ fn sensors_are_shown_in_amperes() {
     assert_eq!(shown("i_a_a", &settings), scales.current_a.at(2500));
     assert_eq!(shown("i_b_a", &settings), scales.current_b.at(2500));
     assert_eq!(shown("i_c_a", &settings), 0.0);
+    assert_eq!(shown("heat_sink_c", &settings), scales.ntc.celsius(2500));
     settings.scales.sensors = CurrentSensors::LowSide;
     settings.scales.current_c.gain *= 2.0;
     assert_eq!(shown("i_c_a", &settings), settings.scales.current_c.at(2500));
 }
 
 /// What the signals are, for the page.
-const MEANINGS: [(&str, &str); 16] = [
+const MEANINGS: [(&str, &str); 20] = [
     ("phi_deg", "estimated flux angle, electrical degrees"),
     ("flux_hz", "frequency of the flux, electrical"),
     ("speed_rpm", "speed of the shaft, mechanical"),
@@ -202,11 +243,21 @@ const MEANINGS: [(&str, &str); 16] = [
     ),
     ("i_b_a", "the same of phase b"),
     ("i_c_a", "the same of phase c; 0 without a third sensor"),
+    ("torque_nm", "3/2 P L_m²/L_r i_d i_q, with the motor of the settings in force"),
+    ("heat_sink_c", "temperature of the heat sink; also while off. It triggers no trace"),
+    ("state", "0 off, 1 starting, 2 running, 3 stopping, 100 + N in fault N"),
+    (
+        "limit",
+        "why the torque is smaller than asked for: 0 it is not, 1 voltage of the dc link at this speed, 2 hot heat sink, 3 motor, \
+         4 inverter at its thermal limit, 5 dc link high, 6 the same with a hot brake resistor, 7 dc link low, 8 the shaft feeds the \
+         dc link",
+    ),
 ];
 
 #[test]
 fn the_manual_lists_the_signals() {
     let mut table = "| signal | meaning |\n|---|---|\n".to_owned();
+    assert_eq!(SIGNALS.len(), MEANINGS.len());
     for (signal, (name, meaning)) in SIGNALS.iter().zip(MEANINGS) {
         assert_eq!(signal.name, name);
         table += &format!("| `{name}` | {meaning} |\n");

@@ -287,7 +287,7 @@ impl Session {
         };
         let text: Vec<u8> = bytes.iter().filter_map(text).collect();
         for line in self.said.push(&text) {
-            let begun = line.strip_prefix("ok: every ").and_then(|rest| rest.split(' ').next());
+            let begun = line.split_once("ok: every ").and_then(|(_, rest)| rest.split(' ').next());
             let rate = begun.and_then(|periods| periods.parse::<f64>().ok()).map(|n| RATE_HZ / n);
             self.add(Source::Said, line);
             if let Some(rate) = rate {
