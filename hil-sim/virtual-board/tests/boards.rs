@@ -89,9 +89,9 @@ fn the_firmware_and_the_power_stage_agree() {
             assert!((seen / volts - 1.0).abs() < 0.01, "{name}: {seen} V of {volts} V");
         }
         // Currents: gains to 1 %, zero to 0.3 % of the range, both signs.
-        match (stage.sensors, board.currents) {
-            (Sensors::InLine, Currents::InLine(_)) => {}
-            (Sensors::LowSide(shunts), Currents::LowSide { settle_s, .. }) => {
+        match (stage.sensors, board.currents.shunts) {
+            (Sensors::InLine, None) => {}
+            (Sensors::LowSide(shunts), Some(boards::Shunts { settle_s, .. })) => {
                 let scales = &settings.scales;
                 for line in [scales.current_a, scales.current_b, scales.current_c] {
                     for code in [200, 1000, 3000, 4000] {

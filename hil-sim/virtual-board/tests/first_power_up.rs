@@ -268,7 +268,7 @@ impl Bench {
 
     /// A laboratory supply at each sensor in turn.
     fn step_14(&mut self, lines: &[drive_core::Line; 3]) -> Result<()> {
-        let sensors = if self.stage.board().currents.c().is_some() { 3 } else { 2 };
+        let sensors = if self.stage.board().currents.shunts.is_some() { 3 } else { 2 };
         let typed = self.steps[&14].0[0].clone();
         let mut heard = String::new();
         for (n, name) in ["a ", "b ", "c "].into_iter().enumerate().take(sensors) {
