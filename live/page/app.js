@@ -234,7 +234,7 @@ function buildPlots(into, names, group) {
     const line = style.getPropertyValue('--line'), axis = { stroke: style.getPropertyValue('--soft'), grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
     const time = last ? { label: 's', labelSize: 16, size: 34 } : { size: 2, values: (_, splits) => splits.map(() => ''), ticks: { show: false } };
     const plot = new uPlot({
-      width: Math.max(240, into.clientWidth), height: (innerWidth < 760 ? 120 : 140) + (last ? 45 : 0),
+      width: Math.max(240, into.clientWidth), height: (last ? 155 : 110),
       cursor: { sync: { key: group }, drag: { x: true, y: false } },
       scales: { x: { time: false } },
       axes: [{ ...axis, ...time }, { ...axis, label: u, labelSize: 18, size: 60 }],
@@ -336,9 +336,11 @@ $('record').onclick = () => {
   $('record').setAttribute('aria-pressed', true);
 };
 document.querySelectorAll('[data-ask]').forEach(button => {
-  const settings = button.closest('#view-settings');
   button.type = 'button';
-  button.onclick = () => tell(button.dataset.ask, settings ? sayOfSettings : say).then(() => settings && loadSettings(), quiet);
+  button.onclick = () => {
+    const to = { 'view-settings': sayOfSettings, 'view-loops': sayOfLoops }[button.closest('section').id];
+    tell(button.dataset.ask, to || say).then(() => to && loadSettings(), quiet);
+  };
 });
 addEventListener('keydown', event => {
   if (event.key === 'Escape') { event.preventDefault(); stopDrive(); }
