@@ -40,6 +40,7 @@ use stream::Wire;
 pub const LINE_MS: u32 = 30_000;
 
 /// The console.
+#[derive(Default)]
 pub struct Console {
     reader: LineReader,
     /// Text that waits for room in the transmit queue.
@@ -66,23 +67,6 @@ pub struct Console {
 const BYTES_AT_ONCE: usize = 64;
 
 impl Console {
-    /// A console.
-    pub fn new() -> Self {
-        Self {
-            reader: LineReader::new(),
-            out: OutputLine::default(),
-            list: None,
-            began_ms: None,
-            line_ms: None,
-            designs: 0,
-            traced: None,
-            armed: false,
-            commissioned: None,
-            restore: Restore::new(),
-            wire: Wire::new(),
-        }
-    }
-
     /// Writes the version and the end of the last run.
     pub fn greet(&mut self, drive: &impl Firmware) {
         let (version, last_run) =
@@ -112,7 +96,7 @@ impl Console {
             self.line_ms = None;
         }
         if self.flushed(port)
-            && let Some((applied, answer)) = desk.take_done()
+            && let Some((applied, answer)) = desk.done.take()
         {
             if applied != Applied::default() {
                 self.out.news(format_args!("applied{applied}"));

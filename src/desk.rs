@@ -43,7 +43,7 @@ pub struct Desk {
     /// Time of an order to reset the chip.
     reboot_ms: Option<u32>,
     /// How the console's last task has ended, until the console takes it; and remarks on the settings that it has put in force.
-    done: Option<(Applied, Answer)>,
+    pub(crate) done: Option<(Applied, Answer)>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
     designs: u32,
     announcer: Announcer,
@@ -110,11 +110,6 @@ impl Desk {
         self.designs
     }
 
-    /// How the console's last task has ended, and remarks on the settings that it has put in force, once.
-    pub fn take_done(&mut self) -> Option<(Applied, Answer)> {
-        self.done.take()
-    }
-
     /// The last refusal of the bus.
     pub fn refusal(&self) -> Option<&Refusal> {
         self.refusal.as_ref()
@@ -173,7 +168,7 @@ impl Desk {
     pub fn stop_after_silence(&mut self, limit_s: f32, drive: &mut impl DriveHandle, now_ms: u32) {
         if !drive.is_off() {
             self.heard_ms = Some(now_ms);
-            self.announcer.stopping();
+            self.announcer.stopped = true;
             self.stopped = Some(drive.command(Command::Stop(Stop::Coast)).map(|_| limit_s));
         }
     }
@@ -258,7 +253,7 @@ impl Desk {
             Order::Stop(stop) => {
                 // Off is news for the console if the bus stops the drive.
                 if from == Commander::Console {
-                    self.announcer.stopping();
+                    self.announcer.stopped = true;
                 }
                 give(Command::Stop(stop), "", drive)
             }

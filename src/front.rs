@@ -19,7 +19,7 @@ pub struct Front {
 impl Front {
     /// The drive has these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
-        Self { desk: Desk::new(settings), console: Console::new(), bus: Bus::default() }
+        Self { desk: Desk::new(settings), console: Console::default(), bus: Bus::default() }
     }
 
     /// A pass of the main loop. Takes seconds if controllers are designed; `line` answers by itself meanwhile. `now_ms` wraps.

@@ -14,8 +14,7 @@ use hil_sim::experiments::{EXPERIMENTS, WITH_INPUT};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-#[path = "../../tests/common/generated.rs"]
-mod generated;
+use crate::generated;
 
 /// Most words of the pages that are written by hand, of the whole book, and of the README.
 const BY_HAND: usize = 28_000;
@@ -223,7 +222,7 @@ fn pages() -> BTreeMap<String, String> {
 fn tables_of_the_pages_are_those_of_results_and_program() {
     let mine = |text: &String| {
         let blocks = text.split("<!-- generated: ").skip(1).map(str::to_owned);
-        blocks.filter(|block| block.contains("--test documents) -->")).collect::<Vec<_>>()
+        blocks.filter(|block| block.contains("-p hil-sim documents) -->")).collect::<Vec<_>>()
     };
     let mut known: Vec<_> = results().into_iter().map(|(name, _)| name).collect();
     known.extend(["experiments", "motors-list", "budgets"].map(str::to_owned));
@@ -379,4 +378,27 @@ fn links_lead_somewhere() {
         docs.filter(|name| !in_book(name)).map(|name| format!("docs/{name} is not in the book")),
     );
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Every developer task that a page or CONTRIBUTING names is one of `xtask`.
+#[test]
+fn tasks_of_the_pages_exist() {
+    let root = generated::root();
+    let [tasks, contributing] = ["xtask/src/main.rs", "CONTRIBUTING.md"]
+        .map(|file| fs::read_to_string(root.join(file)).unwrap());
+    let mut pages = pages();
+    pages.insert("CONTRIBUTING.md".to_owned(), contributing);
+    for (page, text) in pages {
+        for rest in text.split("cargo xtask ").skip(1) {
+            let task = rest.split(|c: char| c != '-' && !c.is_ascii_lowercase()).next().unwrap();
+            let capital = |part: &str| part[..1].to_uppercase() + &part[1..];
+            let name: String =
+                task.split('-').filter(|part| !part.is_empty()).map(capital).collect();
+            let is_task = |end: &str| tasks.contains(&format!("\n    {name}{end}"));
+            assert!(
+                name.is_empty() || [",", "(", " {"].iter().any(|end| is_task(end)),
+                "{page}: cargo xtask {task}"
+            );
+        }
+    }
 }

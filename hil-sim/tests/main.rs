@@ -13,6 +13,8 @@ mod console;
 mod dissertation_numbers;
 mod documents;
 mod full_range;
+#[path = "../../tests/common/generated.rs"]
+mod generated;
 mod identification_arx;
 mod identification_faults;
 mod identification_model;

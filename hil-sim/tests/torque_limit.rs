@@ -4,8 +4,7 @@ use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::experiments::torque_limit::{TorqueLimit, learned_limit};
 
-#[path = "../../tests/common/generated.rs"]
-mod generated;
+use crate::generated;
 
 fn limit(motor: &str, set: &[&str]) -> (Config, TorqueLimit) {
     let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();

@@ -50,15 +50,10 @@ impl Console {
                 let code = fault.code();
                 out.news(format_args!("fault {code}: {fault}; likely: {likely}; type 'clear'"));
             }
-            News::Running(state) => out.news(format_args!(
-                "running: {}",
-                match state {
-                    State::Speed => "speed",
-                    State::Position => "position",
-                    State::VoltsPerHertz => "vf",
-                    _ => "torque",
-                }
-            )),
+            News::Running(State::Speed) => out.news(format_args!("running: speed")),
+            News::Running(State::Position) => out.news(format_args!("running: position")),
+            News::Running(State::VoltsPerHertz) => out.news(format_args!("running: vf")),
+            News::Running(_) => out.news(format_args!("running: torque")),
             News::Off(why) => out.news(format_args!("off: {why}")),
             News::Learning { point, points, left_s } => {
                 out.news(format_args!("learning: point {point} of {points}, {left_s:.0} s left"));

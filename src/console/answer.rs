@@ -60,9 +60,16 @@ impl Console {
             }
             Request::Stream(plan) => self.stream(plan, drive),
             Request::StreamState => self.stream_state(),
-            Request::EndStream => self.end_stream(drive),
+            Request::EndStream => {
+                self.stop_stream(drive);
+                self.stream_state();
+            }
             Request::Signals => self.begin(ListKind::Signals),
-            Request::Baud(baud) => self.baud(baud, drive),
+            Request::Baud(baud) => {
+                self.stop_stream(drive);
+                self.wire.wanted = baud;
+                self.ok();
+            }
             Request::Log(level) => {
                 drive.set_log_level(level);
                 self.ok();

@@ -42,8 +42,9 @@ pub enum LineError {
 }
 
 /// Place in an escape sequence of a terminal.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default, PartialEq)]
 enum Sequence {
+    #[default]
     Outside,
     /// Behind the escape character.
     Began,
@@ -52,6 +53,7 @@ enum Sequence {
 }
 
 /// Collects bytes to lines.
+#[derive(Default)]
 pub struct LineReader {
     text: String<LONGEST>,
     /// First error in the line so far; the line is discarded at its end.
@@ -62,11 +64,6 @@ pub struct LineReader {
 }
 
 impl LineReader {
-    /// A reader without input so far.
-    pub const fn new() -> Self {
-        Self { text: String::new(), error: None, sequence: Sequence::Outside, returned: false }
-    }
-
     /// Takes one byte. Returns the line at its end (carriage return or line feed), unless it is empty. Tab and the
     /// sequences of cursor keys are ignored.
     ///
@@ -76,7 +73,7 @@ impl LineReader {
         let sequence = core::mem::replace(&mut self.sequence, Sequence::Outside);
         match (sequence, byte) {
             (_, b'\r' | b'\n') => {
-                let fresh = Self { returned: byte == b'\r', ..Self::new() };
+                let fresh = Self { returned: byte == b'\r', ..Self::default() };
                 let line = core::mem::replace(self, fresh);
                 return match line.error {
                     Some(error) => Err(error),
@@ -136,7 +133,7 @@ impl LineReader {
 
     /// Discards the incoming line.
     pub fn forget(&mut self) {
-        *self = Self::new();
+        *self = Self::default();
     }
 }
 

@@ -49,12 +49,13 @@ fn checksum(words: &[u32]) -> u32 {
     digest.finalize()
 }
 
-impl Restore {
-    /// Nothing yet.
-    pub const fn new() -> Self {
+impl Default for Restore {
+    fn default() -> Self {
         Self { words: [0; WORDS], present: 0 }
     }
+}
 
+impl Restore {
     /// Takes words, from an index on.
     ///
     /// # Errors
@@ -71,7 +72,7 @@ impl Restore {
     /// # Errors
     /// Words are missing or damaged, make no result, or one for the other.
     pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
-        let Self { words, present } = core::mem::replace(self, Self::new());
+        let Self { words, present } = core::mem::replace(self, Self::default());
         let count = present.trailing_ones() as usize;
         if !learned::is_whole(present) {
             return Err(RestoreError::Missing(count));

@@ -30,16 +30,18 @@ pub(super) struct Wire {
     last: Option<(u32, u16)>,
     /// Bits per second in force, and those wanted.
     baud: u32,
-    wanted: u32,
+    pub wanted: u32,
 }
 
-impl Wire {
-    pub const fn new() -> Self {
+impl Default for Wire {
+    fn default() -> Self {
         let baud = board::SERIAL_BAUD;
         let (frame, wanted) = ([0; LONGEST], baud);
         Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, last: None, baud, wanted }
     }
+}
 
+impl Wire {
     /// Without a line for so long the drive stops, s; 0: never.
     pub fn alive_s(&self) -> f32 {
         self.stream.as_ref().map_or(0.0, |stream| stream.alive_s)
@@ -86,7 +88,7 @@ impl Console {
         drive.stream(0);
         drive.stream(stream.divider);
         let (divider, baud, wanted) = (stream.divider, self.wire.baud, self.wire.wanted);
-        self.wire = Wire { stream: Some(stream), baud, wanted, ..Wire::new() };
+        self.wire = Wire { stream: Some(stream), baud, wanted, ..Wire::default() };
         self.out.answer(format_args!("ok: every {divider} periods"));
     }
 
@@ -95,19 +97,6 @@ impl Console {
         let Wire { sent, dropped, .. } = self.wire;
         let on = if self.wire.stream.is_some() { "on" } else { "off" };
         self.out.answer(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
-    }
-
-    /// Asks for a rate; a stream ends.
-    pub(super) fn baud(&mut self, baud: u32, drive: &mut impl Firmware) {
-        self.stop_stream(drive);
-        self.wire.wanted = baud;
-        self.ok();
-    }
-
-    /// Ends the stream and tells its state.
-    pub(super) fn end_stream(&mut self, drive: &mut impl Firmware) {
-        self.stop_stream(drive);
-        self.stream_state();
     }
 
     /// Ends the stream.

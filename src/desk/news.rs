@@ -50,18 +50,13 @@ pub struct Announcer {
     state: Option<State>,
     /// The last one but for those of a stop.
     active: State,
-    /// Whether the console, or silence, has stopped the drive.
-    stopped: bool,
+    /// Whether the console, or silence, has stopped the drive: off is no news then, unless it takes a while.
+    pub stopped: bool,
     progress: Option<(usize, usize)>,
     told_ms: u32,
 }
 
 impl Announcer {
-    /// Notes that the console, or silence, stops the drive: off is no news then, unless it takes a while.
-    pub fn stopping(&mut self) {
-        self.stopped = true;
-    }
-
     /// The news of a report, if there are any, of a drive with these settings. `now_ms` wraps.
     pub fn next(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
         let state = status.state;

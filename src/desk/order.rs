@@ -200,11 +200,7 @@ impl Refusal {
             Self::Ended => 9,
             Self::Command(CommandError::NoAnswer | CommandError::NotStarted(_)) => 10,
             Self::Command(CommandError::Refused(_)) => 11,
-            Self::WrongBoard { .. }
-            | Self::Staged
-            | Self::NothingFound
-            | Self::Homing(_)
-            | Self::Unsaved => 12,
+            _ => 12,
         }
     }
 }

@@ -155,10 +155,6 @@ impl<D: DriveHandle> Access<'_, D> {
         Err(why.into())
     }
 
-    fn send_reference(&mut self) -> Result<(), Exception> {
-        Ok(self.bus.send_reference(self.desk, self.drive)?)
-    }
-
     fn command(&mut self, word: u16) -> Result<(), Exception> {
         if word & !(ACTION | FORWARD | REVERSE) != 0 || word & ACTION == ACTION {
             return Err(Exception::IllegalDataValue);
@@ -180,7 +176,9 @@ impl<D: DriveHandle> Access<'_, D> {
         };
         match word & ACTION {
             RUN => self.run(),
-            _ if self.bus.run == Run::Running => self.send_reference(),
+            _ if self.bus.run == Run::Running => {
+                Ok(self.bus.send_reference(self.desk, self.drive)?)
+            }
             _ => Ok(()),
         }
     }
@@ -188,7 +186,7 @@ impl<D: DriveHandle> Access<'_, D> {
     fn run(&mut self) -> Result<(), Exception> {
         match self.bus.run {
             Run::Starting => Ok(()),
-            Run::Running => self.send_reference(),
+            Run::Running => Ok(self.bus.send_reference(self.desk, self.drive)?),
             Run::Ended => self.refuse(Refusal::Ended),
             Run::Stop => {
                 self.order(Order::Start(Mode::Speed))?;
@@ -217,7 +215,11 @@ impl<D: DriveHandle> Access<'_, D> {
     fn frequency(&mut self, word: u16) -> Result<(), Exception> {
         self.may_command()?;
         self.bus.frequency = word;
-        if self.bus.run == Run::Running { self.send_reference() } else { Ok(()) }
+        if self.bus.run == Run::Running {
+            Ok(self.bus.send_reference(self.desk, self.drive)?)
+        } else {
+            Ok(())
+        }
     }
 
     fn may_command(&mut self) -> Result<(), Exception> {

@@ -104,11 +104,9 @@ pub fn busy(frame: &[u8], own: u8) -> Option<Frame> {
     if slave != own || function > LAST_FUNCTION || *sum != rtu::crc16(body).to_be_bytes() {
         return None;
     }
-    let mut answer = Frame::new();
-    let body = [own, function | 0x80, Exception::ServerDeviceBusy as u8];
-    answer.extend_from_slice(&body).ok()?;
-    answer.extend_from_slice(&rtu::crc16(&body).to_be_bytes()).ok()?;
-    Some(answer)
+    let [a, b, c] = [own, function | 0x80, Exception::ServerDeviceBusy as u8];
+    let [d, e] = rtu::crc16(&[a, b, c]).to_be_bytes();
+    Frame::from_slice(&[a, b, c, d, e]).ok()
 }
 
 /// Address and request of a frame; `None` if it is damaged.

@@ -23,7 +23,7 @@ const SECONDS: f64 = 18.0;
 /// From here on the estimate has settled again, s.
 const SETTLED: f64 = 15.0;
 /// Speed (rpm) and torque current (A).
-#[rustfmt::skip] // in short
+#[rustfmt::skip] // pairs, side by side
 const POINTS: [(f64, f64); 9] = [
     (0.0, 1.0), (0.0, 2.0), (30.0, 1.0), (150.0, 0.5), (150.0, 2.0), (150.0, 3.0), (-150.0, 2.0), (300.0, -1.0), (600.0, 1.0),
 ];

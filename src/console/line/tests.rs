@@ -9,7 +9,7 @@ fn push(reader: &mut LineReader, byte: u8) -> Option<Line> {
 }
 
 fn read(bytes: &[u8]) -> Vec<Line> {
-    let mut reader = LineReader::new();
+    let mut reader = LineReader::default();
     bytes.iter().filter_map(|byte| push(&mut reader, *byte)).collect()
 }
 
@@ -53,7 +53,7 @@ fn the_line_is_killed_by_control_characters() {
 #[test]
 fn the_echo_shows_the_line_as_it_is_taken() {
     for typed in ["stop", "storq\x08\x7fp", "torque 3\x15stop", "\x08st\x1b[Aop\t", "st\x03stop"] {
-        let mut reader = LineReader::new();
+        let mut reader = LineReader::default();
         let mut out = OutputLine::default();
         for byte in typed.bytes() {
             reader.echo(byte, &mut out);
@@ -75,7 +75,7 @@ fn the_echo_shows_the_line_as_it_is_taken() {
         }
         assert_eq!((screen.as_str(), reader.text()), ("stop", "stop"), "{typed:?}");
     }
-    let mut reader = LineReader::new();
+    let mut reader = LineReader::default();
     let mut out = OutputLine::default();
     for byte in *b"a\r\n\n" {
         reader.echo(byte, &mut out);
@@ -86,7 +86,7 @@ fn the_echo_shows_the_line_as_it_is_taken() {
 
 #[test]
 fn a_lost_character_spoils_its_line_only() {
-    let mut reader = LineReader::new();
+    let mut reader = LineReader::default();
     for byte in *b"tor" {
         assert_eq!(push(&mut reader, byte), None);
     }

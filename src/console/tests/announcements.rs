@@ -132,7 +132,7 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
 #[test]
 fn every_fault_fits_a_line() {
     for fault in Fault::ALL {
-        let mut console = Console::new();
+        let mut console = Console::default();
         console.tell(News::Fault(*fault), &Desk::new(FirmwareSettings::of_the_board()));
         let text = console.out.as_str();
         let fits = text.len() < line::OUTPUT - line::LONGEST;
