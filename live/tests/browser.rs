@@ -396,12 +396,12 @@ const TENTH: &str = "Start with a tenth of the current";
 /// From the board and the nameplate to a drive that has learned its motor and turns it.
 fn sets_up(page: &mut Page<'_>, folder: &Path) {
     page.value("view('view-setup')");
-    page.value("(i => { i.value = '1715'; i.dispatchEvent(new Event('change')); })(document.querySelector('#nameplate [aria-label=\"nameplate.speed_rpm\"]'))");
-    page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged", PATIENCE);
     step(page, BOARD, BOARD, "^done: confirmed", PATIENCE);
     let read = page.value("$('reading').textContent");
     assert!(read.as_str().unwrap().contains("dc link 31"), "{read}");
     step(page, BOARD, "Confirm", "^ok", PATIENCE);
+    page.value("(i => { i.value = '1715'; i.dispatchEvent(new Event('change')); })(document.querySelector('#nameplate [aria-label=\"nameplate.speed_rpm\"]'))");
+    page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged", PATIENCE);
     step(page, WIRING, WIRING, "^done: the wiring", PATIENCE);
     state(page, "off");
     // A step that is stopped says so.
