@@ -267,7 +267,6 @@ impl Desk {
             }
             Order::Home(plan) => self.home(plan, drive),
             Order::Clear => give(Command::Clear, "", drive),
-            Order::Set(values) => self.set(&values, drive),
             Order::Defaults => {
                 may_stage(drive)?;
                 self.settings.set_defaults();
@@ -313,7 +312,11 @@ impl Desk {
         self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
     }
 
-    fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) -> Answer {
+    /// Stages settings.
+    ///
+    /// # Errors
+    /// Nothing has changed: the drive is not off, or a value is out of its range.
+    pub fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) -> Answer {
         may_stage(drive)?;
         let late = values.iter().find(|(key, _)| key.change() == Change::FromReset);
         let confirmed = self.settings.latest().board_is_confirmed();

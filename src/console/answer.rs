@@ -26,6 +26,7 @@ impl Console {
             Request::Order(order) => {
                 self.reply(&desk.order(Commander::Console, order, drive));
             }
+            Request::Set(values) => self.reply(&desk.set(&values, drive)),
             Request::Help => self.begin(ListKind::Help),
             Request::Status => self.status(desk, drive),
             Request::Get(key) => {

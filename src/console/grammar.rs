@@ -90,6 +90,15 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             "help" | "h" | "?" => Request::Help,
             "status" => Request::Status,
             "history" => Request::History,
+            // An alias of `set angle_source`.
+            "angle" => {
+                let key = setting("angle_source")?;
+                let word = words.next("encoder or injection")?;
+                let value = key.parse(word);
+                let value = value.map_err(|why| ParseError::Value { key, word, why })?;
+                Request::Set([(key, value)].into_iter().collect())
+            }
+            "set" => Request::Set(assignments(&mut words)?),
             "get" => match words.optional() {
                 None => Request::List(""),
                 Some(name) => match keys::find(name) {
@@ -188,15 +197,6 @@ fn order<'a>(word: &str, words: &mut Words<'a>) -> Result<Option<Order>, ParseEr
             i_q: words.number("the current, A")?,
             turns: words.number("the longest way, turns")?,
         }),
-        // An alias of `set angle_source`.
-        "angle" => {
-            let key = setting("angle_source")?;
-            let word = words.next("encoder or injection")?;
-            let value = key.parse(word);
-            let value = value.map_err(|why| ParseError::Value { key, word, why })?;
-            Order::Set([(key, value)].into_iter().collect())
-        }
-        "set" => Order::Set(assignments(words)?),
         "apply" => Order::Apply,
         "revert" => Order::Revert,
         "save" => Order::Save,

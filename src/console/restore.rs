@@ -72,7 +72,7 @@ impl Restore {
     /// # Errors
     /// Words are missing or damaged, make no result, or one for the other.
     pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
-        let Self { words, present } = core::mem::replace(self, Self::default());
+        let Self { words, present } = core::mem::take(self);
         let count = present.trailing_ones() as usize;
         if !learned::is_whole(present) {
             return Err(RestoreError::Missing(count));

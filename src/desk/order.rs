@@ -10,12 +10,10 @@ use super::handle::CommandError;
 use crate::boards::Board;
 use crate::settings::bus::Commander;
 use crate::settings::keys::Key;
-use crate::settings::staging::{Applied, Assignments, SetError};
+use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;
 
 /// An order.
-// Exists once at a time.
-#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
     /// Put the staged settings in force, then start in a mode; to learn it is [`Learn`](Self::Learn).
@@ -45,8 +43,6 @@ pub enum Order {
     Home(Plan),
     /// Clear the latched fault.
     Clear,
-    /// Stage settings.
-    Set(Assignments),
     /// Stage the settings of the image.
     Defaults,
     /// Put the staged settings in force.

@@ -52,8 +52,7 @@ fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
         Situation::NoControl => drive.running = false,
         Situation::Staged => {
             let values = [(keys::find("bus.address").unwrap(), Value::Whole(7))];
-            let order = Order::Set(values.into_iter().collect());
-            desk.order(commander, order, &mut drive).unwrap();
+            desk.set(&values.into_iter().collect(), &drive).unwrap();
         }
     }
     drive.commands.clear();
@@ -63,7 +62,6 @@ fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
 /// Each order, and by situation (`Off`, `Starting`, `Fault`, `NoControl`, `NotConfirmed`, `Staged`): `+` taken, `d` refused by the
 /// drive, `o` must be off, `c` no control, `n` not confirmed, `s` values are staged, `-` nothing found or learned, `u` unsaved.
 fn orders() -> Vec<(Order, &'static str)> {
-    let key = keys::find("motor.r_s").unwrap();
     let plan = Plan { rpm: 60.0, i_q: 0.5, turns: 2.0 };
     vec![
         (Order::Start(Mode::Torque), "+ddcn+"),
@@ -81,7 +79,6 @@ fn orders() -> Vec<(Order, &'static str)> {
         (Order::Position(1.0), "dddcdd"),
         (Order::Home(plan), "dddcdd"),
         (Order::Clear, "+++c++"),
-        (Order::Set([(key, Value::Number(5.5))].into_iter().collect()), "+o+c++"),
         (Order::Defaults, "+o+c++"),
         (Order::Apply, "++++++"),
         (Order::Revert, "++++++"),

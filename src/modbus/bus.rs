@@ -248,7 +248,7 @@ impl<D: DriveHandle> Access<'_, D> {
             // There is room.
             let _ = values.push((key, from_float(key, self.desk.settings().latest(), float)?));
         }
-        self.order(Order::Set(values))
+        self.desk.set(&values, self.drive).map(drop).or_else(|why| self.refuse(why))
     }
 
     fn staged(&mut self, word: u16) -> Result<(), Exception> {

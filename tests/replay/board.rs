@@ -66,7 +66,7 @@ fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
         Some(Request::Order(Order::Stop(stop))) => drive.command(&Command::Stop(stop)),
         Some(Request::Order(Order::Torque(i_q))) => drive.command(&Command::Torque(i_q)),
         Some(Request::Order(Order::Position(turns))) => drive.command(&Command::Position(turns)),
-        Some(Request::Order(Order::Set(values))) => {
+        Some(Request::Set(values)) => {
             values.iter().for_each(|(key, value)| key.set(settings, *value));
             drive.command(&Command::Configure(settings.build().unwrap()))
         }

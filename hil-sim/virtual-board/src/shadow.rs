@@ -123,11 +123,12 @@ impl Shadow {
             Ok(Request::Order(order)) => {
                 let _ = self.desk.order(Commander::Console, order, &mut self.orders);
                 self.desk.go_on(&mut self.orders, 0);
-                Ok(())
             }
-            Ok(_) => Ok(()), // no order
+            Ok(Request::Set(values)) => drop(self.desk.set(&values, &self.orders)),
+            Ok(_) => {} // no order
             Err(why) => bail!("{line}: {why}"),
         }
+        Ok(())
     }
 
     /// The board was reset: it has these settings, which were saved, and starts anew.

@@ -7,6 +7,7 @@ use super::recording::Stream;
 use crate::desk::order::Order;
 use crate::link::trace::Plan;
 use crate::settings::keys::Key;
+use crate::settings::staging::Assignments;
 
 /// Words of a learned result in a line of `backup`.
 pub const WORDS_IN_LINE: usize = 8;
@@ -18,6 +19,8 @@ pub const WORDS_IN_LINE: usize = 8;
 pub enum Request {
     /// An order to the desk.
     Order(Order),
+    /// Stage settings.
+    Set(Assignments),
     /// List all commands.
     Help,
     /// Show the state of the drive.

@@ -21,9 +21,7 @@ fn every_line_of_the_help_but_the_last_is_a_command_and_every_command_has_one() 
 }
 
 fn assigned(values: &[(&str, Value)]) -> Request {
-    Request::Order(Order::Set(
-        values.iter().map(|(name, value)| (keys::find(name).unwrap(), *value)).collect(),
-    ))
+    Request::Set(values.iter().map(|(name, value)| (keys::find(name).unwrap(), *value)).collect())
 }
 
 fn traced(records: u16, divider: u16, names: &[&str], trigger: Trigger) -> Request {
