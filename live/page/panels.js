@@ -224,7 +224,7 @@ function guide(step) {
     if (MEASURED.includes(measured)) { bar.max = MEASURED.length; bar.value = MEASURED.indexOf(measured) + 1; }
     if (/^(sound|refused)/.test(text)) show(`${measured}: ${text}`);
     if (text) {
-      const [, quantity, value, allowed] = text.match(/^(.*?) (-?\d[^(]*)(?:\(allowed: (.*)\))?$/) || [, '', text, ''];
+      const [, quantity, value, allowed] = text.match(/^(.*) (-?[\d.]+(?: \+-[\d.]+)?(?: [^\d\s(][^\s(]*)*) ?(?:\(allowed: (.*)\))?$/) || [, '', text, ''];
       table.hidden = false;
       found.append(make('tr', {}, ...[measured, quantity, value.replace('+-', '±'), allowed || ''].map(textContent => make('td', { textContent }))));
     }

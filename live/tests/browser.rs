@@ -92,10 +92,13 @@ fn rows(text: &str, what: &str, units: &str, names: &str) -> Vec<Vec<f64>> {
 
 /// Presses the button of a guided step that has this text, and waits for its verdict.
 fn step(page: &mut Page<'_>, name: &str, button: &str, expected: &str, patience: Duration) {
-    page.value(&format!(
-        "[...{}.querySelectorAll('button')].find(b => b.textContent == '{button}').click()",
+    let button = format!(
+        "[...{}.querySelectorAll('button')].find(b => b.textContent == '{button}')",
         item(name)
-    ));
+    );
+    // It waits for the state of the drive, which the page hears five times a second.
+    page.until(&format!("!{button}.disabled"), PATIENCE);
+    page.value(&format!("{button}.click()"));
     verdict(page, name, expected, patience);
 }
 
