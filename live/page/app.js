@@ -228,13 +228,13 @@ const inWords = (name, v) => v == null || Number.isNaN(v) ? '–' : !(name in WO
 /** One plot a unit; they share the time axis below the last one, and the time at the cursor. */
 function buildPlots(into, names, group) {
   into.replaceChildren();
-  const units = [...new Set(names.map(name => unit(name) || name))], style = getComputedStyle(document.documentElement);
+  const units = [...new Set(names.map(name => unit(name) || name))], colour = name => () => getComputedStyle(document.documentElement).getPropertyValue(name);
   return units.map((u, n) => {
     const indices = names.flatMap((name, i) => (unit(name) || name) === u ? [i] : []), last = n === units.length - 1;
-    const line = style.getPropertyValue('--line'), axis = { stroke: style.getPropertyValue('--soft'), grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
+    const line = colour('--line'), axis = { stroke: colour('--soft'), grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
     const time = last ? { label: 's', labelSize: 16, size: 34 } : { size: 2, values: (_, splits) => splits.map(() => ''), ticks: { show: false } };
     const plot = new uPlot({
-      width: Math.max(240, into.clientWidth), height: (innerWidth < 760 ? 120 : 140) + (last ? 45 : 0),
+      width: Math.max(240, into.clientWidth), height: (last ? 155 : 110),
       cursor: { sync: { key: group }, drag: { x: true, y: false } },
       scales: { x: { time: false } },
       axes: [{ ...axis, ...time }, { ...axis, label: u, labelSize: 18, size: 60 }],
@@ -336,17 +336,16 @@ $('record').onclick = () => {
   $('record').setAttribute('aria-pressed', true);
 };
 document.querySelectorAll('[data-ask]').forEach(button => {
-  const settings = button.closest('#view-settings');
   button.type = 'button';
-  button.onclick = () => tell(button.dataset.ask, settings ? sayOfSettings : say).then(() => settings && loadSettings(), quiet);
+  button.onclick = () => {
+    const to = { 'view-settings': sayOfSettings, 'view-loops': sayOfLoops }[button.closest('section').id];
+    tell(button.dataset.ask, to || say).then(() => to && loadSettings(), quiet);
+  };
 });
 addEventListener('keydown', event => {
   if (event.key === 'Escape') { event.preventDefault(); stopDrive(); }
   else if (event.key === 'p' && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) pause();
 }, true);
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { 
-  if (streamed.length) plots = buildPlots($('curves'), plotted(), 'live');
-  if (traceText) plotTrace(traceText.split('\n').filter(line => line && !line.startsWith('#')));
-});
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => [...plots, ...tracePlots, ...stepPlots].forEach(({ plot }) => plot.redraw()));
 addEventListener('resize', () => document.querySelectorAll('.curves').forEach(into =>
   [...plots, ...tracePlots, ...stepPlots].forEach(({ plot }) => into.contains(plot.root) && into.clientWidth && plot.setSize({ width: Math.max(240, into.clientWidth), height: plot.height }))));

@@ -38,7 +38,8 @@ const number7 = value => typeof value === 'number' ? +value.toPrecision(7) : val
 /** A number with its unit, in thousands or thousandths where it is large or small. */
 function pretty(value, unit) {
   const size = Math.abs(value);
-  if (typeof value !== 'number' || !/^(s|H|A|V|W|ohm|J)$/.test(unit) || !size || (size >= 0.01 && size < 1e5)) return `${number7(value)} ${unit}`.trim();
+  if (typeof value !== 'number') return value;
+  if (!/^(s|H|A|V|W|ohm|J)$/.test(unit) || !size || (size >= 0.01 && size < 1e5)) return `${number7(value)} ${unit}`.trim();
   const power = Math.max(-3, Math.min(2, Math.floor(Math.log10(size) / 3)));
   return `${+(value / 1000 ** power).toPrecision(5)} ${['n', 'µ', 'm', '', 'k', 'M'][power + 3]}${unit}`;
 }
@@ -114,9 +115,9 @@ $('get-learned').onclick = async () => {
 const sayOfLoops = (text, bad) => { $('l-said').textContent = text; $('l-said').className = bad ? 'error' : ''; };
 /** The figures that the settings give, staged ones included; or why there are none. */
 function showLoops(loops) {
-  const cell = (value, unit) => make('td', { textContent: value == null ? '–' : `${+value.toPrecision(3)} ${unit}`.trim() });
+  const cell = (value, unit) => make('td', { textContent: value == null ? '–' : `${+value.toPrecision(3)}${unit}` });
   $('loops').replaceChildren(...(loops.error ? [make('tr', {}, make('td', { colSpan: 5, className: 'error', textContent: loops.error }))] : loops.map(([name, crossover, margin, peak, gains]) =>
-    make('tr', {}, make('th', { textContent: name }), cell(crossover, 'Hz'), cell(margin, '°'), cell(peak, ''), make('td', { textContent: gains })))));
+    make('tr', {}, make('th', { textContent: name }), cell(crossover, ' Hz'), cell(margin, '°'), cell(peak, ''), make('td', { textContent: gains })))));
 }
 // By mode: the signal that triggers, the one that is judged, what else is recorded.
 const STEP = { torque: ['i_q_ref_a', 'i_q_a', 'i_d_a torque_nm'], speed: ['speed_rpm', 'speed_rpm', 'i_q_a i_q_ref_a'], position: ['turns', 'turns', 'speed_rpm i_q_a'] };
@@ -134,7 +135,7 @@ $('step').onsubmit = async event => {
 };
 /** Shows the record of a step and its figures: the times are those of the value judged, less where it began, over the step. */
 function showStep(lines) {
-  const { judged, from, by } = stepping, names = [...lines[0].split(',').slice(1), `asked_${judged.match(/_(\w+)$/)?.[1] || 'turns'}`];
+  const { judged, from, by } = stepping, names = [...lines[0].split(',').slice(1), `asked_${judged.match(/_([a-z]+)$/)?.[1] || 'turns'}`];
   const rows = lines.slice(1, -1).map(line => line.split(',').map(Number)), y = rows.map(row => row[names.indexOf(judged) + 1]);
   const begun = y.slice(0, 100).reduce((a, b) => a + b) / 100, share = y.map(value => (value - begun) / (from + by - begun));
   const at = level => rows[share.findIndex(value => value >= level)]?.[0], end = share.slice(-50).reduce((a, b) => a + b) / 50;
@@ -223,9 +224,9 @@ function guide(step) {
     if (MEASURED.includes(measured)) { bar.max = MEASURED.length; bar.value = MEASURED.indexOf(measured) + 1; }
     if (/^(sound|refused)/.test(text)) show(`${measured}: ${text}`);
     if (text) {
-      const [, quantity, value, allowed] = text.match(/^(.*?) (-?\d[^(]*)(?:\(allowed: (.*)\))?$/) || [, '', text, ''];
+      const [, quantity, value, allowed] = text.match(/^(.*) (-?[\d.]+(?: \+-[\d.]+)?(?: [^\d\s(][^\s(]*)*) ?(?:\(allowed: (.*)\))?$/) || [, '', text, ''];
       table.hidden = false;
-      found.append(make('tr', {}, ...[measured, quantity, value, allowed || ''].map(textContent => make('td', { textContent }))));
+      found.append(make('tr', {}, ...[measured, quantity, value.replace('+-', '±'), allowed || ''].map(textContent => make('td', { textContent }))));
     }
     if (step.good.test(line)) { bar.hidden = true; (step.then ? step.then() : Promise.resolve(line)).then(text => listeners.includes(hear) && end(`done: ${text}`), fail); }
     else if (step.bad?.test(line) || /^(fault|stopped|off: the start)/.test(line)) end(`not done: ${line}`, true);

@@ -26,6 +26,8 @@ impl Live {
     fn start(folder: &Path, load: &str) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drive-live"));
         command.args(["--no-browser", "--", "--load", load, "--out"]).arg(folder);
+        // `cargo test` sets it: the build of the emulator would take it for a change.
+        command.env_remove("CARGO_MANIFEST_DIR");
         if let Some(elf) = std::env::var_os("LIVE_ELF") {
             command.arg("--elf").arg(elf);
         }
@@ -89,14 +91,42 @@ fn rows(text: &str, what: &str, units: &str, names: &str) -> Vec<Vec<f64>> {
 }
 
 /// Presses the button of a guided step that has this text, and waits for its verdict.
-fn step(page: &mut Page<'_>, number: usize, button: &str, verdict: &str, patience: Duration) {
-    page.value(&format!("[...$('steps').children[{number}].querySelectorAll('button')].find(b => b.textContent == '{button}').click()"));
+fn step(page: &mut Page<'_>, name: &str, button: &str, expected: &str, patience: Duration) {
+    let button = format!(
+        "[...{}.querySelectorAll('button')].find(b => b.textContent == '{button}')",
+        item(name)
+    );
+    // It waits for the state of the drive, which the page hears five times a second.
+    page.until(&format!("!{button}.disabled"), PATIENCE);
+    page.value(&format!("{button}.click()"));
+    verdict(page, name, expected, patience);
+}
+
+/// The item of a guided step.
+fn item(name: &str) -> String {
+    format!(
+        "[...$('steps').children].find(item => item.querySelector('h2').textContent == '{name}')"
+    )
+}
+
+/// Waits for the verdict of a guided step.
+fn verdict(page: &mut Page<'_>, name: &str, expected: &str, patience: Duration) {
     page.until(
-        &format!(
-            "/{verdict}/.test($('steps').children[{number}].querySelector('strong').textContent)"
-        ),
+        &format!("/{expected}/.test({}.querySelector('strong').textContent)", item(name)),
         patience,
     );
+}
+
+/// Streams these signals, so many samples a second.
+fn stream(page: &mut Page<'_>, names: &str, rate: u32) {
+    page.value(&format!("document.querySelectorAll('#signals input').forEach(box => {{ box.checked = '{names}'.split(' ').includes(box.value); }}); $('rate').value = {rate}; restream()"));
+    page.until(&format!("streamed.toSorted().join(' ') == '{names}'.split(' ').toSorted().join(' ') && times.length > 100"), PATIENCE);
+}
+
+/// Whether a control is disabled and its view says why.
+fn waits(page: &mut Page<'_>, id: &str, reason: &str) {
+    let waits = page.value(&format!("$('{id}').disabled && $('{id}').title.startsWith('{reason}') && $('{id}').closest('section').querySelector('.why').textContent.includes('{reason}')"));
+    assert_eq!(waits, true, "{id}: {reason}");
 }
 
 fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
@@ -139,6 +169,8 @@ fn the_page_shows_and_drives_the_virtual_board() {
     page.key("Escape", 27);
     state(&mut page, "off");
     settings(&mut page, &folder, &files);
+    loops(&mut page, &folder);
+    limits(&mut page);
     sets_up(&mut page, &folder);
     begins_again(&mut page);
 
@@ -162,6 +194,46 @@ fn begins(page: &mut Page<'_>) {
         "typeof $ == 'function' && hello && !hello.misfit && settings.length > 50",
         PATIENCE,
     );
+    assert_eq!(page.value("$('start').disabled"), false);
+    waits(page, "set", "the drive does not run");
+    // Currents and speed come first, the angle last, above one time axis.
+    page.until("plots.length == 4", PATIENCE);
+    assert_eq!(page.value("plots.map(({ plot }) => plot.axes[1].label).join()"), "A,rpm,Nm,°");
+    assert_eq!(page.value("plots.map(({ plot }) => plot.axes[0].label || '-').join()"), "-,-,-,s");
+}
+
+/// The newest values are in the legend; signals of what the drive does are there beside the measured ones.
+fn shows_signals(page: &mut Page<'_>) {
+    page.until("/^1\\.9|^2\\.0/.test(document.querySelectorAll('#curves .u-legend .u-value')[1].textContent)", PATIENCE);
+    stream(page, "torque_nm i_a_a i_b_a heat_sink_c state limit i_d_a i_q_a", 200);
+    let last = |page: &mut Page<'_>, name: &str| {
+        page.number(&format!("columns[streamed.indexOf('{name}')].at(-1)"))
+    };
+    let [torque, i_d, i_q] = ["torque_nm", "i_d_a", "i_q_a"].map(|name| last(page, name));
+    let by_status = page.number("parseFloat($('torque').textContent)");
+    assert!((torque - by_status).abs() < 0.05 * by_status, "{torque}, {by_status} Nm");
+    // With an amplitude-invariant transformation the phase currents are as large as those of the frame, but for the carrier.
+    let [a, b] = ["i_a_a", "i_b_a"].map(|name| last(page, name));
+    let peak = (4.0 / 3.0 * (a * a + a * b + b * b)).sqrt();
+    assert!((peak - i_d.hypot(i_q)).abs() < 0.5, "{peak} A, {i_d} A, {i_q} A");
+    assert!((last(page, "heat_sink_c") - 25.0).abs() < 2.0);
+    assert_eq!((last(page, "state"), last(page, "limit")), (2.0, 0.0));
+    page.until("/state:?\\s*running/.test($('curves').innerText) && /limit:?\\s*none/.test($('curves').innerText)", PATIENCE);
+}
+
+/// No peak of a sample is lost where many samples share a pixel.
+fn draws_peaks(page: &mut Page<'_>) {
+    stream(page, "i_d_a i_q_a", 2000);
+    page.until("times.length > 8000", PATIENCE);
+    page.value("draw(); paused = true; globalThis.spike = times.length - 3000; columns[plots[0].indices[0]][spike] = 50; paused = false; draw(); paused = true");
+    std::thread::sleep(Duration::from_millis(300));
+    let samples = page.number("plots[0].plot.data[0].length / plots[0].plot.bbox.width");
+    assert!(samples > 4.0, "{samples} samples a pixel");
+    let drawn = page.value("(({ plot }) => { const x = Math.round(plot.valToPos(times[spike], 'x', true)), y = Math.round(plot.valToPos(43, 'y', true)), [r, g, b, a] = [0, 1, 2, 3].map(n => Math.max(...[...plot.ctx.getImageData(x - 1, y, 3, 1).data].filter((_, i) => i % 4 == n))); return a > 100 && b > 200 && r < 150; })(plots[0])");
+    assert_eq!(drawn, true, "a peak of one sample in {samples} a pixel");
+    let cost = page.number("(began => { paused = false; draw(); plots.forEach(({ plot }) => plot.redraw(false)); return performance.now() - began; })(performance.now())");
+    println!("{cost:.1} ms to hand over {samples:.0} samples a pixel");
+    stream(page, "i_q_a i_q_ref_a i_d_a speed_rpm torque_nm phi_deg", 200);
 }
 
 /// The drive is started, the curves move, and a step of the torque shows in them and in the number.
@@ -179,6 +251,14 @@ fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
     );
     page.until("parseFloat($('torque').textContent) > 0.3", PATIENCE);
     page.until("/apart/.test($('flux-text').textContent)", PATIENCE);
+    for id in ["start", "mode"] {
+        waits(page, id, "the drive must be off");
+    }
+    page.value("view('view-settings')");
+    waits(page, "settings", "the drive must be off");
+    page.value("view('view-live')");
+    shows_signals(page);
+    draws_peaks(page);
     pictures(page, folder, "running");
     page.key("p", 80);
     page.until("paused", PATIENCE);
@@ -194,11 +274,13 @@ fn jogs(page: &mut Page<'_>, folder: &Path) {
     assert_eq!(choose(page, "torque"), "");
     assert_eq!(choose(page, "position"), "position");
     pictures(page, folder, "homing");
-    page.value("$('home').click()");
-    page.until("/not possible while the drive is off/.test($('said').textContent)", PATIENCE);
-    assert_eq!(choose(page, "speed"), "speed");
-    page.value("$('start').click()");
+    waits(page, "home", "the drive does not regulate the position");
+    // The mode is that of the drive, whoever has started it.
+    page.value("tell('start speed')");
     state(page, "regulating speed");
+    assert_eq!(choose(page, "speed"), "speed");
+    page.value("$('mode').value = 'torque'; follow()");
+    assert_eq!(page.value("$('mode').value"), "speed");
     page.value(
         "$('reference').value = 60; document.querySelector('[data-jog=\"-1\"]').onpointerdown()",
     );
@@ -215,7 +297,7 @@ fn records(page: &mut Page<'_>, folder: &Path, files: &Path) {
     page.value("$('record').click()");
     page.until("recorded.rows.length > 200", PATIENCE);
     page.value("$('record').click()");
-    let names = "i_d_a,i_q_a,i_q_ref_a,phi_deg,speed_rpm";
+    let names = "i_d_a,i_q_a,i_q_ref_a,phi_deg,speed_rpm,torque_nm";
     let order = page.value("streamed.slice().sort().join()");
     assert_eq!(order, names);
     let (units, columns) = (page.value("streamed.map(unit)"), page.value("streamed.join()"));
@@ -257,7 +339,16 @@ fn records(page: &mut Page<'_>, folder: &Path, files: &Path) {
 
 /// A setting is changed and put in force; files are saved, compared and loaded.
 fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
-    page.value("view('view-settings'); $('filter').value = 'motor.r_s'; showSettings()");
+    page.value("view('view-settings')");
+    // The twelve to set first are open, the rest is folded, what belongs to the board comes last.
+    assert_eq!(page.value("[...$('settings').children].filter(group => group.open).map(group => group.querySelectorAll('tbody tr').length).join()"), "12");
+    let order = page.value("[$('settings').firstChild, $('settings').lastChild].map(group => group.querySelector('summary').textContent).join()");
+    assert!(order.as_str().unwrap().starts_with("Set these first: 12,Of the board: "), "{order}");
+    let all = page.value("$('settings').querySelectorAll('tbody tr').length == settings.length");
+    assert_eq!(all, true);
+    let shown = page.value("$('settings').querySelector('[aria-label=\"inverter.dead_time_s\"]').parentElement.textContent");
+    assert_eq!(shown, " = 2.2 µs");
+    page.value("$('filter').value = 'motor.r_s'; showSettings()");
     let change = |page: &mut Page<'_>, value: &str| {
         page.value(&format!("(i => {{ i.value = '{value}'; i.dispatchEvent(new Event('change')); }})(document.querySelector('#settings [aria-label=\"motor.r_s\"]'))"));
     };
@@ -301,44 +392,113 @@ fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
     );
 }
 
-/// From the nameplate to a drive that has learned its motor.
+const BOARD: &str = "Check the board";
+const WIRING: &str = "Check the wiring";
+const TENTH: &str = "Start with a tenth of the current";
+
+/// From the board and the nameplate to a drive that has learned its motor and turns it.
 fn sets_up(page: &mut Page<'_>, folder: &Path) {
     page.value("view('view-setup')");
+    step(page, BOARD, BOARD, "^done: confirmed", PATIENCE);
+    let read = page.value("$('reading').textContent");
+    assert!(read.as_str().unwrap().contains("dc link 31"), "{read}");
+    step(page, BOARD, "Confirm", "^ok", PATIENCE);
     page.value("(i => { i.value = '1715'; i.dispatchEvent(new Event('change')); })(document.querySelector('#nameplate [aria-label=\"nameplate.speed_rpm\"]'))");
     page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged", PATIENCE);
-    step(page, 1, "Check the wiring", "^done: the wiring", PATIENCE);
+    step(page, WIRING, WIRING, "^done: the wiring", PATIENCE);
     state(page, "off");
     // A step that is stopped says so.
-    step(page, 2, "Commission", "sensors: sound", PATIENCE);
+    step(page, "Commission", "Commission", "sensors: sound", PATIENCE);
     page.key("Escape", 27);
-    page.until(
-        "/^not done: stopped/.test($('steps').children[2].querySelector('strong').textContent)",
-        PATIENCE,
-    );
+    verdict(page, "Commission", "^not done: stopped", PATIENCE);
     // The page hears of the stop before the outputs are off.
     std::thread::sleep(Duration::from_secs(6));
     state(page, "off");
     // So does one whose connection is lost, which stops the drive.
-    step(page, 2, "Commission", "sensors: sound", PATIENCE);
+    step(page, "Commission", "Commission", "sensors: sound", PATIENCE);
     page.value("socket.close()");
-    page.until(
-        "/^not done: stopped: the program that serves/.test($('steps').children[2].querySelector('strong').textContent)",
-        PATIENCE,
-    );
+    verdict(page, "Commission", "^not done: stopped: the program that serves", PATIENCE);
     std::thread::sleep(Duration::from_secs(6));
     state(page, "off");
-    step(page, 2, "Commission", "^done: commissioning: ended; .accept.", PATIENCE);
-    assert_eq!(page.value("$('steps').children[2].querySelector('progress').value"), 7.0);
-    step(page, 2, "Accept", "^ok", PATIENCE);
+    step(page, "Commission", "Commission", "^done: commissioning: ended; .Accept.", PATIENCE);
+    let commission = item("Commission");
+    assert_eq!(page.value(&format!("{commission}.querySelector('progress').value")), 7.0);
+    // Found and allowed stand in a table.
+    let found = page.value(&format!("[...{commission}.querySelectorAll('tbody tr')].map(row => [...row.cells].map(cell => cell.textContent.trim()).join('|')).find(row => /[|]r_s[|]/.test(row))"));
+    assert!(
+        found.as_str().unwrap().starts_with("levels|r_s|5.")
+            && found.as_str().unwrap().contains(" ohm|0."),
+        "{found}"
+    );
+    step(page, "Commission", "Accept", "^ok", PATIENCE);
     // The simulated motor has 5.4 ohm; the commissioning is within 0.5 % of it.
     page.until("Math.abs(settings.find(s => s.name == 'motor.r_s').value - 5.4) < 0.027", PATIENCE);
-    step(page, 3, "Learn", "^learning: point 3 of", PATIENCE);
+    step(page, "Learn", "Learn", "^learning: point 3 of", PATIENCE);
     pictures(page, folder, "setup");
-    // Pressed again while it runs: nothing.
-    step(page, 3, "Learn", "^done: learned: slope", LEARNING);
-    step(page, 3, "Save", "^ok", PATIENCE);
+    verdict(page, "Learn", "^done: learned: slope", LEARNING);
+    state(page, "off");
+    step(page, "Learn", "Save", "^ok", PATIENCE);
+    step(page, TENTH, TENTH, "^done: with 0.3.* A: torque 0.*Nm, speed", PATIENCE);
+    state(page, "off");
     page.value("view('view-settings'); $('get-learned').click()");
     page.until("$('learned').textContent.split('\\n').length > 5", PATIENCE);
+}
+
+/// The figures of the loops follow a staged setting, and a step is recorded and judged.
+fn loops(page: &mut Page<'_>, folder: &Path) {
+    page.value("view('view-loops')");
+    let cell = |page: &mut Page<'_>, row: usize, column: usize| {
+        page.number(&format!("parseFloat($('loops').rows[{row}].cells[{column}].textContent)"))
+    };
+    assert!((cell(page, 2, 2) - 60.0).abs() < 0.1);
+    let crossover = [0, 2].map(|row| cell(page, row, 1));
+    assert!(crossover[0] > 50.0 && crossover[1] < 10.0, "{crossover:?} Hz");
+    page.value("(i => { i.value = '70'; i.onchange(); })(document.querySelector('#knobs [aria-label=\"speed.phase_margin_deg\"]'))");
+    page.until(
+        "Math.abs(parseFloat($('loops').rows[2].cells[2].textContent) - 70) < 0.1",
+        PATIENCE,
+    );
+    assert!(cell(page, 2, 1) < crossover[1]);
+    page.value("document.querySelector('#view-loops [data-ask=revert]').click()");
+    page.until(
+        "Math.abs(parseFloat($('loops').rows[2].cells[2].textContent) - 60) < 0.1",
+        PATIENCE,
+    );
+    page.value("tell('start torque')");
+    state(page, "regulating torque");
+    page.value("$('l-by').value = 1; $('step').requestSubmit()");
+    page.until("stepPlots.length && stepPlots[0].plot.data[0].length == 500", PATIENCE);
+    let said = page.value("$('l-said').textContent");
+    let figures: Vec<f64> = said
+        .as_str()
+        .unwrap()
+        .split(|c: char| !c.is_ascii_digit() && c != '.')
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    // 10 to 90 % in so many ms, overshoot, where it ends.
+    let [_, _, rise_ms, overshoot, end] = figures[..] else { panic!("{said}") };
+    assert!((1.0..20.0).contains(&rise_ms) && overshoot < 20.0, "{said}");
+    assert!((end - 100.0).abs() < 5.0, "{said}");
+    pictures(page, folder, "loops");
+    page.value("tell('stop')");
+    state(page, "off");
+}
+
+/// A limit that acts is told in words, and is a signal.
+fn limits(page: &mut Page<'_>) {
+    page.value("view('view-live'); tell('set limits.derate_c 0').then(() => tell('apply')).then(() => tell('start torque'))");
+    state(page, "regulating torque");
+    page.value("tell('torque 3.4')");
+    page.until(
+        "/heat sink is hot/.test($('limit').textContent) && !!$('limit').offsetParent",
+        PATIENCE,
+    );
+    stream(page, "limit i_q_a", 200);
+    page.until("columns[streamed.indexOf('limit')].at(-1) === 2", PATIENCE);
+    page.key("Escape", 27);
+    state(page, "off");
+    page.value("tell('set limits.derate_c auto').then(() => tell('apply'))");
+    stream(page, "i_q_a i_q_ref_a i_d_a speed_rpm torque_nm phi_deg", 200);
 }
 
 /// A drive that was reset streams again: when it says so, and when that line is lost.
