@@ -360,11 +360,13 @@ impl Desk {
         }
         let learned = self.settings.in_force().learned.is_some();
         let forgets = matches!(order, Order::Learn { again: false }) && learned;
-        if (self.settings.needs_design() || forgets) && drive.status().is_some() {
+        if self.settings.needs_design() || forgets {
+            drive.status().ok_or_else(|| drive.no_control())?;
             self.task = Some((from, order));
             return Ok(Reply::Designing);
         }
-        self.perform(&order, drive).1
+        let applied = self.settings.prepare().is_some().then(|| self.adopt()).unwrap_or_default();
+        self.finish(&order, applied, drive)
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
@@ -376,32 +378,37 @@ impl Desk {
             if now_ms.wrapping_sub(since) >= REBOOT_MS {
                 return drive.reboot();
             }
-            self.task = Some((from, order));
-            return;
+            return self.task = Some((from, order));
         }
-        match (from, self.perform(&order, drive)) {
-            (Commander::Console, done) => self.done = Some(done),
-            (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
-            (Commander::Bus, _) => {}
+        // The time that it takes is not silence of the user.
+        self.heard_ms = None;
+        let (applied, answer) = match self.apply(&order, drive) {
+            Ok(applied) => (applied, self.finish(&order, applied, drive)),
+            Err(why) => (Applied::default(), Err(why)),
+        };
+        match (from, answer) {
+            (Commander::Console, answer) => self.done = Some((applied, answer)),
+            (Commander::Bus, Err(why)) => self.note_refusal(why),
+            (Commander::Bus, Ok(_)) => {}
         }
     }
 
-    /// Performs an order with the staged settings in force; remarks on these, and the answer.
-    fn perform(&mut self, order: &Order, drive: &mut impl DriveHandle) -> (Applied, Answer) {
-        // The time that it takes is not silence of the user.
-        self.heard_ms = None;
-        let applied = match self.apply(drive) {
-            Ok(applied) => applied,
-            Err(why) => return (Applied::default(), Err(why)),
-        };
-        let answer = match *order {
-            Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
+    /// Finishes an order whose settings are in force.
+    fn finish(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Answer {
+        match *order {
+            Order::Apply => Ok(Reply::Applied(applied)),
             Order::Start(mode) => self.start(mode, drive),
-            Order::Learn { again } => self.learn(again, drive),
+            Order::Learn { again: true } if self.settings.in_force().learned.is_none() => {
+                Err(Refusal::NothingLearned)
+            }
+            Order::Learn { again } => {
+                // The drive has been given the settings without what is learned, if that must not act.
+                self.settings.begin_learning(again, |_| Ok::<_, Refusal>(()))?;
+                self.start(Mode::Learning, drive)
+            }
             Order::Commission(first, last) => self.commission(first, last, drive),
             _ => self.save(Reply::Done, drive),
-        };
-        (applied, answer)
+        }
     }
 
     /// Saves the settings in force.
@@ -411,20 +418,28 @@ impl Desk {
         Ok(reply)
     }
 
-    /// Puts the staged settings in force. If they are refused, the drive stays as it is and they stay staged.
-    fn apply(&mut self, drive: &mut impl DriveHandle) -> Result<Applied, Refusal> {
-        let designs = self.settings.needs_design();
-        let Some(settings) = self.settings.prepare() else { return Ok(Applied::default()) };
-        if designs {
-            self.designs = self.designs.wrapping_add(1);
+    /// Designs for the staged settings and puts them in force; for a learning, gives the drive those without what is learned. If they
+    /// are refused, the drive stays as it is and they stay staged.
+    fn apply(&mut self, order: &Order, drive: &mut impl DriveHandle) -> Result<Applied, Refusal> {
+        self.designs = self.designs.wrapping_add(1);
+        let mut applied = Applied::default();
+        if self.settings.needs_design()
+            && let Some(settings) = self.settings.prepare()
+        {
             configure(drive, settings)?;
-        }
-        let applied = self.settings.adopt();
-        self.unsaved = true;
-        if designs {
+            applied = self.adopt();
             drive.configured(self.settings.in_force());
         }
+        if matches!(order, Order::Learn { again: false }) {
+            self.settings.begin_learning(false, |settings| configure(drive, settings))?;
+        }
         Ok(applied)
+    }
+
+    /// Takes the prepared settings as those in force.
+    fn adopt(&mut self) -> Applied {
+        self.unsaved = true;
+        self.settings.adopt()
     }
 
     /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
@@ -458,19 +473,6 @@ impl Desk {
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
         self.begin(from, Order::Save, drive)
-    }
-
-    /// Lets the drive learn: anew, or again on top of what it has learned.
-    fn learn(&mut self, again: bool, drive: &mut impl DriveHandle) -> Answer {
-        if again && self.settings.in_force().learned.is_none() {
-            return Err(Refusal::NothingLearned);
-        }
-        let Self { settings, designs, .. } = self;
-        settings.begin_learning(again, |settings| {
-            *designs = designs.wrapping_add(1);
-            configure(drive, settings)
-        })?;
-        self.start(Mode::Learning, drive)
     }
 
     /// Lets the drive look for a stop of the shaft.
