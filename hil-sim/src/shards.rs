@@ -1,7 +1,7 @@
 //! Shards: the runs of a statistical experiment shared between processes or machines, kept one by one, and merged.
 //!
 //! Run `k`, counted from 0, belongs to shard `1 + k mod n` of `n`. What a run is depends on its number, the seed and
-//! the settings, not on the shard. A shard is a JSON object with a [`Header`] and the records of its runs; merging
+//! the settings, not on the shard. A shard is a [`Header`] and the records of its runs, a line each; merging
 //! puts the records of all shards in their order and computes the outcome of them, as the whole run does.
 
 mod header;
@@ -89,14 +89,6 @@ pub struct Run {
     pub record: Value,
 }
 
-/// The JSON form of a shard.
-#[derive(Serialize, Deserialize)]
-struct ShardFile {
-    #[serde(flatten)]
-    header: Header,
-    records: Vec<Run>,
-}
-
 /// Does the runs of a shard that the journal does not have yet, and returns all of them in their order.
 ///
 /// # Errors
@@ -107,7 +99,7 @@ pub fn runs(
     header: &Header,
     journal: Option<&Journal>,
 ) -> Result<Vec<Run>, Error> {
-    let before = journal.iter().flat_map(|journal| journal.runs().iter().cloned());
+    let before = journal.iter().flat_map(|journal| journal.runs.iter().cloned());
     let done: Mutex<BTreeMap<usize, Value>> =
         Mutex::new(before.map(|run| (run.run, run.record)).collect());
     let missing: Vec<usize> = {
@@ -124,13 +116,16 @@ pub fn runs(
     Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
 }
 
-/// The JSON object of a shard.
+/// A shard as text, JSON Lines.
 ///
 /// # Errors
 /// [`Error::Internal`] when JSON cannot be made.
-pub fn to_json(header: Header, records: Vec<Run>) -> Result<String, Error> {
-    serde_json::to_string(&ShardFile { header, records })
-        .map_err(|e| Error::Internal(e.to_string()))
+pub fn text(header: &Header, runs: &[Run]) -> Result<String, Error> {
+    let mut bytes = journal::line(header)?;
+    for run in runs {
+        bytes.extend(journal::line(run)?);
+    }
+    String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))
 }
 
 #[cfg(test)]

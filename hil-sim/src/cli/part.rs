@@ -55,7 +55,7 @@ impl Part {
         }
         let runs = shards::runs(statistical, context, &header, journal.as_ref())?;
         if self.is_shard() {
-            say(&format!("{}\n", shards::to_json(header, runs)?))?;
+            say(&shards::text(&header, &runs)?)?;
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();
@@ -65,11 +65,11 @@ impl Part {
 
 /// What was found in a journal, on standard error. A torn line is named even if little is to be said.
 fn note(journal: &Journal, header: &Header, quiet: bool) {
-    let path = journal.path().display();
-    if let Some(line) = journal.torn() {
+    let path = journal.path.display();
+    if let Some(line) = journal.torn {
         eprintln!("note: {path}, line {line}, was torn; its run is done again");
     }
-    let (done, all) = (journal.runs().len(), header.shard.numbers(header.runs).count());
+    let (done, all) = (journal.runs.len(), header.shard.numbers(header.runs).count());
     if done > 0 && !quiet {
         eprintln!("note: {done} of {all} runs are in {path}");
     }
