@@ -1,14 +1,15 @@
 //! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
 //! drawn around it.
 
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::commission::machine::around;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::{Config, PlantModel, plant_settings};
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::Rig;
@@ -103,24 +104,10 @@ pub(super) fn runs(
     Ok(runs)
 }
 
-/// A machine whose resistances, inductances and saliencies are each multiplied by a factor of its own, and whose drive
-/// knows the circuit.
+/// A machine drawn around the motor, whose drive knows the circuit.
 fn drawn(config: &Config, seed: u64) -> Config {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let most = config.spread.machine.ln();
-    let mut factor = || random.random_range(-most..=most).exp();
-    let mut drawn = config.clone();
-    let saliency = plant_settings(config).saliency;
-    let (m, leakage) = (&mut drawn.motor, factor());
-    m.r_s *= factor();
-    m.r_r *= factor();
-    m.l_m *= factor();
-    m.l_ls *= leakage;
-    m.l_lr *= leakage;
-    if config.model.plant == PlantModel::A {
-        drawn.saliency.a_psi = saliency.a_psi * factor();
-        drawn.saliency.b1 = Some(saliency.b1 * factor());
-    }
+    let mut drawn = around(config, &mut random, config.spread.machine);
     let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
     (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);
     (drive.l_ls, drive.l_lr, drive.l_m) = (m.l_ls as f32, m.l_lr as f32, m.l_m as f32);
