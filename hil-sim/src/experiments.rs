@@ -34,16 +34,14 @@ mod orientation;
 mod perturbation;
 mod pi_design;
 mod plant_identification;
-mod position;
-mod profile;
 mod record;
 pub mod saliency;
+pub mod scenario;
 mod sensorless_position;
 mod smallest_slope;
-mod speed_profile;
 pub mod statistics;
 mod steady;
-mod torque;
+pub mod torque;
 mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
@@ -58,7 +56,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::config::{Config, Key};
-use crate::error::{Error, nearest};
+use crate::error::Error;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
 
@@ -231,13 +229,13 @@ pub const EXPERIMENTS: &[Experiment] = &[
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
-    position::EXPERIMENT,
+    scenario::POSITION,
     sensorless_position::EXPERIMENT,
-    torque::STEPS,
-    torque::RAMP,
-    torque::REVERSAL,
+    scenario::STEPS,
+    scenario::RAMP,
+    scenario::REVERSAL,
     perturbation::EXPERIMENT,
-    speed_profile::EXPERIMENT,
+    scenario::SPEED,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
     commission::EXPERIMENT,
@@ -261,7 +259,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
 ];
 
 /// The experiments that need an input file; they are no part of the report.
-pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
+pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE];
 
 /// The experiments of many independent runs, which can be shared between machines and continued.
 pub const STATISTICAL: &[Statistical] = &[
@@ -290,6 +288,14 @@ pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     })
 }
 
+/// Experiments that are gone, and what does the same.
+const REPLACED: &[(&str, &str)] = &[
+    ("tracking", "`run record`, `run torque-steps` and `run perturbation`"),
+    ("torque-drift", "`run record --set record.minutes=1`"),
+    ("speed-torque-sweep", "`run full-range --set full_range.kind=constant`"),
+    ("saliency-check", "`run smallest-slope`"),
+];
+
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";
 
@@ -305,12 +311,16 @@ pub fn named(name: &str) -> Vec<&str> {
 /// The experiment with this name.
 ///
 /// # Errors
-/// [`Error::UnknownExperiment`] with the most similar name.
+/// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with what took the place of an experiment that is gone.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
-    let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
-    all().find(|experiment| experiment.name == name).ok_or_else(|| Error::UnknownExperiment {
-        name: name.to_owned(),
-        nearest: nearest(name, all().map(|experiment| experiment.name)).map(str::to_owned),
+    let mut all = EXPERIMENTS.iter().chain(WITH_INPUT);
+    if let Some(experiment) = all.find(|experiment| experiment.name == name) {
+        return Ok(experiment);
+    }
+    let names = EXPERIMENTS.iter().chain(WITH_INPUT).map(|experiment| experiment.name);
+    Err(match REPLACED.iter().find(|(old, _)| *old == name) {
+        Some((_, by)) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
+        None => Error::unknown("experiment", name, names),
     })
 }
 
