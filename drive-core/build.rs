@@ -17,17 +17,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let Some(cure) = cure else { continue };
         let causes: Vec<&str> =
             section.lines().filter_map(|line| line.strip_prefix("* ")).collect();
-        let link = format!("(#{})", anchor(section.lines().next().unwrap_or_default()));
-        let rows = page.lines().filter(|line| line.contains(&link));
-        let codes: Vec<&str> = rows.filter_map(|row| row.split('|').nth(1)).collect();
-        arms += &format!("{} => (&{causes:?}, {cure:?}),\n", codes.join("|"));
+        let heading = section.lines().next().unwrap_or_default();
+        let codes =
+            codes(heading).ok_or_else(|| format!("{PAGE}: no fault numbers in: {heading}"))?;
+        arms += &format!("{} => (&{causes:?}, {cure:?}),\n", codes);
     }
     let out = Path::new(&env::var("OUT_DIR")?).join("remedies.rs");
     Ok(fs::write(out, format!("match code {{\n{arms}_ => (&[], \"\"),\n}}\n"))?)
 }
 
-/// The anchor of a heading, as links within the page name it.
-fn anchor(heading: &str) -> String {
-    let kept = heading.chars().filter(|c| c.is_ascii_alphanumeric() || " -".contains(*c));
-    kept.collect::<String>().to_lowercase().replace(' ', "-")
+/// The pattern of the faults in a heading: `Fault 4: ...`, `Faults 1 to 3: ...`, `Faults 7, 8 and 38: ...`.
+fn codes(heading: &str) -> Option<String> {
+    let (_, list) = heading.split_once(':')?.0.split_once(' ')?;
+    let Some((first, last)) = list.split_once(" to ") else {
+        return Some(list.replace(" and ", "|").replace(", ", "|"));
+    };
+    let all = first.parse::<u8>().ok()?..=last.parse().ok()?;
+    Some(all.map(|code| code.to_string()).collect::<Vec<_>>().join("|"))
 }

@@ -9,6 +9,8 @@ pub mod board;
 pub mod boards;
 pub mod commissioning;
 pub mod console;
+pub mod desk;
+pub mod front;
 mod hash;
 pub mod link;
 pub mod modbus;
@@ -20,3 +22,6 @@ pub mod store;
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]
 extern crate self as induction_drive;
+#[cfg(test)]
+#[path = "../tests/common/generated.rs"]
+mod generated;

@@ -7,7 +7,7 @@
 //! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,
 //!   `Drive::step`, compare values out, then one command from the console if there is one.
 //! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`chip/rs485.rs`): a byte in, a byte out.
-//! * the loop at the end of `main`, between interrupts: console (`console.rs`), the log ten times a second, the
+//! * the loop at the end of `main`, between interrupts: desk, console and field bus (`front.rs`), the log ten times a second, the
 //!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory and registers
 //!   (`task/check.rs`), and the second opinions on clock and reference (`task/sources.rs`).
 //! * `chip/stop.rs`, when the firmware cannot go on: outputs off, the reason kept for the next boot, reset.
@@ -44,12 +44,11 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)] // its stack comes in the place of that of the start
 fn run(board: task::bring_up::Board) -> ! {
-    let task::bring_up::Board { console, mut port, mut bus, supervisor } = board;
-    console.greet(supervisor);
+    let task::bring_up::Board { front, mut port, mut line, supervisor } = board;
+    front.console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        console.poll(&mut port, supervisor, now_ms);
-        console.serve(&mut bus, supervisor, now_ms);
+        front.pass(&mut port, &mut line, supervisor, now_ms);
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

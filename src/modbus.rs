@@ -1,9 +1,9 @@
 //! The field bus: a Modbus RTU slave on an RS-485 line, for PLCs, spindle controllers and scripts.
 //!
 //! Shapes: a [`Frame`] comes in whole, [`slave::answer`] makes the frame that goes out, and asks [`slave::Registers`] for
-//! words. The console has the registers ([`crate::console`]): it turns writes into the requests that its own lines make, so
-//! that settings, limits, refusals and time-out are the same on both ways.
+//! words. [`bus::Bus`] has the registers: it turns writes into orders to the desk ([`crate::desk`]).
 
+pub mod bus;
 pub mod cia402;
 pub mod faults;
 pub mod float;
@@ -28,6 +28,8 @@ pub trait Port {
     fn receive(&mut self) -> Option<Frame>;
     /// Sends a frame, after the one before.
     fn send(&mut self, frame: &Frame);
+    /// While a slave has this address the port itself answers its requests with [`slave::busy`], until `None`.
+    fn set_busy(&mut self, own: Option<u8>);
 }
 
 /// A board may have no bus.
@@ -40,5 +42,8 @@ impl<P: Port> Port for Option<P> {
     }
     fn send(&mut self, frame: &Frame) {
         self.iter_mut().for_each(|port| port.send(frame));
+    }
+    fn set_busy(&mut self, own: Option<u8>) {
+        self.iter_mut().for_each(|port| port.set_busy(own));
     }
 }

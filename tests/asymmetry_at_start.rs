@@ -1,9 +1,7 @@
 //! Procedure: the sensors drift after the drive has learned. Its next start measures by how much they differ now, so that torque at
 //! standstill has the right angle.
 
-mod common;
-
-use common::{Rig, config};
+use crate::common::{Rig, config};
 use drive_core::{Command, Fault, Mode, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Load, Plant};

@@ -1,9 +1,7 @@
 //! Procedure: a command acts the same whichever of the ten samples of the carrier period it comes behind. Each sample has
 //! its own task (`drive-core/src/drive/in_turn.rs`), and a command may come between any two.
 
-mod common;
-
-use common::config;
+use crate::common::config;
 use drive_core::AngleSource;
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Dq, Excitation, Mode, Refused, State, Stop};

@@ -1,11 +1,9 @@
 //! Procedure: what do the demodulators really see (Figure 19)? The chain as printed sees the
 //! fundamental leaking through its band-pass; the rectified one sees the saliency.
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
-use common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
+use crate::common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
 use drive_core::carrier::{CarrierPeriod, CarrierSample, Demodulate, Literal, Rectified};
 use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};

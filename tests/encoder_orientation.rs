@@ -1,9 +1,7 @@
 //! Procedure: field orientation with the encoder on a dynamometer. Is the flux where the drive says
 //! it is, and the torque what the current should give?
 
-mod common;
-
-use common::{IDEAL, ISOTROPIC, all, config, regulating_with};
+use crate::common::{IDEAL, ISOTROPIC, all, config, regulating_with};
 use hil_sim::config::plant_settings;
 use hil_sim::stats::Stats;
 

@@ -1,9 +1,7 @@
 //! Procedure: five demodulations on one motor. What each sees, where its carrier lies, and how each
 //! tracks without a position sensor.
 
-mod common;
-
-use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
+use crate::common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::Command;
 use drive_core::carrier::DemodulatorKind;
 use drive_settings::{Settings, SettingsError};

@@ -1,8 +1,6 @@
 //! Procedure: homing against an elastic stop of the simulated shaft, with the noise of its sensors.
 
-mod common;
-
-use common::config;
+use crate::common::config;
 use core::f64::consts::TAU;
 use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
 use drive_core::{Command, Mode, State, Stop};

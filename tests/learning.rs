@@ -1,8 +1,6 @@
 //! Procedure: the drive learns on its motor with the shaft locked, then drives it.
 
-mod common;
-
-use common::{all, config, run};
+use crate::common::{all, config, run};
 use drive_core::learned::Learned;
 use drive_core::table::ReferenceTable;
 use drive_core::{Command, Fault, Mode, State, Stop};

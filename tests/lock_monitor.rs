@@ -1,9 +1,7 @@
 //! Procedure: throw the sensorless drive off its flux, and see whether it notices; see whether it
 //! leaves a sound one alone.
 
-mod common;
-
-use common::{config, regulating, run};
+use crate::common::{config, regulating, run};
 use drive_core::{Command, Fault, Mode, State};
 use hil_sim::rig::Rig;
 

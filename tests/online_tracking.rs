@@ -1,11 +1,9 @@
 //! Procedure: the rotor warms up while the drive runs. Does the drive find the rotor time constant
 //! from the terminals, and does the flux stay where it believes it to be?
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::config;
+use crate::common::config;
 use drive_core::flux::TAU_R_LIMITS;
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused};
 use drive_settings::Settings;

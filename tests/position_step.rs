@@ -1,8 +1,6 @@
 //! Procedure: a position step of five turns with the encoder (Figure 37).
 
-mod common;
-
-use common::run;
+use crate::common::run;
 
 #[test]
 fn five_turns_arrive_without_overshoot() {

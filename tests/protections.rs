@@ -1,9 +1,7 @@
 //! Procedure: break a sensor while the motor runs. The drive must switch off before the current in
 //! any phase leaves the range of the sensors, and must not switch off without reason.
 
-mod common;
-
-use common::{config, regulating};
+use crate::common::{config, regulating};
 use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::plant::{Channel, CurrentFault, EncoderFault, Load};
 use hil_sim::rig::Rig;

@@ -1,10 +1,8 @@
 //! Procedure: start the sensorless drive on motors with more and less saliency.
 
-mod common;
-
 use std::thread;
 
-use common::{Rig, config};
+use crate::common::{Rig, config};
 use drive_core::{AngleSource, Command, Fault, Mode, State};
 use hil_sim::Config;
 use hil_sim::rig::RATE_HZ;

@@ -1,11 +1,9 @@
 //! Procedure: position without an encoder, on the simulated rotor: a step, and what holds it and what
 //! does not.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::config;
+use crate::common::config;
 use drive_core::{Command, Mode, State};
 use hil_sim::Config;
 use hil_sim::plant::Load;

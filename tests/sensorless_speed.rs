@@ -1,10 +1,8 @@
 //! Procedure: the speed of a free shaft regulated without a position sensor, on the simulated rotor.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{config, plant_settings};
+use crate::common::{config, plant_settings};
 use drive_core::{Command, Mode, State};
 use hil_sim::Config;
 use hil_sim::plant::Load;

@@ -1,8 +1,6 @@
 //! Procedure: torque steps and ramp with a locked shaft and no position sensor (Figures 38 and 39).
 
-mod common;
-
-use common::{IDEAL, all, config, run};
+use crate::common::{IDEAL, all, config, run};
 
 /// The chain of the source with a rectifier.
 const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];
@@ -123,7 +121,7 @@ fn negative_torque_works_as_well() {
 #[test]
 fn torque_is_linear_in_the_current_and_does_not_drift() {
     let per_ampere = |i_q: f32| {
-        let mut rig = common::regulating(&config(&[]), 31, i_q, 1.5);
+        let mut rig = crate::common::regulating(&config(&[]), 31, i_q, 1.5);
         let (mut torque, mut angle) = (vec![], vec![]);
         for _ in 0..4 {
             let (mut t, mut a, mut n) = (0.0, 0.0, 0.0);

@@ -1,8 +1,6 @@
 //! Procedure: the three ways to stop, on the simulated rotor with the noise of its sensors.
 
-mod common;
-
-use common::config;
+use crate::common::config;
 use drive_core::{Command, Mode, State, Stop};
 use hil_sim::rig::Rig;
 

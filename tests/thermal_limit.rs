@@ -1,8 +1,6 @@
 //! Procedure: more torque asked for than motor or inverter carry for any time, at standstill.
 
-mod common;
-
-use common::config;
+use crate::common::config;
 use drive_core::{Command, Limiting, Mode, State};
 use hil_sim::rig::Rig;
 

@@ -14,25 +14,27 @@ use hil_sim::rig::Rig;
 fn a_start_on_a_turning_shaft_keeps_the_resistance() {
     let mut refused = 0;
     for (seed, rpm, torque) in [(1, 85.0, -2.2), (2, -60.0, 2.2), (3, 140.0, 1.0), (4, 85.0, 2.2)] {
+        let mut config = for_the_range(&Config::default()).unwrap();
+        config.prepare.learn = true;
+        let mut rig = Rig::from_config(&config, seed).unwrap();
+        rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
+        rig.start(Mode::Torque).unwrap();
+        for n in 1..=20 {
+            let speed = rpm * f64::from(n) / 20.0 * TAU / 60.0;
+            rig.set_load(Load::Speed { speed }).unwrap();
+            rig.run(0.01, |_| {});
+        }
+        rig.command(&Command::Torque(torque)).unwrap();
+        rig.run(0.5, |_| {});
+        assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {torque} A");
+        let before = rig.drive.stator_resistance().unwrap();
+        rig.command(&Command::Stop(Stop::Coast)).unwrap();
+        while rig.drive.state() != State::Off {
+            rig.run(0.001, |_| {});
+        }
+        let stopped = rig;
         for pause in [0.05, 0.15, 0.25, 0.37, 1.5] {
-            let mut config = for_the_range(&Config::default()).unwrap();
-            config.prepare.learn = true;
-            let mut rig = Rig::from_config(&config, seed).unwrap();
-            rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
-            rig.start(Mode::Torque).unwrap();
-            for n in 1..=20 {
-                let speed = rpm * f64::from(n) / 20.0 * TAU / 60.0;
-                rig.set_load(Load::Speed { speed }).unwrap();
-                rig.run(0.01, |_| {});
-            }
-            rig.command(&Command::Torque(torque)).unwrap();
-            rig.run(0.5, |_| {});
-            assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {torque} A");
-            let before = rig.drive.stator_resistance().unwrap();
-            rig.command(&Command::Stop(Stop::Coast)).unwrap();
-            while rig.drive.state() != State::Off {
-                rig.run(0.001, |_| {});
-            }
+            let mut rig = stopped.clone();
             rig.run(pause, |_| {});
             // The residual flux and the flux of the search can cancel. The drive then takes the shaft for standing, and the
             // saliency check refuses the start.

@@ -1,9 +1,7 @@
 //! Procedure: turn a motor of which only the nameplate is known, by voltage and frequency. The parameters in `motor.*` are
 //! those of another motor throughout.
 
-mod common;
-
-use common::{config, plant_settings};
+use crate::common::{config, plant_settings};
 use drive_core::{Command, Fault, Limiting, Mode, Motor, Refused, State, Stop};
 use drive_settings::Settings;
 use hil_sim::Config;

@@ -1,9 +1,7 @@
 //! Procedure: the first start after the defaults, with the wiring right and wrong. No current may reach
 //! 0.5 A while the wiring is looked at.
 
-mod common;
-
-use common::config;
+use crate::common::config;
 use drive_core::{Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Channel, CurrentFault, Plant};

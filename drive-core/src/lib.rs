@@ -92,6 +92,9 @@ pub mod settings;
 pub mod tuning;
 #[cfg(test)]
 extern crate self as drive_core;
+#[cfg(test)]
+#[path = "../../tests/common/generated.rs"]
+mod generated;
 
 /// The examples of the documents.
 #[cfg(doctest)]

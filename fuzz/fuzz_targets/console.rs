@@ -4,9 +4,9 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use induction_drive::console::Console;
-use induction_drive::console::announce::ANNOUNCEMENTS;
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
+use induction_drive::console::line::UNASKED;
+use induction_drive::front::Front;
 use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
@@ -16,7 +16,7 @@ use drive_core::{Drive, Measured, State};
 
 #[path = "../../src/console/tests/doubles.rs"]
 mod doubles;
-use doubles::{FakeDrive, FakePort, found};
+use doubles::{FakeBus, FakeDrive, FakePort, found};
 
 fuzz_target!(|bytes: &[u8]| {
     let settings = FirmwareSettings::of_the_board();
@@ -24,7 +24,7 @@ fuzz_target!(|bytes: &[u8]| {
     static DRIVE: OnceLock<Drive> = OnceLock::new();
     let initial = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));
     let mut drive = FakeDrive::new(initial.clone());
-    let mut console = Console::new(settings);
+    let (mut front, mut bus) = (Front::new(settings), None::<FakeBus>);
     let mut port = FakePort::default();
     let mut now_ms = 0_u32;
     // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
@@ -47,7 +47,7 @@ fuzz_target!(|bytes: &[u8]| {
             0xfe => {
                 drive.drive.step(&Measured { dc_link: 311.0, ..Measured::default() });
             }
-            0xff => console.poll(&mut port, &mut drive, now_ms),
+            0xff => front.pass(&mut port, &mut bus, &mut drive, now_ms),
             _ => port.sent.push_back(byte),
         }
     }
@@ -59,11 +59,9 @@ fuzz_target!(|bytes: &[u8]| {
     while !port.sent.is_empty() || polls < 200 {
         polls = if port.sent.is_empty() { polls + 1 } else { 0 };
         now_ms = now_ms.wrapping_add(1);
-        console.poll(&mut port, &mut drive, now_ms);
+        front.pass(&mut port, &mut bus, &mut drive, now_ms);
     }
-    let mut lines = port.received.lines().filter(|line| {
-        !ANNOUNCEMENTS.iter().any(|first| line.starts_with(first))
-    });
+    let mut lines = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);
     let running = !matches!(drive.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", drive.drive.state());

@@ -34,10 +34,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Every experiment, with the figure or table it stands for
+    /// The experiments of every day, with the figure or table each stands for
     List {
-        /// Print a JSON list, with the keys that each experiment uses
+        /// The other experiments: figures and tables of the two sources, and special questions
         #[arg(long)]
+        lab: bool,
+        /// Print a JSON list of all, with the keys that each experiment uses
+        #[arg(long, conflicts_with = "lab")]
         json: bool,
     },
     /// Every key that --set and a configuration file take, with value, unit and range
@@ -140,7 +143,9 @@ pub fn main() -> ExitCode {
             &Part::default(),
             &Output::default(),
         ),
-        Some(Command::List { json }) => lists::experiments(json).and_then(|text| say(&text)),
+        Some(Command::List { lab, json }) => {
+            lists::experiments(json, lab).and_then(|text| say(&text))
+        }
         Some(Command::Motors { name, json }) => {
             lists::motors(name.as_deref(), json).and_then(|text| say(&text))
         }

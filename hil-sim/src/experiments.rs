@@ -1,216 +1,45 @@
 //! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
 #![deny(clippy::use_debug)]
 
-mod adc_calibration;
-mod angle_identification;
 mod anti_windup;
 pub mod battery;
-mod bode;
 pub mod commission;
 mod current_step;
-mod dead_time;
-mod demodulators;
-mod filters;
 pub mod full_range;
-mod identify_continuous;
-mod identify_discrete;
-mod identify_machine;
-mod identify_recursive;
-pub mod identify_trace;
-mod identify_validate;
-mod injection_map;
-mod learn_reference;
-pub mod learning;
-mod linear_model;
 mod lock_monitor;
 mod losses;
 mod machines;
-pub mod measured_motors;
-mod modulation;
 mod monte_carlo;
-mod motor_tests;
-mod online_tracking;
 mod orientation;
-mod perturbation;
-mod pi_design;
-mod plant_identification;
 mod record;
-pub mod saliency;
 pub mod scenario;
 mod sensorless_position;
 mod smallest_slope;
-pub mod statistics;
-mod steady;
-pub mod torque;
 mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
-pub mod warming_rotor;
 
-pub use torque::assumptions;
+pub use sim_bench::experiment::{
+    BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
+    assumptions,
+};
+use sim_bench::{bode, steady};
+pub use sim_bench::{learning, statistics};
+use sim_lab::{
+    adc_calibration, angle_identification, dead_time, demodulators, filters, identify_continuous,
+    identify_discrete, identify_machine, identify_recursive, identify_validate, injection_map,
+    learn_reference, modulation, motor_tests, online_tracking, perturbation, pi_design,
+    plant_identification,
+};
+pub use sim_lab::{identify_trace, measured_motors, saliency, warming_rotor};
 
 use statistics::Statistical;
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use crate::config::{Config, Key};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::Outcome;
-use crate::progress::Progress;
-
-/// Input of an experiment.
-pub struct Context<'a> {
-    /// The configuration.
-    pub config: &'a Config,
-    /// Seed of all that is random.
-    pub seed: u64,
-    /// Simulated time, s; unset: the experiment's own.
-    pub seconds: Option<f64>,
-    /// Progress bars.
-    pub progress: Progress,
-    /// File of an experiment that takes one.
-    pub file: Option<&'a Path>,
-}
-
-impl Context<'_> {
-    /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
-    ///
-    /// # Errors
-    /// The error of a job that failed.
-    pub fn in_parallel<J: Sync, T: Send>(
-        &self,
-        label: &str,
-        jobs: &[J],
-        run: impl Fn(u64, &J) -> Result<T, Error> + Sync,
-    ) -> Result<Vec<T>, Error> {
-        let bar = self.progress.bar(label, jobs.len() as u64);
-        let one = |(number, job): (usize, &J)| {
-            let result = run(number as u64, job);
-            bar.advance(1);
-            result
-        };
-        jobs.par_iter().enumerate().map(one).collect()
-    }
-}
-
-/// An experiment.
-pub struct Experiment {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// The part of the source that it reproduces: `Figure 38`.
-    pub stands_for: &'static str,
-    /// Description in one sentence.
-    pub about: &'static str,
-    /// The keys that it uses: names, and beginnings of names that end in a full stop.
-    pub uses: &'static [&'static [&'static str]],
-    /// Exceptions from `uses`, likewise: keys that the experiment sets itself, or that do nothing in it.
-    pub not: &'static [&'static [&'static str]],
-    /// Runs it.
-    pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
-}
-
-impl Experiment {
-    /// Whether a key has an effect on this experiment.
-    pub fn uses_key(&self, key: Key) -> bool {
-        let name = key.assigned_name();
-        let is_in = |given: &&str| {
-            if given.ends_with('.') { name.starts_with(given) } else { name == *given }
-        };
-        self.uses.iter().copied().flatten().any(is_in)
-            && !self.not.iter().copied().flatten().any(is_in)
-    }
-
-    /// The keys that it uses, in words.
-    pub fn uses_text(&self) -> String {
-        let words = |names: &[&str]| {
-            let shown = names.iter().map(|name| match name.strip_suffix('.') {
-                Some(group) => format!("{group}.*"),
-                None => (*name).to_owned(),
-            });
-            shown.collect::<Vec<_>>().join(", ")
-        };
-        match (self.uses.concat().as_slice(), self.not.concat().as_slice()) {
-            ([], _) => "no key".to_owned(),
-            (uses, []) => words(uses),
-            (uses, not) => format!("{}; except {}", words(uses), words(not)),
-        }
-    }
-
-    /// Whether it takes an input file.
-    fn takes_file(&self) -> bool {
-        WITH_INPUT.iter().any(|with| with.name == self.name)
-    }
-
-    /// Checks that a file is given where one is needed, and nowhere else.
-    ///
-    /// # Errors
-    /// [`Error::Refused`].
-    pub fn check_file(&self, file: Option<&Path>) -> Result<(), Error> {
-        let name = self.name;
-        match (self.takes_file(), file) {
-            (true, None) => Err(Error::Refused(format!("{name} needs --input FILE"))),
-            (false, Some(file)) => {
-                let (file, with) = (file.display(), WITH_INPUT.iter().map(|with| with.name));
-                let with = with.collect::<Vec<_>>().join(", ");
-                Err(Error::Refused(format!(
-                    "--input {file}: {name} takes no file; allowed with: {with}"
-                )))
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// Keys of the simulated motor, inverter and sensors.
-pub const BENCH: &[&str] = &[
-    "motor.",
-    "saliency.",
-    "plant",
-    "flux_level",
-    "iron.",
-    "warming.",
-    "inverter.",
-    "dc_link.",
-    "measurement.",
-    "shaft.",
-];
-/// Keys of the drive.
-pub const DRIVE: &[&str] = &[
-    "drive.",
-    "nameplate.",
-    "scales.",
-    "angle_source",
-    "current_plant",
-    "current_plant.",
-    "ignore_delays",
-    "injection.",
-    "limits.",
-    "sequence.",
-    "speed.",
-    "observer.",
-    "braking.",
-    "flux.",
-    "vf.",
-];
-/// Keys of the speed loop, which a drive that regulates torque does not use.
-pub const SPEED_LOOP: &[&str] = &[
-    "speed.limit_rpm",
-    "speed.ramp_rpm_per_s",
-    "speed.quick_rpm_per_s",
-    "speed.s_ramp_s",
-    "speed.phase_margin_deg",
-    "drive.motor.inertia",
-];
-/// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
-pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
-/// Keys of the tracking of the saliency, which a drive with an encoder does not use.
-pub const TRACKING: &[&str] =
-    &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
-/// Keys that do nothing while the shaft is locked.
-pub const TURNING: &[&str] =
-    &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
@@ -261,6 +90,20 @@ pub const EXPERIMENTS: &[Experiment] = &[
 /// The experiments that need an input file; they are no part of the report.
 pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE];
 
+/// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
+pub const EVERYDAY: [&str; 10] = [
+    "torque-steps",
+    "speed-profile",
+    "sensorless-position",
+    "profile",
+    "commission",
+    "monte-carlo",
+    "battery",
+    "full-range",
+    "torque-envelope",
+    "lock-monitor",
+];
+
 /// The experiments of many independent runs, which can be shared between machines and continued.
 pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<monte_carlo::MonteCarlo>(),
@@ -295,6 +138,22 @@ const REPLACED: &[(&str, &str)] = &[
     ("speed-torque-sweep", "`run full-range --set full_range.kind=constant`"),
     ("saliency-check", "`run smallest-slope`"),
 ];
+/// Checks that a file is given to an experiment that needs one, and to no other.
+///
+/// # Errors
+/// [`Error::Refused`].
+pub fn check_file(experiment: &Experiment, file: Option<&Path>) -> Result<(), Error> {
+    let (name, with) = (experiment.name, WITH_INPUT.iter().map(|with| with.name));
+    match (with.clone().any(|with| with == name), file) {
+        (true, None) => Err(Error::Refused(format!("{name} needs --input FILE"))),
+        (false, Some(file)) => Err(Error::Refused(format!(
+            "--input {}: {name} takes no file; allowed with: {}",
+            file.display(),
+            with.collect::<Vec<_>>().join(", ")
+        ))),
+        _ => Ok(()),
+    }
+}
 
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";
@@ -329,8 +188,7 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
 /// # Errors
 /// As [`find`], and the errors of the experiment.
 pub fn run(name: &str, config: &Config, seed: u64) -> Result<Outcome, Error> {
-    let context = Context { config, seed, seconds: None, progress: Progress::hidden(), file: None };
-    (find(name)?.run)(&context)
+    find(name)?.outcome(config, seed)
 }
 
 #[cfg(test)]
@@ -348,15 +206,7 @@ mod tests {
             page.contains(&format!("```rust\n{example}```")),
             "amplitude.rs differs from the page"
         );
-        let config = Config::default();
-        let context = Context {
-            config: &config,
-            seed: 1,
-            seconds: None,
-            progress: Progress::hidden(),
-            file: None,
-        };
-        let outcome = (amplitude::EXPERIMENT.run)(&context).unwrap();
+        let outcome = amplitude::EXPERIMENT.outcome(&Config::default(), 1).unwrap();
         let rms = |volts: u32| outcome.metrics.get(&format!("rms_at_{volts}_v_deg")).unwrap();
         assert!((0.1..5.0).contains(&rms(80)) && rms(80) < rms(40), "more carrier, less noise");
     }

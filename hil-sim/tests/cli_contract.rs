@@ -1,8 +1,7 @@
 //! What the command line promises: exit codes, messages, one JSON object, no half-written files.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, text};
+use crate::cli_common::{files, folder, hil_sim, text};
+use hil_sim::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
 
 #[test]
 fn a_run_prints_its_table_and_writes_its_page() {
@@ -154,10 +153,18 @@ fn a_page_that_cannot_be_written_is_a_failure_of_its_own() {
 #[test]
 fn lists_name_every_experiment_and_key() {
     let folder = folder("lists");
-    let list = hil_sim(&folder, &["list"]);
-    for experiment in hil_sim::experiments::EXPERIMENTS {
-        assert!(text(&list.stdout).contains(experiment.name));
-        assert!(text(&list.stdout).contains(experiment.stands_for));
+    let names = |options: &[&str]| {
+        let output = hil_sim(&folder, options);
+        let list = text(&output.stdout);
+        let heads = list.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
+        heads.map(|line| line.split_once(' ').unwrap().0.to_owned()).collect::<Vec<_>>()
+    };
+    let everyday = names(&["list"]);
+    assert_eq!(everyday, EVERYDAY);
+    let both = [everyday, names(&["list", "--lab"])].concat();
+    assert_eq!(both.len(), EXPERIMENTS.len() + WITH_INPUT.len(), "each in one of the lists");
+    for experiment in EXPERIMENTS {
+        assert!(both.iter().any(|name| name == experiment.name), "{}", experiment.name);
     }
     let keys = hil_sim(&folder, &["keys"]);
     for key in hil_sim::config::Key::all() {

@@ -15,8 +15,6 @@ use serialport::{SerialPort as _, TTYPort};
 /// A firmware with two settings.
 #[derive(Default)]
 struct Firmware {
-    /// Whether it knows `describe` and `backup`.
-    recent: bool,
     echo: bool,
     settings: BTreeMap<&'static str, f64>,
     heard: Vec<String>,
@@ -24,9 +22,9 @@ struct Firmware {
 
 type Shared = Arc<Mutex<Firmware>>;
 
-fn firmware(recent: bool, echo: bool) -> Shared {
+fn firmware(echo: bool) -> Shared {
     let settings = BTreeMap::from([("motor.r_r", 1.1), ("motor.r_s", 5.4)]);
-    Arc::new(Mutex::new(Firmware { recent, echo, settings, heard: Vec::new() }))
+    Arc::new(Mutex::new(Firmware { echo, settings, heard: Vec::new() }))
 }
 
 impl Firmware {
@@ -39,11 +37,10 @@ impl Firmware {
         };
         match words[..] {
             ["help"] => "status   the state\r\nset KEY VALUE  sets\r\nok\r\n".into(),
-            ["status"] => "fault 4: dc link above its limit\r\noff; i_d 0.00 A\r\n".into(),
+            ["status"] => "* fault 4: dc link above its limit\r\noff; i_d 0.00 A\r\n".into(),
             ["trace", ..] => "t_s,i_q_a,v_q_v\r\n0,1,20\r\n0.1,2,30\r\nok\r\n".into(),
-            ["get"] => listed(&|(name, value)| format!("{name} = {value} ohm (0.1 to 9)")),
-            ["backup"] if self.recent => listed(&|(name, value)| format!("set {name} {value}")),
-            ["describe"] if self.recent => {
+            ["backup"] => listed(&|(name, value)| format!("set {name} {value}")),
+            ["describe"] => {
                 listed(&|(name, value)| format!("{{\"name\":\"{name}\",\"value\":{value}}}"))
             }
             ["set", name, value] => match (self.settings.get_mut(name), value.parse::<f64>()) {
@@ -75,7 +72,13 @@ fn serve(mut port: impl Read + Write, firmware: &Shared) {
         let text = String::from_utf8(std::mem::take(&mut line)).unwrap();
         let mut firmware = firmware.lock().unwrap();
         let echo = if firmware.echo { format!("{text}\r\n") } else { String::new() };
-        let answer = echo + &firmware.answer(&text);
+        // A sign of life has no answer; all else has a tag, which the last line repeats.
+        let (tag, request) = text.split_once(' ').unwrap_or_default();
+        let answer = firmware.answer(request);
+        let (before, last) = answer.trim_end().rsplit_once('\n').unwrap_or(("", answer.trim_end()));
+        let before = if before.is_empty() { String::new() } else { format!("{before}\n") };
+        let last = if tag.is_empty() { String::new() } else { format!("{tag} {last}\r\n") };
+        let answer = echo + &before + &last;
         if port.write_all(answer.as_bytes()).is_err() {
             return;
         }
@@ -113,7 +116,7 @@ fn folder(name: &str) -> PathBuf {
 #[test]
 fn answers_are_printed_and_unasked_lines_kept_apart() {
     for echo in [false, true] {
-        let firmware = firmware(true, echo);
+        let firmware = firmware(echo);
         let (_theirs, port) = port(&firmware);
         let (code, out, err) = texts(&console(&port, &["status", "set motor.r_s 6", "help"]));
         assert_eq!(code, Some(0), "{err}");
@@ -126,7 +129,7 @@ fn answers_are_printed_and_unasked_lines_kept_apart() {
 
 #[test]
 fn the_first_error_ends_it_with_exit_code_1() {
-    let firmware = firmware(true, false);
+    let firmware = firmware(false);
     let (_theirs, port) = port(&firmware);
     let (code, out, err) = texts(&console(&port, &["set motor.r_s 99", "status"]));
     assert_eq!((code, out.as_str()), (Some(1), "error: motor.r_s 99: allowed 0.1 to 9\n"));
@@ -140,32 +143,29 @@ fn the_first_error_ends_it_with_exit_code_1() {
 
 #[test]
 fn settings_go_to_a_file_and_back() {
-    for recent in [true, false] {
-        let firmware = firmware(recent, false);
-        let (_theirs, port) = port(&firmware);
-        let file = folder("backup").join("drive.txt");
-        let [backup, restore] = ["backup", "restore"].map(|w| format!("!{w} {}", file.display()));
-        let (code, out, err) = texts(&console(&port, &[&backup, "set motor.r_s 2", &restore]));
-        assert_eq!(code, Some(0), "{out}{err}");
-        let text = std::fs::read_to_string(&file).unwrap();
-        assert_eq!(text, "set motor.r_r 1.1\nset motor.r_s 5.4\n", "recent: {recent}");
-        assert_eq!(firmware.lock().unwrap().settings["motor.r_s"], 5.4);
+    let firmware = firmware(false);
+    let (_theirs, port) = port(&firmware);
+    let file = folder("backup").join("drive.txt");
+    let [backup, restore] = ["backup", "restore"].map(|w| format!("!{w} {}", file.display()));
+    let (code, out, err) = texts(&console(&port, &[&backup, "set motor.r_s 2", &restore]));
+    assert_eq!(code, Some(0), "{out}{err}");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(text, "set motor.r_r 1.1\nset motor.r_s 5.4\n");
+    assert_eq!(firmware.lock().unwrap().settings["motor.r_s"], 5.4);
 
-        std::fs::write(&file, "# mine\n\nset motor.r_r 2\nset motor.r_s 77\nset motor.r_r 3\n")
-            .unwrap();
-        let (code, _, err) = texts(&console(&port, &[&restore]));
-        assert_eq!(code, Some(1));
-        for said in ["drive.txt, line 4: `set motor.r_s 77`", "allowed 0.1 to 9", "1 lines before"]
-        {
-            assert!(err.contains(said), "{said} is not in {err}");
-        }
-        assert_eq!(firmware.lock().unwrap().settings["motor.r_r"], 2.0, "it stops at the error");
+    std::fs::write(&file, "# mine\n\nset motor.r_r 2\nset motor.r_s 77\nset motor.r_r 3\n")
+        .unwrap();
+    let (code, _, err) = texts(&console(&port, &[&restore]));
+    assert_eq!(code, Some(1));
+    for said in ["drive.txt, line 4: `set motor.r_s 77`", "allowed 0.1 to 9", "1 lines before"] {
+        assert!(err.contains(said), "{said} is not in {err}");
     }
+    assert_eq!(firmware.lock().unwrap().settings["motor.r_r"], 2.0, "it stops at the error");
 }
 
 #[test]
 fn the_last_trace_is_plotted() {
-    let (_theirs, port) = port(&firmware(true, false));
+    let (_theirs, port) = port(&firmware(false));
     let file = folder("plot").join("trace.svg");
     let plot = format!("!plot {}", file.display());
     let (code, _, err) = texts(&console(&port, &[&plot]));
@@ -187,16 +187,14 @@ fn a_port_that_does_not_open_is_named() {
 
 #[test]
 fn the_drive_lists_what_can_be_completed() {
-    for recent in [true, false] {
-        let (ours, theirs) = UnixStream::pair().unwrap();
-        let firmware = firmware(recent, false);
-        std::thread::spawn(move || serve(ours, &firmware));
-        let mut link = Link::new(theirs.try_clone().unwrap(), theirs, |_: &str| ());
-        let catalogue = Catalogue::read(&mut link).unwrap();
-        assert_eq!(catalogue.settings(), 2);
-        assert_eq!(catalogue.complete("set motor.r_s 1 mo").1, ["motor.r_r", "motor.r_s"]);
-        assert_eq!(catalogue.complete("sta").1, ["status"]);
-    }
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let firmware = firmware(false);
+    std::thread::spawn(move || serve(ours, &firmware));
+    let mut link = Link::new(theirs.try_clone().unwrap(), theirs, |_: &str| ());
+    let catalogue = Catalogue::read(&mut link).unwrap();
+    assert_eq!(catalogue.settings(), 2);
+    assert_eq!(catalogue.complete("set motor.r_s 1 mo").1, ["motor.r_r", "motor.r_s"]);
+    assert_eq!(catalogue.complete("sta").1, ["status"]);
 }
 
 #[test]

@@ -1,17 +1,40 @@
 //! The sampled machine and the least squares on it: assertions A1 to A4, and the exact inverse.
 
-use hil_sim::identification::models::{
-    dc_resistance, model_b, model_c, model_d, time_constant_roots,
-};
+use hil_sim::identification::batch::{least_squares, parts};
+use hil_sim::identification::models::{model_b, model_c, model_d, time_constant_roots};
 use hil_sim::identification::trial::Noise;
 use hil_sim::identification::{
     Complex, CurrentVoltage, Data, Delta, Estimate, FirstOrderTheta, NotIdentifiable, Parameters,
     Signal, Step, Trial,
 };
+use nalgebra::DMatrix;
 
 const PERIODS: [f64; 3] = [50e-6, 100e-6, 200e-6];
 const SPEEDS: [f64; 2] = [375.0, 61.0];
 const MACHINES: [Parameters; 2] = [Parameters::PX, Parameters::RBV];
+
+/// Model A with the eight real unknowns of Eq. 24, in that order.
+fn real_regression(data: &Data) -> Result<[f64; 8], NotIdentifiable> {
+    let (i, v) = (&data.i, &data.v);
+    let count = i.len().min(v.len()).saturating_sub(2);
+    let a = DMatrix::from_fn(2 * count, 8, |row, column| {
+        let k = row / 2 + 1 - (column / 2) % 2;
+        let x = if column < 4 { i[k] } else { v[k] };
+        match (row % 2, column % 2) {
+            (0, 0) | (1, 1) => x.re,
+            (0, _) => -x.im,
+            _ => x.im,
+        }
+    });
+    let theta = least_squares(a, parts(i[2..].iter().take(count)))?.theta;
+    Ok(std::array::from_fn(|k| theta[k]))
+}
+
+/// Stator resistance from the gain at standstill of the signals, 1/r_s = (h1 + h0)/(1 - f1 - f0):
+/// exact at any speed and period.
+fn dc_resistance(delta: &Delta) -> Complex {
+    -delta.g0 / delta.u0
+}
 
 /// Machines, speeds and periods of the paper.
 fn cases() -> impl Iterator<Item = (Parameters, f64)> {
@@ -114,7 +137,7 @@ fn a2_least_squares_on_clean_data_is_exact_and_complex_equals_real() {
             }
             for data in [&clean, &noisy] {
                 let complex = data.regression().unwrap();
-                let real = data.real_regression().unwrap();
+                let real = real_regression(data).unwrap();
                 let complex = complex.delta.current_voltage().array();
                 let worst = std::iter::zip(complex, real).map(|(c, r)| (c - r).abs());
                 let worst = worst.fold(0.0, f64::max);
@@ -166,7 +189,7 @@ fn a3_model_d_is_the_exact_inverse() {
             println!("{} {h}: {worst:.1e}", machine.omega_m);
             assert!(worst < bound, "{machine:?} {h}: {worst:e}");
         }
-        let r_s = dc_resistance(&machine.current_voltage(h));
+        let r_s = dc_resistance(&machine.delta(h));
         assert!((r_s / machine.r_s - 1.0).norm() < 1e-9, "{r_s}");
     }
 }
@@ -233,7 +256,7 @@ fn what_cannot_be_identified_says_why() {
     let sine = Data { v: sine, i: lagging };
     for data in [constant(1.0, 2.0), constant(0.0, 0.0), sine] {
         assert_eq!(data.regression().unwrap_err(), NotIdentifiable::PoorExcitation);
-        assert!(data.first_order().is_err() && data.real_regression().is_err());
+        assert!(data.first_order().is_err() && real_regression(&data).is_err());
     }
     let mut short = constant(1.0, 1.0);
     short.v.truncate(4);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
 use hil_sim::identification::models::model_c;
-use hil_sim::identification::recursive::{Plain, Reference};
+use hil_sim::identification::recursive::Reference;
 use hil_sim::identification::signals::{Filter, noise};
 use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Delta, Parameters, Signal, Trial};
@@ -14,6 +14,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use rotor_id::rls::{Rls, RlsSettings};
 use rustfft::num_complex::Complex as Of;
+use rustfft::num_traits::Float;
 
 const H: f64 = 50e-6;
 const CURRENT: f64 = 30.0;
@@ -123,6 +124,68 @@ fn r1_sixty_seconds_in_single_precision() {
     for result in &results {
         assert!(result.omega_rms < 0.02, "{} rad/s", result.omega_rms);
         assert!(result.medians.iter().all(|m| *m < 1e-3), "{:?}", result.medians);
+    }
+}
+
+/// The plain recursion on Eq. 14 as textbooks print it: with g = P conj(x), K = g / (lambda + x g) and
+/// P = (P - K gᴴ) / lambda.
+///
+/// It fails, in `f32` and in `f64`: P loses its symmetry, then its sign.
+#[derive(Clone, Copy, Debug)]
+struct Plain<T> {
+    lambda: T,
+    theta: [Of<T>; 4],
+    p: [[Of<T>; 4]; 4],
+    /// Voltage and current of the last two samples, newest first.
+    samples: [[Of<T>; 2]; 2],
+    count: u32,
+}
+
+impl<T: Float> Plain<T> {
+    /// All coefficients zero, P0 = `p0` I.
+    fn new(lambda: T, p0: T) -> Self {
+        let zero = Of::new(T::zero(), T::zero());
+        let mut p = [[zero; 4]; 4];
+        for (k, row) in p.iter_mut().enumerate() {
+            row[k].re = p0;
+        }
+        Self { lambda, theta: [zero; 4], p, samples: [[zero; 2]; 2], count: 0 }
+    }
+
+    /// One filtered sample.
+    fn step(&mut self, v: Of<T>, i: Of<T>) {
+        let [[v1, v2], [i1, i2]] = self.samples;
+        self.samples = [[v, v1], [i, i1]];
+        self.count = self.count.saturating_add(1);
+        if self.count > 3 {
+            self.update([i1, i2, v1, v2], i);
+        }
+    }
+
+    fn update(&mut self, x: [Of<T>; 4], y: Of<T>) {
+        let zero = Of::new(T::zero(), T::zero());
+        let sum = |f: &dyn Fn(usize) -> Of<T>| (0..4).fold(zero, |sum, k| sum + f(k));
+        let p = self.p;
+        let column: [Of<T>; 4] = std::array::from_fn(|i| sum(&|k| p[i][k] * x[k].conj()));
+        let alpha = sum(&|k| x[k] * column[k]) + self.lambda;
+        let error = y - sum(&|k| x[k] * self.theta[k]);
+        for i in 0..4 {
+            let gain = column[i] / alpha;
+            self.theta[i] = self.theta[i] + gain * error;
+            for j in 0..4 {
+                self.p[i][j] = (p[i][j] - gain * column[j].conj()) / self.lambda;
+            }
+        }
+    }
+
+    /// Smallest real part on the diagonal of P: positive as long as P is a covariance.
+    fn smallest(&self) -> T {
+        (0..4).map(|k| self.p[k][k].re).fold(T::infinity(), |a, b| if b < a { b } else { a })
+    }
+
+    /// Whether P and the estimate are finite.
+    fn is_finite(&self) -> bool {
+        self.p.iter().flatten().chain(&self.theta).all(|x| x.re.is_finite() && x.im.is_finite())
     }
 }
 

@@ -1,10 +1,8 @@
 //! A motor of one's own, of which a file says the nameplate, the circuit and the dc link: it works the first time.
 
-mod cli_common;
-
 use std::path::Path;
 
-use cli_common::{folder, hil_sim, text};
+use crate::cli_common::{folder, hil_sim, text};
 use drive_settings::PlantSource;
 use hil_sim::config::motors::Motor;
 use hil_sim::{Config, experiments};

@@ -1,10 +1,8 @@
 //! The inverter: averaged against switched, dead time, delay, and the integration steps.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{PERIOD, TOP, duties, plant, settings, voltage};
+use crate::common::{PERIOD, TOP, duties, plant, settings, voltage};
 use drive_core::Compare;
 use hil_sim::plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
 use rand::{RngExt, SeedableRng};

@@ -1,10 +1,8 @@
 //! All outputs off: the currents end in the diodes.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{PERIOD, plant, settings, voltage};
+use crate::common::{PERIOD, plant, settings, voltage};
 use drive_core::Compare;
 use hil_sim::plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
 

@@ -48,14 +48,21 @@ fn the_figures_are_those_of_the_runs() {
     let distortion = ["current_distortion_uncompensated_pct", "current_distortion_compensated_pct"];
     let [plain, compensated] = numbers("dead-time", 1, distortion);
     let [rms, peak] = numbers("filters", 1, ["pp_sections_error_rms_a", "pp_sections_error_max_a"]);
-    let steps = ["current_step_error_max_deg", "current_step_warm_error_max_deg"];
-    let [reversal, warm] = numbers("perturbation", 1, steps);
+    let steps = [
+        "load_step_error_max_deg",
+        "current_step_error_max_deg",
+        "current_step_warm_error_max_deg",
+    ];
+    let [load, reversal, warm] = numbers("perturbation", 1, steps);
     let figures = page("docs/figures.md");
     for row in [
         format!("(delays left in: up to {left_in:.1}°)"),
         format!("encoder | within {torque:.2} % |"),
         format!("{plain:.1} % without compensation, {compensated:.2} % with it"),
         format!("≤ {:.0} µA rms, {:.0} µA peak", rms * 1e6, peak * 1e6),
+        format!(
+            "load step of 0.6 Nm on a free shaft, sensorless | angle error ≤ {load:.1}° in 72 runs"
+        ),
         format!(
             "angle error ≤ {reversal:.1}° in 24 runs; rotor 30 % warmer than believed: ≤ {warm:.1}° |"
         ),

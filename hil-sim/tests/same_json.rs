@@ -2,7 +2,7 @@
 //! experiments and is to change no figure.
 //!
 //! ```text
-//! OLD=PATH cargo test --release -p hil-sim --test same_json -- --ignored --nocapture
+//! OLD=PATH cargo test --release -p hil-sim same_json -- --ignored --nocapture
 //! ```
 //!
 //! `OLD` is the program as built before the change, `ONLY` a part of the names of the experiments. Experiments and keys that got another
@@ -48,12 +48,12 @@ fn result(program: &Path, name: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{name}: {error}: {text}"))
 }
 
-/// Names of the experiments of a program: the lines of its list that are not indented.
+/// Names of the experiments of a program.
 fn names(program: &Path) -> Vec<String> {
-    let output = Command::new(program).arg("list").output().expect("the program runs");
-    let text = String::from_utf8(output.stdout).expect("UTF-8");
-    let lines = text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_lowercase()));
-    lines.filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
+    let output = Command::new(program).args(["list", "--json"]).output().expect("it runs");
+    let list: Vec<Value> = serde_json::from_slice(&output.stdout).expect("a JSON list");
+    let names = list.iter().filter_map(|experiment| experiment["name"].as_str());
+    names.map(str::to_owned).collect()
 }
 
 /// Where two values differ, and what they are there.

@@ -1,8 +1,6 @@
 //! Scenarios: the files of the program as files of a user, an own one, and what is refused with file and line.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, object, text};
+use crate::cli_common::{files, folder, hil_sim, object, text};
 use hil_sim::experiments::scenario::QUANTITIES;
 
 /// A file of the program gives, as a file of a user, what the experiment of its name gives.

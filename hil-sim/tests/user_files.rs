@@ -1,10 +1,8 @@
 //! Files of a user: profiles, recorded traces, configuration files.
 
-mod cli_common;
-
 use std::fmt::Write as _;
 
-use cli_common::{files, folder, hil_sim, object, text};
+use crate::cli_common::{files, folder, hil_sim, object, text};
 use drive_core::{Command, Mode};
 use hil_sim::config::{Config, Value};
 use hil_sim::rig::Rig;

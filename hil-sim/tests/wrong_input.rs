@@ -1,9 +1,7 @@
 //! Fifty wrong inputs of the command line: each message names the thing, the value and what is allowed; nothing is
 //! written.
 
-mod cli_common;
-
-use cli_common::{files, folder, hil_sim, text};
+use crate::cli_common::{files, folder, hil_sim, text};
 
 /// Files of the tests: name and text.
 const FILES: [(&str, &str); 16] = [
@@ -32,7 +30,7 @@ const CASES: [(&str, &[&str]); 54] = [
     ("rum torque-steps", &["rum", "run"]),
     ("run", &["<NAME>", "cargo sim run"]),
     ("run torque-step", &["`torque-step`", "did you mean `torque-steps`?", "`list`"]),
-    ("run xyzzy", &["`xyzzy`", "`list` shows all"]),
+    ("run xyzzy", &["`xyzzy`", "`list` and `list --lab` show all"]),
     ("run torque-steps extra", &["extra"]),
     ("run torque-steps --sed 1", &["--sed", "--seed"]),
     ("keys motr", &["`motr`", "did you mean `motor`?"]),

@@ -3,7 +3,7 @@
 //! A change that keeps the control keeps these. They are those of one mathematics library, so only who changes the control asks for them:
 //!
 //! ```text
-//! cargo test --release -p hil-sim --test yardstick -- --ignored
+//! cargo test --release -p hil-sim yardstick -- --ignored
 //! ```
 //!
 //! `YARDSTICK=write` records them anew; the commit that does so says why.

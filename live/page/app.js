@@ -72,8 +72,9 @@ function lost(why) {
   // What the drive says meanwhile is not heard: a step of the set-up that waits for it ends.
   announced(`stopped: ${why}`);
 }
-/** A line of the console: an announcement. */
-function announced(line) {
+/** A line of the console: an announcement, `* TEXT`. */
+function announced(said) {
+  const line = said.replace(/^\* /, '');
   listeners.forEach(listener => listener(line));
   if (line.startsWith('fault ')) showFault();
   if (/^(off|stopped|running|homing): /.test(line)) say(line);

@@ -2,15 +2,13 @@
 //!
 //! `cargo xtask pages` runs it: it needs Chromium and the virtual board. The pictures are in `target/pages`.
 
-mod chromium;
-
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use chromium::{Browser, Page};
+use crate::chromium::{Browser, Page};
 
 /// Simulated time may pass at a tenth of the clock's: a start takes 2 s, a design as long.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -160,7 +158,10 @@ fn the_page_shows_and_drives_the_virtual_board() {
 
 fn begins(page: &mut Page<'_>) {
     state(page, "off");
-    page.until("hello && !hello.misfit && settings.length > 50", PATIENCE);
+    page.until(
+        "typeof $ == 'function' && hello && !hello.misfit && settings.length > 50",
+        PATIENCE,
+    );
 }
 
 /// The drive is started, the curves move, and a step of the torque shows in them and in the number.

@@ -6,6 +6,7 @@ use super::{
     ALL, Board, COMPARATOR_ERROR, Level, OF_SWITCHES, SENSING_ERROR, Source, check, morpho, pin,
 };
 use crate::board::{protection, settings_of};
+use crate::generated;
 
 const SCALES: [&str; 3] = ["scale of current a", "scale of current b", "scale of current c"];
 
@@ -84,13 +85,9 @@ fn shunts_refuse_both_zero_vectors() {
     }
 }
 
-/// On a difference the message is the section as it should be.
 #[test]
 fn the_manual_lists_the_boards() {
-    let manual = include_str!("../../docs/boards.md");
-    let sections = ALL.map(section);
-    let all = sections.iter().all(|section| manual.contains(section));
-    assert!(all, "docs/boards.md has to contain:\n{}", sections.join("\n"));
+    generated::check("boards.md", "boards", &ALL.map(section).join("\n"));
 }
 
 /// Nominal dc link, end of generating torque, highest in operation, trip of the software, of the comparator, with the margins

@@ -5,7 +5,7 @@
 //! driver is on nothing is received.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use drive_settings::value::Words as _;
@@ -18,7 +18,7 @@ use crate::chip::serial::PRIORITY;
 use induction_drive::boards::pin::{Pin, USART3_RX, USART3_TX};
 use induction_drive::boards::{Level, Rs485};
 use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
-use induction_drive::modbus::{self, Frame};
+use induction_drive::modbus::{self, Frame, slave};
 use induction_drive::settings::bus::{Baud, Format};
 
 /// The main loop's end of the port.
@@ -56,6 +56,9 @@ static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 static LINE: AtomicU32 = AtomicU32::new(NO_LINE);
 /// The port is off.
 const NO_LINE: u32 = u32::MAX;
+
+/// Address of a slave that is busy; 0 while it is not.
+static BUSY: AtomicU8 = AtomicU8::new(0);
 
 /// Rate and format as a word.
 fn line(baud: Baud, format: Format) -> u32 {
@@ -115,6 +118,10 @@ impl modbus::Port for Port {
         self.to_send.send_with(|place| place.clone_from(frame));
         NVIC::pend(Interrupt::USART3);
     }
+
+    fn set_busy(&mut self, own: Option<u8>) {
+        BUSY.store(own.unwrap_or(0), Ordering::Relaxed);
+    }
 }
 
 #[interrupt]
@@ -150,14 +157,31 @@ impl PortInterrupt {
         if status.rtof().bit() {
             port.icr().write(|w| w.rtocf().clear());
             if self.next.is_none() {
-                if !self.damaged && !self.frame.is_empty() {
-                    // Lost if the main loop has not taken the one before: the master asks again.
-                    self.received.send_with(|place| place.clone_from(&self.frame));
-                }
-                self.frame.clear();
+                self.end_frame();
             }
             self.damaged = false;
         }
+    }
+
+    /// A frame has come in: to the main loop, or answered here while that designs controllers for seconds.
+    fn end_frame(&mut self) {
+        let whole = !self.damaged && !self.frame.is_empty();
+        let own = BUSY.load(Ordering::Relaxed);
+        if whole && own == 0 {
+            // Lost if the main loop has not taken the one before: the master asks again.
+            self.received.send_with(|place| place.clone_from(&self.frame));
+        } else if whole && let Some(answer) = slave::busy(&self.frame, own) {
+            self.frame = answer;
+            self.transmit();
+            return;
+        }
+        self.frame.clear();
+    }
+
+    /// Begins to send the frame.
+    fn transmit(&mut self) {
+        self.next = Some(0);
+        pins::set(self.driver, Level::High);
     }
 
     /// Between two frames: begins to send, or changes the line.
@@ -167,8 +191,7 @@ impl PortInterrupt {
         }
         let frame = &mut self.frame;
         if self.to_send.take_with(|message| frame.clone_from(message)).is_some() {
-            self.next = Some(0);
-            pins::set(self.driver, Level::High);
+            self.transmit();
             return;
         }
         let wanted = LINE.load(Ordering::Relaxed);

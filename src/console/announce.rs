@@ -1,154 +1,97 @@
-//! Announcements: changes of the drive's state that the console tells unasked.
+//! The text of the news, in lines that come unasked.
 
 use core::fmt;
 
+use drive_commission::Step;
+use drive_core::State;
 use drive_core::learned::Learned;
-use drive_core::{Fault, State};
-use drive_settings::Settings;
+use drive_settings::value::Words as _;
 
-use crate::link::Status;
-
-/// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
-/// for an answer passes over them.
-pub const ANNOUNCEMENTS: [&str; 14] = [
-    "fault ",
-    "running: ",
-    "off: ",
-    "stopped: ",
-    "learning: ",
-    "learned: ",
-    "commissioning: ",
-    "homing: ",
-    "refused: ",
-    "trace: ",
-    "link: ",
-    "bus: ",
-    "applied: ",
-    "designing...",
-];
-
-/// Longest silence while the drive learns, ms.
-const PROGRESS_MS: u32 = 5000;
+use super::Console;
+use super::handle::Firmware;
+use crate::commissioning;
+use crate::desk::Desk;
+use crate::desk::news::News;
 
 /// Asymmetry that no gain mismatch explains from which on a second rotor position is advised.
 const UNEXPLAINED: f32 = 0.002;
 
-/// An announcement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum News {
-    /// The drive is in a fault.
-    Fault(Fault),
-    /// The drive regulates, in this state.
-    Running(State),
-    /// The outputs are off, for this reason.
-    Off(&'static str),
-    /// It learns.
-    Learning {
-        /// The point that is being measured, from 1 on.
-        point: usize,
-        /// Number of points.
-        points: usize,
-        /// Expected time until the end, s.
-        left_s: f32,
-    },
-}
-
-/// Follows the state of the drive.
-pub struct Announcer {
-    /// The last state that was seen.
-    state: Option<State>,
-    /// The last one but for those of a stop.
-    active: State,
-    /// Whether the console has stopped the drive.
-    stopped: bool,
-    progress: Option<(usize, usize)>,
-    told_ms: u32,
-}
-
-impl Announcer {
-    /// One that has seen nothing yet.
-    pub const fn new() -> Self {
-        Self { state: None, active: State::Off, stopped: false, progress: None, told_ms: 0 }
+impl Console {
+    /// Writes the next news, if there are any, on lines of their own.
+    #[inline(never)]
+    pub(super) fn announce(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
+        let typed = desk.settings().in_force().command.echo && self.reader.begun();
+        if typed {
+            self.out.raw("\r\n");
+        }
+        let empty = self.out.as_str().len();
+        if let Some((news, line)) = self.commissioned {
+            let (text, next) = told(&news, line);
+            self.out.news(format_args!("commissioning: {text}"));
+            self.commissioned = next.map(|line| (news, line));
+        } else if let Some(news) = desk.news(drive, now_ms) {
+            self.tell(news, desk);
+        } else if self.armed && !drive.tracing() {
+            self.armed = false;
+            self.out.news(format_args!("trace: recorded; `trace` prints it"));
+        }
+        if self.out.as_str().len() == empty {
+            self.out.clear();
+        } else if typed {
+            self.out.raw(self.reader.text());
+        }
     }
 
-    /// Notes that the console stops the drive: off is no news then, unless it takes a while.
-    pub fn stopping(&mut self) {
-        self.stopped = true;
-    }
-
-    /// The news of a report, if there are any, of a drive with these settings. `now_ms` wraps.
-    pub fn next(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
-        let state = status.state;
-        let before = self.state.replace(state);
-        if before == Some(state) {
-            return self.learning(status, settings, now_ms);
-        }
-        let was = self.active;
-        if !state.is_stopping() {
-            self.active = state;
-        }
-        match state {
-            State::Fault(fault) => Some(News::Fault(fault)),
-            State::Torque | State::Speed | State::Position | State::VoltsPerHertz => {
-                Some(News::Running(state))
+    pub(super) fn tell(&mut self, news: News, desk: &Desk) {
+        let out = &mut self.out;
+        match news {
+            News::Fault(fault) => {
+                let likely = fault.causes().first().copied().unwrap_or_default();
+                let code = fault.code();
+                out.news(format_args!("fault {code}: {fault}; likely: {likely}; type 'clear'"));
             }
-            State::Off => {
-                let asked = core::mem::take(&mut self.stopped);
-                match (before?, was) {
-                    (State::Fault(_), _) => None,
-                    // The commissioning says so itself.
-                    (State::Exciting | State::CheckingWiring, State::Exciting) => None,
-                    (State::Learning | State::Stopping, State::Learning) if !asked => {
-                        Some(News::Off("the learning has ended"))
-                    }
-                    (state, _) if state.is_stopping() || state == State::VoltsPerHertz => {
-                        Some(News::Off("stopped"))
-                    }
-                    // At once, and answered.
-                    _ if asked => None,
-                    _ => Some(News::Off("the start has ended")),
+            News::Running(state) => out.news(format_args!(
+                "running: {}",
+                match state {
+                    State::Speed => "speed",
+                    State::Position => "position",
+                    State::VoltsPerHertz => "vf",
+                    _ => "torque",
+                }
+            )),
+            News::Off(why) => out.news(format_args!("off: {why}")),
+            News::Learning { point, points, left_s } => {
+                out.news(format_args!("learning: point {point} of {points}, {left_s:.0} s left"));
+            }
+            News::Learned => {
+                let Some((_, result)) = desk.learned() else { return };
+                out.news(format_args!("{}", outcome(result)));
+                if let Some(tracked) = desk.settings().in_force().drive.tracked(result) {
+                    out.news(format_args!("learned: {tracked}"));
                 }
             }
-            State::Learning => {
-                self.progress = None;
-                self.learning(status, settings, now_ms)
+            News::Commissioning(news) => {
+                let (text, next) = told(&news, 0);
+                out.news(format_args!("commissioning: {text}"));
+                self.commissioned = next.map(|line| (news, line));
             }
-            _ => None,
-        }
-    }
-
-    fn learning(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
-        let (point, points) = status.learning?;
-        let late = now_ms.wrapping_sub(self.told_ms) >= PROGRESS_MS;
-        if self.progress == status.learning && !late {
-            return None;
-        }
-        (self.progress, self.told_ms) = (status.learning, now_ms);
-        Some(News::Learning { point, points, left_s: settings.learning().seconds_left(point) })
-    }
-}
-
-impl fmt::Display for News {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Fault(fault) => {
-                let likely = fault.causes().first().copied().unwrap_or_default();
-                write!(f, "fault {}: {fault}; likely: {likely}; type 'clear'", fault.code())
-            }
-            Self::Running(State::Speed) => f.write_str("running: speed"),
-            Self::Running(State::Position) => f.write_str("running: position"),
-            Self::Running(State::VoltsPerHertz) => f.write_str("running: vf"),
-            Self::Running(_) => f.write_str("running: torque"),
-            Self::Off(why) => write!(f, "off: {why}"),
-            Self::Learning { point, points, left_s } => {
-                write!(f, "learning: point {point} of {points}, {left_s:.0} s left")
+            News::Homed(Ok(())) => out.news(format_args!("homing: position 0 is at the stop")),
+            News::Homed(Err(why)) => out.news(format_args!("homing: {why}")),
+            News::Stopped(stopped) => match stopped.refused {
+                None => out.news(format_args!("stopped: no command for {} s", stopped.limit_s)),
+                Some(why) => out.news(format_args!("error: not stopped: {why}")),
+            },
+            News::BusRefused => {
+                if let Some(why) = desk.refusal() {
+                    out.news(format_args!("bus: refused: {why}"));
+                }
             }
         }
     }
 }
 
 /// The announcement of a learning's result.
-pub fn outcome(result: &Learned) -> impl fmt::Display {
+fn outcome(result: &Learned) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         if result.verdict.is_accepted() {
             write!(f, "learned: {result}; ")?;
@@ -163,4 +106,30 @@ pub fn outcome(result: &Learned) -> impl fmt::Display {
             write!(f, "refused: {result}")
         }
     })
+}
+
+/// Line number `line` of what is told of a commissioning's news, and the number of the next line.
+fn told(news: &commissioning::News, line: usize) -> (impl fmt::Display, Option<usize>) {
+    let value = match news {
+        commissioning::News::Report(report) => report.values.get(line).copied().flatten(),
+        commissioning::News::Ended { .. } => None,
+    };
+    let text = fmt::from_fn(move |f| match (news, value) {
+        (commissioning::News::Report(report), Some(value)) => {
+            write!(f, "{}: {value}", report.step.word())
+        }
+        (commissioning::News::Report(report), None) => write!(f, "{report}"),
+        (commissioning::News::Ended { sound: true, step }, _) => {
+            f.write_str("ended; `accept` puts it in force and saves it")?;
+            // Another motor has to be learned.
+            f.write_str(match step {
+                Step::Inertia => "",
+                _ => "; then lock the shaft and `learn`",
+            })
+        }
+        (commissioning::News::Ended { sound: false, .. }, _) => {
+            f.write_str("ended; the settings are as they were")
+        }
+    });
+    (text, value.map(|_| line + 1))
 }

@@ -13,14 +13,16 @@ use drive_commission::Step;
 use drive_core::{Fault, Mode, Stop, homing};
 use drive_settings::value::{self, Words as _};
 
+use super::line::Tag;
 use super::suggest::nearest;
 use crate::board;
 use crate::boards;
+use crate::desk::order::Order;
 use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
 
 use backup::{hexadecimal, restore};
-pub use error::ParseError;
+pub use error::{ParseError, TagError};
 pub use recording::Stream;
 pub use request::{LEVELS, Level, Request, WORDS_IN_LINE};
 
@@ -64,54 +66,127 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Parses one line, in lower case.
+/// Splits the tag off a line: `@17 status` is the request `status` with the tag `17`.
+///
+/// # Errors
+/// A tag of no characters or of more than [`LONGEST_TAG`](super::line::LONGEST_TAG).
+pub fn tagged(line: &mut str) -> Result<(Option<Tag>, &mut str), TagError> {
+    if !line.starts_with('@') {
+        return Ok((None, line));
+    }
+    let end = line.find(' ').unwrap_or(line.len());
+    let (tag, request) = line.split_at_mut(end);
+    let tag = Tag::try_from(&tag[1..]).ok().filter(|tag| !tag.is_empty()).ok_or(TagError)?;
+    Ok((Some(tag), request))
+}
+
+/// Parses one request, in lower case.
 ///
 /// # Errors
 /// The first invalid or missing word. A line is valid as a whole or not at all.
 pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
     let mut words = Words(line.split_ascii_whitespace());
-    let request = match words.next("a command")? {
-        "help" | "h" | "?" => Request::Help,
-        "status" => Request::Status,
-        "history" => Request::History,
+    let word = words.next("a command")?;
+    let request = match order(word, &mut words)? {
+        Some(order) => Request::Order(order),
+        None => match word {
+            "help" | "h" | "?" => Request::Help,
+            "status" => Request::Status,
+            "history" => Request::History,
+            "get" => match words.optional() {
+                None => Request::List(""),
+                Some(name) => match keys::find(name) {
+                    Some(key) => Request::Get(key),
+                    None => Request::List(prefix(name)?),
+                },
+            },
+            "describe" => match words.optional() {
+                Some("stream") => Request::Signals,
+                word => Request::Describe(word.map_or(Ok(""), prefix)?),
+            },
+            "backup" => Request::Backup,
+            "learned" => match words.optional() {
+                None => Request::Learned,
+                Some("check") => Request::Restored(hexadecimal(words.next("the checksum")?)?),
+                Some(index) => restore(index, &mut words)?,
+            },
+            "faults" => Request::Faults(words.optional().map(fault).transpose()?),
+            "trace" => match words.optional() {
+                None => Request::ShowTrace,
+                Some("off") => Request::EndTrace,
+                Some(records) => Request::Trace(recording::plan(records, &mut words)?),
+            },
+            "stream" => match words.optional() {
+                None => Request::StreamState,
+                Some("off") => Request::EndStream,
+                Some(signal) => Request::Stream(recording::stream(signal, &mut words)?),
+            },
+            "baud" => {
+                let word = words.next("the bits per second")?;
+                let (min, max) = (board::SERIAL_BAUD, board::SERIAL_BAUD_MAX);
+                Request::Baud(whole("the bits per second", word, min, max)?)
+            }
+            "log" => {
+                Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?)
+            }
+            "board" => {
+                match words.optional() {
+                    None => Request::Board,
+                    Some(word) => Request::Order(Order::BoardIs(boards::find(word).ok_or(
+                        ParseError::OneOf { what: "the board", word, all: boards::ALL_NAMES },
+                    )?)),
+                }
+            }
+            "version" => Request::Version,
+            word => {
+                return Err(ParseError::Command { word, near: nearest(word, COMMANDS.split(' ')) });
+            }
+        },
+    };
+    words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))
+}
+
+/// The order that begins with this word; `None` if it begins none.
+fn order<'a>(word: &str, words: &mut Words<'a>) -> Result<Option<Order>, ParseError<'a>> {
+    Ok(Some(match word {
         "start" => match words.optional() {
-            None | Some("torque") => Request::Start(Mode::Torque),
-            Some("speed") => Request::Start(Mode::Speed),
-            Some("position") => Request::Start(Mode::Position),
-            Some("vf") => Request::Start(Mode::VoltsPerHertz),
-            Some("learning") => Request::Learn { again: false },
+            None | Some("torque") => Order::Start(Mode::Torque),
+            Some("speed") => Order::Start(Mode::Speed),
+            Some("position") => Order::Start(Mode::Position),
+            Some("vf") => Order::Start(Mode::VoltsPerHertz),
+            Some("learning") => Order::Learn { again: false },
             Some(word) => {
                 let all = "torque speed position vf learning";
                 return Err(ParseError::OneOf { what: "the mode", word, all });
             }
         },
         "commission" => match words.optional() {
-            None => Request::Commission(Step::Nameplate, Step::LAST),
+            None => Order::Commission(Step::Nameplate, Step::LAST),
             Some(word) => {
                 let first = step(word)?;
-                Request::Commission(first, words.optional().map_or(Ok(first), step)?)
+                Order::Commission(first, words.optional().map_or(Ok(first), step)?)
             }
         },
-        "accept" => Request::Accept,
+        "accept" => Order::Accept,
         "learn" => match words.optional() {
-            None => Request::Learn { again: false },
-            Some("again") => Request::Learn { again: true },
+            None => Order::Learn { again: false },
+            Some("again") => Order::Learn { again: true },
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
         "stop" => match words.optional() {
-            None => Request::Stop(Stop::Coast),
-            Some("ramp") => Request::Stop(Stop::Ramp),
-            Some("quick") => Request::Stop(Stop::Quick),
+            None => Order::Stop(Stop::Coast),
+            Some("ramp") => Order::Stop(Stop::Ramp),
+            Some("quick") => Order::Stop(Stop::Quick),
             Some(word) => {
                 return Err(ParseError::OneOf { what: "the way to stop", word, all: "ramp quick" });
             }
         },
-        "relock" => Request::Relock,
-        "torque" => Request::Torque(words.number("the current, A")?),
-        "speed" => Request::Speed(words.number("the speed, rpm")?),
-        "jog" => Request::Jog(words.number("the speed, rpm")?),
-        "position" => Request::Position(words.number("the position, turns")?),
-        "home" => Request::Home(homing::Plan {
+        "relock" => Order::Relock,
+        "torque" => Order::Torque(words.number("the current, A")?),
+        "speed" => Order::Speed(words.number("the speed, rpm")?),
+        "jog" => Order::Jog(words.number("the speed, rpm")?),
+        "position" => Order::Position(words.number("the position, turns")?),
+        "home" => Order::Home(homing::Plan {
             rpm: words.number("the speed, rpm")?,
             i_q: words.number("the current, A")?,
             turns: words.number("the longest way, turns")?,
@@ -122,71 +197,25 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             let word = words.next("encoder or injection")?;
             let value = key.parse(word);
             let value = value.map_err(|why| ParseError::Value { key, word, why })?;
-            Request::Set([(key, value)].into_iter().collect())
+            Order::Set([(key, value)].into_iter().collect())
         }
-        "get" => match words.optional() {
-            None => Request::List(""),
-            Some(name) => match keys::find(name) {
-                Some(key) => Request::Get(key),
-                None => Request::List(prefix(name)?),
-            },
-        },
-        "describe" => match words.optional() {
-            Some("stream") => Request::Signals,
-            word => Request::Describe(word.map_or(Ok(""), prefix)?),
-        },
-        "set" => Request::Set(assignments(&mut words)?),
-        "apply" => Request::Apply,
-        "revert" => Request::Revert,
-        "save" => Request::Save,
-        "defaults" => Request::Defaults,
-        "backup" => Request::Backup,
-        "learned" => match words.optional() {
-            None => Request::Learned,
-            Some("check") => Request::Restored(hexadecimal(words.next("the checksum")?)?),
-            Some(index) => restore(index, &mut words)?,
-        },
-        "faults" => Request::Faults(words.optional().map(fault).transpose()?),
-        "clear" => Request::Clear,
-        "trace" => match words.optional() {
-            None => Request::ShowTrace,
-            Some("off") => Request::EndTrace,
-            Some(records) => Request::Trace(recording::plan(records, &mut words)?),
-        },
-        "stream" => match words.optional() {
-            None => Request::StreamState,
-            Some("off") => Request::EndStream,
-            Some(signal) => Request::Stream(recording::stream(signal, &mut words)?),
-        },
-        "baud" => {
-            let word = words.next("the bits per second")?;
-            let (min, max) = (board::SERIAL_BAUD, board::SERIAL_BAUD_MAX);
-            Request::Baud(whole("the bits per second", word, min, max)?)
-        }
-        "log" => Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?),
+        "set" => Order::Set(assignments(words)?),
+        "apply" => Order::Apply,
+        "revert" => Order::Revert,
+        "save" => Order::Save,
+        "defaults" => Order::Defaults,
+        "clear" => Order::Clear,
         "echo" => {
-            Request::Echo(words.one_of("on or off", "on off", &[("on", true), ("off", false)])?)
+            Order::Echo(words.one_of("on or off", "on off", &[("on", true), ("off", false)])?)
         }
         "reboot" => match words.optional() {
-            None => Request::Reboot(false),
-            Some("now") => Request::Reboot(true),
+            None => Order::Reboot(false),
+            Some("now") => Order::Reboot(true),
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
-        "board" => match words.optional() {
-            None => Request::Board,
-            Some(word) => Request::BoardIs(boards::find(word).ok_or(ParseError::OneOf {
-                what: "the board",
-                word,
-                all: boards::ALL_NAMES,
-            })?),
-        },
-        "confirm" => words.one_of("what to confirm", "board", &[("board", Request::Confirm)])?,
-        "version" => Request::Version,
-        word => {
-            return Err(ParseError::Command { word, near: nearest(word, COMMANDS.split(' ')) });
-        }
-    };
-    words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))
+        "confirm" => words.one_of("what to confirm", "board", &[("board", Order::Confirm)])?,
+        _ => return Ok(None),
+    }))
 }
 
 /// The step of the commissioning with this name.

@@ -5,10 +5,18 @@ use core::fmt;
 use heapless::String;
 use thiserror::Error;
 
-/// Longest line that is taken, characters without its end.
-pub const LONGEST: usize = 120;
+/// Longest tag of a request, characters.
+pub const LONGEST_TAG: usize = 8;
+/// Longest line that is taken, characters without its end: a request of 120 behind `@TAG `.
+pub const LONGEST: usize = 120 + LONGEST_TAG + 2;
 /// Room for text that goes out, bytes: the longest line, that of `status`, or one of `describe` and what was typed so far.
 pub const OUTPUT: usize = 504;
+
+/// Tag of a request.
+pub type Tag = String<LONGEST_TAG>;
+
+/// Beginning of each line that comes unasked, and of no other.
+pub const UNASKED: &str = "* ";
 
 const CTRL_C: u8 = 0x03;
 const BACKSPACE: u8 = 0x08;
@@ -96,7 +104,7 @@ impl LineReader {
     }
 
     /// Writes the text that a terminal is to show for the next byte, before it is [pushed](Self::push).
-    pub fn echo<const N: usize>(&self, byte: u8, to: &mut OutputLine<N>) {
+    pub fn echo(&self, byte: u8, to: &mut OutputLine) {
         match byte {
             b'\n' if self.returned => {}
             b'\r' | b'\n' => to.raw("\r\n"),
@@ -134,26 +142,37 @@ impl LineReader {
 
 /// Text that goes out. What does not fit is cut off, between characters.
 #[derive(Default)]
-pub struct OutputLine<const N: usize = OUTPUT> {
-    text: String<N>,
-    muted: bool,
+pub struct OutputLine {
+    text: String<OUTPUT>,
+    /// Tag of the request whose answer has not ended.
+    tag: Option<Tag>,
 }
 
-impl<const N: usize> OutputLine<N> {
-    /// Drops what is added from now on, or no more.
-    pub fn mute(&mut self, muted: bool) {
-        self.muted = muted;
+impl OutputLine {
+    /// Begins the answer to a request with this tag, if it has one.
+    pub fn begin_answer(&mut self, tag: Option<Tag>) {
+        self.tag = tag;
     }
 
-    /// Adds a line.
+    /// Adds the last line of an answer, behind the request's tag.
+    pub fn answer(&mut self, text: fmt::Arguments<'_>) {
+        match self.tag.take() {
+            Some(tag) => self.line(format_args!("@{tag} {text}")),
+            None => self.line(text),
+        }
+    }
+
+    /// Adds a line that comes unasked.
+    pub fn news(&mut self, text: fmt::Arguments<'_>) {
+        self.line(format_args!("{UNASKED}{text}"));
+    }
+
+    /// Adds a line: of an answer, one that others follow.
     pub fn line(&mut self, text: fmt::Arguments<'_>) {
         const END: &str = "\r\n";
-        if self.muted {
-            return;
-        }
         // Writing to it never fails.
         let _ = fmt::Write::write_fmt(self, text);
-        while self.text.len() + END.len() > N {
+        while self.text.len() + END.len() > OUTPUT {
             self.text.pop();
         }
         let _ = self.text.push_str(END);
@@ -175,9 +194,9 @@ impl<const N: usize> OutputLine<N> {
     }
 }
 
-impl<const N: usize> fmt::Write for OutputLine<N> {
+impl fmt::Write for OutputLine {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        let fits = text.floor_char_boundary(N - self.text.len());
+        let fits = text.floor_char_boundary(OUTPUT - self.text.len());
         let fits = text.get(..fits).unwrap_or_default();
         self.text.push_str(fits).map_err(|()| fmt::Error)
     }

@@ -4,15 +4,17 @@ use core::fmt;
 
 use drive_core::Fault;
 use drive_core::io::PERIOD_S;
+use drive_settings::Settings;
 use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
 use super::Console;
-use super::handle::DriveHandle;
+use super::handle::Firmware;
 use super::help::HELP;
 use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
+use crate::desk::Desk;
 use crate::link::trace::Plan;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::{self, Key};
@@ -53,13 +55,10 @@ impl Console {
     }
 
     /// Writes the next line of the list, or `ok` behind the last; nothing if the list has to wait.
-    pub(super) fn next_of_list(&mut self, drive: &impl DriveHandle) {
+    pub(super) fn next_of_list(&mut self, desk: &Desk, drive: &impl Firmware) {
         let Some(List { kind, next }) = self.list else { return };
         let line = usize::from(next);
-        let settings = self.settings.in_force();
-        // The last result if it is not believable, else the one in use.
-        let learned = self.unbelievable.as_ref().or(settings.learned.as_ref());
-        let believable = self.unbelievable.is_none();
+        let settings = desk.settings().in_force();
         let out = &mut self.out;
         let mut say = |text: &dyn fmt::Display, next| {
             out.line(format_args!("{text}"));
@@ -68,30 +67,31 @@ impl Console {
         let written = match kind {
             ListKind::Help => HELP.get(line).map(|text| say(text, next + 1)),
             ListKind::Settings(prefix) => setting_from(line, prefix)
-                .map(|(key, next)| say(&Setting::new(key, &self.settings), next)),
+                .map(|(key, next)| say(&Setting::new(key, desk.settings()), next)),
             ListKind::Describe(prefix) => setting_from(line, prefix)
-                .map(|(key, next)| say(&Description::new(key, &self.settings), next)),
-            ListKind::Backup => self.backup(line),
+                .map(|(key, next)| say(&Description::new(key, desk.settings()), next)),
+            ListKind::Backup => self.backup(line, settings),
             ListKind::Board => reply::board(settings, line).map(|text| say(&text, next + 1)),
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
             ListKind::History => {
                 reply::history(drive.history(), line).map(|text| say(&text, next + 1))
             }
-            ListKind::Learned => learned
-                .and_then(|result| reply::learned(result, believable, next))
+            ListKind::Learned => desk
+                .learned()
+                .and_then(|(in_use, result)| reply::learned(result, in_use, next))
                 .map(|text| say(&text, next + 1)),
             ListKind::Signals => super::stream::described(line).map(|text| say(&text, next + 1)),
             ListKind::Trace if drive.tracing() => return,
-            ListKind::Trace => self.trace_line(next, drive),
+            ListKind::Trace => self.trace_line(next, &settings.drive, drive),
         };
         self.list = written.map(|next| List { kind, next });
         if written.is_none() {
-            self.out.line(format_args!("ok"));
+            self.ok();
         }
     }
 
     /// The header, then a line a record.
-    fn trace_line(&mut self, next: u16, drive: &impl DriveHandle) -> Option<u16> {
+    fn trace_line(&mut self, next: u16, settings: &Settings, drive: &impl Firmware) -> Option<u16> {
         let Plan { choice, divider, .. } = self.traced.as_ref()?;
         let Some(i) = next.checked_sub(1) else {
             let names = fmt::from_fn(|f| {
@@ -102,7 +102,6 @@ impl Console {
         };
         let (from_trigger, record) = drive.traced(i)?;
         let seconds = f32::from(from_trigger) * f32::from(*divider) * PERIOD_S;
-        let settings = &self.settings.in_force().drive;
         let values = fmt::from_fn(|f| {
             record.iter().zip(choice.signals()).try_for_each(|(value, signal)| {
                 write!(f, ",{}", Significant(signal.shown(*value, settings), TRACE_DIGITS))
@@ -114,12 +113,12 @@ impl Console {
 
     /// Writes the next line of a backup, from this place on: the board; `defaults`; the words, since ranges depend on them, and then
     /// the numbers that differ from the image; what was learned; `apply`.
-    fn backup(&mut self, place: usize) -> Option<u16> {
+    fn backup(&mut self, place: usize, settings: &FirmwareSettings) -> Option<u16> {
         const FIRST: usize = 2;
         const NUMBERS: usize = FIRST + keys::COUNT;
         const LEARNED: usize = NUMBERS + keys::COUNT;
         const LAST: usize = 1000;
-        let (settings, out) = (self.settings.in_force(), &mut self.out);
+        let out = &mut self.out;
         if place < FIRST {
             match place {
                 0 => out.line(format_args!("board {}", settings.board.name)),

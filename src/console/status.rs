@@ -9,29 +9,30 @@ use drive_core::{Hardware, Limiting, State};
 use drive_settings::{CurrentSensors, Settings};
 
 use super::Console;
-use super::handle::DriveHandle;
+use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
+use crate::desk::Desk;
 use crate::link::Status;
 use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
 
 impl Console {
     /// Answers with the status line.
-    pub(super) fn status(&mut self, drive: &impl DriveHandle) {
+    pub(super) fn status(&mut self, desk: &Desk, drive: &impl Firmware) {
         let Some(status) = drive.status() else { return self.error(&drive.no_control()) };
         let tracking = drive.tracking().filter(|_| status.state.regulates());
-        let staged = self.settings.count();
+        let staged = desk.settings().count();
         let line = fmt::from_fn(|f| {
-            line(f, &status, self.settings.in_force(), drive.stack())?;
+            line(f, &status, desk.settings().in_force(), drive.stack())?;
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
-            let settings = &self.settings.in_force().drive;
+            let settings = &desk.settings().in_force().drive;
             temperatures(f, status.stator_resistance, rotor, settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
-        self.out.line(format_args!("{line}"));
+        self.out.answer(format_args!("{line}"));
     }
 }
 

@@ -9,10 +9,12 @@ use thiserror::Error;
 
 use super::Console;
 use super::grammar::Stream;
-use super::handle::{DriveHandle, Port};
+use super::handle::{Firmware, Port};
 use crate::board;
+use crate::desk::Desk;
 use crate::link::ring::Record;
 use crate::link::trace::{self, SIGNALS};
+use crate::settings::bus::Commander;
 
 const _: () = assert!(trace::MOST == MOST_SIGNALS);
 
@@ -72,7 +74,7 @@ struct TooMuch {
 
 impl Console {
     /// Begins a stream.
-    pub(super) fn stream(&mut self, stream: Stream, drive: &mut impl DriveHandle) {
+    pub(super) fn stream(&mut self, stream: Stream, drive: &mut impl Firmware) {
         let (signals, baud) = (stream.choice.signals().count(), self.wire.wanted);
         let rate = board::PWM_HZ / u32::from(stream.divider).max(1);
         let wanted = rate * wire_bytes(signals) as u32;
@@ -85,31 +87,31 @@ impl Console {
         drive.stream(stream.divider);
         let (divider, baud, wanted) = (stream.divider, self.wire.baud, self.wire.wanted);
         self.wire = Wire { stream: Some(stream), baud, wanted, ..Wire::new() };
-        self.out.line(format_args!("ok: every {divider} periods"));
+        self.out.answer(format_args!("ok: every {divider} periods"));
     }
 
     /// Tells the state of the stream.
     pub(super) fn stream_state(&mut self) {
         let Wire { sent, dropped, .. } = self.wire;
         let on = if self.wire.stream.is_some() { "on" } else { "off" };
-        self.out.line(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
+        self.out.answer(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
     }
 
     /// Asks for a rate; a stream ends.
-    pub(super) fn baud(&mut self, baud: u32, drive: &mut impl DriveHandle) {
+    pub(super) fn baud(&mut self, baud: u32, drive: &mut impl Firmware) {
         self.stop_stream(drive);
         self.wire.wanted = baud;
         self.ok();
     }
 
     /// Ends the stream and tells its state.
-    pub(super) fn end_stream(&mut self, drive: &mut impl DriveHandle) {
+    pub(super) fn end_stream(&mut self, drive: &mut impl Firmware) {
         self.stop_stream(drive);
         self.stream_state();
     }
 
     /// Ends the stream.
-    pub(super) fn stop_stream(&mut self, drive: &mut impl DriveHandle) {
+    pub(super) fn stop_stream(&mut self, drive: &mut impl Firmware) {
         drive.stream(0);
         self.wire.stream = None;
     }
@@ -118,9 +120,9 @@ impl Console {
     pub(super) fn send_frames(
         &mut self,
         port: &mut impl Port,
-        drive: &mut impl DriveHandle,
+        settings: &Settings,
+        drive: &mut impl Firmware,
     ) -> bool {
-        let settings = &self.settings.in_force().drive;
         let wire = &mut self.wire;
         // As many as the ring holds at most: the main loop goes on.
         for _ in 0..=board::RECORDED_PERIODS {
@@ -137,11 +139,23 @@ impl Console {
         false
     }
 
+    /// Ends the stream when no line came for the time that it allows; the drive is stopped, if the console commands.
+    pub(super) fn watch_link(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
+        let alive_s = self.wire.alive_s();
+        let silence_ms = now_ms.wrapping_sub(*self.line_ms.get_or_insert(now_ms));
+        if alive_s > 0.0 && silence_ms as f32 * 1e-3 > alive_s {
+            self.stop_stream(drive);
+            if desk.commander() == Commander::Console {
+                desk.stop_after_silence(alive_s, drive, now_ms);
+            }
+        }
+    }
+
     /// Changes the rate that was asked for, when the answer is sent; falls back without a valid line.
     pub(super) fn watch_rate(
         &mut self,
         port: &mut impl Port,
-        drive: &mut impl DriveHandle,
+        drive: &mut impl Firmware,
         now_ms: u32,
     ) {
         let usual = board::SERIAL_BAUD;
@@ -151,7 +165,7 @@ impl Console {
                 self.wire.baud = wanted;
                 self.line_ms = Some(now_ms);
                 if wanted == usual {
-                    self.out.line(format_args!("link: {usual} baud"));
+                    self.out.news(format_args!("link: {usual} baud"));
                 }
             }
         } else if self.wire.baud != usual

@@ -1,25 +1,30 @@
 mod announcements;
 mod bus;
 mod commission;
+mod documents;
 mod doubles;
 mod learning;
 mod lists;
 mod staging;
 mod stream;
+mod tags;
 mod torque;
 mod typing;
 mod wrong;
 
-use super::announce::ANNOUNCEMENTS;
 use super::help::HELP;
 use super::*;
 use crate::boards;
+use crate::front::Front;
 use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
+use crate::settings::FirmwareSettings;
 use crate::settings::keys;
-use doubles::{FakeDrive, FakePort, found};
+/// For the tests of the desk.
+pub(crate) use doubles::FakeDrive;
+use doubles::{FakeBus, FakePort, found};
 use drive_core::io::PERIOD_S;
-use drive_core::learned::Verdict;
+use drive_core::learned::{Learned, Verdict};
 use drive_core::{
     Command, Compare, Drive, Fault, FrontEndState, Hardware, Measured, Mode, Sample, State, Stop,
 };
@@ -32,7 +37,7 @@ fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Co
 }
 
 struct Talk {
-    console: Console,
+    front: Front,
     drive: FakeDrive,
     port: FakePort,
     now_ms: u32,
@@ -50,7 +55,7 @@ impl Talk {
 
     fn with(settings: FirmwareSettings) -> Self {
         Self {
-            console: Console::new(settings),
+            front: Front::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
             now_ms: 0,
@@ -58,16 +63,19 @@ impl Talk {
     }
 
     fn poll(&mut self) {
-        self.console.poll(&mut self.port, &mut self.drive, self.now_ms);
+        let mut no_line = None::<FakeBus>;
+        self.front.pass(&mut self.port, &mut no_line, &mut self.drive, self.now_ms);
     }
 
     /// Sends bytes and gives the replies, until the console has nothing more to say.
     fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
         self.port.sent.extend(bytes.as_ref());
-        let mut said = usize::MAX;
-        while !self.port.sent.is_empty() || self.port.received.len() != said {
-            said = self.port.received.len();
+        // What happens at the end of a pass is told in the next.
+        let mut silent = 0;
+        while !self.port.sent.is_empty() || silent < 2 {
+            let said = self.port.received.len();
             self.poll();
+            silent = if self.port.received.len() == said { silent + 1 } else { 0 };
         }
         let text = std::mem::take(&mut self.port.received);
         text.split_terminator("\r\n").map(str::to_owned).collect()
@@ -76,7 +84,7 @@ impl Talk {
     /// Sends a line that has one reply, beside what comes unasked.
     fn ask(&mut self, line: &str) -> String {
         let mut replies = self.say(format!("{line}\n"));
-        replies.retain(|reply| !ANNOUNCEMENTS.iter().any(|first| reply.starts_with(first)));
+        replies.retain(|reply| !reply.starts_with(line::UNASKED));
         assert_eq!(replies.len(), 1, "{replies:?}");
         replies.into_iter().next().unwrap()
     }
@@ -85,8 +93,8 @@ impl Talk {
 #[test]
 fn says_at_the_start_who_it_is_and_what_ended_the_last_run() {
     let mut talk = Talk::new();
-    talk.console.greet(&talk.drive);
-    assert_eq!(talk.say(""), ["induction-drive version; last run: power-on"]);
+    talk.front.console.greet(&talk.drive);
+    assert_eq!(talk.say(""), ["* induction-drive version; last run: power-on"]);
 }
 
 #[test]
@@ -174,7 +182,7 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     settings.drive.scales = drive_settings::Scales::default();
     settings.confirm_board();
     let mut talk = Talk::new();
-    talk.console = Console::new(settings);
+    talk.front.desk = Desk::new(settings);
     talk.drive.drive = Drive::new(settings.build().unwrap());
     let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
@@ -206,7 +214,7 @@ fn silence_stops_a_running_drive_once_and_only_if_asked_for() {
     // What is not understood does not count.
     talk.ask("rubbish");
     talk.now_ms += 200;
-    assert_eq!(talk.say(""), ["stopped: no command for 2 s"]);
+    assert_eq!(talk.say(""), ["* stopped: no command for 2 s"]);
     assert_eq!(talk.drive.drive.state(), State::Off);
     talk.now_ms += 5000;
     assert!(talk.say("").is_empty());
@@ -217,7 +225,7 @@ fn half_lines_are_dropped_in_time() {
     let mut talk = Talk::new();
     assert!(talk.say("start").is_empty());
     talk.now_ms += LINE_MS + 1;
-    assert_eq!(talk.say(""), ["error: the line was not finished"]);
+    assert_eq!(talk.say(""), ["* error: the line was not finished"]);
     assert_eq!(talk.say("\n"), [""; 0]);
     assert!(talk.drive.commands.is_empty());
 }
@@ -248,7 +256,7 @@ fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved()
     let mut talk = Talk::new();
     let mut settings = FirmwareSettings::of_the_board();
     settings.command.wiring_checked = true;
-    talk.console = Console::new(settings);
+    talk.front.desk = Desk::new(settings);
     for mode in ["", " speed", " position", " learning"] {
         let answer = talk.ask(&format!("start{mode}"));
         assert!(answer.starts_with("error: ") && answer.contains("`confirm board`"), "{answer}");
@@ -283,7 +291,7 @@ fn lines_of_another_board_are_refused_as_a_whole() {
     assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
     assert_eq!(talk.ask("revert"), "ok: 1 staged values dropped");
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
-    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("apply\n"), ["* designing...", "ok"]);
 }
 
 #[test]
@@ -367,7 +375,7 @@ fn what_is_not_believable_is_shown_and_not_used() {
     ] {
         talk.drive.found = Some(result);
         let list = talk.say("learned\n");
-        assert_eq!(list[0], format!("refused: {why}; nothing was changed"));
+        assert_eq!(list[0], format!("* refused: {why}; nothing was changed"));
         assert!(
             list[1].starts_with(&format!("not used: {why}; nothing was changed; ")),
             "{list:?}"

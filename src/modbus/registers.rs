@@ -77,7 +77,11 @@ pub struct View<'a> {
     pub faults: &'a FaultLog,
     /// Seconds since the start.
     pub seconds: u32,
+    /// Number of the last refusal of the bus, 0 for none.
+    pub refusal: u16,
 }
+
+use Shown::{Double, Number, Word};
 
 /// The way to a value.
 pub enum Shown {
@@ -93,8 +97,6 @@ pub enum Shown {
 pub struct Row {
     /// Number of the (first) register.
     pub at: u16,
-    /// Whether it can be written.
-    pub written: bool,
     /// Unit; empty if there is none.
     pub unit: &'static str,
     /// Its value.
@@ -103,102 +105,46 @@ pub struct Row {
     pub help: &'static str,
 }
 
-const fn number(
-    at: u16,
-    parts: u16,
-    unit: &'static str,
-    value: fn(&View<'_>) -> f32,
-    help: &'static str,
-) -> Row {
-    Row { at, written: false, unit, shown: Shown::Number(parts, value), help }
-}
-
-const fn word(at: u16, value: fn(&View<'_>) -> u16, help: &'static str) -> Row {
-    Row { at, written: false, unit: "", shown: Shown::Word(value), help }
-}
-
-const fn double(
-    at: u16,
-    unit: &'static str,
-    value: fn(&View<'_>) -> u32,
-    help: &'static str,
-) -> Row {
-    Row { at, written: false, unit, shown: Shown::Double(value), help }
-}
-
-const fn written(row: Row) -> Row {
-    Row { written: true, ..row }
+/// Rows of `NUMBER: SHOWN, UNIT, MEANING;`.
+macro_rules! rows {
+    ($($at:tt: $shown:expr, $unit:literal, $help:literal;)+) => {
+        [$(Row { at: $at, unit: $unit, shown: $shown, help: $help }),+]
+    };
 }
 
 /// The registers but for settings and faults, by number.
-pub static ROWS: [Row; 29] = [
-    number(0x0100, 100, "Hz", |v| v.largest_hz(), "largest frequency that is asked for, as 0x211B"),
-    written(word(
-        COMMAND,
-        |v| v.command,
-        "command: 1 stop, 18 run forward, 34 run reverse, 0 release",
-    )),
-    written(number(
-        FREQUENCY,
-        100,
-        "Hz",
-        |v| f32::from(v.frequency) * 0.01,
-        "frequency that is asked for",
-    )),
-    written(word(RESET, |_| 0, "bit 1 clears the latched fault; reads as 0")),
-    word(0x2100, |v| v.fault(), "number of the latched fault, 0 for none"),
-    word(0x2101, |v| v.delta_status(), "status, see below"),
-    number(0x2102, 100, "Hz", |v| f32::from(v.frequency) * 0.01, "frequency that is asked for"),
-    number(0x2103, 100, "Hz", |v| v.output_hz(), "output frequency (of the flux), magnitude"),
-    number(0x2104, 10, "A", |v| v.current(), "current of a line, rms of the fundamental"),
-    number(0x2105, 10, "V", |v| v.dc_link(), "dc link"),
-    number(
-        0x2106,
-        10,
-        "V",
-        |v| v.voltage(),
-        "output voltage between lines, rms of the fundamental",
-    ),
-    number(0x2107, 1, "rpm", |v| v.rpm().abs(), "speed of the shaft, magnitude"),
-    number(0x210b, 1, "%", |v| v.torque(), "torque in per cent of the rated one, signed"),
-    number(0x210c, 1, "rpm", |v| v.rpm().abs(), "speed of the shaft, magnitude"),
-    number(0x210e, 1, "degC", |v| v.heat_sink(), "heat sink, signed"),
-    number(
-        0x211b,
-        100,
-        "Hz",
-        |v| v.largest_hz(),
-        "largest frequency that is asked for: `speed.limit_rpm` times pole pairs",
-    ),
-    written(word(
-        STAGED,
-        |v| v.staged as u16,
-        "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them",
-    )),
-    word(0x5000, |_| 1, "layout of the pages"),
-    double(
-        0x5001,
-        "",
-        |_| names(),
-        "hash of the settings' names: the numbers of their registers hold for this value",
-    ),
-    word(0x5003, |_| keys::COUNT as u16, "number of settings"),
-    word(
-        0x5004,
-        |_| {
-            version(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | version(env!("CARGO_PKG_VERSION_MINOR"))
-        },
-        "version of the firmware: major in the upper byte, minor in the lower",
-    ),
-    word(0x5005, |_| version(env!("CARGO_PKG_VERSION_PATCH")), "its patch level"),
-    word(0x5006, |v| board(v.settings), "board, as `board` in the settings"),
-    double(0x5007, "s", |v| v.seconds, "time since the start"),
-    word(0x5009, |v| v.settings.bus.commander.place() as u16, "who commands: 0 console, 1 bus"),
-    word(0x500a, |v| v.settings.learned.is_some().into(), "1 if learned values are in force"),
-    word(0x603f, |v| v.error_code(), "fault as in CiA 402: 0xFF00 plus its number, 0 for none"),
-    written(word(CONTROL, |v| v.control_word(), "control word of CiA 402, see below")),
-    word(0x6041, |v| v.status_word(), "status word of CiA 402, see below"),
-];
+pub static ROWS: [Row; 30] = rows! {
+    0x0100: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for, as 0x211B";
+    COMMAND: Word(|v| v.command), "", "command: 1 stop, 18 run forward, 34 run reverse, 0 release";
+    FREQUENCY: Number(100, |v| f32::from(v.frequency) * 0.01), "Hz", "frequency that is asked for";
+    RESET: Word(|_| 0), "", "bit 1 clears the latched fault; reads as 0";
+    0x2100: Word(|v| v.fault()), "", "number of the latched fault, 0 for none";
+    0x2101: Word(|v| v.delta_status()), "", "status, see below";
+    0x2102: Number(100, |v| f32::from(v.frequency) * 0.01), "Hz", "frequency that is asked for";
+    0x2103: Number(100, |v| v.output_hz()), "Hz", "output frequency (of the flux), magnitude";
+    0x2104: Number(10, |v| v.current()), "A", "current of a line, rms of the fundamental";
+    0x2105: Number(10, |v| v.dc_link()), "V", "dc link";
+    0x2106: Number(10, |v| v.voltage()), "V", "output voltage between lines, rms of the fundamental";
+    0x2107: Number(1, |v| v.rpm().abs()), "rpm", "speed of the shaft, magnitude";
+    0x210b: Number(1, |v| v.torque()), "%", "torque in per cent of the rated one, signed";
+    0x210c: Number(1, |v| v.rpm().abs()), "rpm", "speed of the shaft, magnitude";
+    0x210e: Number(1, |v| v.heat_sink()), "degC", "heat sink, signed";
+    0x211b: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for: `speed.limit_rpm` times pole pairs";
+    STAGED: Word(|v| v.staged as u16), "", "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them";
+    0x5000: Word(|_| 1), "", "layout of the pages";
+    0x5001: Double(|_| names()), "", "hash of the settings' names: the numbers of their registers hold for this value";
+    0x5003: Word(|_| keys::COUNT as u16), "", "number of settings";
+    0x5004: Word(|_| { version(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | version(env!("CARGO_PKG_VERSION_MINOR")) }), "", "version of the firmware: major in the upper byte, minor in the lower";
+    0x5005: Word(|_| version(env!("CARGO_PKG_VERSION_PATCH"))), "", "its patch level";
+    0x5006: Word(|v| board(v.settings)), "", "board, as `board` in the settings";
+    0x5007: Double(|v| v.seconds), "s", "time since the start";
+    0x5009: Word(|v| v.settings.bus.commander.place() as u16), "", "who commands: 0 console, 1 bus";
+    0x500a: Word(|v| v.settings.learned.is_some().into()), "", "1 if learned values are in force";
+    0x500b: Word(|v| v.refusal), "", "reason of the last refused write since the start, see below; 0 for none";
+    0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";
+    CONTROL: Word(|v| v.control_word()), "", "control word of CiA 402, see below";
+    0x6041: Word(|v| v.status_word()), "", "status word of CiA 402, see below";
+};
 
 impl View<'_> {
     /// The word of a register.
@@ -341,6 +287,11 @@ impl Row {
             Shown::Word(value) => value(view),
             Shown::Double(value) => half(value(view), place),
         })
+    }
+
+    /// Whether it can be written.
+    pub fn is_written(&self) -> bool {
+        matches!(self.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL)
     }
 
     /// Number of its registers.

@@ -42,6 +42,8 @@ impl Words<'_> {
 
 /// The registers of a slave.
 pub trait Registers {
+    /// Whether every request is to be answered with [`Exception::ServerDeviceBusy`].
+    fn is_busy(&self) -> bool;
     /// The word of a register.
     ///
     /// # Errors
@@ -66,7 +68,7 @@ enum Asked<'a> {
 }
 
 /// Carries out a frame that came in, if it is whole and for the address `own` or for all, and sends the answer, if there is
-/// one; whether it was.
+/// one; whether it was a write.
 pub fn answer(
     frame: &[u8],
     own: u8,
@@ -75,12 +77,14 @@ pub fn answer(
 ) -> bool {
     let Some((slave, pdu)) = whole(frame) else { return false };
     let function = pdu[0];
+    let writes = matches!(function, 6 | 16);
     // A read of all has no answer.
-    let for_us = slave == own || (slave == BROADCAST && matches!(function, 6 | 16));
+    let for_us = slave == own || (slave == BROADCAST && writes);
     if !for_us || function > LAST_FUNCTION {
         return false;
     }
     let asked = match asked(pdu) {
+        _ if registers.is_busy() => Err(Exception::ServerDeviceBusy),
         Ok(Asked::Write(_, at, words)) => {
             registers.write(at, words).and_then(|()| self::asked(pdu))
         }
@@ -89,7 +93,22 @@ pub fn answer(
     if slave != BROADCAST {
         reply(slave, function, asked, registers, send);
     }
-    true
+    writes
+}
+
+/// The answer of a slave with this address that is busy, exception 6, if the frame is whole and for it alone. Without a panic, for an
+/// interrupt.
+pub fn busy(frame: &[u8], own: u8) -> Option<Frame> {
+    let (body, sum) = frame.split_last_chunk::<2>()?;
+    let [slave, function, ..] = *body else { return None };
+    if slave != own || function > LAST_FUNCTION || *sum != rtu::crc16(body).to_be_bytes() {
+        return None;
+    }
+    let mut answer = Frame::new();
+    let body = [own, function | 0x80, Exception::ServerDeviceBusy as u8];
+    answer.extend_from_slice(&body).ok()?;
+    answer.extend_from_slice(&rtu::crc16(&body).to_be_bytes()).ok()?;
+    Some(answer)
 }
 
 /// Address and request of a frame; `None` if it is damaged.

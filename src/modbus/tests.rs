@@ -7,17 +7,21 @@ use modbus_core::Exception;
 
 use super::Frame;
 use super::cia402::Power;
-use super::registers::{FAULTS, ROWS, SETTINGS, Shown};
+use super::registers::{FAULTS, ROWS, Shown};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
+use crate::generated;
 use crate::settings::bus::{Baud, Format};
-use crate::settings::keys;
 
 /// Registers 0x2000 to 0x20ff, of which the last cannot be written.
 #[derive(Clone, Debug, PartialEq)]
 struct Memory(Vec<u16>);
 
 impl Registers for Memory {
+    fn is_busy(&self) -> bool {
+        false
+    }
+
     fn read(&mut self, at: u16) -> Result<u16, Exception> {
         let word = self.0.get(usize::from(at).wrapping_sub(0x2000));
         word.copied().ok_or(Exception::IllegalDataAddress)
@@ -63,6 +67,24 @@ fn ask(frame: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
     let (bytes, sum) = out.split_at_checked(out.len().checked_sub(2)?)?;
     assert_eq!(sum, crc(bytes));
     Some(bytes.to_vec())
+}
+
+/// Exception 6 to a whole request for this slave alone; nothing to a damaged one, to others, to all, and to an exception.
+#[test]
+fn a_busy_slave_answers_whole_requests_for_it_alone() {
+    let busy = |frame: &[u8]| slave::busy(frame, 17).map(|answer| answer.to_vec());
+    let read = framed(&[17, 3, 0x20, 0x01, 0, 2]);
+    assert_eq!(busy(&read), Some(framed(&[17, 0x83, 6])));
+    assert_eq!(busy(&framed(&[17, 16, 0x20, 1, 0, 1, 2, 0, 9])), Some(framed(&[17, 0x90, 6])));
+    for at in 0..read.len() {
+        let mut damaged = read.clone();
+        damaged[at] ^= 1;
+        assert_eq!(busy(&damaged), None, "byte {at}");
+        assert_eq!(busy(&read[..at]), None, "{at} bytes");
+    }
+    for other in [&[18, 3, 0, 0, 0, 1][..], &[0, 6, 0x20, 1, 0, 1], &[17, 0x83, 2], &[17]] {
+        assert_eq!(busy(&framed(other)), None, "{other:?}");
+    }
 }
 
 #[test]
@@ -215,28 +237,9 @@ fn rows() -> String {
             _ => row.unit.to_owned(),
         };
         let kind = if matches!(row.shown, Shown::Double(_)) { "32 bits" } else { "16 bits" };
-        let access = if row.written { "read, write" } else { "read" };
+        let access = if row.is_written() { "read, write" } else { "read" };
         writeln!(text, "| `0x{:04X}` | {kind} | {unit} | {access} | {} |", row.at, row.help)
             .unwrap();
-    }
-    text
-}
-
-fn settings() -> String {
-    let mut text = String::new();
-    for (n, key) in keys::all().enumerate() {
-        let words: Vec<_> =
-            key.words().iter().enumerate().map(|(n, word)| format!("{n} {word}")).collect();
-        let auto = if key.has_rule() { "NaN auto" } else { "" };
-        let at = usize::from(SETTINGS) + 2 * n;
-        writeln!(
-            text,
-            "| `0x{at:04X}` | `{}` | {} | {}{auto} |",
-            key.name(),
-            key.unit(),
-            words.join(", ")
-        )
-        .unwrap();
     }
     text
 }
@@ -250,12 +253,13 @@ fn states() -> String {
     text
 }
 
-/// On a difference the message is the table as it should be.
 #[test]
 fn the_manual_lists_the_registers() {
-    let manual = include_str!("../../docs/modbus.md");
-    let mut missing = vec![rows(), settings(), states()];
-    missing.retain(|table| !manual.contains(table));
-    assert!(missing.is_empty(), "docs/modbus.md has to list:\n{}", missing.join("\n"));
+    let table = |name, head: &str, rows: String| {
+        let line = "|---".repeat(head.matches('|').count() - 1);
+        generated::check("modbus.md", name, &format!("{head}\n{line}|\n{rows}"));
+    };
+    table("registers", "| address | size | unit | | meaning |", rows());
+    table("states", "| state | bits |", states());
     assert_eq!(FAULTS, 0x5100);
 }

@@ -88,6 +88,14 @@ pub struct Settings {
     pub commander: Commander,
 }
 
+impl Settings {
+    /// The address in a frame.
+    pub fn own(&self) -> u8 {
+        // 1 to 247.
+        self.address as u8
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         // Rate and parity that the specification recommends (Modbus over serial line V1.02, 2.4.2).

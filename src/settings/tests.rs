@@ -5,9 +5,12 @@ use drive_settings::value::Value;
 
 use super::FirmwareSettings;
 use super::keys::{self, Key};
+use crate::generated;
+use crate::modbus::registers::SETTINGS;
 
-/// The row of a setting: name, unit, default, range, meaning.
-fn row(key: Key) -> String {
+/// The row of a setting: name, register, unit, default, range, meaning.
+fn row(n: usize, key: Key) -> String {
+    let register = usize::from(SETTINGS) + 2 * n;
     let settings = FirmwareSettings::of_the_board();
     let (value, number) = (key.get(&settings), key.number(&settings));
     let default = match (value, number) {
@@ -26,14 +29,15 @@ fn row(key: Key) -> String {
     let learned = if key.learned() { "; **L**" } else { "" };
     let hardware = if key.hardware() { "; **H**" } else { "" };
     let (name, unit, help) = (key.name(), key.unit(), key.help());
-    format!("| `{name}` | {unit} | {default} | {range} | {help}{change}{learned}{hardware} |")
+    format!(
+        "| `{name}` | {register:04X} | {unit} | {default} | {range} | {help}{change}{learned}{hardware} |"
+    )
 }
 
-/// On a difference the message is the table as it should be.
 #[test]
 fn the_manual_lists_the_settings_in_their_order() {
-    let rows: Vec<String> = keys::all().map(row).collect();
-    let manual = include_str!("../../docs/settings.md");
-    let listed: Vec<&str> = manual.lines().filter(|line| line.starts_with("| `")).collect();
-    assert!(listed == rows, "docs/settings.md has to list:\n{}", rows.join("\n"));
+    let head =
+        "| key | register | unit | default | range | |\n|---|---|---|---|---|---|\n".to_owned();
+    let table = keys::all().enumerate().fold(head, |table, (n, key)| table + &row(n, key) + "\n");
+    generated::check("settings.md", "settings", &table);
 }

@@ -22,7 +22,7 @@ use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
-use induction_drive::console::Console;
+use induction_drive::front::Front;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
@@ -36,12 +36,12 @@ use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
 pub struct Board<'a> {
-    /// The console, with the saved settings, or the defaults.
-    pub console: &'static mut Console,
+    /// Desk, console and field bus, with the saved settings, or the defaults.
+    pub front: &'static mut Front,
     /// The serial port of the console.
     pub port: Port,
     /// The port of the field bus, if the board has one.
-    pub bus: Option<rs485::Port>,
+    pub line: Option<rs485::Port>,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -96,12 +96,12 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
     let pins = (a.pa2, a.pa3);
     let port = Port::new(chip.LPUART1, pins, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
-    let bus = SELECTED
+    let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     // Before the control runs: these are made with the interrupts masked.
-    let console = singleton!(: MaybeUninit<Console> = MaybeUninit::uninit()).ok_or(TWICE)?;
+    let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
@@ -132,7 +132,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
     start.settings.boot_pin_counts = board::boot_pin_counts(options);
-    let console = make(console, || Console::new(start.settings));
+    let front = make(front, || Front::new(start.settings));
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
@@ -142,7 +142,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let drive = &settings.drive;
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
-    Ok(Board { console, port, bus, supervisor })
+    Ok(Board { front, port, line, supervisor })
 }
 
 /// Makes a value in its place, with a stack that comes in the place of those of other functions.

@@ -22,7 +22,8 @@ use crate::task::sources::Sources;
 use induction_drive::board;
 use induction_drive::commissioning::{Action, Session};
 use induction_drive::console::grammar::Level;
-use induction_drive::console::handle::{CommandError, DriveHandle};
+use induction_drive::console::handle::Firmware;
+use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::ring::{self, Record as Period};
 use induction_drive::link::trace::{self, Plan};
@@ -323,10 +324,6 @@ impl DriveHandle for Supervisor {
         self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
     }
 
-    fn tracking(&self) -> Option<Report> {
-        self.tracking.as_ref().map(Tracking::report)
-    }
-
     fn session(&mut self) -> &mut Session {
         self.commissioning
     }
@@ -335,6 +332,23 @@ impl DriveHandle for Supervisor {
         extended(&mut self.guard, || self.chip.saved.save(settings))?;
         self.chip.rejected = None;
         Ok(())
+    }
+
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        if let Some(link) = &mut self.link {
+            link.learned.take_with(|result| result.as_ref().map(show));
+        }
+    }
+
+    fn reboot(&mut self) {
+        pwm::outputs_off();
+        cortex_m::peripheral::SCB::sys_reset();
+    }
+}
+
+impl Firmware for Supervisor {
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
 
     fn history(&self) -> &History {
@@ -366,17 +380,6 @@ impl DriveHandle for Supervisor {
 
     fn sampled(&mut self) -> Option<Period> {
         self.link.as_mut()?.streamed.find(|period| period.streamed)
-    }
-
-    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
-        if let Some(link) = &mut self.link {
-            link.learned.take_with(|result| result.as_ref().map(show));
-        }
-    }
-
-    fn reboot(&mut self) {
-        pwm::outputs_off();
-        cortex_m::peripheral::SCB::sys_reset();
     }
 
     fn set_log_level(&mut self, level: Level) {

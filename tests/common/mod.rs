@@ -1,5 +1,4 @@
 //! The bench that the procedures share.
-#![allow(dead_code)] // every procedure uses its own part of it
 
 use drive_core::{Command, Mode};
 use drive_settings::Settings;

@@ -16,9 +16,10 @@ use std::fs;
 
 use drive_core::{Command, Compare, Drive, FrontEndState, Sample};
 use induction_drive::console::grammar::{self, Request};
+use induction_drive::desk::order::Order;
 use induction_drive::settings::FirmwareSettings;
 
-use crate::player::{BLOCK, Fnv};
+use super::player::{BLOCK, Fnv};
 
 /// Hashes of the compare values, one for every [`BLOCK`] interrupts, and the number of interrupts.
 fn replay(name: &str) -> (Vec<u64>, usize) {
@@ -61,11 +62,11 @@ fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
     let request = if line == "check wiring" { None } else { Some(grammar::parse(line).unwrap()) };
     let taken = match request {
         None => drive.command(&Command::CheckWiring),
-        Some(Request::Start(mode)) => drive.command(&Command::Start(mode)),
-        Some(Request::Stop(stop)) => drive.command(&Command::Stop(stop)),
-        Some(Request::Torque(i_q)) => drive.command(&Command::Torque(i_q)),
-        Some(Request::Position(turns)) => drive.command(&Command::Position(turns)),
-        Some(Request::Set(values)) => {
+        Some(Request::Order(Order::Start(mode))) => drive.command(&Command::Start(mode)),
+        Some(Request::Order(Order::Stop(stop))) => drive.command(&Command::Stop(stop)),
+        Some(Request::Order(Order::Torque(i_q))) => drive.command(&Command::Torque(i_q)),
+        Some(Request::Order(Order::Position(turns))) => drive.command(&Command::Position(turns)),
+        Some(Request::Order(Order::Set(values))) => {
             values.iter().for_each(|(key, value)| key.set(settings, *value));
             drive.command(&Command::Configure(settings.build().unwrap()))
         }

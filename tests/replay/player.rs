@@ -6,8 +6,9 @@ use drive_commission::{Collector, Commissioning, Next, Step};
 use drive_core::{Command, Compare, Drive, FrontEndState, Mode, Output, Sample, Stop, Telemetry};
 use drive_settings::Settings;
 use induction_drive::console::grammar::{self, Request};
+use induction_drive::desk::order::Order;
 
-use crate::scenes::Scene;
+use super::scenes::Scene;
 
 /// Periods to a hash, so that a difference is located.
 pub const BLOCK: usize = 6000;
@@ -123,15 +124,15 @@ impl Player {
                 Command::Configure(self.settings.build().unwrap())
             }
             _ => match grammar::parse(line).unwrap() {
-                Request::Start(mode) => Command::Start(mode),
-                Request::Learn { .. } => Command::Start(Mode::Learning),
-                Request::Stop(stop) => Command::Stop(stop),
-                Request::Clear => Command::Clear,
-                Request::Relock => Command::Relock,
-                Request::Torque(i_q) => Command::Torque(i_q),
-                Request::Speed(rpm) => Command::Speed(rpm),
-                Request::Jog(rpm) => Command::Jog(rpm),
-                Request::Position(turns) => Command::Position(turns),
+                Request::Order(Order::Start(mode)) => Command::Start(mode),
+                Request::Order(Order::Learn { .. }) => Command::Start(Mode::Learning),
+                Request::Order(Order::Stop(stop)) => Command::Stop(stop),
+                Request::Order(Order::Clear) => Command::Clear,
+                Request::Order(Order::Relock) => Command::Relock,
+                Request::Order(Order::Torque(i_q)) => Command::Torque(i_q),
+                Request::Order(Order::Speed(rpm)) => Command::Speed(rpm),
+                Request::Order(Order::Jog(rpm)) => Command::Jog(rpm),
+                Request::Order(Order::Position(turns)) => Command::Position(turns),
                 other => panic!("{other:?} is no order to the drive"),
             },
         };

@@ -12,8 +12,8 @@ use hil_sim::experiments::full_range::for_the_range;
 use hil_sim::plant::{Load, Plant};
 use hil_sim::rig::{RATE_HZ, Rig};
 
-use crate::learned;
-use crate::player::Player;
+use super::learned;
+use super::player::Player;
 
 /// A recorded run.
 pub struct Scene {

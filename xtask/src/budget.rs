@@ -15,6 +15,7 @@ pub struct Budgets {
     /// Lines of code by room.
     pub lines: Vec<Room>,
     pub bytes: Bytes,
+    pub seconds: Seconds,
     pub cycles: Cycles,
 }
 
@@ -27,6 +28,13 @@ pub struct Room {
     pub budget: usize,
     /// Beginnings of the paths of its files.
     pub paths: Vec<String>,
+}
+
+/// Time of tests on two quiet cores.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seconds {
+    pub test_module: f64,
 }
 
 /// Memory of the image, bytes.

@@ -7,6 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
+use crate::board;
 use crate::run::{self, TARGET};
 use crate::toolchain::{self, Target};
 
@@ -45,7 +46,7 @@ pub fn test() -> Result<()> {
         let from = folder.join(TARGET).join("release").join(&name);
         fs::copy(from, programs.join(format!("embassy-{name}")))?;
     }
-    let mut test = run::cargo("test --release --package virtual-board --test foreign --");
+    let mut test = board::cargo("test --release --test image foreign --")?;
     test.args(["--ignored", "--nocapture"]).env(FOLDER, programs);
     run::step("programs of others on the virtual board", &mut test)
 }

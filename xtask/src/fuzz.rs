@@ -10,7 +10,7 @@ use anyhow::Result;
 use crate::run;
 
 /// The files in `fuzz/fuzz_targets`.
-pub const TARGETS: [&str; 3] = ["console", "settings", "stream"];
+const TARGETS: [&str; 3] = ["console", "settings", "stream"];
 
 /// Flags of the instrumentation: counters at every edge, and the comparisons.
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -24,7 +24,7 @@ pub fn fuzz(seconds: u32) -> Result<()> {
 }
 
 /// The command that fuzzes one target for `seconds`, and goes on from the inputs found so far.
-pub fn command(name: &str, seconds: u32) -> Result<Command> {
+fn command(name: &str, seconds: u32) -> Result<Command> {
     let host = run::output("rustc", &["--print", "host-tuple"])?;
     let corpus = run::folder(format!("fuzz/corpus/{name}"))?;
     let findings = run::folder(format!("fuzz/findings/{name}"))?;

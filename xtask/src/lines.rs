@@ -3,39 +3,54 @@
 //! Blank lines count nowhere outside tests. Documentation is `///` and `//!`, a comment any other line
 //! that begins with `//`; everything else is code. Test lines are files below `tests/` and `benches/`,
 //! files named `tests.rs`, and items under `#[cfg(test)]` in column 0 that have a body in the same file.
+//! Beside Rust: JavaScript, Python and tables in TOML, without blank lines and comments, manifests and code of others.
 
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
 use crate::budget::{self, Room};
 use crate::sources;
 
-/// Lines of code, documentation, comments, test code, and all else in tests.
-type Counts = [usize; 5];
+/// Lines of Rust (code, documentation, comments, test code, all else in tests), and of each of [`OTHERS`].
+type Counts = [usize; 8];
+
+/// Other languages: ending of the files, and how a comment begins.
+const OTHERS: [(&str, &str); 3] = [("js", "//"), ("py", "#"), ("toml", "#")];
 
 /// Prints the table; fails above a budget.
 pub fn report() -> Result<()> {
     let rooms = budget::read()?.lines;
     let mut rows = vec![Counts::default(); rooms.len()];
-    for path in sources::rust_files()? {
-        let text = sources::read(&path)?;
-        let room = room_of(&rooms, &path).with_context(|| path.display().to_string())?;
-        add(&mut rows[room], count(&path, &text));
+    let mut tally = |path: &Path, counts: fn(&Path, &str) -> Counts| -> Result<()> {
+        let room = room_of(&rooms, path).with_context(|| path.display().to_string())?;
+        add(&mut rows[room], counts(path, &sources::read(path)?));
+        Ok(())
+    };
+    for path in sources::files("rs")? {
+        tally(&path, count)?;
+    }
+    for (ending, _) in OTHERS {
+        let ours = |path: &PathBuf| {
+            !path.ends_with("Cargo.toml") && !path.to_string_lossy().ends_with(".min.js")
+        };
+        for path in sources::files(ending)?.iter().filter(|path| ours(path)) {
+            tally(path, count_other)?;
+        }
     }
     let mut all = Counts::default();
     rows.iter().for_each(|counts| add(&mut all, *counts));
     let whole: usize = rooms.iter().map(|room| room.budget).sum();
 
-    let heads = ["budget", "code", "docs", "comments", "test code", "test other"];
+    let heads =
+        ["budget", "code", "docs", "comments", "test code", "test other", "JS", "Python", "TOML"];
     println!("{}", row("lines", heads));
     let named = rooms.iter().map(|room| (room.name.as_str(), room.budget)).zip(rows);
     let mut over = Vec::new();
-    for ((name, budget), [code, docs, comments, tests, other]) in
-        named.chain([(("all", whole), all)])
-    {
-        println!("{}", row(name, [budget, code, docs, comments, tests, other]));
+    for ((name, budget), counts) in named.chain([(("all", whole), all)]) {
+        let [code, docs, comments, tests, other, js, python, toml] = counts;
+        println!("{}", row(name, [budget, code, docs, comments, tests, other, js, python, toml]));
         if code > budget {
             over.push(format!("{name} {code} of {budget}"));
         }
@@ -51,12 +66,25 @@ fn room_of(rooms: &[Room], path: &Path) -> Option<usize> {
     rooms.iter().position(|room| room.paths.iter().any(|begin| path.starts_with(begin)))
 }
 
-fn row<T: Display>(name: &str, cells: [T; 6]) -> String {
-    format!("{name:<20}{}", cells.map(|cell| format!("{cell:>12}")).concat())
+fn row<T: Display>(name: &str, cells: [T; 9]) -> String {
+    format!("{name:<20}{}", cells.map(|cell| format!("{cell:>11}")).concat())
 }
 
 fn add(sum: &mut Counts, counts: Counts) {
     sum.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+}
+
+/// The lines of another language.
+fn count_other(path: &Path, text: &str) -> Counts {
+    let is_it = |(ending, _): &(&str, &str)| path.extension().is_some_and(|found| found == *ending);
+    let mut counts = Counts::default();
+    if let Some(language) = OTHERS.iter().position(is_it) {
+        let comment = OTHERS[language].1;
+        let lines = text.lines().map(str::trim_start);
+        counts[5 + language] =
+            lines.filter(|line| !line.is_empty() && !line.starts_with(comment)).count();
+    }
+    counts
 }
 
 fn count(path: &Path, text: &str) -> Counts {
@@ -105,15 +133,22 @@ mod tests {
     #[test]
     fn lines_are_told_apart() {
         let text = "//! Head.\n\n// Comment.\n#[cfg(test)]\nmod tests;\n/// Doc.\nfn f() {\n    1 // one\n}\n";
-        assert_eq!(count(Path::new("src/a.rs"), text), [5, 2, 1, 0, 0]);
-        assert_eq!(count(Path::new("src/a/tests.rs"), text), [0, 0, 0, 5, 4]);
-        assert_eq!(count(Path::new("tests/a.rs"), text), [0, 0, 0, 5, 4]);
+        assert_eq!(count(Path::new("src/a.rs"), text), [5, 2, 1, 0, 0, 0, 0, 0]);
+        assert_eq!(count(Path::new("src/a/tests.rs"), text), [0, 0, 0, 5, 4, 0, 0, 0]);
+        assert_eq!(count(Path::new("tests/a.rs"), text), [0, 0, 0, 5, 4, 0, 0, 0]);
+    }
+
+    #[test]
+    fn blank_lines_and_comments_of_other_languages_do_not_count() {
+        let text = "# One\n\n[motor]\nr_s = 5.4 # ohm\n";
+        assert_eq!(count_other(Path::new("motors/a.toml"), text), [0, 0, 0, 0, 0, 0, 0, 2]);
+        assert_eq!(count_other(Path::new("a.js"), "// One\nf();\n"), [0, 0, 0, 0, 0, 1, 0, 0]);
     }
 
     #[test]
     fn code_behind_a_test_item_counts_as_code() {
         let text =
             "#[cfg(test)]\nmod tests {\n    // Comment.\n\n    fn f() {\n    }\n}\n\nfn g() {}\n";
-        assert_eq!(count(Path::new("src/a.rs"), text), [1, 0, 0, 5, 2]);
+        assert_eq!(count(Path::new("src/a.rs"), text), [1, 0, 0, 5, 2, 0, 0, 0]);
     }
 }

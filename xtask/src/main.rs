@@ -1,11 +1,9 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
-mod bench;
 mod board;
 mod budget;
-mod bus;
+mod by_name;
 mod control;
-mod documents;
 mod elf;
 mod foreign;
 mod fuzz;
@@ -13,7 +11,6 @@ mod image;
 mod lines;
 mod map;
 mod modules;
-mod pages;
 mod paths;
 mod prove;
 mod rooms;
@@ -22,6 +19,7 @@ mod sections;
 mod size;
 mod sources;
 mod stack;
+mod times;
 mod toolchain;
 mod tools;
 
@@ -39,6 +37,8 @@ enum Task {
     /// firmware on the virtual board. All of it runs; what failed is named at the end. Installs missing
     /// programs, or prints the command to type
     Test,
+    /// Before a commit: format, modules, lines, lints, unit tests, procedures. All that needs neither image nor emulator
+    Quick,
     /// Builds and checks the image for a board (also: cargo firmware)
     Firmware(Which),
     /// Builds the image of a board, writes it through a debug probe and shows its log
@@ -95,8 +95,6 @@ enum Task {
     /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
     /// the text of a plot is too small. Drives the live page on the virtual board
     Pages,
-    /// Runs every command that a document shows, except those of a list with reasons
-    Documents,
     /// Long proofs in shards, which a later call continues. Lists them, or does one
     Prove {
         /// Name of the proof
@@ -137,13 +135,14 @@ fn main() -> ExitCode {
 fn run(task: Task) -> Result<()> {
     match task {
         Task::Test => test(),
+        Task::Quick => quick(),
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
-        Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
+        Task::BenchDump(which) => by_name::bench_dump(&which.image()?, &which.board),
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
-        Task::Bus => bus::test(&image::build()?),
+        Task::Bus => by_name::bus(&image::build()?),
         Task::Campaign { count, seed, class, rpm, which } => {
             let faults = board::Faults { count, seed, rpm };
             board::campaign(&which.image()?, &which.board, &faults, &class)
@@ -154,31 +153,53 @@ fn run(task: Task) -> Result<()> {
         Task::Rooms => rooms::check(),
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book(),
-        Task::Pages => pages::pages(),
-        Task::Documents => documents::check(),
+        Task::Pages => by_name::pages(),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }
 }
 
-/// Everything a change must pass, the quick things first. All of it runs, also when a step fails.
-fn test() -> Result<()> {
+/// What most changes break, without image and emulator.
+fn quick() -> Result<()> {
     let mut steps = run::Steps::default();
-    steps.run("programs of others", || {
-        toolchain::ensure_format_and_lints()?;
-        toolchain::ensure_c_compiler()
+    before_tests(&mut steps);
+    steps.run("unit tests", || {
+        times::test("unit tests", run::cargo("test --workspace --lib --bins --no-fail-fast"))
     });
+    steps.run("procedures", || times::test("procedures", run::cargo("test --test procedures")));
+    steps.end()
+}
+
+/// Format, modules, lines and lints of the main workspace.
+fn before_tests(steps: &mut run::Steps) {
+    steps.run("programs of others", toolchain::ensure_format_and_lints);
     steps.command("format", run::cargo("fmt --all --check"));
     steps.run("rooms", rooms::check);
     steps.run("lines", lines::report);
     steps.command("lints", run::cargo("clippy --workspace --all-targets -- -D warnings"));
-    // The virtual board needs the image.
-    let host = "test --workspace --exclude virtual-board --no-fail-fast";
-    steps.command("host tests", run::cargo(host));
+}
+
+/// Everything a change must pass, the quick things first. All of it runs, also when a step fails.
+fn test() -> Result<()> {
+    let mut steps = run::Steps::default();
+    before_tests(&mut steps);
+    let host = || run::cargo("test --workspace --no-fail-fast");
+    steps.run("host tests", || {
+        let mut tests = host();
+        tests.arg("--tests");
+        times::test("host tests", tests)
+    });
+    let mut examples = host();
+    examples.arg("--doc");
+    steps.command("examples in documentation", examples);
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
-    steps.run("commands of the documents", documents::check);
+
+    let mut commands =
+        run::cargo("test --workspace --test simulator commands_of_the_documents -- --ignored");
+    commands.arg("--nocapture");
+    steps.command("commands of the documents", commands);
 
     let target = steps.run("compiler for the controller", toolchain::for_target);
     let target = target.as_ref();
@@ -193,6 +214,9 @@ fn test() -> Result<()> {
     let elf = steps.with(target, "firmware", image::build_with);
     let elf = elf.as_deref();
     steps.with(elf, "size", size::report);
+
+    let compiler = steps.run("compiler for the emulator", toolchain::ensure_c_compiler);
+    steps.with(compiler, "format, lints, documentation of the virtual board", |()| board::check());
     steps.with(elf, "campaign of faults", |elf| {
         let faults = board::Faults { count: CAMPAIGN / 20, seed: 1, rpm: None };
         board::campaign(elf, image::REFERENCE, &faults, "")

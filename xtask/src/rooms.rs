@@ -22,8 +22,19 @@ type Arrows = BTreeMap<Name, BTreeMap<Name, String>>;
 /// Prints the circles of every crate; fails if there is one.
 pub fn check() -> Result<()> {
     let (mut count, mut in_circles) = (0, 0);
-    for root in sources::rust_files()?.into_iter().filter(|file| is_root(file)) {
-        let modules = modules::read(&root)?;
+    let files = sources::files("rs")?;
+    for root in files.iter().filter(|file| is_root(file)) {
+        let modules = modules::read(root)?;
+        if root.iter().any(|part| part == "tests") {
+            let beside =
+                files.iter().filter(|file| *file != root && file.parent() == root.parent());
+            for file in beside {
+                let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                let is_module = modules.contains_key(&[name][..]);
+                ensure!(is_module, "{}: no module of {}", file.display(), root.display());
+            }
+            continue;
+        }
         let arrows = arrows(&modules);
         let circles = circles(&arrows);
         for circle in &circles {
@@ -42,7 +53,8 @@ pub fn check() -> Result<()> {
 
 fn is_root(file: &Path) -> bool {
     let is_bin = file.parent().is_some_and(|dir| dir.ends_with("src/bin"));
-    is_bin || file.ends_with("src/lib.rs") || file.ends_with("src/main.rs")
+    let is_test = file.ends_with("main.rs") && file.iter().any(|part| part == "tests");
+    is_bin || is_test || file.ends_with("src/lib.rs") || file.ends_with("src/main.rs")
 }
 
 fn shown(modules: &[Name]) -> String {

@@ -120,7 +120,7 @@ impl Steps {
 }
 
 /// The program and its arguments, without paths and variables.
-fn shown(command: &Command) -> String {
+pub fn shown(command: &Command) -> String {
     let program = Path::new(command.get_program()).file_name().unwrap_or_default();
     let words: Vec<_> = [program].into_iter().chain(command.get_args()).collect();
     words.join(OsStr::new(" ")).to_string_lossy().into_owned()

@@ -1,4 +1,4 @@
-//! The Rust source files and the documents of the repository.
+//! The source files of the repository.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,19 +11,8 @@ use crate::run;
 /// Directories with build results.
 const BUILT: [&str; 2] = ["target", "out"];
 
-/// All Rust files below the root, sorted, as paths relative to it.
-pub fn rust_files() -> Result<Vec<PathBuf>> {
-    files("rs")
-}
-
-/// All documents for readers of today; the change log speaks of the past.
-pub fn documents() -> Result<Vec<PathBuf>> {
-    let mut documents = files("md")?;
-    documents.retain(|path| !path.ends_with("CHANGELOG.md"));
-    Ok(documents)
-}
-
-fn files(extension: &str) -> Result<Vec<PathBuf>> {
+/// All files below the root with this ending, sorted, as paths relative to it.
+pub fn files(extension: &str) -> Result<Vec<PathBuf>> {
     let kept = |name: &str| !name.starts_with('.') && !BUILT.contains(&name);
     let entries = WalkDir::new(run::root())
         .sort_by_file_name()

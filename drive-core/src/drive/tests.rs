@@ -10,6 +10,7 @@ mod trust;
 use super::*;
 use crate::filter::dissertation::LPF;
 use crate::flux::AngleSource;
+use crate::generated;
 use crate::math::frames::{Abc, AlphaBeta};
 
 use crate::carrier::{CARRIER_SAMPLES, DemodulatorKind};

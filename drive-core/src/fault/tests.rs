@@ -1,4 +1,5 @@
 use super::*;
+use crate::generated;
 
 /// The numbers are in logs and manuals: this list may grow, nothing in it may change.
 #[test]
@@ -75,13 +76,28 @@ fn texts_fit_a_line_of_the_console() {
     }
 }
 
-/// The page of the faults lists each with its text; its section gives at least one cause, and the cure.
+/// The page of the faults lists each with its text and a link to its section, which gives at least one cause, and the cure.
 #[test]
 fn the_manual_says_the_same() {
-    let manual = include_str!("../../../docs/faults.md");
+    let manual = std::fs::read_to_string(generated::root().join("docs/faults.md")).unwrap();
+    let sections: Vec<_> =
+        manual.lines().filter_map(|line| line.strip_prefix("## Fault")).collect();
+    let mut table = "| | meaning | cause and cure |\n|---|---|---|\n".to_owned();
     for fault in Fault::ALL {
-        let row = format!("\n| {} | {fault} | [cure](#", fault.code());
-        assert!(manual.contains(&row), "no row {row}");
+        let section = sections.iter().find(|heading| numbers(heading).contains(&fault.code()));
+        let section = section.unwrap_or_else(|| panic!("no section for {}", fault.code()));
+        let anchor: String =
+            section.chars().filter(|c| c.is_ascii_alphanumeric() || " -".contains(*c)).collect();
+        let anchor = anchor.to_lowercase().replace(' ', "-");
+        table += &format!("| {} | {fault} | [cure](#fault{anchor}) |\n", fault.code());
         assert!(!fault.causes().is_empty() && !fault.cure().is_empty(), "{fault}");
     }
+    generated::check("faults.md", "faults", &table);
+}
+
+/// The faults of a heading: " 4: ...", "s 1 to 3: ...", "s 7, 8 and 38: ...".
+fn numbers(heading: &str) -> Vec<u8> {
+    let (list, _) = heading.split_once(':').expect("numbers");
+    let found: Vec<u8> = list.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+    if list.contains(" to ") { (found[0]..=found[1]).collect() } else { found }
 }

@@ -41,9 +41,9 @@ pub fn virtual_board() -> Result<PathBuf, Error> {
         eprintln!("emulator: built once; some 2 minutes");
     }
     let mut command = cargo();
-    command.args(["build", "--release", "--package", "virtual-board", "--bin", "board"]);
+    command.args(["build", "--release", "--bin", "board"]);
     command.arg("--message-format=json-render-diagnostics");
-    command.arg("--manifest-path").arg(root().join("Cargo.toml"));
+    command.current_dir(root().join("hil-sim/virtual-board"));
     let lines = lines_of("emulator", command)?;
     let program = lines.iter().rev().find_map(|line| executable(line));
     program.ok_or_else(|| failed("emulator", "cargo names no program"))

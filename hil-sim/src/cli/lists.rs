@@ -5,27 +5,30 @@ use serde_json::json;
 use crate::config::motors::Motor;
 use crate::config::{Config, Key, Value, file};
 use crate::error::Error;
-use crate::experiments::{EXPERIMENTS, Experiment, WITH_INPUT};
+use crate::experiments::{EVERYDAY, EXPERIMENTS, Experiment, WITH_INPUT};
 use crate::input::Input;
 use crate::outcome::{Cell, Table};
 use crate::report;
 
-fn all() -> impl Iterator<Item = &'static Experiment> {
-    EXPERIMENTS.iter().chain(WITH_INPUT)
-}
-
-/// The experiments.
+/// All experiments as JSON; as text those of every day, or the others.
 ///
 /// # Errors
 /// [`Error::Internal`] when JSON cannot be made.
-pub fn experiments(as_json: bool) -> Result<String, Error> {
+pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
+    let all = EXPERIMENTS.iter().chain(WITH_INPUT);
     if as_json {
-        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "uses": e.uses.concat(), "not": e.not.concat() });
-        return pretty(&all().map(object).collect());
+        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "everyday": EVERYDAY.contains(&e.name), "uses": e.uses.concat(), "not": e.not.concat() });
+        return pretty(&all.map(object).collect());
     }
+    let place = |e: &&Experiment| EVERYDAY.iter().position(|name| *name == e.name);
+    let mut shown: Vec<_> = all.filter(|e| place(e).is_none() == lab).collect();
+    shown.sort_by_key(place);
     let mut text = String::new();
-    for Experiment { name, stands_for, about, .. } in all() {
+    for Experiment { name, stands_for, about, .. } in shown {
         text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
+    }
+    if !lab {
+        text.push_str("    The others, most of them of the laboratory: `list --lab`.\n");
     }
     Ok(text)
 }

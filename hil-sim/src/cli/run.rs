@@ -122,7 +122,7 @@ pub fn run(
         }
     };
     if let (None, Some(one)) = (&own, chosen.first()) {
-        one.check_file(file)?;
+        experiments::check_file(one, file)?;
     }
     let file = file.or(own.as_ref().map(|_| Path::new(name)));
     let config = input.config()?;

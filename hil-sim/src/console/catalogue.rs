@@ -20,23 +20,15 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Asks a drive. A firmware that does not know `describe` is asked with `get`.
+    /// Asks a drive.
     ///
     /// # Errors
     /// The drive does not answer.
     pub fn read(link: &mut Link) -> Result<Self, LinkError> {
         let commands = commands(&link.ask("help", |_| ())?);
         let described = link.ask("describe", |_| ())?;
-        let settings = match described.error() {
-            None => {
-                described.contents().iter().filter_map(|line| described_setting(line)).collect()
-            }
-            Some(_) => {
-                let listed = link.ask("get", |_| ())?;
-                listed.contents().iter().filter_map(|line| listed_setting(line)).collect()
-            }
-        };
-        Ok(Self { commands, settings })
+        let settings = described.contents().iter().filter_map(|line| described_setting(line));
+        Ok(Self { commands, settings: settings.collect() })
     }
 
     /// Number of settings.
@@ -104,15 +96,6 @@ fn described_setting(line: &str) -> Option<Known> {
     Some(Known { name: object["name"].as_str()?.to_owned(), words })
 }
 
-/// The setting of a line of `get`: `NAME = VALUE UNIT (MIN to MAX)` or `NAME = WORD (one of: WORD WORD)`.
-fn listed_setting(line: &str) -> Option<Known> {
-    let (name, rest) = line.split_once(" = ")?;
-    let words = rest.split_once("(one of: ").map_or("", |(_, words)| words.trim_end_matches(')'));
-    let mut words: Vec<_> = words.split_whitespace().map(str::to_owned).collect();
-    words.extend(rest.starts_with("auto").then(|| "auto".to_owned()));
-    Some(Known { name: name.to_owned(), words })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,18 +150,5 @@ mod tests {
                 "{line}"
             );
         }
-    }
-
-    #[test]
-    fn lines_of_get_name_settings_too() {
-        let source =
-            listed_setting("angle_source = injection (one of: encoder injection)").unwrap();
-        assert_eq!(source.words, ["encoder", "injection"]);
-        let current = listed_setting("sequence.i_d = auto: 0.7 A (0 to 3)").unwrap();
-        assert_eq!(
-            (current.name.as_str(), &current.words[..]),
-            ("sequence.i_d", &["auto".to_owned()][..])
-        );
-        assert_eq!(listed_setting("off; i_d 0.00 A"), None);
     }
 }

@@ -1,5 +1,6 @@
-//! Moves lines between this program and the drive. A thread reads; its lines go to the command that awaits an answer, or
-//! are shown at once. Frames of a stream between the lines go their own way.
+//! Moves lines between this program and the drive. A thread reads; its lines go to the request that awaits an answer, or
+//! are shown at once. Each request has a tag of its own, which tells its answer from all else ([`super::answer`]). Frames of a
+//! stream between the lines go their own way.
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -8,7 +9,7 @@ use std::time::Duration;
 
 use drive_stream::{Frame, Piece, Splitter};
 
-use super::answer::{Awaited, Meaning, is_error};
+use super::answer::{self, Meaning, is_error};
 use super::trace::{Collector, Trace};
 
 /// Longest silence within an answer: a setting is designed for seconds, on a virtual board at a fraction of real time.
@@ -63,44 +64,46 @@ struct Route {
     frames: Box<dyn FnMut(Option<Frame>) + Send>,
     traces: Collector,
     closed: bool,
-    /// Answers to urgent lines that come before that to the command, and behind it.
-    owed: u32,
-    owed_behind: u32,
 }
 
 impl Route {
     fn line(&mut self, line: String) {
         self.traces.push(&line);
         match &self.asked {
-            Some(asked) if self.owed == 0 || !ends_answer(&line) => drop(asked.send(line)),
-            _ => self.unasked(&line),
+            Some(asked) => drop(asked.send(line)),
+            None => self.unawaited(&line),
         }
     }
 
-    /// Shows a line that answers no command.
-    fn unasked(&mut self, line: &str) {
-        if ends_answer(line) {
-            self.owed = self.owed.saturating_sub(1);
-        }
-        (self.show)(line);
+    /// Shows a line that nobody awaits, without its tag.
+    fn unawaited(&mut self, line: &str) {
+        let rest = line.strip_prefix('@').and_then(|tagged| tagged.split_once(' '));
+        (self.show)(rest.map_or(line, |(_, rest)| rest));
     }
 }
 
 /// The direction to the drive.
 type Port = Arc<Mutex<Outgoing>>;
 
-struct Outgoing(Box<dyn Write + Send>);
-
-impl Outgoing {
-    fn send(&mut self, line: &str) -> std::io::Result<()> {
-        self.0.write_all(format!("{line}\n").as_bytes())?;
-        self.0.flush()
-    }
+struct Outgoing {
+    port: Box<dyn Write + Send>,
+    /// Tag of the last request.
+    tag: u32,
 }
 
-/// Whether a line ends an answer, whatever the command was.
-fn ends_answer(line: &str) -> bool {
-    line == "ok" || line.starts_with("ok:") || is_error(line)
+impl Outgoing {
+    /// Sends a request; its tag. An empty line is a sign of life, which has no answer and cuts nothing short.
+    fn send(&mut self, request: &str) -> std::io::Result<u32> {
+        let line = if request.is_empty() {
+            String::new()
+        } else {
+            self.tag = self.tag.wrapping_add(1);
+            answer::tagged(self.tag, request)
+        };
+        self.port.write_all(format!("{line}\n").as_bytes())?;
+        self.port.flush()?;
+        Ok(self.tag)
+    }
 }
 
 /// A connection to a drive.
@@ -111,7 +114,7 @@ pub struct Link {
 
 /// Sends lines that cannot wait for an answer that is awaited.
 #[derive(Clone)]
-pub struct Urgent(Port, Arc<Mutex<Route>>);
+pub struct Urgent(Port);
 
 impl Urgent {
     /// Sends a line at once. Its answer is shown, unless a list is being answered: the line cuts that short.
@@ -119,17 +122,7 @@ impl Urgent {
     /// # Errors
     /// The port is gone.
     pub fn send(&self, line: &str) -> Result<(), LinkError> {
-        // Locked while it is noted as well: the answers come in the order of the lines.
-        let mut port = locked(&self.0);
-        // An empty line is a sign of life, which has no answer and cuts nothing short.
-        if !line.is_empty() {
-            let mut route = locked(&self.1);
-            match route.asked {
-                Some(_) => route.owed_behind += 1,
-                None => route.owed += 1,
-            }
-        }
-        port.send(line).map_err(|_| LinkError::Closed)
+        locked(&self.0).send(line).map(drop).map_err(|_| LinkError::Closed)
     }
 }
 
@@ -151,25 +144,18 @@ impl Link {
         frames: impl FnMut(Option<Frame>) + Send + 'static,
     ) -> Self {
         let (show, frames) = (Box::new(show), Box::new(frames));
-        let route = Route {
-            asked: None,
-            show,
-            frames,
-            traces: Collector::default(),
-            closed: false,
-            owed: 0,
-            owed_behind: 0,
-        };
+        let route =
+            Route { asked: None, show, frames, traces: Collector::default(), closed: false };
         let route = Arc::new(Mutex::new(route));
         let to = route.clone();
         std::thread::spawn(move || read_lines(reader, &to));
-        let port = Arc::new(Mutex::new(Outgoing(Box::new(port))));
+        let port = Arc::new(Mutex::new(Outgoing { port: Box::new(port), tag: 0 }));
         Self { port, route }
     }
 
     /// A way for lines that cannot wait.
     pub fn urgent(&self) -> Urgent {
-        Urgent(self.port.clone(), self.route.clone())
+        Urgent(self.port.clone())
     }
 
     /// Whether the port is gone.
@@ -190,45 +176,35 @@ impl Link {
     /// There is no whole answer.
     pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
         let (send, lines) = channel();
-        let sent = {
-            let mut port = locked(&self.port);
+        {
             let mut route = locked(&self.route);
             if route.closed {
                 return Err(LinkError::Closed);
             }
             route.asked = Some(send);
-            drop(route);
-            port.send(command)
-        };
-        let mut answer = match sent {
-            Ok(()) => self.hear(command, &lines, &mut show),
+        }
+        let sent = locked(&self.port).send(command);
+        let answer = match sent {
+            Ok(tag) => self.hear(command, tag, &lines, &mut show),
             Err(_) => Err(LinkError::Closed),
         };
-        let _port = locked(&self.port);
         let mut route = locked(&self.route);
         route.asked = None;
-        // The answer to an urgent line has ended a list.
-        let many = answer.as_ref().is_ok_and(|answer| answer.lines.len() > 1);
-        if route.owed_behind > 0 && many {
-            route.owed_behind -= 1;
-            answer = Err(LinkError::Cut(command.to_owned()));
-        }
-        route.owed += std::mem::take(&mut route.owed_behind);
-        if matches!(answer, Err(LinkError::Silence(..))) {
-            route.owed = 0;
-        }
-        lines.try_iter().for_each(|line| route.unasked(&line));
+        lines.try_iter().for_each(|line| route.unawaited(&line));
         answer
     }
 
     fn hear(
         &self,
         command: &str,
+        tag: u32,
         lines: &Receiver<String>,
         show: &mut impl FnMut(&str),
     ) -> Result<Answer, LinkError> {
-        let (mut awaited, mut answer) = (Awaited::new(command), Answer::default());
-        let patience = if awaited.is_slow() { PATIENCE_WITH_TRACE } else { PATIENCE };
+        let mut answer = Answer::default();
+        // A trace is recorded before anything is said.
+        let is_trace = command.split_whitespace().next() == Some("trace");
+        let patience = if is_trace { PATIENCE_WITH_TRACE } else { PATIENCE };
         loop {
             let line = lines.recv_timeout(patience).map_err(|why| match why {
                 RecvTimeoutError::Timeout => {
@@ -236,17 +212,23 @@ impl Link {
                 }
                 RecvTimeoutError::Disconnected => LinkError::Closed,
             })?;
-            let meaning = awaited.take(&line);
-            match meaning {
+            match answer::meaning(tag, command, &line) {
                 Meaning::Echo => {}
                 Meaning::Unasked => (locked(&self.route).show)(&line),
-                Meaning::Answer | Meaning::Last => {
+                Meaning::Older(rest) => (locked(&self.route).show)(rest),
+                Meaning::Younger(rest) => {
+                    (locked(&self.route).show)(rest);
+                    return Err(LinkError::Cut(command.to_owned()));
+                }
+                Meaning::Answer => {
                     show(&line);
                     answer.lines.push(line);
                 }
-            }
-            if meaning == Meaning::Last {
-                return Ok(answer);
+                Meaning::Last(rest) => {
+                    show(rest);
+                    answer.lines.push(rest.to_owned());
+                    return Ok(answer);
+                }
             }
         }
     }
@@ -329,7 +311,7 @@ fn readable(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// A drive that answers each line with the next of these texts; what was shown unasked.
+    /// A drive that answers each request with the next of these texts; what was shown unasked.
     #[cfg(unix)]
     fn talk(answers: &'static [&str], with: impl FnOnce(&mut Link, &Urgent)) -> Vec<String> {
         use std::io::{BufRead as _, BufReader};
@@ -357,19 +339,26 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn the_answer_to_an_urgent_line_is_no_answer_to_the_next_command() {
-        let shown = talk(&["ok\r\n", "off; dc link 311 V\r\n"], |link, urgent| {
+        let answers = &["@1 ok\r\n", "* running: torque\r\n@2 off; dc link 311 V\r\n"];
+        let shown = talk(answers, |link, urgent| {
             urgent.send("stop").unwrap();
             urgent.send("").unwrap();
             assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; dc link 311 V"]);
         });
-        assert_eq!(shown, ["ok"]);
+        assert_eq!(shown, ["ok", "* running: torque"]);
     }
 
     #[cfg(unix)]
     #[test]
     fn an_urgent_line_cuts_a_list_short_and_nothing_else() {
-        let answers = &["a  b\r\nc  d\r\n", "ok\r\n", "off; x\r\n", "ok\r\n", "off; y\r\n"];
-        talk(answers, |link, urgent| {
+        let answers = &[
+            "a  b\r\nc  d\r\n",
+            "@2 ok\r\n",
+            "@3 off; x\r\n",
+            "@4 ok\r\n",
+            "off: y\r\nok\r\n@5 ok\r\n",
+        ];
+        let shown = talk(answers, |link, urgent| {
             let later = |urgent: Urgent| {
                 std::thread::spawn(move || {
                     std::thread::sleep(Duration::from_millis(10));
@@ -383,8 +372,10 @@ mod tests {
             let sent = later(urgent.clone());
             assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; x"]);
             sent.join().unwrap();
-            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; y"]);
+            // Lines that look like news, or like an end, are those of a list all the same.
+            assert_eq!(link.ask("help", |_| ()).unwrap().lines, ["off: y", "ok", "ok"]);
         });
+        assert_eq!(shown, ["ok", "ok"]);
     }
 
     #[test]

@@ -25,8 +25,8 @@ pub use trial::{Refused, Trial, UNNOTICED_S};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::{AngleSource, Drive};
 
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, built, check_model, plant_settings};
 use crate::error::Error;

@@ -17,10 +17,10 @@ use drive_settings::Flux;
 use case::Case;
 use trial::Run;
 
+use super::assumptions;
 use super::battery::{Moment, Trial, learned};
 use super::commission::commissioned;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};
 use crate::error::Error;

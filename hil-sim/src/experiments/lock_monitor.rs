@@ -4,8 +4,8 @@ mod trials;
 
 pub use self::trials::Trial;
 use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::columns;
 use crate::config::Config;

@@ -2,9 +2,9 @@
 
 use drive_core::Drive;
 
+use super::assumptions;
 use super::battery::held;
 use super::full_range::for_the_range;
-use super::torque::assumptions;
 use super::torque_limit::learned_limit;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
 use crate::config::{Config, plant_settings};

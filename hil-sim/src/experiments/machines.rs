@@ -4,10 +4,10 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::assumptions;
 use super::commission::machine::around;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::{Config, plant_settings};
 use crate::error::Error;

@@ -3,9 +3,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::config::plant_settings;

@@ -5,9 +5,9 @@ mod held;
 use drive_core::Command;
 
 use self::held::{Held, Standstill, reversing};
+use super::assumptions;
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
-use super::torque::assumptions;
 use super::torque_limit::{BEYOND_A, TorqueLimit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::{Config, open_phase, plant_settings};

@@ -17,7 +17,7 @@ pub use quantity::QUANTITIES;
 pub use record::Record;
 
 use self::file::{Ramp, Text};
-use super::torque::assumptions;
+use super::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TRACKING};
 use crate::config::{Config, Key, LoadMode, Value};
 use crate::error::Error;
@@ -65,7 +65,7 @@ pub const PROFILE: Experiment = Experiment {
     about: "References and load over time from a CSV file: `run profile --input FILE.csv`.",
     uses: REVERSAL.uses,
     run: |context| {
-        PROFILE.check_file(context.file)?;
+        super::check_file(&PROFILE, context.file)?;
         Scenario::of_csv(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
     },
     ..OWN

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use drive_core::Mode;
 
+use super::assumptions;
 use super::scenario::{Metric, Record, Statistic, position_step};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, learning};
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};

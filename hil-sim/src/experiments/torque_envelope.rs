@@ -2,9 +2,9 @@
 
 use drive_core::Drive;
 
+use super::assumptions;
 use super::battery::held;
 use super::full_range::{I_D_A, for_the_range};
-use super::torque::assumptions;
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
 use crate::config::Config;

@@ -1,7 +1,7 @@
 //! Records the runs of the board that `tests/replay/` gives to a host drive: `tests/recorded/NAME.samples` and
 //! `NAME.orders`; see the README there.
 //!
-//! `cargo run --release -p virtual-board --example record`, after `cargo firmware` and with the path that it prints in
+//! `cargo run --release --example record` in `hil-sim/virtual-board`, after `cargo firmware` and with the path that it prints in
 //! `INDUCTION_DRIVE_ELF`.
 
 use std::fs;

@@ -3,7 +3,7 @@
 
 use anyhow::{Result, bail};
 use drive_core::State;
-use induction_drive::console::announce::ANNOUNCEMENTS;
+use induction_drive::console::line::UNASKED;
 
 use crate::board::{Board, Options, Period};
 use crate::image::Image;
@@ -86,9 +86,8 @@ impl Pair {
         let mut answer = String::new();
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
             answer += &pair.board.take_console();
-            let announced = |line: &&str| ANNOUNCEMENTS.iter().any(|first| line.starts_with(first));
             while let Some((first, rest)) = answer.split_once('\n')
-                && announced(&first)
+                && first.starts_with(UNASKED)
             {
                 answer = rest.to_owned();
             }

@@ -4,32 +4,77 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Drive, FrontEndState, Mode, Output, State};
-use drive_settings::Settings;
+use drive_core::learned::Learned;
+use drive_core::{Accepted, Coefficients, Command, Drive, FrontEndState, Output, State};
+use drive_settings::{Settings, SettingsError};
 
 use crate::board::{Options, Period, confirmed};
+use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::{self, Request};
+use induction_drive::desk::Desk;
+use induction_drive::desk::handle::{CommandError, DriveHandle};
+use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::rotor_tracking::Tracking;
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::staging::Staging;
+use induction_drive::settings::bus::Commander;
+use induction_drive::store::FlashError;
 
-/// A drive with the settings of the board.
+/// A drive with the settings of the board, and a desk of its own.
 pub struct Shadow {
     /// The drive.
     pub drive: Drive,
     front_end: FrontEndState,
     /// Output of its last step.
     pub output: Output,
-    settings: Staging,
-    /// Dead time that the timer makes since its start, s.
-    dead_time_s: f32,
-    orders: VecDeque<Command>,
+    desk: Desk,
+    orders: Orders,
     tracking: Option<Tracking>,
     /// Rotor time constant that the main loop is about to order, s.
     tau_r: Option<f32>,
     /// Control interrupts compared so far.
     pub compared: u64,
+}
+
+/// The shadow's drive as its desk sees it: commands wait until the interrupt of the board takes one.
+struct Orders {
+    waiting: VecDeque<Command>,
+    state: State,
+    periods: u32,
+    /// Dead time that the timer makes since its start, s.
+    dead_time_s: f32,
+    learned: Option<Learned>,
+    session: Session,
+}
+
+impl DriveHandle for Orders {
+    fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
+        self.waiting.push_back(command);
+        Ok(Accepted::AsGiven)
+    }
+    fn no_control(&self) -> CommandError {
+        CommandError::NoAnswer
+    }
+    fn status(&self) -> Option<Status> {
+        Some(Status { periods: self.periods, state: self.state, ..Status::default() })
+    }
+    fn is_off(&self) -> bool {
+        self.state.is_off()
+    }
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
+        settings.build_for(self.dead_time_s)
+    }
+    fn configured(&mut self, _: &FirmwareSettings) {}
+    fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+    fn save(&mut self, _: &FirmwareSettings) -> Result<(), FlashError> {
+        Ok(())
+    }
+    fn reboot(&mut self) {}
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        self.learned.take().iter().for_each(show);
+    }
 }
 
 impl Shadow {
@@ -48,9 +93,15 @@ impl Shadow {
             front_end: FrontEndState::default(),
             output: Output::default(),
             tracking: Tracking::new(&settings.drive),
-            settings: Staging::new(settings),
-            dead_time_s,
-            orders: VecDeque::new(),
+            desk: Desk::new(settings),
+            orders: Orders {
+                waiting: VecDeque::new(),
+                state: State::Off,
+                periods: 0,
+                dead_time_s,
+                learned: None,
+                session: Session::new(&settings.drive),
+            },
             tau_r: None,
             compared: 0,
         })
@@ -58,75 +109,25 @@ impl Shadow {
 
     /// Its settings, with the dead time that the timer makes.
     pub fn settings(&self) -> Settings {
-        let mut settings = self.settings.in_force().drive;
-        settings.inverter.dead_time_s = self.dead_time_s;
+        let mut settings = self.firmware_settings().drive;
+        settings.inverter.dead_time_s = self.orders.dead_time_s;
         settings
     }
 
-    /// A line that was typed at the console of the board.
+    /// A line that was typed at the console of the board. A refused order gives the drive no command, here and there.
     ///
     /// # Errors
-    /// The line gives no order.
+    /// The line is invalid.
     pub fn type_line(&mut self, line: &str) -> Result<()> {
-        let order = match grammar::parse(line) {
-            Ok(Request::Start(mode)) => {
-                self.apply()?;
-                self.start(mode)
+        match grammar::parse(line) {
+            Ok(Request::Order(order)) => {
+                let _ = self.desk.order(Commander::Console, order, &mut self.orders);
+                self.desk.go_on(&mut self.orders, 0);
+                Ok(())
             }
-            Ok(Request::Learn { again }) => {
-                self.apply()?;
-                let Self { settings, orders, dead_time_s, .. } = self;
-                settings.begin_learning(again, |settings| -> Result<()> {
-                    orders.push_back(Command::Configure(settings.build_for(*dead_time_s)?));
-                    Ok(())
-                })?;
-                self.start(Mode::Learning)
-            }
-            Ok(Request::Stop(stop)) => Command::Stop(stop),
-            Ok(Request::Relock) => Command::Relock,
-            Ok(Request::Clear) => Command::Clear,
-            Ok(Request::Torque(i_q)) => Command::Torque(i_q),
-            Ok(Request::Speed(rpm)) => Command::Speed(rpm),
-            Ok(Request::Jog(rpm)) => Command::Jog(rpm),
-            Ok(Request::Position(turns)) => Command::Position(turns),
-            Ok(Request::Set(values)) => {
-                self.settings.set(&values).map_err(|why| anyhow::anyhow!("{line}: {why}"))?;
-                return Ok(());
-            }
-            Ok(Request::Defaults) => {
-                self.settings.set_defaults();
-                return Ok(());
-            }
-            Ok(Request::Revert) => {
-                self.settings.revert();
-                return Ok(());
-            }
-            Ok(Request::Apply | Request::Save) => return self.apply(),
-            Ok(_) => return Ok(()), // no order to the drive
+            Ok(_) => Ok(()), // no order
             Err(why) => bail!("{line}: {why}"),
-        };
-        self.orders.push_back(order);
-        Ok(())
-    }
-
-    /// The start in a mode; a check of the wiring comes before the first.
-    fn start(&mut self, mode: Mode) -> Command {
-        if !self.settings.in_force().command.wiring_checked {
-            self.orders.push_back(Command::CheckWiring);
         }
-        Command::Start(mode)
-    }
-
-    /// Puts the staged settings in force, as the firmware's console does.
-    fn apply(&mut self) -> Result<()> {
-        let designs = self.settings.needs_design();
-        if let Some(settings) = self.settings.prepare()
-            && designs
-        {
-            self.orders.push_back(Command::Configure(settings.build_for(self.dead_time_s)?));
-        }
-        self.settings.adopt();
-        Ok(())
     }
 
     /// The board was reset: it has these settings, which were saved, and starts anew.
@@ -134,16 +135,16 @@ impl Shadow {
     /// # Errors
     /// They make no drive.
     pub fn restart(&mut self, mut settings: FirmwareSettings) -> Result<()> {
-        self.settings = Staging::new(settings);
-        self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
+        self.desk = Desk::new(settings);
+        self.drive = Drive::new(settings.build_for(self.orders.dead_time_s)?);
         self.front_end = FrontEndState::default();
-        self.orders.clear();
+        self.orders.waiting.clear();
         Ok(())
     }
 
     /// All settings, with the learned table.
     pub fn firmware_settings(&self) -> &FirmwareSettings {
-        self.settings.in_force()
+        self.desk.settings().in_force()
     }
 
     /// Follows a control interrupt of the board.
@@ -159,7 +160,7 @@ impl Shadow {
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()
         {
-            self.settings.learned(found);
+            self.orders.learned = Some(*found);
         }
         if compare != period.compare {
             bail!(
@@ -170,18 +171,16 @@ impl Shadow {
             );
         }
         self.compared += 1;
-        // As the firmware's console: a drive that is past the check need not check again.
-        if self.drive.state().has_current() {
-            self.settings.note(|settings| settings.command.wiring_checked = true);
-        }
+        (self.orders.state, self.orders.periods) = (self.drive.state(), self.compared as u32);
+        self.desk.follow(&mut self.orders);
         if period.took_order {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);
-            let order = tracked.or_else(|| self.orders.pop_front());
+            let order = tracked.or_else(|| self.orders.waiting.pop_front());
             let Some(order) = order else { bail!("an order that was not given") };
             let answer = self.drive.command(&order);
             if let (Ok(_), Command::Configure(_)) = (answer, order) {
-                self.tracking = Tracking::new(&self.settings.in_force().drive);
+                self.tracking = Tracking::new(&self.firmware_settings().drive);
             }
         }
         // As the firmware's main loop.

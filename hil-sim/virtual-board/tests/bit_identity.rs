@@ -1,7 +1,6 @@
 //! The ELF and the same drive on the host compute the same bits.
 
-mod common;
-
+use crate::common;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;

@@ -1,7 +1,6 @@
 //! The image on the board: its start, its messages, and its ends.
 
-mod common;
-
+use crate::common;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;

@@ -1,7 +1,5 @@
 //! Every board with the image that is built for it: the drivers are off unless the drive is on, and the drive works.
 
-mod common;
-
 use std::f64::consts::TAU;
 
 use anyhow::{Context, Result};

@@ -1,7 +1,6 @@
 //! Currents sampled in both zero vectors: less noise, the same bits on the host, and the protections see both conversions.
 
-mod common;
-
+use crate::common;
 use std::cell::Cell;
 use std::rc::Rc;
 

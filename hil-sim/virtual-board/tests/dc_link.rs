@@ -1,7 +1,6 @@
 //! Brake chopper and precharge relay at their pins.
 
-mod common;
-
+use crate::common;
 use anyhow::{Context, Result};
 use drive_core::{Fault, State};
 use hil_sim::Config;

@@ -1,11 +1,8 @@
 //! The gates behind the drivers of every board, and the shunts, with register scripts: no firmware.
 
-#[path = "common/script.rs"]
-mod script;
-
+use crate::common::script::*;
 use anyhow::Result;
 use drive_core::Compare;
-use script::*;
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::bridge::{BadGates, Leg};
 use virtual_board::power_stage::shunts::Shunts;

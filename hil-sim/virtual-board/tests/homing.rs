@@ -1,7 +1,6 @@
 //! Homing by the image, against a stop of the simulated shaft.
 
-mod common;
-
+use crate::common;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;

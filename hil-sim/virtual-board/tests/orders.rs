@@ -1,7 +1,6 @@
 //! Cycles of the control interrupts that take orders from the console.
 
-mod common;
-
+use crate::common;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;

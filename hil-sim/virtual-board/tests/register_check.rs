@@ -1,7 +1,6 @@
 //! Bits of configuration registers flip while the drive regulates: the outputs go off and the chip starts afresh.
 
-mod common;
-
+use crate::common;
 use anyhow::{Result, ensure};
 use induction_drive::monitor::register_check::control;
 use virtual_board::periph::Reset;

@@ -2,9 +2,7 @@
 //! peripheral access crate `stm32g4` (ST's SVD with the corrections of stm32-rs; its source is read) and against the
 //! data of `stm32-metapac` (embassy); clocks and pins against the latter.
 
-#[path = "registers/metapac.rs"]
 mod metapac;
-#[path = "registers/svd.rs"]
 mod svd;
 
 use std::collections::BTreeMap;

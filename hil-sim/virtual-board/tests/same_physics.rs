@@ -3,8 +3,7 @@
 //! Same plant, same settings, same steps. The seeds are the same too, but not the noise: the board
 //! has drawn from it while it started, and an order comes some periods later.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 
 use anyhow::Result;

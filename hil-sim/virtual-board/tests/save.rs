@@ -1,7 +1,6 @@
 //! What the flash keeps while the power comes and goes.
 
-mod common;
-
+use crate::common;
 use anyhow::Result;
 use induction_drive::settings::keys;
 use virtual_board::{Image, campaign};

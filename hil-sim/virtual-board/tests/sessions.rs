@@ -1,12 +1,9 @@
 //! `cargo sim board` with scripts: what a session keeps, shows and refuses.
 
-#[path = "common/program.rs"]
-mod program;
-
 use std::path::Path;
 use std::process::Stdio;
 
-use program::{command, folder};
+use crate::common::program::{command, folder};
 
 /// A session with a script, as fast as it goes; exit code and all that it showed.
 fn play(folder: &Path, script: &str, arguments: &[&str]) -> (Option<i32>, String) {

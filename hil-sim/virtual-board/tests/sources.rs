@@ -1,8 +1,7 @@
 //! Core clock and reference voltage against the other clock and the other reference of the chip: at start and while the drive
 //! regulates.
 
-mod common;
-
+use crate::common;
 use anyhow::{Result, bail};
 use drive_core::{Fault, State};
 use hil_sim::Config;

@@ -1,7 +1,6 @@
 //! The stream on the image: its rate, its losses, its price, and the console beside it.
 
-mod common;
-
+use crate::common;
 use anyhow::{Context, Result, ensure};
 use drive_core::State;
 use drive_stream::{Frame, Piece, Splitter};

@@ -1,8 +1,7 @@
 //! Images on the stricter board: ours breaks no rule of the chip, a halted core ends with the outputs off, and an old
 //! image with known faults is caught.
 
-mod common;
-
+use crate::common;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -197,7 +196,7 @@ fn a_single_bank_chip_is_refused() -> Result<()> {
 /// ```text
 /// git worktree add ../old 1abee12 && cd ../old && cargo xtask firmware && cd -
 /// INDUCTION_DRIVE_OLD_ELF=../old/target/.../firmware/induction-drive \
-///     cargo test --release -p virtual-board --test strict -- --ignored --nocapture
+///     cargo test --release strict -- --ignored --nocapture
 /// ```
 #[test]
 #[ignore = "needs the image of another commit"]

@@ -1,7 +1,6 @@
 //! The rotor time constant is found and used while the image runs.
 
-mod common;
-
+use crate::common;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;

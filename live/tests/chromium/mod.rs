@@ -75,10 +75,7 @@ impl Browser {
         let session = self.call(&Value::Null, "Target.attachToTarget", attach)["sessionId"].clone();
         let mut page = Page { browser: self, target, session };
         page.call("Page.bringToFront", json!({}));
-        page.until(
-            "typeof $ == 'function' && document.readyState == 'complete'",
-            Duration::from_secs(20),
-        );
+        page.until("document.readyState == 'complete'", Duration::from_secs(20));
         page
     }
 }
@@ -144,10 +141,20 @@ impl Page<'_> {
         self.call("Emulation.setEmulatedMedia", feature);
     }
 
+    /// Writes a picture of what is in sight.
     pub fn picture(&mut self, file: &Path) {
-        let data = self.call("Page.captureScreenshot", json!({ "format": "png" }))["data"].clone();
+        self.write("Page.captureScreenshot", file);
+    }
+
+    /// Writes the page as it is printed.
+    pub fn print(&mut self, file: &Path) {
+        self.write("Page.printToPDF", file);
+    }
+
+    fn write(&mut self, method: &str, file: &Path) {
+        let data = self.call(method, json!({}))["data"].clone();
         let bytes = data_encoding::BASE64.decode(data.as_str().unwrap().as_bytes()).unwrap();
-        std::fs::write(file, bytes).expect("the picture is written");
+        std::fs::write(file, bytes).expect("the file is written");
     }
 
     pub fn close(self) {

@@ -5,8 +5,16 @@ use core::fmt;
 use drive_settings::value::ValueError;
 use thiserror::Error;
 
+use crate::console::line::LONGEST_TAG;
 use crate::link::trace::SIGNALS;
 use crate::settings::keys::Key;
+
+/// The tag of a request is too long, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error(
+    "a tag has 1 to {LONGEST_TAG} characters between `@` and a space; the request was not carried out"
+)]
+pub struct TagError;
 
 /// Reason why a line is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]

@@ -21,7 +21,9 @@ fn every_line_of_the_help_but_the_last_is_a_command_and_every_command_has_one() 
 }
 
 fn assigned(values: &[(&str, Value)]) -> Request {
-    Request::Set(values.iter().map(|(name, value)| (keys::find(name).unwrap(), *value)).collect())
+    Request::Order(Order::Set(
+        values.iter().map(|(name, value)| (keys::find(name).unwrap(), *value)).collect(),
+    ))
 }
 
 fn traced(records: u16, divider: u16, names: &[&str], trigger: Trigger) -> Request {
@@ -40,22 +42,25 @@ fn commands_are_understood() {
         ("help", Request::Help),
         ("?", Request::Help),
         ("  status\t", Request::Status),
-        ("start", Request::Start(Mode::Torque)),
-        ("start position", Request::Start(Mode::Position)),
-        ("start vf", Request::Start(Mode::VoltsPerHertz)),
-        ("start learning", Request::Learn { again: false }),
-        ("learn", Request::Learn { again: false }),
-        ("learn again", Request::Learn { again: true }),
-        ("stop", Request::Stop(Stop::Coast)),
-        ("stop ramp", Request::Stop(Stop::Ramp)),
-        ("stop quick", Request::Stop(Stop::Quick)),
-        ("relock", Request::Relock),
-        ("torque -1.5", Request::Torque(-1.5)),
-        ("start speed", Request::Start(Mode::Speed)),
-        ("speed -150", Request::Speed(-150.0)),
-        ("jog -60", Request::Jog(-60.0)),
-        ("position 5e1", Request::Position(50.0)),
-        ("home -30 0.5 4", Request::Home(homing::Plan { rpm: -30.0, i_q: 0.5, turns: 4.0 })),
+        ("start", Request::Order(Order::Start(Mode::Torque))),
+        ("start position", Request::Order(Order::Start(Mode::Position))),
+        ("start vf", Request::Order(Order::Start(Mode::VoltsPerHertz))),
+        ("start learning", Request::Order(Order::Learn { again: false })),
+        ("learn", Request::Order(Order::Learn { again: false })),
+        ("learn again", Request::Order(Order::Learn { again: true })),
+        ("stop", Request::Order(Order::Stop(Stop::Coast))),
+        ("stop ramp", Request::Order(Order::Stop(Stop::Ramp))),
+        ("stop quick", Request::Order(Order::Stop(Stop::Quick))),
+        ("relock", Request::Order(Order::Relock)),
+        ("torque -1.5", Request::Order(Order::Torque(-1.5))),
+        ("start speed", Request::Order(Order::Start(Mode::Speed))),
+        ("speed -150", Request::Order(Order::Speed(-150.0))),
+        ("jog -60", Request::Order(Order::Jog(-60.0))),
+        ("position 5e1", Request::Order(Order::Position(50.0))),
+        (
+            "home -30 0.5 4",
+            Request::Order(Order::Home(homing::Plan { rpm: -30.0, i_q: 0.5, turns: 4.0 })),
+        ),
         ("angle encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("set angle_source encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("get", Request::List("")),
@@ -85,9 +90,9 @@ fn commands_are_understood() {
         ("faults 4", Request::Faults(Some(Fault::DcLinkOverVoltage))),
         ("log warn", Request::Log(Level::Warn)),
         ("log debug", Request::Log(Level::Debug)),
-        ("echo on", Request::Echo(true)),
-        ("reboot", Request::Reboot(false)),
-        ("reboot now", Request::Reboot(true)),
+        ("echo on", Request::Order(Order::Echo(true))),
+        ("reboot", Request::Order(Order::Reboot(false))),
+        ("reboot now", Request::Order(Order::Reboot(true))),
         ("version", Request::Version),
     ];
     for (line, request) in table {
@@ -171,7 +176,7 @@ proptest! {
     fn words_that_look_like_commands_are_understood_or_refused(
         line in "(start|torque|speed|position|angle|get|set|trace|log|stop|learned|faults) ?[-+.0-9a-z_ ]{0,30}",
     ) {
-        if let Ok(Request::Torque(x) | Request::Speed(x) | Request::Position(x)) = parse(&line) {
+        if let Ok(Request::Order(Order::Torque(x)) | Request::Order(Order::Speed(x)) | Request::Order(Order::Position(x))) = parse(&line) {
             prop_assert!(x.is_finite());
         }
     }
@@ -181,7 +186,7 @@ proptest! {
         digits in -9_999_999..=9_999_999, power in -9_i32..=9,
     ) {
         let value = digits as f32 * 10_f32.powi(power);
-        prop_assert_eq!(parse(&format!("torque {value}")).ok(), Some(Request::Torque(value)));
-        prop_assert_eq!(parse(&format!("torque {value:e}")).ok(), Some(Request::Torque(value)));
+        prop_assert_eq!(parse(&format!("torque {value}")).ok(), Some(Request::Order(Order::Torque(value))));
+        prop_assert_eq!(parse(&format!("torque {value:e}")).ok(), Some(Request::Order(Order::Torque(value))));
     }
 }

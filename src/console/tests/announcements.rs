@@ -4,6 +4,7 @@ use drive_core::AngleSource;
 use hil_sim::rig::Rig;
 
 use super::*;
+use crate::desk::news::News;
 
 /// Bytes a second of the wire.
 const BYTES_PER_S: f64 = 11_520.0;
@@ -98,11 +99,11 @@ fn a_fault_in_any_state_is_told_in_words_within_a_fifth_of_a_second() {
             talk.port.received.clear();
             talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
             assert_eq!(talk.drive.drive.state(), State::Fault(Fault::Break));
-            let (seconds, line) = until_line(&mut talk, "fault 20: ");
+            let (seconds, line) = until_line(&mut talk, "* fault 20: ");
             assert!(seconds < LATEST_S, "{state}, {printing:?}: {seconds} s");
             assert_eq!(
                 line,
-                "fault 20: the power stage pulled the break input; likely: the power stage reports a fault of its \
+                "* fault 20: the power stage pulled the break input; likely: the power stage reports a fault of its \
                  own; type 'clear'"
             );
         }
@@ -121,7 +122,7 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
     talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     let lines = talk.say("");
     assert_eq!(lines.len(), keys::COUNT + 2);
-    let fault = lines.iter().position(|line| line.starts_with("fault ")).unwrap();
+    let fault = lines.iter().position(|line| line.starts_with("* fault ")).unwrap();
     assert!((1..20).contains(&fault) && lines.last().unwrap() == "ok");
     // Once.
     talk.now_ms += 60_000;
@@ -131,11 +132,11 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
 #[test]
 fn every_fault_fits_a_line() {
     for fault in Fault::ALL {
-        let text = announce::News::Fault(*fault).to_string();
-        assert!(
-            text.len() + 2 < line::OUTPUT - line::LONGEST && text.ends_with("type 'clear'"),
-            "{text}"
-        );
+        let mut console = Console::new();
+        console.tell(News::Fault(*fault), &Desk::new(FirmwareSettings::of_the_board()));
+        let text = console.out.as_str();
+        let fits = text.len() < line::OUTPUT - line::LONGEST;
+        assert!(fits && text.ends_with("type 'clear'\r\n"), "{text}");
     }
 }
 
@@ -145,9 +146,9 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
     talk.drive.drive = in_state(State::Magnetising).drive;
     assert!(talk.say("").is_empty());
     for (state, line) in [
-        (State::Torque, "running: torque"),
-        (State::Speed, "running: speed"),
-        (State::Position, "running: position"),
+        (State::Torque, "* running: torque"),
+        (State::Speed, "* running: speed"),
+        (State::Position, "* running: position"),
     ] {
         talk.drive.drive = in_state(state).drive;
         assert_eq!(talk.say(""), [line]);
@@ -159,7 +160,7 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
         rig.step();
     }
     talk.drive.drive = rig.drive;
-    assert_eq!(talk.say(""), ["off: stopped"]);
+    assert_eq!(talk.say(""), ["* off: stopped"]);
     // A stop that is off at once is answered with ok.
     talk.ask("start");
     assert_eq!(talk.say("stop\n"), ["ok"]);
@@ -168,7 +169,7 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
         let mut rig = in_state(State::VoltsPerHertz);
         let mut talk = Talk::new();
         talk.drive.drive = rig.drive.clone();
-        assert_eq!(talk.say(""), ["running: vf"]);
+        assert_eq!(talk.say(""), ["* running: vf"]);
         rig.command(&Command::Stop(stop)).unwrap();
         if stop == Stop::Ramp {
             talk.drive.drive = rig.drive.clone();
@@ -176,7 +177,7 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
             rig.step();
         }
         talk.drive.drive = rig.drive;
-        assert_eq!(talk.say(""), ["off: stopped"]);
+        assert_eq!(talk.say(""), ["* off: stopped"]);
     }
 }
 
@@ -186,7 +187,7 @@ fn a_learning_tells_its_progress_and_its_end() {
     let mut rig = in_state(State::Learning);
     talk.drive.drive = rig.drive.clone();
     let first = talk.say("");
-    let seconds = first[0].strip_prefix("learning: point 1 of 56, ").unwrap();
+    let seconds = first[0].strip_prefix("* learning: point 1 of 56, ").unwrap();
     let expected: f64 = seconds.strip_suffix(" s left").unwrap().parse().unwrap();
     let began = rig.time();
     let (mut told, mut lines) = (0, Vec::new());
@@ -206,25 +207,7 @@ fn a_learning_tells_its_progress_and_its_end() {
     assert!((took / expected - 1.0).abs() < 0.05, "{took} s, {expected} s were expected");
     lines.extend(talk.say(""));
     lines.sort();
-    assert!(lines[0].starts_with("learned: slope -0.0"), "{lines:?}");
-    assert!(lines[1].starts_with("learned: trackable from -0.88 to 0.88 Nm"), "{lines:?}");
-    assert_eq!(lines[2..], ["off: the learning has ended"]);
-}
-
-#[test]
-fn every_announcement_begins_as_programs_expect() {
-    let words = |text: String| {
-        assert!(ANNOUNCEMENTS.iter().any(|first| text.starts_with(first)), "{text}");
-    };
-    for news in [
-        announce::News::Fault(Fault::Break),
-        announce::News::Running(State::Torque),
-        announce::News::Off("stopped"),
-        announce::News::Learning { point: 1, points: 26, left_s: 130.0 },
-    ] {
-        words(news.to_string());
-    }
-    for verdict in [Verdict::Sound, Verdict::Weak, Verdict::Uneven] {
-        words(announce::outcome(&Learned { verdict, ..found() }).to_string());
-    }
+    assert!(lines[0].starts_with("* learned: slope -0.0"), "{lines:?}");
+    assert!(lines[1].starts_with("* learned: trackable from -0.88 to 0.88 Nm"), "{lines:?}");
+    assert_eq!(lines[2..], ["* off: the learning has ended"]);
 }

@@ -1,30 +1,8 @@
 //! The bus beside the console.
 
-use std::collections::VecDeque;
-
 use super::*;
-use crate::modbus::{self, Frame};
+use crate::modbus::Frame;
 use crate::settings::bus::{Baud, Format};
-
-/// The port of the bus.
-#[derive(Default)]
-struct FakeBus {
-    asked: VecDeque<Frame>,
-    answers: VecDeque<Frame>,
-    line: Option<(Baud, Format)>,
-}
-
-impl modbus::Port for FakeBus {
-    fn set_line(&mut self, baud: Baud, format: Format) {
-        self.line = Some((baud, format));
-    }
-    fn receive(&mut self) -> Option<Frame> {
-        self.asked.pop_front()
-    }
-    fn send(&mut self, frame: &Frame) {
-        self.answers.push_back(frame.clone());
-    }
-}
 
 /// A console with a bus; the bus commands if `lines` say so.
 struct Both {
@@ -45,7 +23,8 @@ impl Both {
     }
 
     fn serve(&mut self) {
-        self.talk.console.serve(&mut self.bus, &mut self.talk.drive, self.talk.now_ms);
+        let Talk { front, drive, now_ms, .. } = &mut self.talk;
+        front.bus.serve(&mut self.bus, &mut front.desk, drive, *now_ms);
     }
 
     /// The answer to a request: without address and checksum.
@@ -93,9 +72,8 @@ fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
     assert!(both.talk.drive.commands.is_empty());
     // A refusal that is repeated is told once.
     let said = both.talk.say("");
-    let words = "bus: refused: the console commands: `set bus.commands bus` lets the bus";
+    let words = "* bus: refused: the console commands: `set bus.commands bus` lets the bus";
     assert_eq!(said.iter().filter(|line| *line == words).count(), 1, "{said:?}");
-    assert!(ANNOUNCEMENTS.iter().any(|first| words.starts_with(first)));
     // Switch on disabled, and not remote.
     assert_eq!((both.read(0x6041) & 0x26f, both.read(0x5009)), (0x40, 0));
     // The release that LinuxCNC writes all the time does not stop the console's run; a stop does.
@@ -187,25 +165,21 @@ fn silence_of_the_one_that_commands_stops_the_drive() {
         both.serve();
     }
     assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
-    // Reads do.
-    let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
-    both.write(0x2000, 18);
-    for _ in 0..15 {
-        both.talk.now_ms += 100;
-        both.read(0x2101);
-        both.talk.poll();
+    // Writes do; reads, and the frames of others, do not.
+    let stop = Command::Stop(Stop::Coast);
+    let requests = [&[1, 6, 0x20, 0, 0, 18][..], &[1, 3, 0x21, 1, 0, 1], &[2, 6, 0x20, 0, 0, 18]];
+    for (request, alive) in requests.into_iter().zip([true, false, false]) {
+        let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
+        both.write(0x2000, 18);
+        for _ in 0..15 {
+            both.talk.now_ms += 100;
+            let sum = modbus_core::rtu::crc16(request).to_be_bytes();
+            both.bus.asked.push_back(Frame::from_slice(&[request, &sum].concat()).unwrap());
+            both.serve();
+            both.talk.poll();
+        }
+        assert_ne!(both.talk.drive.commands.contains(&stop), alive, "{request:?}");
     }
-    assert!(!both.talk.drive.commands.contains(&Command::Stop(Stop::Coast)));
-    // Frames of others do not.
-    for _ in 0..15 {
-        both.talk.now_ms += 100;
-        let other = [2, 3, 0x20, 0, 0, 1];
-        let sum = modbus_core::rtu::crc16(&other).to_be_bytes();
-        both.bus.asked.push_back(Frame::from_slice(&[&other[..], &sum].concat()).unwrap());
-        both.serve();
-        both.talk.poll();
-    }
-    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
 }
 
 #[test]
@@ -237,11 +211,15 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     both.talk.say("");
     assert_eq!((both.write(0x2001, 300), both.write(0x2000, 18)), (0, 0));
     assert!(both.talk.drive.commands.is_empty());
-    assert_eq!(both.talk.say(""), [""; 0]);
+    // Every request until then is answered with exception 6.
+    assert_eq!((both.write(0x2000, 1), both.ask(&[3, 0x21, 1, 0, 1])), (6, vec![0x83, 6]));
     // What came meanwhile is not answered: the master has given it up.
     let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
     both.bus.asked.push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
+    let Talk { front, drive, .. } = &mut both.talk;
+    front.desk.go_on(drive, 0);
     both.serve();
+    assert_eq!(both.talk.say(""), [""; 0]);
     assert!(both.bus.asked.is_empty() && both.bus.answers.is_empty());
     let started = &both.talk.drive.commands[1..];
     assert_eq!(started, [Command::Start(Mode::Speed), Command::Speed(90.0)]);
@@ -275,7 +253,7 @@ fn settings_of_the_hardware_are_not_for_the_bus() {
         assert_eq!(
             said,
             [format!(
-                "bus: refused: {} belongs to the hardware: set it at the console",
+                "* bus: refused: {} belongs to the hardware: set it at the console",
                 key.name()
             )]
         );

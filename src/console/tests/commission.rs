@@ -66,7 +66,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     let told = told(&mut talk);
     assert!(told.len() >= 4, "{told:?}");
     assert!(told[0].contains("nameplate: test current 3.578 A"), "{told:?}");
-    assert!(told.iter().any(|line| line == "commissioning: nameplate: sound"), "{told:?}");
+    assert!(told.iter().any(|line| line == "* commissioning: nameplate: sound"), "{told:?}");
     assert!(told.last().unwrap().contains("ended; `accept`"), "{told:?}");
 
     // A refusal names the step and the reason, and says that nothing has changed.
@@ -74,8 +74,8 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     assert_eq!(talk.ask("commission leakage"), "ok");
     talk.drive.session.refused(None);
     let told = self::told(&mut talk);
-    let why = format!("commissioning: leakage: refused: {}", Refusal::SamplesLost);
-    assert_eq!(told, [why.as_str(), "commissioning: ended; the settings are as they were"]);
+    let why = format!("* commissioning: leakage: refused: {}", Refusal::SamplesLost);
+    assert_eq!(told, [why.as_str(), "* commissioning: ended; the settings are as they were"]);
 }
 
 /// Lines that the console tells until the commissioning has ended.
@@ -91,7 +91,7 @@ fn told(talk: &mut Talk) -> Vec<String> {
 #[test]
 fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     let mut talk = Talk::new();
-    let before = *talk.console.settings.in_force();
+    let before = *talk.front.desk.settings().in_force();
     assert_eq!(talk.ask("accept"), "error: nothing new was found: `commission` first");
     assert_eq!(talk.drive.saved, None);
     talk.drive.session = found_on_a_motor(&before.drive);
@@ -100,7 +100,7 @@ fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     let answers = talk.say("accept\n");
     assert_eq!(answers.last().unwrap(), "ok", "{answers:?}");
     let saved = talk.drive.saved.expect("not saved");
-    assert_eq!(&saved, talk.console.settings.in_force());
+    assert_eq!(&saved, talk.front.desk.settings().in_force());
     assert!((saved.drive.motor.r_s / 6.0 - 1.0).abs() < 0.01, "{}", saved.drive.motor.r_s);
     assert_eq!(saved.drive.motor.inertia, 0.02);
     assert_eq!(saved.drive.nameplate, before.drive.nameplate);

@@ -12,12 +12,15 @@ use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
 use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::Level;
-use induction_drive::console::handle::{CommandError, DriveHandle, Port};
+use induction_drive::console::handle::{Firmware, Port};
+use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
+use induction_drive::modbus;
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::bus::{Baud, Format};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
 
@@ -113,9 +116,6 @@ impl DriveHandle for FakeDrive {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
     }
-    fn tracking(&self) -> Option<Report> {
-        self.tracking.as_ref().map(Tracking::report)
-    }
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -125,6 +125,20 @@ impl DriveHandle for FakeDrive {
         }
         self.saved = Some(*settings);
         Ok(())
+    }
+    fn reboot(&mut self) {
+        self.reboots += 1;
+    }
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        if let Some(found) = self.found.take() {
+            show(&found);
+        }
+    }
+}
+
+impl Firmware for FakeDrive {
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
     fn history(&self) -> &History {
         &self.history
@@ -154,14 +168,6 @@ impl DriveHandle for FakeDrive {
     }
     fn sampled(&mut self) -> Option<Record> {
         self.streamed.1.pop_front()
-    }
-    fn reboot(&mut self) {
-        self.reboots += 1;
-    }
-    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
-        if let Some(found) = self.found.take() {
-            show(&found);
-        }
     }
     fn set_log_level(&mut self, _: Level) {}
     fn stack(&self) -> (usize, usize) {
@@ -248,4 +254,28 @@ impl Port for FakePort {
         }
         !self.sending
     }
+}
+
+/// The port of the field bus.
+#[derive(Default)]
+pub struct FakeBus {
+    /// Requests on their way to the drive.
+    pub asked: VecDeque<modbus::Frame>,
+    /// Answers of the drive.
+    pub answers: VecDeque<modbus::Frame>,
+    /// Rate and format that were set.
+    pub line: Option<(Baud, Format)>,
+}
+
+impl modbus::Port for FakeBus {
+    fn set_line(&mut self, baud: Baud, format: Format) {
+        self.line = Some((baud, format));
+    }
+    fn receive(&mut self) -> Option<modbus::Frame> {
+        self.asked.pop_front()
+    }
+    fn send(&mut self, frame: &modbus::Frame) {
+        self.answers.push_back(frame.clone());
+    }
+    fn set_busy(&mut self, _: Option<u8>) {}
 }

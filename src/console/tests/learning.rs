@@ -79,7 +79,7 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     let first = result(0.01, asymmetry(0.002, 0.003, -0.004), 0.0054);
     assert_eq!(
         ends_with(&mut talk, first),
-        "learned: slope -0.0700 /rad, torque current up to 2.75 A; one rotor position: `learn again` at another \
+        "* learned: slope -0.0700 /rad, torque current up to 2.75 A; one rotor position: `learn again` at another \
          tells slots from the stator; `save` keeps it"
     );
 
@@ -87,24 +87,24 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     assert!(matches!(talk.drive.commands[1..], [Command::Start(Mode::Learning)]), "as it was");
     // The slots have turned: the difference to the first.
     let told = ends_with(&mut talk, result(-0.004, asymmetry(-0.001, 0.0, 0.006), 0.006));
-    assert_eq!(told, "learned: slope -0.0700 /rad, torque current up to 2.75 A; `save` keeps it");
-    let both = talk.console.settings.in_force().learned.unwrap();
+    assert_eq!(told, "* learned: slope -0.0700 /rad, torque current up to 2.75 A; `save` keeps it");
+    let both = talk.front.desk.settings().in_force().learned.unwrap();
     assert!((both.gain_mismatch.value - 0.008).abs() < 1e-6, "{both:?}");
     assert!(both.asymmetry.plus(&asymmetry(0.0015, 0.003, -0.001), -1.0).size() < 1e-6, "{both:?}");
     assert_eq!(both.positions, 2);
     assert!(talk.say("learned\n")[0].contains("; rotor positions 2; asymmetry 0.00350; "));
     // The next start is with the mean.
-    assert_eq!(talk.say("start\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("start\n"), ["* designing...", "ok"]);
     assert_eq!(*configured(&talk), with(Some(both)));
     talk.say("stop\n");
     assert_eq!(talk.say("start\nstop\n"), ["ok", "ok"], "once");
 
     // Anew: without it, and only the new result is left.
-    assert_eq!(talk.say("learn\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("learn\n"), ["* designing...", "ok"]);
     assert_eq!(*configured(&talk), with(None));
     let third = result(0.002, Asymmetry::default(), 0.0);
     assert!(ends_with(&mut talk, third).ends_with("2.75 A; `save` keeps it"));
-    assert_eq!(talk.console.settings.in_force().learned, Some(third));
+    assert_eq!(talk.front.desk.settings().in_force().learned, Some(third));
 }
 
 /// A learning that finds nothing leaves what was learned before in force.
@@ -114,7 +114,7 @@ fn after_a_refused_learning_the_result_before_holds() {
         let mut settings = fresh();
         settings.learn(&found(), false);
         let mut talk = Talk::with(settings);
-        assert_eq!(talk.say("learn\n"), ["designing...", "ok"]);
+        assert_eq!(talk.say("learn\n"), ["* designing...", "ok"]);
         assert_eq!(*configured(&talk), with(None));
         match end {
             "refused" => {
@@ -129,7 +129,7 @@ fn after_a_refused_learning_the_result_before_holds() {
                 talk.say("clear\n");
             }
         }
-        assert_eq!(talk.console.settings.in_force().learned, Some(found()));
+        assert_eq!(talk.front.desk.settings().in_force().learned, Some(found()));
         assert_eq!(talk.say("start\n").last().unwrap(), "ok", "{end}");
         assert_eq!(*configured(&talk), with(Some(found())), "{end}");
     }

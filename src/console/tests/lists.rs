@@ -51,7 +51,7 @@ fn a_trace_with_a_trigger_is_announced_and_printed_when_asked_for() {
     assert_eq!((talk.ask("trace 1"), talk.ask("trace")), (busy.into(), busy.into()));
     assert_eq!(talk.ask("start"), "ok");
     talk.drive.triggered = true;
-    assert_eq!(talk.say(""), ["trace: recorded; `trace` prints it"]);
+    assert_eq!(talk.say(""), ["* trace: recorded; `trace` prints it"]);
     let trace = talk.say("trace\n");
     assert_eq!(trace[..2], ["t_s,i_q_a", "-0.000333,0.333333"]);
     assert_eq!((trace.len(), trace[3].as_str()), (6, "0.000000,0.333333"));
@@ -161,7 +161,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let told = "slope -0.0700 /rad, torque current up to 2.75 A";
     // 3/2 P L_M i_d of Table 5 with 0.7 A: 0.322 Nm/A; L_m i_d: 0.124 Wb.
     let range = "trackable from -0.88 to 0.88 Nm (-2.75 to 2.75 A) at 0.124 Wb (0.70 A); the limit is the slope, which is lost beyond";
-    let first = [format!("learned: {told}; `save` keeps it"), format!("learned: {range}")];
+    let first = [format!("* learned: {told}; `save` keeps it"), format!("* learned: {range}")];
     let list = list.strip_prefix(&first).unwrap();
     assert_eq!(
         list[..4],

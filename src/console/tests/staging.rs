@@ -7,7 +7,7 @@ use crate::settings::staging::UNCONFIRMED;
 
 /// A console whose settings in force and staged are these, by name.
 fn shown(talk: &Talk, name: &str) -> (String, String) {
-    let (key, settings) = (keys::find(name).unwrap(), &talk.console.settings);
+    let (key, settings) = (keys::find(name).unwrap(), talk.front.desk.settings());
     (key.get(settings.in_force()).to_string(), key.get(settings.latest()).to_string())
 }
 
@@ -16,7 +16,7 @@ fn settings_out_of_range_are_refused_with_the_range() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000 ohm");
     assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
-    assert!(talk.drive.commands.is_empty() && !talk.console.settings.is_staged());
+    assert!(talk.drive.commands.is_empty() && !talk.front.desk.settings().is_staged());
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn a_value_that_is_none_is_refused_with_what_is_allowed() {
     ] {
         assert_eq!(talk.ask(line), format!("error: {answer}"));
     }
-    assert!(talk.drive.commands.is_empty() && !talk.console.settings.is_staged());
+    assert!(talk.drive.commands.is_empty() && !talk.front.desk.settings().is_staged());
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn staged_values_are_marked_and_designed_for_once() {
     assert_eq!(talk.ask("get motor.r_s"), in_force(get));
     assert_eq!(talk.say("get motor.r_s\n").len(), 1);
     assert!(talk.ask("status").ends_with("; 3 staged"));
-    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("apply\n"), ["* designing...", "ok"]);
     assert!(matches!(talk.drive.commands[..], [Command::Configure(_)]));
     assert_eq!(shown(&talk, "motor.r_r"), ("1.2".into(), "1.2".into()));
     // Back to the value in force: nothing is staged any more.
@@ -90,7 +90,7 @@ fn ranges_are_those_beside_the_staged_values() {
     let refused =
         "error: limits.current_a = 15: allowed is 0.01 to 10 A; not in force, still staged";
     for line in ["apply", "save"] {
-        assert_eq!(talk.say(format!("{line}\n")), ["designing...", refused]);
+        assert_eq!(talk.say(format!("{line}\n")), ["* designing...", refused]);
     }
     assert!(talk.ask("start").starts_with("error: the board's polarities"));
     assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
@@ -105,16 +105,16 @@ fn a_refused_design_names_the_reason_and_changes_nothing() {
         talk.ask("set current_plant identified current_plant.q.p 0 current_plant.d.k 1"),
         "ok: staged"
     );
-    let before = talk.console.settings.in_force().drive;
+    let before = talk.front.desk.settings().in_force().drive;
     let replies = talk.say("start\n");
-    assert_eq!((replies.len(), replies[0].as_str()), (2, "designing..."));
+    assert_eq!((replies.len(), replies[0].as_str()), (2, "* designing..."));
     assert!(
         replies[1].starts_with("error: ") && replies[1].ends_with("; not in force, still staged"),
         "{replies:?}"
     );
     assert!(talk.drive.commands.is_empty());
-    assert_eq!(talk.console.settings.in_force().drive, before);
-    let count = talk.console.settings.count();
+    assert_eq!(talk.front.desk.settings().in_force().drive, before);
+    let count = talk.front.desk.settings().count();
     assert!(count >= 2);
     assert_eq!(talk.ask("revert"), format!("ok: {count} staged values dropped"));
     assert_eq!(talk.ask("start"), "ok");
@@ -124,7 +124,7 @@ fn a_refused_design_names_the_reason_and_changes_nothing() {
 fn start_and_save_put_staged_values_in_force_first() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
-    assert_eq!(talk.say("start speed\n"), ["designing...", "ok"]);
+    assert_eq!(talk.say("start speed\n"), ["* designing...", "ok"]);
     assert!(matches!(
         talk.drive.commands[..],
         [Command::Configure(_), Command::Start(Mode::Speed)]
@@ -140,8 +140,8 @@ fn start_and_save_put_staged_values_in_force_first() {
     assert_eq!(
         said,
         [
-            "designing...",
-            "applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
+            "* designing...",
+            "* applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
             "ok"
         ]
     );
@@ -158,7 +158,7 @@ fn a_start_after_a_design_is_not_stopped_for_silence() {
     talk.now_ms += 2000;
     talk.poll();
     talk.now_ms += 500;
-    assert_eq!(talk.say(""), ["designing...", "ok"]);
+    assert_eq!(talk.say(""), ["* designing...", "ok"]);
     assert_eq!(talk.drive.drive.state(), State::Calibrating);
 }
 
@@ -190,11 +190,11 @@ fn a_backup_restores_settings_and_what_was_learned() {
     assert_eq!(other.ask("set motor.r_s 9"), "ok: staged");
     let replies = other.say(lines.join("\r\n") + "\r\n");
     assert!(replies.iter().all(|reply| !reply.starts_with("error")), "{replies:#?}");
-    let mut expected = *talk.console.settings.in_force();
+    let mut expected = *talk.front.desk.settings().in_force();
     // Whoever restores checks the wiring.
     expected.command.wiring_checked = false;
-    assert_eq!(*other.console.settings.in_force(), expected);
-    assert_eq!(other.console.settings.in_force().learned, Some(found()));
+    assert_eq!(*other.front.desk.settings().in_force(), expected);
+    assert_eq!(other.front.desk.settings().in_force().learned, Some(found()));
     assert_eq!(other.say("backup\n"), backup);
 }
 
@@ -219,13 +219,13 @@ fn damaged_learned_values_are_refused() {
         say(&["learned 60 00000000 00000000".to_owned()]),
         "error: learned: more than 61 words"
     );
-    assert!(!other.console.settings.is_staged());
+    assert!(!other.front.desk.settings().is_staged());
     // Whole, but then other settings.
     assert_eq!(other.say(words.join("\n") + "\n").pop().unwrap(), "ok: staged");
     let dropped = "ok: staged; what was restored belongs to other settings and is dropped";
     assert_eq!(other.ask("set motor.r_s 5"), dropped);
     assert_eq!(other.ask("apply"), "ok");
-    assert_eq!(other.console.settings.in_force().learned, None);
+    assert_eq!(other.front.desk.settings().in_force().learned, None);
 }
 
 /// A result that was learned with one zero vector is forgotten when both are switched on, and its backup is refused then; and the
@@ -244,17 +244,17 @@ fn learned_values_hold_for_one_zero_vector_or_for_both() {
         let forgotten =
             "ok: what was learned with another scales.both_zero_vectors is forgotten: learn again";
         assert_eq!(talk.say(set(other)).last().unwrap(), forgotten);
-        assert_eq!(talk.console.settings.in_force().learned, None);
+        assert_eq!(talk.front.desk.settings().in_force().learned, None);
         let refused = format!(
             "error: learned: with scales.both_zero_vectors = {learned}; set it so before, or learn again"
         );
         assert_eq!(talk.say(words.clone()).last().unwrap(), &refused);
-        assert_eq!(talk.console.settings.latest().learned, None);
+        assert_eq!(talk.front.desk.settings().latest().learned, None);
         // Beside the setting that it was learned with it is taken.
         talk.say(set(learned));
         assert_eq!(talk.say(words).last().unwrap(), "ok: staged");
         assert_eq!(talk.ask("apply"), "ok");
-        assert_eq!(talk.console.settings.in_force().learned, Some(found()));
+        assert_eq!(talk.front.desk.settings().in_force().learned, Some(found()));
     }
 }
 
@@ -284,7 +284,7 @@ fn a_backup_of_earlier_firmware_is_restored() {
         let mut talk = Talk::new();
         let restored = talk.say(format!("{text}learned check {check:08x}\napply\n"));
         assert_eq!(restored.last().unwrap(), "ok", "{restored:?}");
-        assert_eq!(talk.console.settings.in_force().learned, Some(old));
+        assert_eq!(talk.front.desk.settings().in_force().learned, Some(old));
         // A line less is no result.
         let all = text.lines().count();
         let short: String = text.lines().take(all - 1).map(|line| format!("{line}\n")).collect();

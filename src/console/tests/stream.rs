@@ -109,7 +109,7 @@ fn the_rate_changes_behind_the_answer_and_falls_back_without_a_valid_line() {
     talk.port.sent.extend(b"\x00\xff\n");
     talk.pass(20);
     assert_eq!(talk.port.baud, board::SERIAL_BAUD);
-    assert!(talk.port.received.contains("link: 115200 baud\r\n"), "{}", talk.port.received);
+    assert!(talk.port.received.contains("* link: 115200 baud\r\n"), "{}", talk.port.received);
     assert_eq!(talk.drive.streamed.0, 0, "the stream has ended");
 }
 
@@ -128,7 +128,11 @@ fn a_link_that_is_lost_stops_the_drive_if_the_stream_asks_for_it() {
     assert!(!talk.drive.commands.contains(&Command::Stop(Stop::Coast)));
     talk.pass(3);
     assert_eq!(talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
-    assert!(talk.port.received.contains("stopped: no command for 0.4 s"), "{}", talk.port.received);
+    assert!(
+        talk.port.received.contains("* stopped: no command for 0.4 s"),
+        "{}",
+        talk.port.received
+    );
     assert_eq!(talk.drive.streamed.0, 0);
 }
 
@@ -140,8 +144,7 @@ fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
     talk.ask("stream i_q_a 2000 alive 0.4");
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
     talk.port.sent.extend(b"apply\n\n\n");
-    // One poll takes the line, the next designs.
-    talk.poll();
+    // One pass takes the line and designs at its end.
     talk.poll();
     talk.now_ms += 3000;
     let answer = talk.say("");

@@ -37,8 +37,8 @@ fn pushed(rpm: f64, volts: f64, sign: f32) -> (Rig, f64) {
 fn status_tells_the_torque_that_the_motor_then_gives() {
     let mut talk = Talk::new();
     let settings = for_the_range(&Config::default()).unwrap().drive;
-    talk.console =
-        Console::new(FirmwareSettings { drive: settings, ..FirmwareSettings::of_the_board() });
+    talk.front.desk =
+        Desk::new(FirmwareSettings { drive: settings, ..FirmwareSettings::of_the_board() });
     for (rpm, volts) in
         [(300.0, 311.0), (1800.0, 311.0), (1800.0, 230.0), (2700.0, 311.0), (3300.0, 270.0)]
     {

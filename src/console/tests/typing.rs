@@ -26,7 +26,7 @@ fn typed_characters_come_back_if_asked_for() {
     talk.poll();
     let said = std::mem::take(&mut talk.port.received);
     assert!(
-        said.starts_with("\r\nfault 20: ") && said.ends_with("type 'clear'\r\nsta"),
+        said.starts_with("\r\n* fault 20: ") && said.ends_with("type 'clear'\r\nsta"),
         "{said:?}"
     );
     assert_eq!(talk.say("\x15echo off\n").last().unwrap(), "ok");

@@ -75,16 +75,16 @@ const WRONG: [(&str, &[&str]); 65] = [
 #[test]
 fn wrong_lines_name_thing_value_and_what_is_allowed_and_change_nothing() {
     let mut talk = Talk::new();
-    let before = *talk.console.settings.in_force();
+    let before = *talk.front.desk.settings().in_force();
     for (line, named) in WRONG {
         let answer = talk.ask(line);
         assert!(answer.starts_with("error: "), "{line}: {answer}");
         for part in named {
             assert!(answer.contains(part), "{line}: {part} is not in {answer}");
         }
-        assert!(!talk.console.settings.is_staged(), "{line}");
+        assert!(!talk.front.desk.settings().is_staged(), "{line}");
     }
-    assert_eq!(*talk.console.settings.in_force(), before);
+    assert_eq!(*talk.front.desk.settings().in_force(), before);
     assert_eq!(talk.drive.drive.state(), State::Off);
     // The one that is no command of a drive that is off.
     assert_eq!(talk.drive.commands, [Command::Torque(1.0)]);

@@ -2,6 +2,7 @@ use drive_core::Telemetry;
 use drive_settings::{CurrentSensors, Settings};
 
 use super::*;
+use crate::generated;
 
 fn plan(records: u16, divider: u16, trigger: Trigger) -> Plan {
     Plan { records, divider, choice: SignalChoice::usual(), trigger }
@@ -178,4 +179,37 @@ fn sensors_are_shown_in_amperes() {
     settings.scales.sensors = CurrentSensors::LowSide;
     settings.scales.current_c.gain *= 2.0;
     assert_eq!(shown("i_c_a", &settings), settings.scales.current_c.at(2500));
+}
+
+/// What the signals are, for the page.
+const MEANINGS: [(&str, &str); 16] = [
+    ("phi_deg", "estimated flux angle, electrical degrees"),
+    ("flux_hz", "frequency of the flux, electrical"),
+    ("speed_rpm", "speed of the shaft, mechanical"),
+    ("i_d_ref_a", "filtered reference of the direct current"),
+    ("i_q_ref_a", "filtered reference of the torque current"),
+    ("i_d_a", "filtered direct current in the estimated flux frame"),
+    ("i_q_a", "filtered torque current in the estimated flux frame"),
+    ("v_d_v", "direct voltage without the carrier"),
+    ("v_q_v", "quadrature voltage without the carrier"),
+    ("delta_i_a", "current difference of the printed demodulators"),
+    ("saliency", "`q` of the synchronous demodulation"),
+    ("dc_link_v", "voltage of the dc link"),
+    ("turns", "mechanical turns from the start"),
+    (
+        "i_a_a",
+        "sensor of phase a by its calibration, without the offset of a start; also while off",
+    ),
+    ("i_b_a", "the same of phase b"),
+    ("i_c_a", "the same of phase c; 0 without a third sensor"),
+];
+
+#[test]
+fn the_manual_lists_the_signals() {
+    let mut table = "| signal | meaning |\n|---|---|\n".to_owned();
+    for (signal, (name, meaning)) in SIGNALS.iter().zip(MEANINGS) {
+        assert_eq!(signal.name, name);
+        table += &format!("| `{name}` | {meaning} |\n");
+    }
+    generated::check("console.md", "signals", &table);
 }

@@ -7,7 +7,7 @@ use drive_core::{Accepted, Command, Drive, State};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::{Config, open_phase};
 use crate::error::Error;
-use crate::experiments::torque::LOST_DEG;
+use crate::experiments::LOST_DEG;
 use crate::plant::{Complex, Load, Plant, PlantSettings};
 use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;

@@ -6,7 +6,7 @@ use drive_core::Fault;
 use serde::{Deserialize, Serialize};
 
 use super::kind::Kind;
-use crate::experiments::torque::LOST_DEG;
+use crate::experiments::LOST_DEG;
 use crate::stats::Stats;
 
 /// A state that lasts longer, s, should have been noticed.

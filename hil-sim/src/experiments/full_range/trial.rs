@@ -9,11 +9,11 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::case::{Case, sign};
 use crate::config::{Config, RangeKind, plant_settings};
 use crate::error::Error;
+use crate::experiments::LOST_DEG;
 use crate::experiments::battery::{
     Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
     nominal_limit_a,
 };
-use crate::experiments::torque::LOST_DEG;
 use crate::plant::Load;
 
 /// Least and largest constant torque current, in relation to the current limit.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use induction_drive::console::line::UNASKED;
+
 /// Where a line came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -48,13 +50,15 @@ impl Line {
     /// The text of a line that changes what the drive does, or reports a fault or a reset.
     fn event(&self, references: bool) -> Option<&str> {
         let text = self.text.trim();
+        let (_, text) =
+            text.strip_prefix('@').and_then(|tagged| tagged.split_once(' ')).unwrap_or(("", text));
         let first = text.split_whitespace().next()?;
         match self.source {
             Source::Typed if CHANGES.contains(&first) => Some(text),
             Source::Typed if references && REFERENCES.contains(&first) => Some(text),
             Source::Board if text.starts_with("reset") => Some(text),
             Source::Log => text.strip_prefix("ERROR ").filter(|text| is_fault(text)),
-            Source::Said if is_fault(text) => Some(text),
+            Source::Said => text.strip_prefix(UNASKED).filter(|text| is_fault(text)),
             _ => None,
         }
     }

@@ -1,5 +1,7 @@
 //! Helpers of the tests.
-#![allow(dead_code)] // every test uses its own part of it
+
+pub mod program;
+pub mod script;
 
 use anyhow::Result;
 use drive_core::State;

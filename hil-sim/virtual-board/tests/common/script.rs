@@ -1,5 +1,4 @@
 //! Register scripts: a board whose core stands still after reset, and writes to its registers instead.
-#![allow(dead_code)] // every test uses its own part of it
 
 use anyhow::Result;
 use drive_core::Compare;

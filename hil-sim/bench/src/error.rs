@@ -1,0 +1,181 @@
+//! The errors of a command, and their exit codes.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Nothing has this name.
+    #[error("there is no {what} `{name}`{}; {list}", did_you_mean(.nearest))]
+    Unknown {
+        /// What it should be a name of.
+        what: &'static str,
+        /// The name that was given.
+        name: String,
+        /// The most similar name.
+        nearest: Option<String>,
+        /// Where the names are.
+        list: &'static str,
+    },
+    /// A key cannot have this value.
+    #[error("{key} = {value}: {problem}; allowed: {allowed}")]
+    Value {
+        /// The key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// The reason why it is refused.
+        problem: &'static str,
+        /// The values that are allowed, with their unit.
+        allowed: String,
+    },
+    /// `--set` without an equals sign.
+    #[error("`{0}`: write KEY=VALUE, for example --set motor.r_s=5.4")]
+    Assignment(String),
+    /// The configuration file cannot be read or is not TOML.
+    #[error("{}: {problem}", .path.display())]
+    ConfigFile {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        problem: String,
+    },
+    /// An assignment of the configuration file is refused.
+    #[error("{}, line {line}: {error}", .path.display())]
+    ConfigLine {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// The refusal.
+        error: Box<Error>,
+    },
+    /// The experiment does not use a key that was set for it.
+    #[error("{name} does not use `{key}`; it uses: {uses}")]
+    UnusedKey {
+        /// The experiment, or the group.
+        name: String,
+        /// The key.
+        key: String,
+        /// The keys it uses.
+        uses: String,
+    },
+    /// Data of a file cannot be used.
+    #[error("{}{}: {problem}", .path.display(), line_text(.line))]
+    Data {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1; none where the file as a whole is meant.
+        line: Option<u64>,
+        /// The reason.
+        problem: String,
+    },
+    /// A run was lost: its results are written, its end was not as wanted.
+    #[error("{name}: {reason}")]
+    Lost {
+        /// The experiment.
+        name: String,
+        /// The fault, or the other reason.
+        reason: String,
+    },
+    /// Some experiments of a report were refused or lost; the others are in it.
+    #[error("{failed} of {all} experiments failed: {}", .names.join(", "))]
+    Incomplete {
+        /// How many failed.
+        failed: usize,
+        /// How many there are.
+        all: usize,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// Each value is in its range, but a model, a filter or a design rule refuses their combination.
+    #[error("{0}")]
+    Refused(String),
+    /// A file or folder cannot be written.
+    #[error("cannot write {}: {source}", .path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// The error of the system.
+        source: io::Error,
+    },
+    /// A failure that no input should be able to cause.
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Error {
+    /// The error of a part that refuses its settings.
+    pub fn refused(reason: impl std::fmt::Display) -> Self {
+        Self::Refused(reason.to_string())
+    }
+
+    /// The error of a name that is none of the known ones: that of a key, an experiment or a motor.
+    pub fn unknown<'a>(
+        what: &'static str,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        let list = match what {
+            "key" => "`keys` shows all of them",
+            "experiment" => "`list` and `list --lab` show all of them",
+            _ => "`motors` shows all of them, and a name that ends in .toml is a file",
+        };
+        let nearest = nearest(name, known.into_iter()).map(str::to_owned);
+        Self::Unknown { what, name: name.to_owned(), nearest, list }
+    }
+
+    /// The error of a failure to write `path`.
+    pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+        move |source| Self::Write { path: path.to_owned(), source }
+    }
+
+    /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Write { .. }
+            | Self::Internal(_)
+            | Self::Lost { .. }
+            | Self::Incomplete { .. } => 1,
+            _ => 2,
+        }
+    }
+}
+
+fn line_text(line: &Option<u64>) -> String {
+    line.map(|line| format!(", line {line}")).unwrap_or_default()
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+}
+
+/// The message about a name that is none of those which are allowed.
+pub fn unknown(what: &str, name: &str, allowed: &[&str]) -> String {
+    let guess = nearest(name, allowed.iter().copied()).map(str::to_owned);
+    format!("unknown {what} `{name}`{}; allowed: {}", did_you_mean(&guess), allowed.join(", "))
+}
+
+/// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.
+pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .map(|candidate| (strsim::levenshtein(&name.to_lowercase(), candidate), candidate))
+        .filter(|&(distance, candidate)| distance <= 2 + candidate.len() / 4)
+        .min()
+        .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_found_and_a_far_one_is_not() {
+        let known = ["motor.rs", "motor.rr", "inverter.vdc"];
+        assert_eq!(nearest("motor.sr", known.into_iter()), Some("motor.rr"));
+        assert_eq!(nearest("inverter.vcd", known.into_iter()), Some("inverter.vdc"));
+        assert_eq!(nearest("xylophone", known.into_iter()), None);
+        assert_eq!(nearest("MOTOR.RS", known.into_iter()), Some("motor.rs"));
+    }
+}

@@ -1,0 +1,163 @@
+//! An experiment: one function from a [`Context`] to an [`Outcome`].
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::config::{Config, Key, plant_settings};
+use crate::error::Error;
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+
+/// Input of an experiment.
+pub struct Context<'a> {
+    /// The configuration.
+    pub config: &'a Config,
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// Simulated time, s; unset: the experiment's own.
+    pub seconds: Option<f64>,
+    /// Progress bars.
+    pub progress: Progress,
+    /// File of an experiment that takes one.
+    pub file: Option<&'a Path>,
+}
+
+impl Context<'_> {
+    /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
+    ///
+    /// # Errors
+    /// The error of a job that failed.
+    pub fn in_parallel<J: Sync, T: Send>(
+        &self,
+        label: &str,
+        jobs: &[J],
+        run: impl Fn(u64, &J) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let bar = self.progress.bar(label, jobs.len() as u64);
+        let one = |(number, job): (usize, &J)| {
+            let result = run(number as u64, job);
+            bar.advance(1);
+            result
+        };
+        jobs.par_iter().enumerate().map(one).collect()
+    }
+}
+
+/// An experiment.
+pub struct Experiment {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// The part of the source that it reproduces: `Figure 38`.
+    pub stands_for: &'static str,
+    /// Description in one sentence.
+    pub about: &'static str,
+    /// The keys that it uses: names, and beginnings of names that end in a full stop.
+    pub uses: &'static [&'static [&'static str]],
+    /// Exceptions from `uses`, likewise: keys that the experiment sets itself, or that do nothing in it.
+    pub not: &'static [&'static [&'static str]],
+    /// Runs it.
+    pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
+}
+
+impl Experiment {
+    /// Runs it for its own time, and shows no progress.
+    ///
+    /// # Errors
+    /// Those of the experiment.
+    pub fn outcome(&self, config: &Config, seed: u64) -> Result<Outcome, Error> {
+        let progress = Progress::hidden();
+        (self.run)(&Context { config, seed, seconds: None, progress, file: None })
+    }
+
+    /// Whether a key has an effect on this experiment.
+    pub fn uses_key(&self, key: Key) -> bool {
+        let name = key.assigned_name();
+        let is_in = |given: &&str| {
+            if given.ends_with('.') { name.starts_with(given) } else { name == *given }
+        };
+        self.uses.iter().copied().flatten().any(is_in)
+            && !self.not.iter().copied().flatten().any(is_in)
+    }
+
+    /// The keys that it uses, in words.
+    pub fn uses_text(&self) -> String {
+        let words = |names: &[&str]| {
+            let shown = names.iter().map(|name| match name.strip_suffix('.') {
+                Some(group) => format!("{group}.*"),
+                None => (*name).to_owned(),
+            });
+            shown.collect::<Vec<_>>().join(", ")
+        };
+        match (self.uses.concat().as_slice(), self.not.concat().as_slice()) {
+            ([], _) => "no key".to_owned(),
+            (uses, []) => words(uses),
+            (uses, not) => format!("{}; except {}", words(uses), words(not)),
+        }
+    }
+}
+
+/// An error beyond this, degrees, is a lost angle: half way to where the saliency, which repeats
+/// every 180°, has the wrong sign.
+pub const LOST_DEG: f64 = 45.0;
+
+/// Keys of the simulated motor, inverter and sensors.
+pub const BENCH: &[&str] = &[
+    "motor.",
+    "saliency.",
+    "plant",
+    "flux_level",
+    "iron.",
+    "warming.",
+    "inverter.",
+    "dc_link.",
+    "measurement.",
+    "shaft.",
+];
+/// Keys of the drive.
+pub const DRIVE: &[&str] = &[
+    "drive.",
+    "nameplate.",
+    "scales.",
+    "angle_source",
+    "current_plant",
+    "current_plant.",
+    "ignore_delays",
+    "injection.",
+    "limits.",
+    "sequence.",
+    "speed.",
+    "observer.",
+    "braking.",
+    "flux.",
+    "vf.",
+];
+/// Keys of the speed loop, which a drive that regulates torque does not use.
+pub const SPEED_LOOP: &[&str] = &[
+    "speed.limit_rpm",
+    "speed.ramp_rpm_per_s",
+    "speed.quick_rpm_per_s",
+    "speed.s_ramp_s",
+    "speed.phase_margin_deg",
+    "drive.motor.inertia",
+];
+/// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
+pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
+/// Keys of the tracking of the saliency, which a drive with an encoder does not use.
+pub const TRACKING: &[&str] =
+    &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
+/// Keys that do nothing while the shaft is locked.
+pub const TURNING: &[&str] =
+    &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
+
+/// Assumptions of the simulated plant, for the remarks of an outcome.
+pub fn assumptions(config: &Config) -> Vec<String> {
+    let (s, motor) = (plant_settings(config).saliency, config.motor_text());
+    vec![format!(
+        "Simulated motor: {motor}, with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
+         %/A by the current. Nothing in the source measures the saliency: every angle error here is a \
+         statement about this simulated motor.",
+        s.a_psi * 100.0,
+        s.b1 * 100.0
+    )]
+}

@@ -1,0 +1,116 @@
+//! Experiments of many independent runs: planned from configuration and seed alone, done in any order and on any
+//! machine, judged together.
+
+pub mod fault_code;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::error::Error;
+use crate::experiment::{Context, Experiment};
+use crate::outcome::Outcome;
+
+/// A statistical experiment.
+pub trait Study: Sized + Sync {
+    /// All that the outcome needs of a run. Written as JSON it must be read back to the bit: see
+    /// [`exact`](crate::stats::exact).
+    type Record: Serialize + DeserializeOwned + Send;
+    /// The experiment; its `run` is [`whole`].
+    const EXPERIMENT: &'static Experiment;
+
+    /// Plans the runs.
+    ///
+    /// # Errors
+    /// When the configuration is refused.
+    fn new(context: &Context<'_>) -> Result<Self, Error>;
+
+    /// How many runs there are.
+    fn runs(&self) -> usize;
+
+    /// Does one of them, counted from 0. It does not depend on the others.
+    ///
+    /// # Errors
+    /// When the run cannot be done; the experiment fails then.
+    fn run(&self, number: usize) -> Result<Self::Record, Error>;
+
+    /// The outcome of all runs, in their order.
+    ///
+    /// # Errors
+    /// When there is none.
+    fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error>;
+}
+
+/// The seed of a run of an experiment with this seed.
+pub fn seed_of(seed: u64, number: usize) -> u64 {
+    seed.wrapping_mul(1_000_003).wrapping_add(number as u64)
+}
+
+/// Does all runs on all cores.
+///
+/// # Errors
+/// Those of the study.
+pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
+    let study = S::new(context)?;
+    let numbers: Vec<usize> = (0..study.runs()).collect();
+    let name = S::EXPERIMENT.name;
+    let records = context.in_parallel(name, &numbers, |_, &number| study.run(number))?;
+    study.outcome(context, records)
+}
+
+/// Takes the record of a run.
+pub type Keep<'a> = &'a (dyn Fn(usize, Value) -> Result<(), Error> + Sync);
+
+/// A statistical experiment whose runs are kept as JSON.
+pub struct Statistical {
+    /// The experiment.
+    pub experiment: &'static Experiment,
+    /// How many runs it has.
+    pub runs: fn(&Context<'_>) -> Result<usize, Error>,
+    /// Does these runs on all cores and passes each record on as soon as it is there.
+    pub some: fn(&Context<'_>, &[usize], Keep<'_>) -> Result<(), Error>,
+    /// The outcome of all runs, in their order.
+    pub outcome: fn(&Context<'_>, Vec<Value>) -> Result<Outcome, Error>,
+}
+
+impl Statistical {
+    /// That of a study.
+    pub const fn of<S: Study>() -> Self {
+        Self {
+            experiment: S::EXPERIMENT,
+            runs: |context| Ok(S::new(context)?.runs()),
+            some: some::<S>,
+            outcome: outcome::<S>,
+        }
+    }
+}
+
+fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> Result<(), Error> {
+    let study = S::new(context)?;
+    let one = |_, &number: &usize| keep(number, value::<S>(number, &study.run(number)?)?);
+    context.in_parallel(S::EXPERIMENT.name, numbers, one).map(|_: Vec<()>| ())
+}
+
+/// A record as JSON, after a check that it is read back as it is.
+fn value<S: Study>(number: usize, record: &S::Record) -> Result<Value, Error> {
+    let lost = |e| Error::Internal(format!("the record of run {number} is not kept exactly: {e}"));
+    let value = serde_json::to_value(record).map_err(lost)?;
+    read::<S>(value.clone()).and_then(serde_json::to_value).map_err(lost).and_then(|again| {
+        match again == value {
+            true => Ok(value),
+            false => Err(Error::Internal(format!("the record of run {number} changes: {again}"))),
+        }
+    })
+}
+
+fn read<S: Study>(value: Value) -> serde_json::Result<S::Record> {
+    serde_json::from_value(value)
+}
+
+fn outcome<S: Study>(context: &Context<'_>, values: Vec<Value>) -> Result<Outcome, Error> {
+    let record = |(number, value)| {
+        read::<S>(value).map_err(|e| Error::Refused(format!("the record of run {number}: {e}")))
+    };
+    let records = values.into_iter().enumerate().map(record).collect::<Result<_, _>>()?;
+    S::new(context)?.outcome(context, records)
+}

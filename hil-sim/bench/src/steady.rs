@@ -1,0 +1,138 @@
+//! One run at constant torque current and speed, of which statistics consist.
+
+use std::f64::consts::TAU;
+
+use drive_core::{Command, Fault, Mode};
+use drive_settings::Settings;
+use serde::{Deserialize, Serialize};
+
+use crate::config::{Config, LoadMode};
+use crate::error::Error;
+use crate::experiment::LOST_DEG;
+use crate::plant::Load;
+use crate::rig::Rig;
+use crate::statistics::fault_code;
+use crate::stats::{Stats, exact};
+
+/// Operating point and seed of a run.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct OperatingPoint {
+    /// Speed, rpm.
+    pub rpm: f64,
+    /// Torque current, A.
+    pub iq: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// Result of a run.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct SteadyRun {
+    /// Operating point and seed.
+    pub case: OperatingPoint,
+    /// Angle error, degrees.
+    pub error: Stats,
+    /// Mean torque, Nm.
+    #[serde(with = "exact")]
+    pub torque: f64,
+    /// Whether the error went beyond 45° at any time, or the drive stopped itself.
+    pub lost: bool,
+    /// The fault with which it stopped itself.
+    #[serde(with = "fault_code")]
+    pub fault: Option<Fault>,
+}
+
+impl SteadyRun {
+    /// The reason why the run was lost, after its operating point; nothing for one that was not.
+    pub fn lost_text(&self) -> Option<String> {
+        let OperatingPoint { rpm, iq, seed } = self.case;
+        let reason = match self.fault {
+            Some(fault) => format!("fault {}: {fault}", fault.code()),
+            None => format!("angle error beyond {LOST_DEG}°"),
+        };
+        self.lost.then(|| format!("{iq:.2} A at {rpm:.0} rpm, seed {seed}: {reason}"))
+    }
+}
+
+/// How fast the dynamometer gets up to speed, rpm/s.
+const RAMP_RPM_PER_S: f64 = 600.0;
+
+/// A drive that has been started, brought up to speed without torque, and given its torque.
+///
+/// # Errors
+/// When the configuration is refused or the drive does not start.
+pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
+    let mut rig = prepared(&config.drive, config, case.seed)?;
+    bring_up(&mut rig, case.rpm)?;
+    rig.command(&Command::Torque(case.iq as f32))?;
+    Ok(rig)
+}
+
+/// A drive that is off, coupled to a dynamometer at rest.
+///
+/// # Errors
+/// As [`Rig::from_config`].
+pub fn prepared(drive: &Settings, config: &Config, seed: u64) -> Result<Rig, Error> {
+    let mut config = Config { drive: *drive, ..config.clone() };
+    config.load.mode = LoadMode::Speed;
+    config.load.speed_rpm = 0.0;
+    Rig::from_config(&config, seed)
+}
+
+/// Starts a drive and brings it up to speed, rpm, without torque; it may have stopped itself on the way.
+///
+/// # Errors
+/// When the drive does not start.
+pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
+    rig.start(Mode::Torque)?;
+    let steps = (rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
+    for n in 1..=steps {
+        let speed = rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
+        rig.set_load(Load::Speed { speed })?;
+        rig.run(0.01, |_| {});
+    }
+    rig.run(0.3, |_| {});
+    Ok(())
+}
+
+/// At speed and torque, one second to settle, then `seconds` of judging.
+///
+/// # Errors
+/// When the configuration is refused or the drive does not start.
+pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
+    steady_run_of(&config.drive, config, case, seconds)
+}
+
+/// The same with a drive that is set otherwise than the configuration says.
+///
+/// # Errors
+/// As [`steady_run`].
+pub fn steady_run_of(
+    drive: &Settings,
+    config: &Config,
+    case: OperatingPoint,
+    seconds: f64,
+) -> Result<SteadyRun, Error> {
+    judged(prepared(drive, config, case.seed)?, case, seconds)
+}
+
+/// The same with a drive that is off.
+///
+/// # Errors
+/// When the drive does not start.
+pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
+    bring_up(&mut rig, case.rpm)?;
+    let (mut error, mut torque) = (Stats::default(), Stats::default());
+    if let Some(fault) = rig.drive.state().fault() {
+        return Ok(SteadyRun { case, error, torque: 0.0, lost: true, fault: Some(fault) });
+    }
+    rig.command(&Command::Torque(case.iq as f32))?;
+    rig.run(1.0, |_| {});
+    rig.run(seconds, |p| {
+        error.push(p.angle_error_deg);
+        torque.push(p.torque);
+    });
+    let fault = rig.drive.state().fault();
+    let lost = error.largest() > LOST_DEG || fault.is_some();
+    Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })
+}

@@ -1,0 +1,201 @@
+//! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
+
+use num_complex::Complex64;
+use sim_bench::bode::{largest_pole, roots};
+use sim_bench::prelude::*;
+
+use super::measure::Record;
+use crate::identification::arx::{Orders, fit};
+
+/// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
+#[derive(Clone, Copy, Debug)]
+pub struct Model {
+    /// A/rad or 1/rad.
+    pub k: f64,
+    /// Denominator.
+    pub a: [f64; 2],
+}
+
+/// PII controller, Eq. 3.44.
+#[derive(Clone, Copy, Debug)]
+pub struct Pii {
+    /// rad/A or rad.
+    pub k_s: f64,
+    /// Zero.
+    pub z_s: f64,
+}
+
+/// As used in section 3.11.
+pub const PRINTED_PII: Pii = Pii { k_s: 0.132_546, z_s: 0.90 };
+
+/// Table 6: i_q in A, k_phi, real and imaginary part of the poles.
+pub const TABLE_6: [(f64, f64, f64, f64); 6] = [
+    (0.5, 1.6145e-5, 0.98668, 0.06684),
+    (1.0, 4.6610e-5, 0.97357, 0.06383),
+    (1.5, 5.9470e-5, 0.97433, 0.06527),
+    (2.0, 7.3862e-5, 0.97451, 0.06250),
+    (2.5, 8.0544e-5, 0.97572, 0.05969),
+    (3.0, 9.5797e-5, 0.97686, 0.06461),
+];
+
+/// Iterations in which the data are filtered by the denominator found last.
+const ITERATIONS: usize = 40;
+
+impl Model {
+    /// A row of Table 6.
+    pub fn printed(row: usize) -> Self {
+        let (_, k, re, im) = TABLE_6[row];
+        Self { k, a: [-2.0 * re, re * re + im * im] }
+    }
+
+    /// Least squares of Eq. 3.43 as in Appendix A, which minimises the equation error; and the iteration
+    /// with the data filtered by the last denominator (Steiglitz and McBride), which minimises the
+    /// output error.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the data do not excite the model.
+    pub fn identify(record: &Record) -> Result<[Self; 2], Error> {
+        let refused = |error: crate::identification::NotIdentifiable| {
+            Error::Refused(format!("the data do not give Eq. 3.43: {error}"))
+        };
+        let orders = Orders { outputs: 2, inputs: 1, delay: 1 };
+        // Three periods of the sequence: transients of the filters die out in the first.
+        let (u, y) = (record.u.repeat(3), record.y.repeat(3));
+        let period = record.u.len();
+        let solve = |u: &[f64], y: &[f64]| {
+            let arx = fit(&u[period..], &y[period..], orders).map_err(refused)?;
+            Ok::<_, Error>(Self { k: arx.b[0], a: [arx.a[0], arx.a[1]] })
+        };
+        let first = solve(&u, &y)?;
+        let mut model = first;
+        for _ in 0..ITERATIONS {
+            if !model.is_stable() {
+                break;
+            }
+            let filter = Self { k: 1.0, a: model.a };
+            model = solve(&filter.simulate(&u), &filter.simulate(&y))?;
+        }
+        Ok([first, model])
+    }
+
+    /// Output for this input, from rest.
+    pub fn simulate(&self, u: &[f64]) -> Vec<f64> {
+        let mut y = Vec::with_capacity(u.len());
+        for k in 0..u.len() {
+            let [y1, y2] = [1, 2].map(|n| if k >= n { y[k - n] } else { 0.0 });
+            let u2 = if k >= 2 { u[k - 2] } else { 0.0 };
+            y.push(self.k * u2 - self.a[0] * y1 - self.a[1] * y2);
+        }
+        y
+    }
+
+    /// The model's output over a period of the sequence, and how well it fits: 100 % less the rms
+    /// error over the rms of the signal.
+    pub fn fit(&self, record: &Record) -> (Vec<f64>, f64) {
+        let n = record.u.len();
+        let y = self.simulate(&record.u.repeat(3)).split_off(2 * n);
+        let square = |of: &dyn Fn(usize) -> f64| (0..n).map(|k| of(k).powi(2)).sum::<f64>();
+        let left = square(&|k| record.y[k] - y[k]) / square(&|k| record.y[k]);
+        (y, 100.0 * (1.0 - left.sqrt()))
+    }
+
+    /// Gain at dc, per rad.
+    pub fn static_gain(&self) -> f64 {
+        self.k / (1.0 + self.a[0] + self.a[1])
+    }
+
+    /// Both poles, the one with the larger imaginary part (or the larger one) first.
+    pub fn poles(&self) -> [Complex64; 2] {
+        let poles = roots(&self.a);
+        let [p, q] = [poles[0], poles[1]];
+        if (p.im, p.re) < (q.im, q.re) { [q, p] } else { [p, q] }
+    }
+
+    fn is_stable(&self) -> bool {
+        let [a1, a2] = self.a;
+        a2.abs() < 1.0 && a1.abs() < 1.0 + a2
+    }
+
+    /// Frequency response at rad/sample.
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let [a1, a2] = self.a.map(|a| Complex64::new(a, 0.0));
+        Complex64::new(self.k, 0.0) / (z * z + a1 * z + a2)
+    }
+
+    /// Coefficients of the loop of this plant and a controller, without the first:
+    /// (z - 1)^2 (z^2 + a1 z + a2) + k_s k (z - z_s).
+    pub fn closed_loop(&self, pii: Pii) -> [f64; 4] {
+        let [a1, a2] = self.a;
+        let gain = pii.k_s * self.k;
+        [a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s]
+    }
+
+    /// The fastest controller with its zero a factor [`LEAD`] below the crossover that is stable and
+    /// keeps the sensitivity peak below [`MS`]; and that crossover, rad/sample. (A phase margin alone
+    /// would not do: an identified plant may peak above the crossover.)
+    pub fn design(&self) -> Option<(Pii, f64)> {
+        let sign = self.static_gain().signum();
+        let candidates = (0..200).map(|n| 0.3 * 0.97_f64.powi(n)).map(|crossover| {
+            let open = self.open_loop(Pii { k_s: 1.0, z_s: 1.0 - crossover / LEAD }, crossover);
+            (Pii { k_s: sign / open.norm(), z_s: 1.0 - crossover / LEAD }, crossover)
+        });
+        let fits = |pii: Pii| {
+            largest_pole(&self.closed_loop(pii)) < 1.0
+                && (1..300).all(|n| {
+                    let w = std::f64::consts::PI * 0.97_f64.powi(n);
+                    (Complex64::ONE + self.open_loop(pii, w)).norm() > 1.0 / MS
+                })
+        };
+        candidates.into_iter().find(|&(pii, _)| fits(pii))
+    }
+
+    /// Controller and plant at rad/sample.
+    fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let integrator = z - Complex64::ONE;
+        let controller = (z - Complex64::new(pii.z_s, 0.0)) / (integrator * integrator);
+        controller * Complex64::new(pii.k_s, 0.0) * self.response(omega_t)
+    }
+}
+
+/// Crossover over zero of the designed controller.
+const LEAD: f64 = 4.0;
+/// Largest sensitivity peak of the design.
+const MS: f64 = 2.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identification::signals::Prbs;
+
+    #[test]
+    fn a_known_plant_is_found_and_stabilised() {
+        let plant = Model::printed(2);
+        let mut prbs = Prbs::new(8).unwrap();
+        let bits: Vec<f64> = (0..255).map(|_| prbs.step()).collect();
+        let u: Vec<f64> = bits.iter().flat_map(|&bit| [bit; 20]).collect();
+        let y = plant.simulate(&u.repeat(3)).split_off(2 * u.len());
+        let record = Record { u, y };
+        for model in Model::identify(&record).unwrap() {
+            assert!((model.k / plant.k - 1.0).abs() < 1e-6, "{model:?}");
+            assert!(model.fit(&record).1 > 99.99);
+        }
+        let (pii, crossover) = plant.design().unwrap();
+        assert!(largest_pole(&plant.closed_loop(pii)) < 0.9999);
+        assert!((plant.open_loop(pii, crossover).norm() - 1.0).abs() < 1e-9);
+        // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
+        let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
+        assert!(largest_pole(&plant.closed_loop(more)) < 1.0);
+    }
+
+    #[test]
+    fn the_printed_controller_is_at_the_limit_on_the_printed_plants() {
+        // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
+        let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
+        for (row, expected) in expected.into_iter().enumerate() {
+            let found = largest_pole(&Model::printed(row).closed_loop(PRINTED_PII));
+            assert!((found - expected).abs() < 2e-5, "{row}: {found}");
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The demodulations that are compared, and the drives that use them.
+
+use drive_core::carrier::DemodulatorKind;
+use drive_core::table::ReferenceTable;
+use drive_settings::Settings;
+use sim_bench::learning;
+use sim_bench::prelude::*;
+
+use crate::injection_map::PP;
+
+/// A demodulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Demodulation {
+    /// How the configuration names it.
+    pub name: &'static str,
+    /// Which.
+    pub demodulator: DemodulatorKind,
+    /// How much larger its signal is than that of the rectified chain for the same saliency, by the
+    /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
+    pub gain: f64,
+    /// Constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
+    pub constant_a: f64,
+}
+
+/// Gain of the band-pass at 600 Hz.
+pub const BPF: f64 = 0.9452;
+/// Gain of a rectifier.
+const RECTIFIER: f64 = std::f64::consts::FRAC_2_PI;
+/// Gain of the rectified chain.
+const RECTIFIED_GAIN: f64 = BPF * RECTIFIER * PP;
+const PRINTED_REFERENCE_A: f64 = 0.010;
+
+/// The chain as printed.
+pub const LITERAL: Demodulation =
+    Demodulation::new("literal", DemodulatorKind::Literal, 1.0, PRINTED_REFERENCE_A);
+/// The printed chain with a rectifier that works.
+pub const RECTIFIED: Demodulation =
+    Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, ..LITERAL };
+/// The drive's own.
+pub const SYNCHRONOUS: Demodulation =
+    Demodulation::new("synchronous", DemodulatorKind::Synchronous, 1.0, 0.0);
+
+/// All of them.
+pub const DEMODULATIONS: [Demodulation; 5] = [
+    LITERAL,
+    RECTIFIED,
+    Demodulation::new(
+        "rms-impedance",
+        DemodulatorKind::RmsImpedance,
+        PP / BPF / RECTIFIED_GAIN,
+        0.0,
+    ),
+    Demodulation::new(
+        "envelope",
+        DemodulatorKind::Envelope,
+        BPF / RECTIFIED_GAIN,
+        PRINTED_REFERENCE_A * BPF / RECTIFIED_GAIN,
+    ),
+    SYNCHRONOUS,
+];
+
+impl Demodulation {
+    const fn new(
+        name: &'static str,
+        demodulator: DemodulatorKind,
+        gain: f64,
+        constant_a: f64,
+    ) -> Self {
+        Self { name, demodulator, gain, constant_a }
+    }
+
+    /// The name in metrics and file names.
+    pub fn key(&self) -> String {
+        self.name.replace('-', "_")
+    }
+
+    /// The configuration with this demodulation.
+    pub fn config(&self, config: &Config) -> Config {
+        let mut config = config.clone();
+        config.drive.injection.demodulator = self.demodulator;
+        // A motor without saliency must be measured, not refused.
+        config.drive.injection.synchronous.check = false;
+        config
+    }
+
+    /// Unit of its signal times 1000.
+    pub fn unit(&self) -> &'static str {
+        if self.demodulator == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
+    }
+
+    /// The reference that it learns on this motor.
+    ///
+    /// # Errors
+    /// As [`learning::reference_of`].
+    pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
+        let config = self.config(config);
+        learning::reference_of(self.demodulator, &config, seed)
+    }
+
+    /// The drive of this kind, if the demodulation has one.
+    pub fn drive(
+        &self,
+        kind: ReferenceKind,
+        config: &Config,
+        learned: ReferenceTable,
+    ) -> Option<Settings> {
+        let mut drive = self.config(config).drive;
+        if self.demodulator == DemodulatorKind::Synchronous {
+            drive.injection.synchronous.reference = Some(learned);
+            return (kind == ReferenceKind::Retuned).then_some(drive);
+        }
+        let printed = &mut drive.injection.printed;
+        if kind == ReferenceKind::Constant {
+            printed.reference_a = self.constant_a as f32;
+        } else {
+            printed.learned = Some(learned);
+        }
+        if kind == ReferenceKind::Retuned {
+            (printed.k_s, printed.z_s) = RETUNED;
+        }
+        printed.k_s /= self.gain as f32;
+        Some(drive)
+    }
+}
+
+/// Reference of the signal, and the controller behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReferenceKind {
+    /// A constant and the gains of the configuration (as printed).
+    Constant,
+    /// A learned table and the same gains.
+    Learned,
+    /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
+    /// own loop.
+    Retuned,
+}
+
+/// All kinds with their names in tables and metrics.
+pub const KINDS: [(ReferenceKind, &str); 3] = [
+    (ReferenceKind::Constant, "constant"),
+    (ReferenceKind::Learned, "learned"),
+    (ReferenceKind::Retuned, "retuned"),
+];
+
+/// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
+/// crossover, where the printed one has none.
+const RETUNED: (f32, f32) = (0.1, 0.995);

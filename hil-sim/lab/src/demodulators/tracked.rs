@@ -1,0 +1,72 @@
+//! Angle error of a drive without a position sensor, with each demodulation.
+
+use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::{Command, Mode};
+use drive_settings::Settings;
+use sim_bench::prelude::*;
+use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
+
+/// Levels of Figure 38, A, and the time at each, s.
+const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+const LEVEL_S: f64 = 0.6;
+/// Not judged after the first level, s: the angle settles from the magnetising position.
+const SETTLING_S: f64 = 0.5;
+
+/// A run through the torque steps.
+#[derive(Clone, Debug)]
+pub struct StepsRun {
+    /// Angle error, degrees, over time, s: means over a carrier period.
+    pub error: Vec<(f64, f64)>,
+    /// Angle error after settling, degrees.
+    pub stats: Stats,
+    /// Whether it went beyond 45°, or the drive stopped itself.
+    pub lost: bool,
+}
+
+/// Torque steps with the shaft locked.
+///
+/// # Errors
+/// As [`Rig::new`] and [`Rig::start`].
+pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
+    let mut config = config.clone();
+    config.load.mode = LoadMode::Locked;
+    let config = Config { drive: *drive, ..config };
+    let mut rig = Rig::from_config(&config, seed)?;
+    rig.start(Mode::Torque)?;
+    let start = rig.time();
+    let (mut error, mut stats) = (Vec::new(), Stats::default());
+    for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
+        if rig.drive.state().fault().is_some() {
+            break;
+        }
+        rig.command(&Command::Torque(iq as f32))?;
+        for _ in 0..(LEVEL_S * RATE_HZ) as usize / CARRIER_SAMPLES {
+            let t = rig.time() - start;
+            let mut mean = Stats::default();
+            rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {
+                mean.push(p.angle_error_deg);
+                if t >= SETTLING_S {
+                    stats.push(p.angle_error_deg);
+                }
+            });
+            error.push((t, mean.mean()));
+        }
+    }
+    let lost = stats.largest() > LOST_DEG || rig.drive.state().fault().is_some();
+    Ok(StepsRun { error, stats, lost })
+}
+
+/// One second at constant speed and torque; none where the angle is lost.
+///
+/// # Errors
+/// As [`Rig::new`] and [`Rig::start`].
+pub fn turning(
+    drive: &Settings,
+    config: &Config,
+    rpm: f64,
+    iq: f64,
+    seed: u64,
+) -> Result<Option<SteadyRun>, Error> {
+    let run = steady_run_of(drive, config, OperatingPoint { rpm, iq, seed }, 1.0)?;
+    Ok((!run.lost).then_some(run))
+}

@@ -1,0 +1,193 @@
+//! The direct-current, locked-rotor and no-load tests of section 3.6 of Barroso (2017): from readings
+//! of meters to the equivalent circuit (Figure 21), and the readings that a simulated motor gives.
+
+use std::f64::consts::{SQRT_2, TAU};
+
+use sim_bench::plant::{
+    Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel, PlantError,
+    SaliencySettings,
+};
+
+use super::Complex;
+
+/// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
+/// values, rms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readings {
+    /// Direct voltage between two phases, V, and the current through them, A.
+    pub dc: (f64, f64),
+    /// Frequency (Hz), voltage (V), current (A) and the angle between them (rad), rotor locked.
+    pub locked: (f64, f64, f64, f64),
+    /// Frequency (Hz), voltage (V) and current (A) without load.
+    pub no_load: (f64, f64, f64),
+}
+
+impl Readings {
+    /// Sections 3.6.1 to 3.6.3.
+    pub const PRINTED: Self =
+        Self { dc: (27.9, 2.60), locked: (15.0, 22.67, 2.71, 0.671), no_load: (60.0, 37.9, 0.491) };
+
+    /// Impedance of a phase with the rotor locked (Eq. 3.17), ohm.
+    pub fn locked_impedance(&self) -> Complex {
+        let (_, v, i, angle) = self.locked;
+        Complex::from_polar(v / i, angle)
+    }
+
+    /// Impedance of a phase without load, ohm.
+    pub fn no_load_impedance(&self) -> f64 {
+        self.no_load.1 / self.no_load.2
+    }
+
+    /// The circuit as section 3.6 reads it off: no current in the magnetising branch while the rotor is
+    /// locked, no voltage at the stator resistance without load, two equal leakages.
+    pub fn as_printed(&self) -> Circuit {
+        let r_s = 0.5 * self.dc.0 / self.dc.1;
+        let z = self.locked_impedance();
+        let leakage = z.im / (2.0 * TAU * self.locked.0);
+        let l_s = self.no_load_impedance() / (TAU * self.no_load.0);
+        Circuit { r_s, r_r: z.re - r_s, l_l1: leakage, l_l2: leakage, l_m: l_s - leakage }
+    }
+
+    /// The circuit that has these readings with a magnetising branch, and the stator resistance in the
+    /// no-load test: Z - r_s - j w L_s = (w L_m)² / (r_r + j w L_r), L_r = L_s.
+    pub fn exact(&self) -> Circuit {
+        let r_s = 0.5 * self.dc.0 / self.dc.1;
+        let z = self.no_load_impedance();
+        let l_s = (z * z - r_s * r_s).sqrt() / (TAU * self.no_load.0);
+        let w = TAU * self.locked.0;
+        let rotor = (self.locked_impedance() - Complex::new(r_s, w * l_s)).inv();
+        let l_m = (l_s / (rotor.im * w)).sqrt();
+        let r_r = rotor.re * (w * l_m).powi(2);
+        Circuit { r_s, r_r, l_l1: l_s - l_m, l_l2: l_s - l_m, l_m }
+    }
+}
+
+/// The equivalent circuit (Figure 21), SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circuit {
+    /// Stator resistance.
+    pub r_s: f64,
+    /// Rotor resistance.
+    pub r_r: f64,
+    /// Stator leakage inductance.
+    pub l_l1: f64,
+    /// Rotor leakage inductance.
+    pub l_l2: f64,
+    /// Magnetising inductance.
+    pub l_m: f64,
+}
+
+impl Circuit {
+    /// Names of the five, in the order of Table 5 and of [`Self::array`].
+    pub const NAMES: [&str; 5] = ["r_s", "r_r", "l_l1", "l_l2", "l_m"];
+
+    /// Table 5.
+    pub const TABLE_5: Self = Self { r_s: 5.4, r_r: 1.1, l_l1: 0.0276, l_l2: 0.0276, l_m: 0.1771 };
+
+    /// The five in the order of [`Self::NAMES`].
+    pub const fn array(&self) -> [f64; 5] {
+        [self.r_s, self.r_r, self.l_l1, self.l_l2, self.l_m]
+    }
+}
+
+impl From<&MachineSettings> for Circuit {
+    fn from(m: &MachineSettings) -> Self {
+        Self { r_s: m.rs, r_r: m.rr, l_l1: m.lls, l_l2: m.llr, l_m: m.lm }
+    }
+}
+
+/// Steps of the simulation in a period of the supply.
+const STEPS: u32 = 400;
+/// The direct current is read after this time, s.
+const DC_S: f64 = 2.0;
+/// The alternating current settles for so long before it is read, s.
+const SETTLE_S: f64 = 3.0;
+/// Periods over which a meter reads.
+const PERIODS: u32 = 10;
+/// How often the supply is set anew until it gives the wanted current: the saliency bends the line.
+const ADJUSTMENTS: u32 = 4;
+
+/// Drive of the rotor in the no-load test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shaft {
+    /// Another machine, at synchronous speed: no slip, as section 3.6.3 takes it.
+    Driven,
+    /// The motor itself, against its friction. It was turning already.
+    Free,
+}
+
+/// Runs the three tests on a simulated motor, with the currents and the no-load voltage of
+/// [`Readings::PRINTED`].
+///
+/// # Errors
+/// [`PlantError`] when the plant refuses the settings.
+pub fn measure(
+    machine: &MachineSettings,
+    saliency: &SaliencySettings,
+    mechanics: &MechanicsSettings,
+    shaft: Shaft,
+) -> Result<Readings, PlantError> {
+    let bench = |load: Load| -> Result<MotorModel, PlantError> {
+        let mechanics = Mechanics::new(&MechanicsSettings { load, ..*mechanics })?;
+        Ok(MotorModel::new(Machine::new(machine, saliency)?, mechanics))
+    };
+    let printed = Readings::PRINTED;
+
+    let locked = bench(Load::Locked)?;
+    let dc = adjusted(printed.dc, |volts| dc_current(locked, volts));
+    let (hz, volts, amps, _) = printed.locked;
+    let (volts, amps) = adjusted((volts, amps), |volts| steady(locked, hz, volts).norm() / SQRT_2);
+    let angle = -steady(locked, hz, volts).arg();
+
+    let (hz, no_load_volts, _) = printed.no_load;
+    let synchronous = TAU * hz / f64::from(machine.pole_pairs);
+    let shaft = match shaft {
+        Shaft::Driven => Load::Speed { speed: synchronous },
+        Shaft::Free => Load::Free { torque: 0.0 },
+    };
+    let mut turning = bench(shaft)?;
+    turning.state.speed = synchronous;
+    let current = steady(turning, hz, no_load_volts).norm() / SQRT_2;
+    Ok(Readings {
+        dc,
+        locked: (printed.locked.0, volts, amps, angle),
+        no_load: (hz, no_load_volts, current),
+    })
+}
+
+/// Sets the voltage until the current is that of the reading; both as they are then.
+fn adjusted((volts, amps): (f64, f64), current: impl Fn(f64) -> f64) -> (f64, f64) {
+    let mut volts = volts;
+    for _ in 0..ADJUSTMENTS {
+        volts *= amps / current(volts);
+    }
+    (volts, current(volts))
+}
+
+/// Direct current through phases b and c in series, A, phase a open: that is a voltage along beta.
+fn dc_current(mut motor: MotorModel, volts: f64) -> f64 {
+    const H: f64 = 1e-4;
+    for _ in 0..(DC_S / H) as u32 {
+        motor.step(Complex::new(0.0, volts / 3f64.sqrt()), H);
+    }
+    motor.state.electrical.i.im * 0.5 * 3f64.sqrt()
+}
+
+/// Steady current vector (A peak) at `volts` rms per phase: its fundamental, relative to the voltage.
+fn steady(mut motor: MotorModel, hz: f64, volts: f64) -> Complex {
+    let h = 1.0 / (hz * f64::from(STEPS));
+    let settle = (SETTLE_S * hz) as u32;
+    let mut sum = Complex::ZERO;
+    for period in 0..settle + PERIODS {
+        for step in 0..STEPS {
+            let turn = TAU * f64::from(step) / f64::from(STEPS);
+            if period >= settle {
+                sum += motor.state.electrical.i * Complex::from_polar(1.0, -turn);
+            }
+            // Constant within a step: the mean of the sinusoid over it, ahead by half a step.
+            let middle = turn + 0.5 * TAU / f64::from(STEPS);
+            motor.step(Complex::from_polar(SQRT_2 * volts, middle), h);
+        }
+    }
+    sum / f64::from(PERIODS * STEPS)
+}

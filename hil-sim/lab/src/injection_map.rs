@@ -1,0 +1,187 @@
+//! The current difference over the injection angle, Figure 19.
+
+use drive_core::Command;
+use drive_core::carrier::DemodulatorKind;
+use sim_bench::prelude::*;
+
+/// Gain of the post-processing filter at dc.
+pub(super) const PP: f64 = 0.944_061;
+
+/// Figure 19.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "injection-map",
+    stands_for: "Figure 19, Figure 18",
+    about: "Current difference over the injection angle, with the encoder: what each demodulator sees.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
+    run,
+};
+
+const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
+/// Step of phi2 - theta, degrees.
+const STEP_DEG: i32 = 15;
+/// Time for the filters to settle at each angle, and to average, s.
+const SETTLE_S: f64 = 0.08;
+const AVERAGE_S: f64 = 0.05;
+
+/// One family of curves.
+#[derive(Clone, Copy)]
+pub(super) struct Variant {
+    pub name: &'static str,
+    pub title: &'static str,
+    pub demodulator: DemodulatorKind,
+    pub saliency: bool,
+    pub inject: bool,
+    /// Whether the delay of the demodulation is compensated.
+    pub compensate: bool,
+}
+
+const LITERAL: Variant = Variant {
+    name: "literal",
+    title: "As printed, motor with saliency",
+    demodulator: DemodulatorKind::Literal,
+    saliency: true,
+    inject: true,
+    compensate: false,
+};
+const RECTIFIED: Variant = Variant {
+    name: "rectified",
+    title: "Rectified, delay compensated, motor with saliency",
+    demodulator: DemodulatorKind::Rectified,
+    compensate: true,
+    ..LITERAL
+};
+#[rustfmt::skip] // a variant a line
+const VARIANTS: [Variant; 7] = [
+    LITERAL,
+    Variant { name: "literal_isotropic", title: "As printed, motor without saliency", saliency: false, ..LITERAL },
+    Variant { name: "literal_silent", title: "As printed, no saliency and no injection", saliency: false, inject: false, ..LITERAL },
+    RECTIFIED,
+    Variant { name: "rectified_isotropic", title: "Rectified, delay compensated, motor without saliency", saliency: false, ..RECTIFIED },
+    Variant { name: "rectified_delayed", title: "Rectified, delay left in, motor with saliency", compensate: false, ..RECTIFIED },
+    Variant { name: "rectified_isotropic_delayed", title: "Rectified, delay left in, motor without saliency", saliency: false, compensate: false, ..RECTIFIED },
+];
+
+/// delta_i in mA (of the synchronous demodulation: thousandths) over phi2 - theta in degrees.
+pub(super) type Curve = Vec<(f64, f64)>;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let jobs: Vec<(Variant, f64)> =
+        VARIANTS.iter().flat_map(|&v| IQ_A.iter().map(move |&iq| (v, iq))).collect();
+    let curves = context.in_parallel("injection-map", &jobs, |_, &(variant, iq)| {
+        curve(context.config, context.seed, variant, iq)
+    })?;
+
+    let mut outcome = Outcome::default();
+    for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
+        let panel = panel("Δi (mA)", &IQ_A, family);
+        outcome.figures.push(Figure::new(variant.name, variant.title, "Figure 19").panel(panel));
+        for (iq, curve) in [(IQ_A[2], &family[2]), (IQ_A[4], &family[4])] {
+            let name = format!("{}_at_90_deg_iq_{iq}a_ma", variant.name);
+            outcome.metrics.set(name, at(curve, 90.0));
+        }
+    }
+    outcome.tables.push(table(&curves, f64::from(context.config.drive.i_d())));
+    let isotropic = &curves[IQ_A.len()..2 * IQ_A.len()];
+    let silent = &curves[2 * IQ_A.len()..3 * IQ_A.len()];
+    let same =
+        Stats::of(isotropic.iter().flatten().zip(silent.iter().flatten()).map(|(a, b)| a.1 - b.1));
+    outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
+    outcome.remarks.extend([
+        "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
+         zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \
+         fundamental current leaking through the 40 dB of the band-pass at dc, which says nothing \
+         about the flux. The rectified chain sees the saliency.",
+        "The rectified chain, its delay compensated, gives about the same current difference at \
+         ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
+         the delay of the band-pass (8.83 samples) left in, 2.4 mA per ampere are added by the slip \
+         of the flux, with or without saliency.",
+    ].map(String::from));
+    Ok(outcome)
+}
+
+/// A family of curves, one a torque current, A.
+pub(super) fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
+    iq_a.iter()
+        .zip(family)
+        .fold(Panel::new("φ̂₂ − θ (° electrical)", y), |panel, (iq, curve)| {
+            panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
+        })
+}
+
+/// Makes the motor one without saliency.
+pub(super) fn take_saliency(config: &mut Config) {
+    (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, Some(0.0), 0.0);
+}
+
+/// Sweeps the injection angle with the encoder as angle source and the shaft locked. Where the carrier
+/// belongs along the flux, theta is counted from 90° ahead of it.
+pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
+    let mut config = config.clone();
+    config.drive.injection.demodulator = variant.demodulator;
+    config.drive.ignore_delays = !variant.compensate;
+    if !variant.saliency {
+        take_saliency(&mut config);
+    }
+    if !variant.inject {
+        config.drive.injection.amplitude_v = Some(0.0);
+    }
+    let mut rig = Rig::oriented(&config, seed)?;
+    rig.command(&Command::Torque(iq as f32))?;
+    rig.run(0.3, |_| {});
+    let mut curve = Curve::new();
+    for x in (-180..=180).step_by(STEP_DEG as usize) {
+        // theta = phi + 90° + turn, so phi2 - theta = -90° - turn
+        rig.command(&Command::TurnInjection((-90 - x) as f32))?;
+        rig.run(SETTLE_S, |_| {});
+        let (mut delta_i, mut error) = (Stats::default(), Stats::default());
+        rig.run(AVERAGE_S, |p| {
+            delta_i.push(p.signal() * 1e3);
+            error.push(p.angle_error_deg);
+        });
+        curve.push((f64::from(x) + error.mean(), delta_i.mean()));
+    }
+    Ok(curve)
+}
+
+/// Linear interpolation.
+fn at(curve: &Curve, x: f64) -> f64 {
+    let after = curve.iter().position(|p| p.0 >= x).unwrap_or(curve.len() - 1).max(1);
+    let (a, b) = (curve[after - 1], curve[after]);
+    a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)
+}
+
+/// Where the curve goes through zero between -90° and 90°, upwards or downwards.
+fn zero(curve: &Curve) -> f64 {
+    curve
+        .windows(2)
+        .filter(|w| w[0].0 > -100.0 && w[1].0 < 100.0)
+        .find(|w| w[0].1.signum() != w[1].1.signum())
+        .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
+}
+
+/// The printed chain on the motor without saliency beside the predicted leakage, and the rectified
+/// chain on the motor with saliency.
+fn table(curves: &[Curve], id: f64) -> Table {
+    let mut table = Table::new("What Figure 19 shows", &[]).note(
+        "The leak predicts Δi = −√2 · 0.01 · 0.944 · |i| · sin(φ̂₂ − θ + γ), γ \
+         = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
+         (In the source the 0.944 of the low-pass, which makes the real currents larger than \
+         commanded, cancels that of PP: 9.9 mA.)",
+    );
+    for (k, iq) in IQ_A.iter().enumerate() {
+        let seen = |variant: usize, x: f64| at(&curves[variant * IQ_A.len() + k], x);
+        table.record([
+            ("iq (A)", Cell::fixed(*iq, 1)),
+            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP * id, 3)),
+            ("as printed, isotropic, at -90° (mA)", Cell::fixed(seen(1, -90.0), 3)),
+            ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
+            ("zero found at (°)", Cell::fixed(zero(&curves[IQ_A.len() + k]), 2)),
+            ("rectified, saliency, at 90° (mA)", Cell::fixed(seen(3, 90.0), 2)),
+            ("rectified, isotropic, at 90° (mA)", Cell::fixed(seen(4, 90.0), 2)),
+            ("delay left in, saliency, at 90° (mA)", Cell::fixed(seen(5, 90.0), 2)),
+            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(seen(6, 90.0), 2)),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,28 @@
+//! The laboratory: experiments that repeat figures and tables of the two sources, and the identification of the 1996 paper.
+//! The command line and the experiments of a drive in use are in `hil-sim`.
+#![deny(clippy::use_debug)]
+
+pub mod adc_calibration;
+pub mod angle_identification;
+pub mod dead_time;
+pub mod demodulators;
+pub mod filters;
+pub mod identification;
+pub mod identify_continuous;
+pub mod identify_discrete;
+pub mod identify_machine;
+pub mod identify_recursive;
+pub mod identify_trace;
+pub mod identify_validate;
+pub mod injection_map;
+pub mod learn_reference;
+mod linear_model;
+pub mod measured_motors;
+pub mod modulation;
+pub mod motor_tests;
+pub mod online_tracking;
+pub mod perturbation;
+pub mod pi_design;
+pub mod plant_identification;
+pub mod saliency;
+pub mod warming_rotor;

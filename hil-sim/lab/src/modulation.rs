@@ -1,0 +1,237 @@
+//! Space-vector modulation, and the amplitude modulation that carries the angle.
+
+mod carrier;
+
+use std::f64::consts::TAU;
+
+use drive_core::current::Modulator;
+use drive_core::io::PERIOD_S;
+use drive_core::{Abc, AlphaBeta};
+use sim_bench::prelude::*;
+
+/// Figures 4, 5 and 11, Table 2.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "modulation",
+    stands_for: "Figures 4, 5, 11, Table 2",
+    about: "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
+            spectrum of the current difference, an amplitude modulation of the carrier.",
+    uses: &[&["inverter.dc_link_v"]],
+    not: &[],
+    run,
+};
+
+/// A row of Table 2: name, states of the legs, phase voltages in thirds, line voltages; all over the
+/// dc link.
+type Row = (&'static str, [u8; 3], [i8; 3], [i8; 3]);
+
+/// Table 2 as printed.
+const TABLE_2: [Row; 8] = [
+    ("O_000", [0, 0, 0], [0, 0, 0], [0, 0, 0]),
+    ("U_0", [1, 0, 0], [2, -1, -1], [1, 0, -1]),
+    ("U_60", [1, 1, 0], [1, 1, -2], [0, 1, -1]),
+    ("U_120", [0, 1, 0], [-1, 2, -1], [-1, 1, 0]),
+    ("U_180", [0, 1, 1], [-2, 1, 1], [-1, 0, 1]),
+    ("U_240", [0, 0, 1], [-1, -1, 2], [0, -1, 1]),
+    ("U_300", [1, 0, 1], [1, -2, 1], [1, -1, 0]),
+    ("O_111", [1, 1, 1], [0, 0, 0], [0, 0, 0]),
+];
+
+/// The modulator of the drive on this dc link.
+struct Inverter {
+    modulator: Modulator,
+    top: f64,
+    vdc: f64,
+}
+
+impl Inverter {
+    fn compare(&self, wanted: AlphaBeta) -> [f64; 3] {
+        let modulated = self.modulator.step(wanted, Abc::ZERO, self.vdc as f32);
+        modulated.duties.map(|duty| (f64::from(duty) * self.top).round())
+    }
+
+    /// Mean voltage at the motor for these compare values, V.
+    fn voltage(&self, compare: [f64; 3]) -> (f64, f64) {
+        clarke(compare.map(|c| c / self.top * self.vdc))
+    }
+}
+
+/// Eq. 2.3, in f64.
+fn clarke([a, b, c]: [f64; 3]) -> (f64, f64) {
+    ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt())
+}
+
+fn vector(volts: f64, angle: f64) -> AlphaBeta {
+    AlphaBeta::new((volts * angle.cos()) as f32, (volts * angle.sin()) as f32)
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let settings = drive_settings::Inverter::default();
+    let inverter = Inverter {
+        modulator: Modulator::new(settings.dead_time_s, false),
+        top: f64::from(settings.top),
+        vdc: context.config.inverter.dc_link_v,
+    };
+    let mut outcome = Outcome::default();
+    outcome.figures.push(vectors(&inverter));
+    outcome.figures.push(sequence(&inverter));
+    let table = table_2(&mut outcome);
+    outcome.tables.push(table);
+    let table = accuracy(&inverter, &mut outcome);
+    outcome.tables.push(table);
+    carrier::add(context, &mut outcome);
+    Ok(outcome)
+}
+
+/// Phase and line voltages of the eight states, computed from the states of the legs.
+fn table_2(outcome: &mut Outcome) -> Table {
+    let mut table = Table::new("Table 2, voltages over the dc link", &[]);
+    let mut differences = 0;
+    for (name, legs, phases, lines) in TABLE_2 {
+        let [a, b, c] = legs.map(|leg| leg as i8);
+        let computed = [2 * a - b - c, 2 * b - a - c, 2 * c - a - b];
+        let line = [a - b, b - c, c - a];
+        let agrees = computed == phases && line == lines;
+        differences += u32::from(!agrees);
+        let (alpha, beta) = clarke([a, b, c].map(f64::from));
+        let length = alpha.hypot(beta);
+        let angle = beta.atan2(alpha).to_degrees().rem_euclid(360.0);
+        let join =
+            |values: [i8; 3]| values.map(|v| v.to_string()).join(" ").replace('-', "\u{2212}");
+        table.record([
+            ("vector", Cell::from(name)),
+            ("a b c", Cell::from(join([a, b, c]))),
+            ("va vb vc (thirds)", Cell::from(join(computed))),
+            ("vab vbc vca", Cell::from(join(line))),
+            ("angle (°)", if length > 0.0 { Cell::fixed(angle, 0) } else { Cell::from("-") }),
+            ("length", Cell::fixed(length, 4)),
+            ("as printed", Cell::from(if agrees { "yes" } else { "no" })),
+        ]);
+    }
+    outcome.metrics.set("table_2_differences", f64::from(differences));
+    table
+}
+
+/// Figure 4, and where the modulator puts voltages that are too long.
+fn vectors(inverter: &Inverter) -> Figure {
+    let corner = |k: i32| {
+        let angle = f64::from(k) * TAU / 6.0;
+        (2.0 / 3.0 * inverter.vdc * angle.cos(), 2.0 / 3.0 * inverter.vdc * angle.sin())
+    };
+    let circle = |volts: f64| {
+        (0..=360)
+            .map(|k| f64::from(k).to_radians())
+            .map(|x| (volts * x.cos(), volts * x.sin()))
+            .collect()
+    };
+    let given = |volts: f64| {
+        (0..=720)
+            .map(|k| vector(volts, f64::from(k) * TAU / 720.0))
+            .map(|wanted| inverter.voltage(inverter.compare(wanted)))
+            .collect()
+    };
+    let inner = inverter.vdc / 3.0_f64.sqrt();
+    let panel = Panel::new("α (V)", "β (V)")
+        .equal_axes()
+        .with(Series::reference("hexagon of U_0 to U_300", (0..=6).map(corner).collect()))
+        .with(Series::points("vectors of Table 2", (0..6).map(corner).collect()))
+        .with(Series::limit("largest circle", circle(inner)))
+        .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
+        .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));
+    Figure::new(
+        "vectors",
+        "Voltage vectors of the inverter, and what the modulator makes of two circles",
+        "Figure 4",
+    )
+    .panel(panel)
+}
+
+/// Figure 5 at 20° and half of the largest circle.
+fn sequence(inverter: &Inverter) -> Figure {
+    let wanted = vector(0.5 * inverter.vdc / 3.0_f64.sqrt(), 20.0_f64.to_radians());
+    let compare = inverter.compare(wanted);
+    let period_us = 1e6 * f64::from(PERIOD_S);
+    let mut panel = Panel::new("time in the PWM period (µs)", "leg high (1) or low (0), offset");
+    for (k, (name, compare)) in ["a", "b", "c"].into_iter().zip(compare).enumerate() {
+        let low = 1.5 * (2 - k) as f64;
+        let half = 0.5 * period_us * compare / inverter.top;
+        let (on, off) = (0.5 * period_us - half, 0.5 * period_us + half);
+        let corners = [
+            (0.0, low),
+            (on, low),
+            (on, low + 1.0),
+            (off, low + 1.0),
+            (off, low),
+            (period_us, low),
+        ];
+        panel = panel.with(Series::line(format!("leg {name}"), corners.to_vec()));
+    }
+    Figure::new(
+        "sequence",
+        "One period at 20° and half of the largest circle: O_000, U_0, U_60, O_111 and back; each leg \
+         switches twice",
+        "Figure 5",
+    )
+    .panel(panel.y_range(-0.2, 4.2))
+}
+
+/// On-times of the two vectors beside a voltage in the first sector to Table 2, over the period.
+fn on_times(wanted: (f64, f64), vdc: f64) -> (f64, f64) {
+    let second = wanted.1 * 3.0_f64.sqrt() / vdc;
+    (1.5 * wanted.0 / vdc - 0.5 * second, second)
+}
+
+fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
+    let circle = inverter.vdc / 3.0_f64.sqrt();
+    let (mut error, mut turned, mut time) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for k in 0..3600 {
+        let angle = f64::from(k) * TAU / 3600.0;
+        for share in [0.2, 0.5, 0.9] {
+            let wanted = vector(share * circle, angle);
+            let given = inverter.voltage(inverter.compare(wanted));
+            let distance =
+                (given.0 - f64::from(wanted.alpha)).hypot(given.1 - f64::from(wanted.beta));
+            error = error.max(distance);
+        }
+        let given = inverter.voltage(inverter.compare(vector(3.0 * circle, angle)));
+        let off = given.1.atan2(given.0) - angle;
+        turned = turned.max((off / TAU - (off / TAU).round()).abs() * 360.0);
+        if angle < TAU / 6.0 {
+            let wanted = (0.7 * circle * angle.cos(), 0.7 * circle * angle.sin());
+            let [a, b, c] = inverter.compare(vector(0.7 * circle, angle));
+            let by_table = on_times(wanted, inverter.vdc);
+            let by_counts = ((a - b) / inverter.top, (b - c) / inverter.top);
+            time = time.max((by_table.0 - by_counts.0).abs()).max((by_table.1 - by_counts.1).abs());
+        }
+    }
+    let time_us = time * 1e6 * f64::from(PERIOD_S);
+    outcome.metrics.set("voltage_error_max_v", error);
+    outcome.metrics.set("limited_angle_error_max_deg", turned);
+    outcome.metrics.set("on_time_difference_max_us", time_us);
+    let mut table = Table::new("The modulator of the drive", &["check", "largest", "unit"]);
+    let count = inverter.vdc / inverter.top;
+    for (check, value, unit) in [
+        ("mean voltage of a period against the one wanted, inside the circle", error, "V"),
+        ("angle of a voltage that is three times too long, after limiting", turned, "°"),
+        ("on-times T1 and T2 against those by Table 2", time_us, "µs"),
+        ("for comparison: one count of the timer", count, "V"),
+    ] {
+        table.row([Cell::from(check), Cell::significant(value, 2), Cell::from(unit)]);
+    }
+    table.note("Without dead-time compensation. The limited angle is off where pulses are dropped or extended because they are too short to be made.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim_bench::config::Config;
+
+    #[test]
+    fn table_2_and_the_sequence_agree_with_the_modulator() {
+        let outcome = EXPERIMENT.outcome(&Config::default(), 1).unwrap();
+        let metric = |name: &str| outcome.metrics.get(name).unwrap();
+        assert_eq!(metric("table_2_differences"), 0.0);
+        assert!(metric("voltage_error_max_v") < 0.05);
+        assert!(metric("on_time_difference_max_us") < 0.03);
+        assert!((metric("sideband_over_signal") - 0.5).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,106 @@
+//! Figure 11: the spectrum of the current difference before and behind the band pass.
+
+use std::f64::consts::TAU;
+
+use drive_core::filter::{BPF, SosState};
+use rand_distr::{Distribution, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+use sim_bench::bode::{RATE, omega_t};
+use sim_bench::prelude::*;
+
+/// Samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
+const SAMPLES: usize = RATE as usize;
+const CARRIER_HZ: f64 = 600.0;
+/// The band of the arbitrary signal, Hz.
+const BAND: std::ops::RangeInclusive<u32> = 20..=180;
+
+/// Adds the figure and its numbers.
+pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
+    let signal = signal(context.seed);
+    let carrier = |k: usize| (omega_t(CARRIER_HZ) * k as f64).cos();
+    let product: Vec<f64> = signal.iter().enumerate().map(|(k, a)| a * carrier(k)).collect();
+    let mut state = SosState::default();
+    // The signal repeats every second; from the second one on the output is settled.
+    let filtered: Vec<f64> = (product.iter().chain(&product))
+        .map(|&x| f64::from(BPF.step(&mut state, x as f32)))
+        .skip(SAMPLES)
+        .collect();
+
+    let carrier: Vec<f64> = (0..SAMPLES).map(carrier).collect();
+    let [a, c, p, f] = [&signal, &carrier, &product, &filtered].map(|x| spectrum(x));
+    let middle = (BAND.start() + BAND.end()) / 2;
+    let at = |spectrum: &[(f64, f64)], hz: f64| spectrum[hz as usize].1;
+    let middle = f64::from(middle);
+    outcome.metrics.set("sideband_over_signal", at(&p, CARRIER_HZ + middle) / at(&a, middle));
+    for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {
+        for (side, hz) in
+            [("lower", CARRIER_HZ - f64::from(offset)), ("upper", CARRIER_HZ + f64::from(offset))]
+        {
+            outcome
+                .metrics
+                .set(format!("bpf_{side}_{key}_edge_db"), 20.0 * (at(&f, hz) / at(&p, hz)).log10());
+        }
+    }
+    let metric = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
+    let remark = format!(
+        "The pass band of BPF ends 100 Hz from the carrier: {} Hz away a change of the angle is \
+         attenuated by {:.1} dB below the carrier and {:.1} dB above, {} Hz away hardly \
+         ({:.1} and {:.1} dB).",
+        BAND.end(),
+        -metric("bpf_lower_outer_edge_db"),
+        -metric("bpf_upper_outer_edge_db"),
+        BAND.start(),
+        -metric("bpf_lower_inner_edge_db"),
+        -metric("bpf_upper_inner_edge_db"),
+    );
+    outcome.remarks.push(remark);
+
+    let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
+    let shown = |spectrum: Vec<(f64, f64)>| spectrum.into_iter().take(1001).collect::<Vec<_>>();
+    let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);
+    outcome.figures.push(
+        Figure::new(
+            "spectrum",
+            "Eq. 2.15: a band-limited signal A and the carrier, their product, and the product \
+             behind BPF",
+            "Figure 11",
+        )
+        .panel(panel().with(Series::line("A", shown(a))).with(Series::line("carrier", shown(c))))
+        .panel(panel().with(Series::line("A times carrier", shown(p))))
+        .panel(
+            panel()
+                .with(Series::line("behind BPF", shown(f)))
+                .with(Series::reference("gain of BPF", gain)),
+        ),
+    );
+}
+
+/// Lines of 1 Hz spacing over the band, highest at its low end, with arbitrary phases.
+fn signal(seed: u64) -> Vec<f64> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let phases = Uniform::new(0.0, TAU);
+    let lines: Vec<(f64, f64, f64)> = BAND
+        .map(|hz| {
+            let amplitude =
+                1.0 - 0.6 * f64::from(hz - BAND.start()) / f64::from(BAND.end() - BAND.start());
+            let phase = phases.map_or(0.0, |phases| phases.sample(&mut random));
+            (omega_t(f64::from(hz)), amplitude, phase)
+        })
+        .collect();
+    let at = |k: usize| {
+        lines.iter().map(|(w, amplitude, phase)| amplitude * (w * k as f64 + phase).cos()).sum()
+    };
+    (0..SAMPLES).map(at).collect()
+}
+
+/// Amplitude over Hz.
+fn spectrum(signal: &[f64]) -> Vec<(f64, f64)> {
+    let mut bins: Vec<Complex<f64>> = signal.iter().map(|&x| Complex::new(x, 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(bins.len()).process(&mut bins);
+    let scale = 2.0 / signal.len() as f64;
+    let half = bins.len() / 2;
+    bins.iter().take(half).enumerate().map(|(hz, bin)| (hz as f64, scale * bin.norm())).collect()
+}

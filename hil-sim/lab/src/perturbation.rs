@@ -1,0 +1,256 @@
+//! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
+//! and predicted.
+
+use drive_core::{AngleSource, Command, Mode};
+use rayon::prelude::*;
+use sim_bench::plant::Load;
+use sim_bench::prelude::*;
+
+use crate::linear_model::{Disturbance, LinearModel};
+
+/// Section 5.2 names it as work to be done.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "perturbation",
+    stands_for: "section 5.2",
+    about: "Angle error after load and current steps, measured and by the linear model.",
+    uses: &[BENCH, DRIVE, &["prepare.learn"]],
+    not: &[&["angle_source"]],
+    run,
+};
+
+/// Seeds over which the measured response is averaged; a fifth of the noise remains.
+const SEEDS: u64 = 24;
+/// Time before the step from which on it is compared, and after it, s.
+const BEFORE_S: f64 = 0.5;
+const AFTER_S: f64 = 1.5;
+
+/// One disturbance.
+#[derive(Clone, Copy)]
+struct StepCase {
+    name: &'static str,
+    disturbance: Disturbance,
+    /// Speed reference, rpm, or torque current before the step, A.
+    from: f64,
+    /// True rotor resistance over the one the drive believes.
+    warmer: f64,
+}
+
+impl StepCase {
+    /// The case in proportion to the motor and the pole pairs of a configuration.
+    fn scaled(self, config: &Config) -> Self {
+        let (disturbance, from) = match self.disturbance {
+            Disturbance::Load(nm) => {
+                (Disturbance::Load(config.newton_metres(nm)), config.rpm(self.from))
+            }
+            Disturbance::TorqueCurrent(by) => {
+                (Disturbance::TorqueCurrent(config.amperes(by)), config.amperes(self.from))
+            }
+        };
+        Self { disturbance, from, ..self }
+    }
+}
+
+const fn load(name: &'static str, rpm: f64, nm: f64) -> StepCase {
+    StepCase { name, disturbance: Disturbance::Load(nm), from: rpm, warmer: 1.0 }
+}
+
+const fn current(name: &'static str, from: f64, to: f64, warmer: f64) -> StepCase {
+    StepCase { name, disturbance: Disturbance::TorqueCurrent(to - from), from, warmer }
+}
+
+const CASES: [StepCase; 8] = [
+    load("0.6 Nm at 0 rpm", 0.0, 0.6),
+    load("0.6 Nm at 30 rpm", 30.0, 0.6),
+    load("0.6 Nm at -150 rpm", -150.0, 0.6),
+    current("1 A to 2 A", 1.0, 2.0, 1.0),
+    current("2 A to -2 A", 2.0, -2.0, 1.0),
+    current("3 A to -3 A", 3.0, -3.0, 1.0),
+    current("1 A to 2 A, rotor 30 % warmer", 1.0, 2.0, 1.3),
+    current("3 A to -3 A, rotor 30 % warmer", 3.0, -3.0, 1.3),
+];
+
+/// Measured and predicted response of a case.
+struct StepResponse {
+    case: StepCase,
+    /// Mean over the seeds, less the mean before the step.
+    angle: Vec<f64>,
+    speed: Vec<f64>,
+    /// Largest single error, noise and all.
+    largest: f64,
+    lost: usize,
+    predicted: Vec<f64>,
+    predicted_speed: Vec<f64>,
+}
+
+impl StepResponse {
+    /// Measured minus predicted, rms, degrees.
+    fn fit(&self) -> f64 {
+        Stats::of(self.angle.iter().zip(&self.predicted).map(|(m, p)| m - p)).rms()
+    }
+}
+
+fn peak(of: &[f64]) -> f64 {
+    of.iter().copied().fold(0.0, |most, x| if x.abs() > f64::abs(most) { x } else { most })
+}
+
+/// The configuration of a case: the drive believes the resistance that the experiment was given.
+fn configured(config: &Config, case: &StepCase) -> Config {
+    let mut config = config.clone();
+    config.motor.r_r *= case.warmer;
+    config.drive.angle_source = AngleSource::Injection;
+    config.load.torque_nm = None;
+    config.load.mode = match case.disturbance {
+        Disturbance::Load(_) => LoadMode::Free,
+        Disturbance::TorqueCurrent(_) => LoadMode::Locked,
+    };
+    config
+}
+
+/// Angle error and speed from the step on; the first value is the mean before it.
+fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
+    let mut rig = Rig::from_config(config, seed)?;
+    match case.disturbance {
+        Disturbance::Load(_) => {
+            rig.start(Mode::Speed)?;
+            rig.command(&Command::Speed(case.from as f32))?;
+        }
+        Disturbance::TorqueCurrent(_) => {
+            rig.start(Mode::Torque)?;
+            rig.command(&Command::Torque(case.from as f32))?;
+        }
+    }
+    rig.run(2.0, |_| {});
+    let (mut angle, mut speed) = (Stats::default(), Stats::default());
+    rig.run(BEFORE_S, |p| {
+        angle.push(p.angle_error_deg);
+        speed.push(p.speed_rpm);
+    });
+    match case.disturbance {
+        Disturbance::Load(nm) => rig.set_load(Load::Free { torque: nm })?,
+        Disturbance::TorqueCurrent(by) => {
+            rig.command(&Command::Torque((case.from + by) as f32))?;
+        }
+    }
+    let (mut points, mut largest) = (Vec::new(), 0.0_f64);
+    rig.run(AFTER_S, |p| {
+        largest = largest.max(p.angle_error_deg.abs());
+        points.push([p.angle_error_deg - angle.mean(), p.speed_rpm - speed.mean()]);
+    });
+    let lost = largest > LOST_DEG || rig.drive.state().fault().is_some();
+    Ok((points, largest, lost))
+}
+
+fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, Error> {
+    let config = configured(config, &case);
+    let (plant, drive) = (plant_settings(&config), config.drive);
+    // Where the drive ends up: there it is for most of the response.
+    let i_q = match case.disturbance {
+        Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.i_d())),
+        Disturbance::TorqueCurrent(by) => case.from + by,
+    };
+    let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
+    let predicted = linear.response(case.disturbance, AFTER_S);
+
+    let mut sum = vec![[0.0; 2]; predicted.angle_deg.len()];
+    let (mut largest, mut lost) = (0.0_f64, 0);
+    let runs: Vec<_> = (0..SEEDS)
+        .into_par_iter()
+        .map(|n| one(&config, &case, seed.wrapping_add(n)))
+        .collect::<Result<_, _>>()?;
+    for (points, most, is_lost) in runs {
+        for (sum, point) in sum.iter_mut().zip(points) {
+            for (sum, value) in sum.iter_mut().zip(point) {
+                *sum += value / SEEDS as f64;
+            }
+        }
+        largest = largest.max(most);
+        lost += usize::from(is_lost);
+    }
+    Ok(StepResponse {
+        case,
+        angle: sum.iter().map(|p| p[0]).collect(),
+        speed: sum.iter().map(|p| p[1]).collect(),
+        largest,
+        lost,
+        predicted: predicted.angle_deg,
+        predicted_speed: predicted.speed_rpm,
+    })
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let bar = context.progress.bar("perturbation", CASES.len() as u64);
+    let mut results = Vec::with_capacity(CASES.len());
+    for case in CASES {
+        let case = case.scaled(context.config);
+        results.push(measure(context.config, case, context.seed)?);
+        bar.advance(1);
+    }
+
+    let mut outcome = Outcome::default();
+    for m in results.iter().filter(|m| m.lost > 0) {
+        outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
+    }
+    let title = format!("Angle error after a step, mean of {SEEDS} runs");
+    let mut table = Table::new(title, &[]).note(
+        "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \
+         taken away, but not from the largest single error, which has \
+         noise and bias in it.",
+    );
+    let is_load = |m: &&StepResponse| matches!(m.case.disturbance, Disturbance::Load(_));
+    for m in &results {
+        table.record([
+            ("step", Cell::from(m.case.name)),
+            ("peak, measured (°)", Cell::fixed(peak(&m.angle), 2)),
+            ("predicted (°)", Cell::fixed(peak(&m.predicted), 2)),
+            ("fit, rms of the difference (°)", Cell::fixed(m.fit(), 2)),
+            ("largest single error (°)", Cell::fixed(m.largest, 2)),
+        ]);
+    }
+    outcome.tables.push(table);
+    let most = |of: &dyn Fn(&StepResponse) -> f64, keep: &dyn Fn(&&StepResponse) -> bool| {
+        results.iter().filter(keep).map(of).fold(0.0, f64::max)
+    };
+    let metrics = &mut outcome.metrics;
+    metrics.set("load_step_error_max_deg", most(&|m| m.largest, &is_load));
+    metrics.set("load_step_fit_rms_deg", most(&StepResponse::fit, &is_load));
+    metrics.set("load_step_dip_rpm", most(&|m| peak(&m.speed).abs(), &is_load));
+    let known = |m: &&StepResponse| !is_load(m) && m.case.warmer == 1.0;
+    let warm = |m: &&StepResponse| m.case.warmer > 1.0;
+    metrics.set("current_step_error_max_deg", most(&|m| m.largest, &known));
+    metrics.set("current_step_fit_rms_deg", most(&StepResponse::fit, &known));
+    metrics.set("current_step_warm_error_max_deg", most(&|m| m.largest, &warm));
+    metrics.set("current_step_warm_fit_rms_deg", most(&StepResponse::fit, &warm));
+    metrics.set("lost_runs", results.iter().map(|m| m.lost).sum::<usize>() as f64);
+
+    let title = "Angle error after a step: measured mean, and the linear model";
+    let mut figure = Figure::new("perturbation", title, "section 5.2");
+    let mut speeds = Figure::new("speed", "Speed after a load step", "section 5.2");
+    let line = |of: &[f64]| {
+        let mean = |(n, c): (usize, &[f64])| {
+            (n as f64 * 10.0 / RATE_HZ, c.iter().sum::<f64>() / c.len() as f64)
+        };
+        of.chunks(10).enumerate().map(mean).collect::<Vec<_>>()
+    };
+    let panel = |y: String, measured: &[f64], predicted: &[f64]| {
+        Panel::new("time after the step (s)", y)
+            .with(Series::line("measured", line(measured)))
+            .with(Series::reference("linear model", line(predicted)))
+    };
+    for m in &results {
+        let name = m.case.name;
+        figure = figure.panel(panel(format!("{name} (°)"), &m.angle, &m.predicted));
+        if is_load(&m) {
+            let y = format!("{name} (rpm)");
+            speeds = speeds.panel(panel(y, &m.speed, &m.predicted_speed));
+        }
+    }
+    outcome.figures.push(figure);
+    outcome.figures.push(speeds);
+    outcome.remarks = assumptions(context.config);
+    outcome.remark(
+        "The model is linear about the operating point after the step: tracking loop with its \
+         averages, slip fed forward, current loop, rotor flux, shaft and speed loop. What it leaves \
+         out is the way there: gain, slope of the saliency and flux at other currents.",
+    );
+    Ok(outcome)
+}

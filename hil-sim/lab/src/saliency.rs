@@ -1,0 +1,241 @@
+//! The saliency that a motor shows at 600 Hz, over torque current and angle error: what an injection drive can see.
+
+pub(super) mod steady;
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use num_complex::Complex;
+use sim_bench::config::{PlantModel, check_model, flux_level_a};
+use sim_bench::plant::{EnergyMachine, EnergyState, Machine, MachineSettings, MachineState};
+use sim_bench::prelude::*;
+
+use steady::Listed;
+
+/// The map.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "saliency",
+    stands_for: "",
+    about: "Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.",
+    uses: &[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]],
+    not: &[&[
+        "iron.slots",
+        "iron.bars",
+        "iron.stator_fixed",
+        "iron.stator_fixed_deg",
+        "motor.inertia",
+        "motor.friction",
+    ]],
+    run,
+};
+
+/// Frequency of the carrier, rad/s.
+const CARRIER: f64 = TAU * 600.0;
+/// Torque currents, A with the dissertation's motor.
+const CURRENTS_A: [f64; 6] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0];
+/// Angle errors of the table, degrees.
+const SHOWN_DEG: [i32; 7] = [-10, 0, 10, 20, 40, 60, 70];
+/// Angle errors of the curves: up to the quadrature axis on either side.
+const FIRST_DEG: i32 = -60;
+const LAST_DEG: i32 = 90;
+/// Half the angle over which the slope is taken, degrees.
+const SLOPE_DEG: f64 = 8.5;
+/// Least direct current in the flux frame, as a share of the whole: with less the flux is gone.
+const LEAST_DIRECT: f64 = 0.02;
+
+/// Steps from no load to the load where a steady state is not found at once.
+const LOAD_STEPS: u32 = 40;
+/// Saliency below which a signal is rounding.
+const NOTHING: f64 = 1e-6;
+
+/// A motor at rest whose saliency can be asked for.
+pub struct Probe {
+    machine: ProbeModel,
+    settings: MachineSettings,
+    /// Direct current of the nominal flux, A.
+    pub i_d: f64,
+}
+
+enum ProbeModel {
+    A(Machine),
+    Energy(EnergyMachine),
+}
+
+impl Probe {
+    /// Of the motor that the configuration describes; what does not turn with the flux is left out.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] with the setting.
+    pub fn new(config: &Config) -> Result<Self, Error> {
+        check_model(config)?;
+        let plant = plant_settings(config);
+        let settings = plant.machine;
+        let machine = match plant.iron {
+            None => {
+                ProbeModel::A(Machine::new(&settings, &plant.saliency).map_err(Error::refused)?)
+            }
+            Some(mut iron) => {
+                (iron.slots, iron.stator_fixed) = (0.0, 0.0);
+                ProbeModel::Energy(EnergyMachine::new(&settings, &iron).map_err(Error::refused)?)
+            }
+        };
+        let i_d = match config.model.plant {
+            PlantModel::A => config.drive.i_d().into(),
+            _ => flux_level_a(config),
+        };
+        Ok(Self { machine, settings, i_d })
+    }
+
+    /// Saliency signal q at the current `(i_d, i_q)`, A, of a frame that lies `e`, rad, behind the rotor flux, with the carrier
+    /// across that frame; in the steady state, shaft locked. With the carrier current `x` along its axis and `y` across,
+    /// `q = -Re(y x*)/|x|^2`: what synchronous demodulation gives. None where the flux is gone.
+    pub fn q(&self, i_d: f64, i_q: f64, e: f64) -> Option<f64> {
+        let axis = FRAC_PI_2 - e;
+        let [along, across] = self.admittance(i_d, i_q, e)?;
+        let (u, t) = ([axis.cos(), axis.sin()], [-axis.sin(), axis.cos()]);
+        let i = [0, 1].map(|k| along[k] * u[0] + across[k] * u[1]);
+        let on = |v: [f64; 2]| i[0] * v[0] + i[1] * v[1];
+        let (x, y) = (on(u), on(t));
+        Some(-(y * x.conj()).re / x.norm_sqr())
+    }
+
+    /// Slope dq/de at no angle error, 1/rad.
+    pub fn slope(&self, i_d: f64, i_q: f64) -> Option<f64> {
+        let e = SLOPE_DEG.to_radians();
+        Some((self.q(i_d, i_q, e)? - self.q(i_d, i_q, -e)?) / (2.0 * e))
+    }
+
+    /// Saliency without load, relative (positive is low inductance along the flux), and the mean inductance, H.
+    pub fn at_rest(&self, i_d: f64) -> Option<(f64, f64)> {
+        let [along, across] = self.admittance(i_d, 0.0, 0.0)?;
+        let inductance = |y: Complex<f64>| (1.0 / y).im / CARRIER;
+        let (d, q) = (inductance(along[0]), inductance(across[1]));
+        Some(((q - d) / (q + d), 0.5 * (q + d)))
+    }
+
+    fn admittance(&self, i_d: f64, i_q: f64, e: f64) -> Option<[[Complex<f64>; 2]; 2]> {
+        let i = Complex::new(i_d, i_q) * Complex::cis(-e);
+        if i.re < LEAST_DIRECT * i.norm() {
+            return None;
+        }
+        match &self.machine {
+            ProbeModel::A(machine) => {
+                self.of(machine, i, |i, psi, _| MachineState { i, psi: psi.into(), i_lp: i })
+            }
+            ProbeModel::Energy(machine) => self.of(&machine.with_load(i.im), i, |i, psi, main| {
+                let psi_s = main + i * self.settings.lls;
+                EnergyState::of_fluxes([psi_s, psi.into(), psi.into(), main])
+            }),
+        }
+    }
+
+    /// Admittance at the steady state with the current `i`, A, in the frame of the flux; `linear` is the state of the
+    /// linear machine with a current, its rotor flux and its main flux.
+    fn of<M: Listed>(
+        &self,
+        machine: &M,
+        i: Complex<f64>,
+        linear: impl Fn(Complex<f64>, f64, Complex<f64>) -> M::State,
+    ) -> Option<[[Complex<f64>; 2]; 2]> {
+        let m = &self.settings;
+        let guess = |i: Complex<f64>| {
+            // psi = Lm i_d, i_r = -j Lm/Lr i_q
+            let (psi, share) = (m.lm * i.re, m.lm / (m.lm + m.llr));
+            let slip = m.rr * share * i.im / psi;
+            let main = Complex::new(psi, m.llr * share * i.im);
+            let v = i * m.rs + Complex::new(0.0, slip) * (main + i * m.lls);
+            (linear(i, psi, main), v, slip)
+        };
+        let psi = m.lm * i.re;
+        let (state, ..) = steady::at_current(machine, i, &guess(i), psi)
+            .or_else(|_| {
+                // From no load on, step by step.
+                (0..=LOAD_STEPS).try_fold(guess(i.re.into()), |start, k| {
+                    let share = f64::from(k) / f64::from(LOAD_STEPS);
+                    steady::at_current(machine, Complex::new(i.re, share * i.im), &start, psi)
+                })
+            })
+            .ok()?;
+        steady::admittance(machine, &state, CARRIER, psi)
+    }
+
+    /// Angle errors, degrees, at which the signal is again that of no error, within the range of the curves.
+    fn second_zeros(curve: &[(f64, f64)], at_zero: f64) -> Vec<f64> {
+        curve
+            .windows(2)
+            .filter(|w| w[0].0 > 2.0 || w[1].0 < -2.0)
+            .filter(|w| (w[0].1 - at_zero) * (w[1].1 - at_zero) < 0.0)
+            .filter(|w| (w[0].1 - w[1].1).abs() > NOTHING)
+            .map(|w| {
+                let share = (at_zero - w[0].1) / (w[1].1 - w[0].1);
+                w[0].0 + share * (w[1].0 - w[0].0)
+            })
+            .collect()
+    }
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let config = context.config;
+    let probe = Probe::new(config)?;
+    let currents = CURRENTS_A.map(|on_reference| config.amperes(on_reference));
+    let degrees: Vec<i32> = (FIRST_DEG..=LAST_DEG).collect();
+    let curves = context.in_parallel("saliency", &currents, |_, &i_q| {
+        let at =
+            |&e: &i32| Some((f64::from(e), probe.q(probe.i_d, i_q, f64::from(e).to_radians())?));
+        Ok(degrees.iter().filter_map(at).collect::<Vec<_>>())
+    })?;
+
+    let mut outcome = Outcome::default();
+    let lost = || Error::Refused("the motor has no steady state without load".to_owned());
+    let (saliency, inductance) = probe.at_rest(probe.i_d).ok_or_else(lost)?;
+    outcome.metrics.set("direct_current_a", probe.i_d);
+    outcome.metrics.set("flux_wb", probe.i_d * config.motor.l_m);
+    outcome.metrics.set("saliency_at_rest_percent", 100.0 * saliency);
+    outcome.metrics.set("inductance_600_hz_mh", 1e3 * inductance);
+    let slopes = currents.map(|i_q| probe.slope(probe.i_d, i_q));
+    if let Some(slope) = slopes[0] {
+        outcome.metrics.set("slope_at_rest_per_rad", slope);
+    }
+    let mut panel = Panel::new("angle error (°)", "q (%)");
+    let mut map = Table::new("q (%) over the angle error", &[]).note(
+        "Rotor flux minus frame, electrical; positive: flux ahead. The saliency is that of the steady state at a current that \
+         keeps to the frame, shaft locked. q is positive with low inductance ahead of the frame; -: the flux is gone.",
+    );
+    let mut table = Table::new("Slope and second zeros", &[]).note(
+        "Slope k = dq/de over ±8.5°: its sign says which axis has the low inductance (positive: along the flux). Second zeros: \
+         angle errors from -60° to 90° with the signal of no error, where a drive may lock falsely.",
+    );
+    for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
+        let cell = |e: i32| {
+            let found = curve.iter().find(|point| point.0 == f64::from(e));
+            Cell::or_dash(found.map(|point| Cell::fixed(100.0 * point.1, 2)))
+        };
+        let i_q_text = format!("{:.2}", i_q);
+        let head = ("iq (A)".to_owned(), Cell::from(i_q_text.clone()));
+        map.record(std::iter::once(head).chain(SHOWN_DEG.map(|e| (format!("{e}°"), cell(e)))));
+        let at_zero = curve.iter().find(|point| point.0 == 0.0).map(|point| point.1);
+        let zeros = at_zero.map(|q| Probe::second_zeros(curve, q)).unwrap_or_default();
+        let zeros: Vec<String> = zeros.iter().map(|e| format!("{e:.0}°")).collect();
+        table.record([
+            ("iq (A)", Cell::from(i_q_text.clone())),
+            ("k (1/rad)", Cell::or_dash(slope.map(|k| Cell::fixed(k, 4)))),
+            (
+                "share of k without load",
+                match (slope, slopes[0]) {
+                    (Some(k), Some(k0)) if k0.abs() > NOTHING => Cell::fixed(k / k0, 2),
+                    _ => Cell::from("-"),
+                },
+            ),
+            (
+                "second zeros",
+                Cell::from(if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") }),
+            ),
+        ]);
+        let points = curve.iter().map(|(e, q)| (*e, 100.0 * q)).collect();
+        panel = panel.with(Series::line(format!("iq = {i_q_text} A"), points));
+    }
+    outcome
+        .figures
+        .push(Figure::new("map", "Saliency signal over the angle error", "").panel(panel));
+    outcome.tables.extend([map, table]);
+    Ok(outcome)
+}

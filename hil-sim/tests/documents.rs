@@ -1,0 +1,372 @@
+//! The pages in `docs/`: tables of the results of long runs, of motors and of experiments; words, links and anchors.
+//!
+//! A file `results/NAME.json` holds the figures of one table with the commit that was measured and the commands. The ignored test
+//! `measure` runs the commands of a file again and writes it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
+
+use hil_sim::config::motors::Motor;
+use hil_sim::experiments::{EXPERIMENTS, WITH_INPUT};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+#[path = "../../tests/common/generated.rs"]
+mod generated;
+
+/// Most words of the pages that are written by hand, of the whole book, and of the README.
+const BY_HAND: usize = 28_000;
+const BOOK: usize = 38_000;
+const README: usize = 900;
+
+/// A table of measured figures.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Results {
+    /// The command that repeats it, as the page prints it.
+    command: String,
+    /// Commit of the program that was measured.
+    commit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
+    /// Title of the table in the command's JSON that the rows are taken from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<String>,
+    columns: Vec<Column>,
+    /// What stands for `{}` in the commands and the metrics of a row.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    keys: Vec<String>,
+    /// Texts, numbers, lists of numbers, or nothing.
+    rows: Vec<Vec<Value>>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Column {
+    name: String,
+    /// Printed digits behind the point, one for each number of a cell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    digits: Vec<usize>,
+    /// Its command, if it is not that of the table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<String>,
+    /// Metrics of the run, or the column of its table, that a cell is taken from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    from: Vec<String>,
+}
+
+impl Results {
+    fn read(path: &Path) -> Self {
+        let text =
+            fs::read_to_string(path).unwrap_or_else(|why| panic!("{}: {why}", path.display()));
+        serde_json::from_str(&text).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
+    }
+
+    /// A column or a row a line.
+    fn text(&self) -> String {
+        let mut head = serde_json::to_value(self).unwrap();
+        for list in ["columns", "keys", "rows"] {
+            head.as_object_mut().unwrap().remove(list);
+        }
+        let mut text = serde_json::to_string_pretty(&head).unwrap();
+        text.truncate(text.trim_end_matches("\n}").len());
+        let mut list = |name: &str, lines: Vec<String>| {
+            write!(text, ",\n  \"{name}\": [\n    {}\n  ]", lines.join(",\n    ")).unwrap();
+        };
+        list("columns", self.columns.iter().map(|c| serde_json::to_string(c).unwrap()).collect());
+        if !self.keys.is_empty() {
+            list(
+                "keys",
+                vec![
+                    self.keys.iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", "),
+                ],
+            );
+        }
+        list("rows", self.rows.iter().map(|row| serde_json::to_string(row).unwrap()).collect());
+        text + "\n}\n"
+    }
+
+    /// The table of the page, and below it where it comes from.
+    fn block(&self) -> String {
+        let names: Vec<_> = self.columns.iter().map(|column| column.name.as_str()).collect();
+        let mut text = format!("| {} |\n|{}\n", names.join(" | "), "---|".repeat(names.len()));
+        for row in &self.rows {
+            assert_eq!(row.len(), names.len(), "{row:?}");
+            let cells: Vec<_> =
+                row.iter().zip(&self.columns).map(|(cell, c)| c.printed(cell)).collect();
+            writeln!(text, "| {} |", cells.join(" | ")).unwrap();
+        }
+        let seed = self.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
+        text + &format!("\n*Commit {}{seed}: `{}`*\n", self.commit, self.command)
+    }
+
+    /// Runs the commands and takes the figures from what they print.
+    fn measure(&mut self) {
+        let mut ran = BTreeMap::new();
+        let mut run = |command: &str| {
+            let ran = ran.entry(command.to_owned()).or_insert_with(|| printed_json(command));
+            ran.clone()
+        };
+        if let Some(title) = &self.table {
+            let printed = run(&self.command);
+            let tables = printed["table"].as_array().expect("tables");
+            let table = tables.iter().find(|t| t["title"] == **title).expect("the table");
+            let heads: Vec<_> = table["columns"].as_array().unwrap().iter().collect();
+            let places: Vec<_> = self
+                .columns
+                .iter()
+                .map(|column| {
+                    heads.iter().position(|head| **head == column.from[0]).expect("the column")
+                })
+                .collect();
+            let rows = table["rows"].as_array().unwrap().iter();
+            self.rows = rows.map(|row| places.iter().map(|&n| row[n].clone()).collect()).collect();
+        } else {
+            for (row, key) in self.rows.iter_mut().zip(&self.keys) {
+                for (cell, column) in row.iter_mut().zip(&self.columns) {
+                    if !column.from.is_empty() {
+                        let command = column.command.as_ref().unwrap_or(&self.command);
+                        let metrics = &run(&command.replace("{}", key))["metrics"];
+                        let of = |name: &String| metrics[name.replace("{}", key)].clone();
+                        *cell = column.from.iter().map(of).collect();
+                    }
+                }
+            }
+        }
+        for (cell, column) in self.rows.iter_mut().flat_map(|row| row.iter_mut().zip(&self.columns))
+        {
+            *cell = column.rounded(cell);
+        }
+        let commit = Command::new("git").args(["rev-parse", "--short", "HEAD"]).output().unwrap();
+        self.commit = String::from_utf8(commit.stdout).unwrap().trim().to_owned();
+    }
+}
+
+impl Column {
+    /// A number to the printed digits; all of them where the file does not say.
+    fn text(&self, n: usize, number: f64) -> String {
+        match self.digits.get(n) {
+            Some(&digits) => format!("{number:.digits$}"),
+            None => number.to_string(),
+        }
+    }
+
+    fn printed(&self, cell: &Value) -> String {
+        let number = |(n, number): (usize, &Value)| match number.as_f64() {
+            Some(number) => self.text(n, number).replace('-', "−"),
+            None => number.as_str().unwrap_or("–").to_owned(),
+        };
+        match cell {
+            Value::Null => String::new(),
+            Value::Array(numbers) => {
+                numbers.iter().enumerate().map(number).collect::<Vec<_>>().join(" / ")
+            }
+            one => number((0, one)),
+        }
+    }
+
+    /// To the printed digits; one number instead of a list of one; nothing where the run has no such number.
+    fn rounded(&self, cell: &Value) -> Value {
+        let round = |(n, number): (usize, &Value)| match number.as_f64() {
+            Some(number) => self.text(n, number).parse::<f64>().unwrap().into(),
+            None => number.clone(),
+        };
+        match cell {
+            Value::Array(all) if all.iter().all(Value::is_null) => Value::Null,
+            Value::Array(one) if one.len() == 1 => round((0, &one[0])),
+            Value::Array(numbers) => numbers.iter().enumerate().map(round).collect(),
+            one => round((0, one)),
+        }
+    }
+}
+
+/// What `cargo sim ...` prints as JSON.
+fn printed_json(command: &str) -> Value {
+    let arguments = command.strip_prefix("cargo sim ").expect("a command of the simulator");
+    println!("{command}");
+    let mut sim = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+    let sim = sim.args(arguments.split_whitespace()).args(["--json", "--quiet"]);
+    let output = sim.current_dir(env!("CARGO_TARGET_TMPDIR")).output().unwrap();
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|why| {
+        panic!("{command}: {why}: {}", String::from_utf8_lossy(&output.stderr))
+    })
+}
+
+fn results() -> Vec<(String, PathBuf)> {
+    let files = fs::read_dir(generated::root().join("results")).expect("the results");
+    let mut files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
+    files.sort();
+    files
+        .into_iter()
+        .map(|path| (path.file_stem().unwrap().to_string_lossy().into_owned(), path))
+        .collect()
+}
+
+/// The pages of the book and the README, by their path from the folder of the repository.
+fn pages() -> BTreeMap<String, String> {
+    let docs = fs::read_dir(generated::root().join("docs")).expect("the pages");
+    let names = docs.map(|file| format!("docs/{}", file.unwrap().file_name().to_string_lossy()));
+    let names = names.filter(|name| name.ends_with(".md")).chain(["README.md".to_owned()]);
+    names
+        .map(|name| {
+            let text = fs::read_to_string(generated::root().join(&name)).unwrap();
+            (name, text)
+        })
+        .collect()
+}
+
+/// A table of results is that of its file, if a page shows it; the lists are those of the program.
+#[test]
+fn tables_of_the_pages_are_those_of_results_and_program() {
+    for (name, path) in results() {
+        let marker = format!("<!-- generated: {name} (");
+        let holds = |(_, text): &(_, String)| text.contains(&marker);
+        let block = Results::read(&path).block();
+        if let Some((page, _)) = pages().into_iter().find(holds) {
+            generated::check(page.trim_start_matches("docs/"), &name, &block);
+        }
+    }
+    let mut list = "| name | stands for |\n|---|---|\n".to_owned();
+    for experiment in EXPERIMENTS.iter().chain(WITH_INPUT) {
+        writeln!(list, "| `{}` | {} |", experiment.name, experiment.stands_for).unwrap();
+    }
+    generated::check("simulator.md", "experiments", &list);
+    let mut list = "| name | motor | unverified |\n|---|---|---|\n".to_owned();
+    for motor in Motor::all() {
+        let unverified = motor
+            .settings()
+            .into_iter()
+            .map(|(key, _)| key)
+            .filter(|key| motor.source_of(key).is_some_and(|source| source.unverified));
+        let unverified = unverified.map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
+        writeln!(list, "| `{}` | {} | {unverified} |", motor.name, motor.title).unwrap();
+    }
+    generated::check("motors.md", "motors-list", &list);
+    let budgets = fs::read_to_string(generated::root().join("xtask/budgets.toml")).unwrap();
+    let budgets: toml::Table = toml::from_str(&budgets).expect("the budgets");
+    let mut list = "| budget | limit |\n|---|---|\n".to_owned();
+    for unit in ["cycles", "bytes"] {
+        for (name, limit) in budgets[unit].as_table().unwrap() {
+            writeln!(list, "| {} | {limit} {unit} |", name.replace('_', " ")).unwrap();
+        }
+    }
+    generated::check("cycles.md", "budgets", &list);
+}
+
+/// `RESULT=NAME cargo test --release -p hil-sim documents::measure -- --ignored --nocapture`. With `TABLE=FILE` the rows
+/// are those of a Markdown table that another program has printed.
+#[test]
+#[ignore = "runs the commands of a file in results/; hours for some"]
+fn measure() {
+    let name = env::var("RESULT").expect("RESULT=NAME: a file of results/");
+    let path = generated::root().join(format!("results/{name}.json"));
+    let mut results = Results::read(&path);
+    match env::var("TABLE") {
+        Ok(table) => results.rows = rows_of(&fs::read_to_string(table).expect("TABLE")),
+        Err(_) => results.measure(),
+    }
+    fs::write(path, results.text()).unwrap();
+}
+
+/// The rows of the first table in a text; numbers as numbers.
+fn rows_of(text: &str) -> Vec<Vec<Value>> {
+    let lines = text.lines().skip_while(|line| !line.contains("---|"));
+    let rows = lines.skip(1).take_while(|line| line.contains('|'));
+    let cell =
+        |cell: &str| cell.trim().parse::<f64>().map_or_else(|_| cell.trim().into(), Value::from);
+    rows.map(|row| row.trim().trim_matches('|').split('|').map(cell).collect()).collect()
+}
+
+/// A word holds a letter: numbers and signs are none. Blocks between the markers of a generated table are not written by hand.
+#[test]
+fn the_book_is_short() {
+    let words = |text: &str| {
+        text.split_whitespace().filter(|word| word.contains(char::is_alphabetic)).count()
+    };
+    let (mut by_hand, mut all) = (0, 0);
+    for (name, text) in pages() {
+        let blocks = text.split("<!-- generated: ").skip(1);
+        let generated: usize =
+            blocks.map(|block| words(block.split_once("<!-- end -->").expect(&name).0)).sum();
+        println!("{:6} {generated:6} {name}", words(&text) - generated);
+        if name.starts_with("docs/") {
+            by_hand += words(&text) - generated;
+            all += words(&text);
+        } else {
+            assert!(words(&text) <= README, "{name}: {} words", words(&text));
+        }
+    }
+    println!("{by_hand:6} by hand, {all} in all");
+    assert!(by_hand <= BY_HAND && all <= BOOK, "{by_hand} words by hand, {all} in all");
+}
+
+/// The anchor that a heading gets, on GitHub and by mdbook alike.
+fn anchor(heading: &str) -> String {
+    let kept = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.collect::<String>().trim().to_lowercase().replace(' ', "-")
+}
+
+/// Every link within the repository leads to a file, every anchor to a heading; every page is in the book, and linked from it.
+#[test]
+fn links_lead_somewhere() {
+    let root = generated::root();
+    let outside = [
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "CHANGELOG.md",
+        "src/README.md",
+        "drive-core/README.md",
+        "hil-sim/README.md",
+    ];
+    let mut pages = pages();
+    for name in outside {
+        pages.insert(name.to_owned(), fs::read_to_string(root.join(name)).unwrap());
+    }
+    let anchors: BTreeMap<_, BTreeSet<_>> = pages
+        .iter()
+        .map(|(name, text)| {
+            let headings = text.lines().filter(|line| line.starts_with('#'));
+            (name, headings.map(|line| anchor(line.trim_start_matches('#'))).collect())
+        })
+        .collect();
+    let mut wrong = Vec::new();
+    for (name, text) in &pages {
+        let text: String = text.split("```").step_by(2).collect();
+        let text: String = text.split('`').step_by(2).collect();
+        for link in
+            text.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link)
+        {
+            if link.contains("://") {
+                continue;
+            }
+            let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let folder = Path::new(name).parent().unwrap();
+            let mut target = if path.is_empty() { PathBuf::from(name) } else { PathBuf::new() };
+            if !path.is_empty() {
+                for part in folder.join(path).components() {
+                    match part.as_os_str().to_str().unwrap() {
+                        ".." => {
+                            target.pop();
+                        }
+                        part => target.push(part),
+                    }
+                }
+            }
+            let known = anchors.get(&target.to_string_lossy().into_owned());
+            let found = known.is_none_or(|known| anchor.is_empty() || known.contains(anchor));
+            if !root.join(&target).exists() || !found {
+                wrong.push(format!("{name}: {link}"));
+            }
+        }
+    }
+    let summary = &pages["docs/SUMMARY.md"];
+    let in_book = |name: &str| name == "SUMMARY.md" || summary.contains(&format!("({name})"));
+    let docs = pages.keys().filter_map(|name| name.strip_prefix("docs/"));
+    wrong.extend(
+        docs.filter(|name| !in_book(name)).map(|name| format!("docs/{name} is not in the book")),
+    );
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

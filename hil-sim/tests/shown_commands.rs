@@ -1,0 +1,139 @@
+//! Every command that a document shows runs, or stands in a list with the reason why not.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::cli_common::{folder, hil_sim, text};
+
+/// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
+const ELSEWHERE: [(&str, &str); 32] = [
+    ("cargo xtask test", "runs this"),
+    ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
+    ("cargo xtask flash", "needs a board"),
+    ("cargo xtask campaign", "`cargo xtask test` injects a twentieth"),
+    ("cargo firmware", "`cargo xtask test` builds it"),
+    ("cargo install probe-rs-tools", "needs a board"),
+    ("cargo bench", "measures; minutes"),
+    ("cargo test", "`cargo xtask test` runs all tests"),
+    ("cargo clippy", "`cargo xtask test` runs it"),
+    ("cargo fmt", "`cargo xtask test` checks the format"),
+    ("cargo run -p induction-drive-core", "compiled by `cargo xtask test`; run by a person"),
+    ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
+    ("cargo sim console", "needs a port; its protocol is tested"),
+    ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
+    ("cargo sim completion", "prints a script"),
+    ("cargo sim run NAME", "a placeholder"),
+    ("cargo sim run GROUP", "a placeholder"),
+    ("cargo sim run lock-monitor --set runs", "long proof"),
+    ("cargo sim run monte-carlo --set runs=1000", "long proof"),
+    ("cargo sim run machines --set", "long proof"),
+    (
+        "cargo sim run battery --plant r --set flux_level=high --set sequence.flux=high --set prepare.learn=yes --set battery.runs=dragged",
+        "long; fails for the runs that the drive does not notice",
+    ),
+    ("cargo sim run commission --set runs", "a file of results/; minutes"),
+    ("cargo sim run full-range", "a file of results/; minutes"),
+    ("cargo sim merge", "the files are the reader's; a test merges shards"),
+    ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
+    ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
+    ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
+    ("cargo sim run hil-sim/scenarios/", "a test runs these files"),
+    ("cargo sim run profile --input", "a test runs it with the file of the examples"),
+    ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
+    ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
+    ("cargo flash", "named to be avoided"),
+];
+
+/// Documents whose Rust is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
+const RUST: [&str; 5] = [
+    "drive-core/README.md",
+    "drive-core/settings/README.md",
+    "hil-sim/plant/README.md",
+    "docs/porting.md",
+    "docs/add-an-experiment.md",
+];
+
+/// The documents for readers of today; the change log speaks of the past.
+fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy();
+        if path.is_dir() && !name.starts_with('.') && !["target", "out"].contains(&&*name) {
+            documents(&path, found);
+        } else if name.ends_with(".md") && name != "CHANGELOG.md" {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+#[ignore = "minutes; cargo xtask test runs it"]
+fn commands_of_the_documents_run() {
+    let mut found = Vec::new();
+    documents(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), &mut found);
+    let mut commands: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut wrong = Vec::new();
+    for path in found {
+        let text = std::fs::read_to_string(&path).unwrap();
+        if text.contains("```rust") && !RUST.iter().any(|known| path.ends_with(known)) {
+            wrong.push(format!("{}: nothing compiles its Rust", path.display()));
+        }
+        for command in commands_of(&text) {
+            commands.entry(command).or_insert_with(|| path.clone());
+        }
+    }
+    let folder = folder("documents");
+    let (mut ran, mut left) = (0, 0);
+    for (command, document) in &commands {
+        let document = document.display();
+        if elsewhere(command).is_some() {
+            left += 1;
+        } else if let Some(arguments) = command.strip_prefix("cargo sim") {
+            let arguments: Vec<_> = arguments.split_whitespace().collect();
+            let output = hil_sim(&folder, &arguments);
+            if !output.status.success() {
+                wrong.push(format!("{document}: `{command}` fails: {}", text(&output.stderr)));
+            }
+            ran += 1;
+        } else {
+            wrong.push(format!("{document}: `{command}` neither runs here nor stands in a list"));
+        }
+    }
+    println!("{ran} commands ran, {left} stand in the list with a reason");
+    assert!(wrong.is_empty() && ran > 20, "{ran} ran\n{}", wrong.join("\n"));
+}
+
+fn elsewhere(command: &str) -> Option<&'static (&'static str, &'static str)> {
+    let fits = |begin: &str| {
+        command
+            .strip_prefix(begin)
+            .is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric()))
+    };
+    ELSEWHERE.iter().filter(|(begin, _)| fits(begin)).max_by_key(|(begin, _)| begin.len())
+}
+
+/// The commands of a document: lines of code blocks and inline code that begin with `cargo`.
+fn commands_of(text: &str) -> Vec<String> {
+    let mut commands = Vec::new();
+    let mut in_block = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            in_block = !in_block;
+        } else if in_block {
+            let line = line.trim().trim_start_matches("$ ");
+            commands.push(line.split(" #").next().unwrap_or_default().trim().to_owned());
+        } else {
+            commands.extend(line.split('`').skip(1).step_by(2).map(|code| code.trim().to_owned()));
+        }
+    }
+    commands.retain(|command| command.starts_with("cargo "));
+    commands
+}
+
+#[test]
+fn commands_are_found_in_blocks_and_in_lines() {
+    let text = "Type `cargo sim list` or:\n\n```\n$ cargo sim   # the drive\nokay\n```\nand `cargo sim` too.\n";
+    assert_eq!(commands_of(text), ["cargo sim list", "cargo sim", "cargo sim"]);
+    assert_eq!(elsewhere("cargo xtask flash").unwrap().1, "needs a board");
+    assert_eq!(elsewhere("cargo sim boards"), None);
+}

@@ -1,0 +1,37 @@
+//! The tests of the image on the virtual board: one program, a module a subject.
+
+mod bench_dump;
+mod bit_identity;
+mod board;
+mod boards;
+mod both_zero_vectors;
+mod bus_clients;
+mod campaign;
+mod commission;
+mod common;
+mod cost;
+mod dc_link;
+mod drivers;
+mod first_power_up;
+mod foreign;
+mod hardware;
+mod homing;
+mod interactive;
+mod learned;
+mod modbus;
+mod motors;
+mod orders;
+mod preemption;
+mod register_check;
+mod registers;
+mod rules;
+mod same_physics;
+mod save;
+mod script;
+mod second_bank;
+mod self_test;
+mod sessions;
+mod sources;
+mod stream;
+mod strict;
+mod tracking;

@@ -1,0 +1,524 @@
+//! The desk: who commands, which settings are staged, which task runs, and what is new. Types in, types out: no text and no bytes.
+//!
+//! Console ([`crate::console`]) and field bus ([`crate::modbus`]) are its front ends: they turn lines and registers into an
+//! [`Order`], and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the time-out of the one that commands are the same for
+//! both.
+
+pub mod handle;
+pub mod news;
+pub mod order;
+#[cfg(test)]
+mod tests;
+
+use drive_commission::Step;
+use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
+use drive_core::learned::Learned;
+use drive_core::{Accepted, Command, Mode, Refused, State, Stop};
+use drive_settings::entry::Change;
+
+use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
+use crate::settings::staging::{Applied, Assignments, Staging};
+use handle::{CommandError, DriveHandle};
+use news::{Announcer, News, Stopped};
+use order::{Order, Refusal, Reply, Task, Unit};
+
+/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
+const BUS_SILENT_S: f32 = 1.0;
+/// From the answer to a reset, ms: the transmit queue empties in 44.
+const REBOOT_MS: u32 = 100;
+
+/// The answer to an order.
+pub type Answer = Result<Reply, Refusal>;
+
+/// See the head of the module.
+pub struct Desk {
+    settings: Staging,
+    /// Whether settings in force were changed since they were saved.
+    unsaved: bool,
+    /// The board that lines belong to, if it is another than this one.
+    foreign: Option<&'static str>,
+    /// A task that waits until its answer is on the way, and who has ordered it.
+    task: Option<(Commander, Task)>,
+    /// How the console's last task has ended, until the console takes it; and remarks on the settings that it has put in force.
+    done: Option<(Applied, Answer)>,
+    /// Number of designs of the controllers, wrapping. A design takes seconds.
+    designs: u32,
+    announcer: Announcer,
+    /// Time of the last sign of life of the one that commands; `None` to begin anew.
+    heard_ms: Option<u32>,
+    stopped: Option<Stopped>,
+    /// While the wiring is being checked: the periods of the status at its start.
+    checking: Option<u32>,
+    /// Result of the last learning, if it is not believable.
+    unbelievable: Option<Learned>,
+    /// Whether a learning has ended that is not announced yet.
+    learned: bool,
+    /// A homing, and how the last one has ended, until that is announced.
+    homing: Option<Homing>,
+    homed: Option<Result<(), Failure>>,
+    /// The last refusal of the bus, and whether it is still to be announced.
+    refusal: Option<Refusal>,
+    refusal_is_news: bool,
+}
+
+impl Desk {
+    /// A desk; the drive has these settings.
+    pub fn new(settings: FirmwareSettings) -> Self {
+        Self {
+            settings: Staging::new(settings),
+            unsaved: false,
+            foreign: None,
+            task: None,
+            done: None,
+            designs: 0,
+            announcer: Announcer::new(),
+            heard_ms: None,
+            stopped: None,
+            checking: None,
+            unbelievable: None,
+            learned: false,
+            homing: None,
+            homed: None,
+            refusal: None,
+            refusal_is_news: false,
+        }
+    }
+
+    /// The settings, in force and staged.
+    pub fn settings(&self) -> &Staging {
+        &self.settings
+    }
+
+    /// The result of the last learning: whether it is in use, and the result itself.
+    pub fn learned(&self) -> Option<(bool, &Learned)> {
+        let in_use = self.settings.in_force().learned.as_ref().map(|result| (true, result));
+        self.unbelievable.as_ref().map(|result| (false, result)).or(in_use)
+    }
+
+    /// Whether a task waits: orders are not taken.
+    pub fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+
+    /// Number of designs of the controllers, wrapping: who has waited for more than one pass of the main loop sees another.
+    pub fn designs(&self) -> u32 {
+        self.designs
+    }
+
+    /// How the console's last task has ended, and remarks on the settings that it has put in force, once.
+    pub fn take_done(&mut self) -> Option<(Applied, Answer)> {
+        self.done.take()
+    }
+
+    /// The last refusal of the bus.
+    pub fn refusal(&self) -> Option<&Refusal> {
+        self.refusal.as_ref()
+    }
+
+    /// Notes a refusal of the bus; a master that repeats itself is announced once.
+    pub fn note_refusal(&mut self, why: Refusal) {
+        self.refusal_is_news |= self.refusal.as_ref() != Some(&why);
+        self.refusal = Some(why);
+    }
+
+    /// Who commands: by the staged settings, which a start puts in force.
+    pub fn commander(&self) -> Commander {
+        self.settings.latest().bus.commander
+    }
+
+    /// Notes a sign of life: silence of the one that commands stops the drive. `now_ms` wraps.
+    pub fn note_activity(&mut self, from: Commander, now_ms: u32) {
+        if self.commander() == from {
+            self.heard_ms = Some(now_ms);
+        }
+    }
+
+    /// Silence of the one that commands after which the drive stops, s; 0: never. A line of the bus that breaks is not
+    /// seen by anybody, so the bus always has a limit.
+    fn timeout_s(&self) -> f32 {
+        let set = self.settings.in_force().command.timeout_s;
+        if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
+    }
+
+    /// Follows the drive. Called at the begin of each pass of the main loop.
+    pub fn follow(&mut self, drive: &mut impl DriveHandle) {
+        self.watch_wiring(drive);
+        drive.learned(&mut |result| {
+            self.settings.learned(result);
+            self.unsaved |= result.verdict.is_accepted();
+            self.unbelievable = Some(*result).filter(|result| !result.verdict.is_accepted());
+            self.learned = true;
+        });
+        if let Some(homed) = self.go_on_homing(drive) {
+            self.homed = Some(homed);
+        }
+    }
+
+    /// Stops the drive when the one that commands is silent for too long. Called at the end of each pass of the main loop: what has come
+    /// meanwhile is heard first. `now_ms` wraps.
+    pub fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+        let limit_s = self.timeout_s();
+        let silence_ms = now_ms.wrapping_sub(*self.heard_ms.get_or_insert(now_ms));
+        if limit_s > 0.0 && silence_ms as f32 * 1e-3 > limit_s {
+            self.stop_after_silence(limit_s, drive, now_ms);
+        }
+    }
+
+    /// Stops the drive: nobody was heard for this time, s.
+    pub fn stop_after_silence(&mut self, limit_s: f32, drive: &mut impl DriveHandle, now_ms: u32) {
+        if !drive.is_off() {
+            self.heard_ms = Some(now_ms);
+            self.announcer.stopping();
+            let stopped = drive.command(Command::Stop(Stop::Coast));
+            self.stopped = Some(Stopped { limit_s, refused: stopped.err() });
+        }
+    }
+
+    /// The next news, if there is any.
+    pub fn news(&mut self, drive: &mut impl DriveHandle, now_ms: u32) -> Option<News> {
+        let status = drive.status()?;
+        if let Some(stopped) = self.stopped.take() {
+            return Some(News::Stopped(stopped));
+        }
+        if core::mem::take(&mut self.learned) {
+            return Some(News::Learned);
+        }
+        let settings = &self.settings.in_force().drive;
+        self.announcer
+            .next(&status, settings, now_ms)
+            .or_else(|| drive.session().news().map(News::Commissioning))
+            .or_else(|| self.homed.take().map(News::Homed))
+            .or_else(|| core::mem::take(&mut self.refusal_is_news).then_some(News::BusRefused))
+    }
+
+    /// Notes when the drive has passed the check of the wiring: it need not be repeated.
+    fn watch_wiring(&mut self, drive: &impl DriveHandle) {
+        let (Some(began), Some(status)) = (self.checking, drive.status()) else { return };
+        // A report from before the start does not count.
+        if status.state.has_current() && status.periods != began {
+            self.settings.note(|settings| settings.command.wiring_checked = true);
+            self.unsaved = true;
+            self.checking = None;
+        }
+    }
+
+    /// Goes on with the homing, if there is one; how it has ended.
+    fn go_on_homing(&mut self, drive: &mut impl DriveHandle) -> Option<Result<(), Failure>> {
+        let (homing, status) = (self.homing.as_mut()?, drive.status()?);
+        let seen = Seen {
+            periods: status.periods,
+            state: status.state,
+            turns: status.telemetry.turns,
+            i_q: status.telemetry.reference.q,
+            room: status.room.i_q,
+        };
+        let outcome = match homing.poll(&seen) {
+            Next::Wait => return None,
+            Next::Command(command) => {
+                // Refused when the drive has just stopped: the next report says so.
+                let _ = drive.command(command);
+                return None;
+            }
+            Next::Ended(outcome) => outcome,
+        };
+        self.homing = None;
+        Some(outcome)
+    }
+
+    /// Carries out an order, or takes it as a task ([`Reply::Designing`]).
+    ///
+    /// # Errors
+    /// Nothing has changed, for this reason. A refusal of the bus is announced.
+    #[inline(never)]
+    pub fn order(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
+        let answer = if order.is_for_the_commander(from) && self.commander() != from {
+            Err(Refusal::Authority(self.commander()))
+        } else {
+            self.carry_out(from, order, drive)
+        };
+        if let (Commander::Bus, Err(why)) = (from, &answer) {
+            self.note_refusal(why.clone());
+        }
+        answer
+    }
+
+    fn carry_out(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
+        match order {
+            Order::Start(mode) => self.begin(from, Task::Start(mode), drive),
+            Order::Learn { again } => self.begin(from, Task::Learn { again }, drive),
+            Order::Commission(first, last) => {
+                self.begin(from, Task::Commission(first, last), drive)
+            }
+            Order::Accept => self.accept(from, drive),
+            Order::Stop(stop) => {
+                // Off is news for the console if the bus stops the drive.
+                if from == Commander::Console {
+                    self.announcer.stopping();
+                }
+                give(Command::Stop(stop), Unit::None, drive)
+            }
+            Order::Relock => give(Command::Relock, Unit::None, drive),
+            Order::Torque(i_q) => give(Command::Torque(i_q), Unit::Ampere, drive),
+            Order::Speed(rpm) => give(Command::Speed(rpm), Unit::Rpm, drive),
+            Order::Jog(rpm) => give(Command::Jog(rpm), Unit::Rpm, drive),
+            Order::Position(turns) => {
+                self.homing = None;
+                give(Command::Position(turns), Unit::Turns, drive)
+            }
+            Order::Home(plan) => self.home(plan, drive),
+            Order::Clear => give(Command::Clear, Unit::None, drive),
+            Order::Set(values) => self.set(&values, drive),
+            Order::Defaults => {
+                may_stage(drive)?;
+                self.settings.set_defaults();
+                Ok(self.staged())
+            }
+            Order::Apply if !self.settings.is_staged() => Ok(Reply::NothingStaged),
+            Order::Apply => self.begin(from, Task::Apply, drive),
+            Order::Revert => {
+                self.foreign = None;
+                let count = self.settings.count();
+                self.settings.revert();
+                Ok(Reply::Dropped(count))
+            }
+            Order::Save => self.begin(from, Task::Save, drive),
+            Order::Echo(on) => {
+                self.settings.note(|settings| settings.command.echo = on);
+                self.unsaved = true;
+                Ok(Reply::Done)
+            }
+            Order::Reboot(now) => self.reboot(now, drive),
+            Order::BoardIs(board) => {
+                let own = self.settings.in_force().board;
+                self.foreign = (board != own).then_some(board.name);
+                self.is_own_board().map(|()| Reply::Done)
+            }
+            Order::Confirm => {
+                must_be_off(drive)?;
+                self.nothing_staged()?;
+                self.settings.note(FirmwareSettings::confirm_board);
+                let boot_pin = self.settings.in_force().boot_pin_counts;
+                self.save(if boot_pin { Reply::BootPin } else { Reply::Done }, drive)
+            }
+        }
+    }
+
+    /// # Errors
+    /// Values are staged.
+    pub fn nothing_staged(&self) -> Result<(), Refusal> {
+        if self.settings.is_staged() { Err(Refusal::Staged) } else { Ok(()) }
+    }
+
+    /// # Errors
+    /// The lines belong to another board.
+    fn is_own_board(&self) -> Result<(), Refusal> {
+        let own = self.settings.in_force().board.name;
+        self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
+    }
+
+    fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) -> Answer {
+        may_stage(drive)?;
+        let late = values.iter().find(|(key, _)| key.change() == Change::FromReset);
+        let confirmed = self.settings.latest().board_is_confirmed();
+        if self.settings.set(values)? {
+            return Ok(Reply::RestoredDropped);
+        }
+        Ok(match late {
+            Some((key, _)) if self.settings.is_staged() => Reply::StagedForReset(*key),
+            _ if confirmed && !self.settings.latest().board_is_confirmed() => Reply::Unconfirmed,
+            _ => self.staged(),
+        })
+    }
+
+    /// Stages a learned result with the staged settings.
+    ///
+    /// # Errors
+    /// The drive is not off.
+    pub fn restore(&mut self, learned: Learned, drive: &impl DriveHandle) -> Answer {
+        may_stage(drive)?;
+        self.settings.restore(learned);
+        Ok(self.staged())
+    }
+
+    fn staged(&self) -> Reply {
+        if self.settings.is_staged() { Reply::Staged } else { Reply::AsInForce }
+    }
+
+    /// Performs a task that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
+    fn begin(&mut self, from: Commander, task: Task, drive: &mut impl DriveHandle) -> Answer {
+        match task {
+            // The drive says why it does not start.
+            Task::Start(mode) if !drive.is_off() => return self.start(mode, drive),
+            Task::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
+            _ => must_be_off(drive)?,
+        }
+        self.is_own_board()?;
+        let starts = matches!(task, Task::Start(_) | Task::Learn { .. } | Task::Commission(..));
+        if starts && !self.settings.latest().board_is_confirmed() {
+            return Err(Refusal::NotConfirmed);
+        }
+        let learned = self.settings.in_force().learned.is_some();
+        let forgets = matches!(task, Task::Learn { again: false }) && learned;
+        if (self.settings.needs_design() || forgets) && drive.status().is_some() {
+            self.task = Some((from, task));
+            return Ok(Reply::Designing);
+        }
+        self.perform(task, drive).1
+    }
+
+    /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
+    #[inline(never)] // its stack does not add to that of the front ends
+    pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+        let Some((from, task)) = self.task.take() else { return };
+        if let Task::Reboot(since) = task {
+            let since = since.unwrap_or(now_ms);
+            self.task = Some((from, Task::Reboot(Some(since))));
+            if now_ms.wrapping_sub(since) >= REBOOT_MS {
+                self.task = None;
+                drive.reboot();
+            }
+            return;
+        }
+        match (from, self.perform(task, drive)) {
+            (Commander::Console, done) => self.done = Some(done),
+            (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
+            (Commander::Bus, _) => {}
+        }
+    }
+
+    /// Performs a task; remarks on the settings that it has put in force, and the answer.
+    fn perform(&mut self, task: Task, drive: &mut impl DriveHandle) -> (Applied, Answer) {
+        // The time that it takes is not silence of the user.
+        self.heard_ms = None;
+        let applied = match self.apply(drive) {
+            Ok(applied) => applied,
+            Err(why) => return (Applied::default(), Err(why)),
+        };
+        let answer = match task {
+            Task::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
+            Task::Start(mode) => self.start(mode, drive),
+            Task::Learn { again } => self.learn(again, drive),
+            Task::Commission(first, last) => self.commission(first, last, drive),
+            Task::Save | Task::Reboot(_) => self.save(Reply::Done, drive),
+        };
+        (applied, answer)
+    }
+
+    /// Saves the settings in force.
+    fn save(&mut self, reply: Reply, drive: &mut impl DriveHandle) -> Answer {
+        drive.save(self.settings.in_force())?;
+        self.unsaved = false;
+        Ok(reply)
+    }
+
+    /// Puts the staged settings in force. If they are refused, the drive stays as it is and they stay staged.
+    fn apply(&mut self, drive: &mut impl DriveHandle) -> Result<Applied, Refusal> {
+        let designs = self.settings.needs_design();
+        let Some(settings) = self.settings.prepare() else { return Ok(Applied::default()) };
+        if designs {
+            self.designs = self.designs.wrapping_add(1);
+            configure(drive, settings)?;
+        }
+        let applied = self.settings.adopt();
+        self.unsaved = true;
+        if designs {
+            drive.configured(self.settings.in_force());
+        }
+        Ok(applied)
+    }
+
+    /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
+    /// boost is a check at every start.
+    fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
+        if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
+            return give(Command::Start(mode), Unit::None, drive);
+        }
+        let began = drive.status().map(|status| status.periods);
+        drive.command(Command::CheckWiring)?;
+        drive.command(Command::Start(mode))?;
+        self.checking = began;
+        Ok(Reply::WiringFirst)
+    }
+
+    /// Lets the drive measure its motor.
+    fn commission(&mut self, first: Step, last: Step, drive: &mut impl DriveHandle) -> Answer {
+        match drive.status().map(|status| status.state) {
+            None => Err(drive.no_control().into()),
+            Some(State::Fault(fault)) => Err(CommandError::Refused(Refused::Fault(fault)).into()),
+            Some(_) => {
+                drive.session().begin(first, last);
+                Ok(if last < Step::Inertia { Reply::Done } else { Reply::ShaftTurns })
+            }
+        }
+    }
+
+    /// Puts in force what the commissioning has found, and saves it.
+    fn accept(&mut self, from: Commander, drive: &mut impl DriveHandle) -> Answer {
+        may_stage(drive)?;
+        let found = drive.session().found(&self.settings.latest().drive);
+        self.settings.stage(found.ok_or(Refusal::NothingFound)?);
+        self.begin(from, Task::Save, drive)
+    }
+
+    /// Lets the drive learn: anew, or again on top of what it has learned.
+    fn learn(&mut self, again: bool, drive: &mut impl DriveHandle) -> Answer {
+        if again && self.settings.in_force().learned.is_none() {
+            return Err(Refusal::NothingLearned);
+        }
+        let Self { settings, designs, .. } = self;
+        settings.begin_learning(again, |settings| {
+            *designs = designs.wrapping_add(1);
+            configure(drive, settings)
+        })?;
+        self.start(Mode::Learning, drive)
+    }
+
+    /// Lets the drive look for a stop of the shaft.
+    fn home(&mut self, plan: Plan, drive: &mut impl DriveHandle) -> Answer {
+        let homing = Homing::new(plan, self.settings.in_force().drive.current_limit_a())?;
+        drive.command(homing.begin())?;
+        self.homing = Some(homing);
+        Ok(Reply::Done)
+    }
+
+    fn reboot(&mut self, now: bool, drive: &impl DriveHandle) -> Answer {
+        must_be_off(drive)?;
+        if !now && (self.unsaved || self.settings.is_staged()) {
+            return Err(Refusal::Unsaved);
+        }
+        self.task = Some((Commander::Console, Task::Reboot(None)));
+        Ok(Reply::Rebooting)
+    }
+}
+
+/// Gives the drive a command; `unit` is that of its reference.
+fn give(command: Command, unit: Unit, drive: &mut impl DriveHandle) -> Answer {
+    Ok(match drive.command(command)? {
+        Accepted::AsGiven => Reply::Done,
+        Accepted::Limited(value) => Reply::Limited(value, unit),
+    })
+}
+
+fn must_be_off(drive: &impl DriveHandle) -> Result<(), Refusal> {
+    if drive.is_off() { Ok(()) } else { Err(Refusal::MustBeOff) }
+}
+
+/// Whether settings can be staged now.
+///
+/// # Errors
+/// The reason why not.
+pub fn may_stage(drive: &impl DriveHandle) -> Result<(), Refusal> {
+    match drive.status() {
+        None => Err(drive.no_control().into()),
+        Some(_) => must_be_off(drive),
+    }
+}
+
+/// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
+#[inline(never)]
+fn configure(drive: &mut impl DriveHandle, settings: &mut FirmwareSettings) -> Result<(), Refusal> {
+    let coefficients = drive.build(settings).map_err(Refusal::Design)?;
+    drive.command(Command::Configure(coefficients))?;
+    Ok(())
+}

@@ -1,0 +1,128 @@
+//! News: what the desk tells unasked.
+
+use drive_core::homing::Failure;
+use drive_core::{Fault, State};
+use drive_settings::Settings;
+
+use super::handle::CommandError;
+use crate::commissioning;
+use crate::link::Status;
+
+/// Longest silence while the drive learns, ms.
+const PROGRESS_MS: u32 = 5000;
+
+/// News.
+// Exists once at a time.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum News {
+    /// The drive is in a fault.
+    Fault(Fault),
+    /// The drive regulates, in this state.
+    Running(State),
+    /// The outputs are off, for this reason.
+    Off(&'static str),
+    /// It learns.
+    Learning {
+        /// The point that is being measured, from 1 on.
+        point: usize,
+        /// Number of points.
+        points: usize,
+        /// Expected time until the end, s.
+        left_s: f32,
+    },
+    /// A learning has ended, with the result that [`Desk::learned`](super::Desk::learned) gives.
+    Learned,
+    /// The commissioning goes on, or has ended.
+    Commissioning(commissioning::News),
+    /// A homing has ended.
+    Homed(Result<(), Failure>),
+    /// Silence of the one that commands has stopped the drive.
+    Stopped(Stopped),
+    /// The bus was refused something: [`Desk::refusal`](super::Desk::refusal).
+    BusRefused,
+}
+
+/// A stop after silence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stopped {
+    /// Time without a sign of life that is allowed, s.
+    pub limit_s: f32,
+    /// Why the drive did not take the stop, if it did not.
+    pub refused: Option<CommandError>,
+}
+
+/// Follows the state of the drive.
+pub struct Announcer {
+    /// The last state that was seen.
+    state: Option<State>,
+    /// The last one but for those of a stop.
+    active: State,
+    /// Whether the console, or silence, has stopped the drive.
+    stopped: bool,
+    progress: Option<(usize, usize)>,
+    told_ms: u32,
+}
+
+impl Announcer {
+    /// One that has seen nothing yet.
+    pub const fn new() -> Self {
+        Self { state: None, active: State::Off, stopped: false, progress: None, told_ms: 0 }
+    }
+
+    /// Notes that the console, or silence, stops the drive: off is no news then, unless it takes a while.
+    pub fn stopping(&mut self) {
+        self.stopped = true;
+    }
+
+    /// The news of a report, if there are any, of a drive with these settings. `now_ms` wraps.
+    pub fn next(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
+        let state = status.state;
+        let before = self.state.replace(state);
+        if before == Some(state) {
+            return self.learning(status, settings, now_ms);
+        }
+        let was = self.active;
+        if !state.is_stopping() {
+            self.active = state;
+        }
+        match state {
+            State::Fault(fault) => Some(News::Fault(fault)),
+            State::Torque | State::Speed | State::Position | State::VoltsPerHertz => {
+                Some(News::Running(state))
+            }
+            State::Off => {
+                let asked = core::mem::take(&mut self.stopped);
+                match (before?, was) {
+                    (State::Fault(_), _) => None,
+                    // The commissioning says so itself.
+                    (State::Exciting | State::CheckingWiring, State::Exciting) => None,
+                    (State::Learning | State::Stopping, State::Learning) if !asked => {
+                        Some(News::Off("the learning has ended"))
+                    }
+                    (state, _) if state.is_stopping() || state == State::VoltsPerHertz => {
+                        Some(News::Off("stopped"))
+                    }
+                    // At once, and answered.
+                    _ if asked => None,
+                    _ => Some(News::Off("the start has ended")),
+                }
+            }
+            State::Learning => {
+                self.progress = None;
+                self.learning(status, settings, now_ms)
+            }
+            _ => None,
+        }
+    }
+
+    fn learning(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
+        let (point, points) = status.learning?;
+        let late = now_ms.wrapping_sub(self.told_ms) >= PROGRESS_MS;
+        if self.progress == status.learning && !late {
+            return None;
+        }
+        (self.progress, self.told_ms) = (status.learning, now_ms);
+        Some(News::Learning { point, points, left_s: settings.learning().seconds_left(point) })
+    }
+}

@@ -1,0 +1,243 @@
+//! Orders to the desk, its replies, and the reasons for which it refuses.
+
+use drive_commission::Step;
+use drive_core::homing::{OutOfRange, Plan};
+use drive_core::{Mode, Refused, Stop};
+use drive_settings::SettingsError;
+use thiserror::Error;
+
+use super::handle::CommandError;
+use crate::boards::Board;
+use crate::settings::bus::Commander;
+use crate::settings::keys::Key;
+use crate::settings::staging::{Applied, Assignments, SetError};
+use crate::store::FlashError;
+
+/// An order.
+// Exists once at a time.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Order {
+    /// Put the staged settings in force, then start in a mode; to learn it is [`Learn`](Self::Learn).
+    Start(Mode),
+    /// Learn on the motor: anew, or again at another rotor position on top of what is learned.
+    Learn {
+        /// On top of it.
+        again: bool,
+    },
+    /// Put the staged settings in force, then commission: these steps, the first and the last.
+    Commission(Step, Step),
+    /// Put in force what the commissioning has found, and save.
+    Accept,
+    /// Stop in this way.
+    Stop(Stop),
+    /// Magnetise again and check that the flux is tracked.
+    Relock,
+    /// Set the current on the quadrature axis, A.
+    Torque(f32),
+    /// Set the speed, mechanical rpm.
+    Speed(f32),
+    /// Turn at this speed, mechanical rpm, while it is repeated.
+    Jog(f32),
+    /// Set the position, mechanical turns from the start.
+    Position(f32),
+    /// Look for a stop of the shaft.
+    Home(Plan),
+    /// Clear the latched fault.
+    Clear,
+    /// Stage settings.
+    Set(Assignments),
+    /// Stage the settings of the image.
+    Defaults,
+    /// Put the staged settings in force.
+    Apply,
+    /// Drop the staged settings.
+    Revert,
+    /// Put the staged settings in force and save all, with what was learned.
+    Save,
+    /// Send typed characters back, or not.
+    Echo(bool),
+    /// Reset the controller; whether unsaved settings may be lost.
+    Reboot(bool),
+    /// Check that what follows belongs to this board.
+    BoardIs(&'static Board),
+    /// Note that the bench steps of the board were done, and save.
+    Confirm,
+}
+
+impl Order {
+    /// Whether only the one that commands may give it. Anybody may stop the drive; the console may also clear a fault, and do all that needs
+    /// the drive off.
+    pub fn is_for_the_commander(&self, from: Commander) -> bool {
+        if from == Commander::Bus {
+            return !matches!(self, Self::Stop(_));
+        }
+        matches!(
+            self,
+            Self::Start(_)
+                | Self::Learn { .. }
+                | Self::Commission(..)
+                | Self::Relock
+                | Self::Torque(_)
+                | Self::Speed(_)
+                | Self::Jog(_)
+                | Self::Position(_)
+                | Self::Home(_)
+        )
+    }
+}
+
+/// Work that takes long, or has to wait until the answer is sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Task {
+    /// Put the staged settings in force.
+    Apply,
+    /// The same, then start.
+    Start(Mode),
+    /// The same, then commission: from this step to that.
+    Commission(Step, Step),
+    /// The same, then learn: anew, or again at another rotor position.
+    Learn {
+        /// On top of what is learned.
+        again: bool,
+    },
+    /// The same, then save.
+    Save,
+    /// Reset the chip this long after the answer, since this time, ms.
+    Reboot(Option<u32>),
+}
+
+/// Unit of a reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// No reference.
+    None,
+    /// A, of the current on the quadrature axis.
+    Ampere,
+    /// Mechanical rpm.
+    Rpm,
+    /// Mechanical turns.
+    Turns,
+}
+
+/// An order was carried out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reply {
+    /// As it was given.
+    Done,
+    /// With this reference instead of the one that was given.
+    Limited(f32, Unit),
+    /// It waits until the answer is on its way: controllers are designed for seconds. The answer follows.
+    Designing,
+    /// The drive starts with a check of the wiring.
+    WiringFirst,
+    /// The commissioning is going to turn the shaft.
+    ShaftTurns,
+    /// Values are staged.
+    Staged,
+    /// What was staged is as in force.
+    AsInForce,
+    /// Staged; this one takes effect at the next reset, if saved.
+    StagedForReset(Key),
+    /// Staged; the board has to be confirmed again.
+    Unconfirmed,
+    /// Staged; restored learned values belong to other settings and are dropped.
+    RestoredDropped,
+    /// Nothing was staged.
+    NothingStaged,
+    /// So many staged values are dropped.
+    Dropped(usize),
+    /// In force, with these remarks.
+    Applied(Applied),
+    /// The board is confirmed, with the boot pin in use.
+    BootPin,
+    /// The chip is about to be reset.
+    Rebooting,
+}
+
+/// Reason why an order was not carried out.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum Refusal {
+    /// The drive refuses it, or does not answer.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+    /// The drive is not off.
+    #[error("the drive must be off: `stop` first")]
+    MustBeOff,
+    /// The other side commands.
+    #[error("{}", AUTHORITY[*.0 as usize])]
+    Authority(Commander),
+    /// The controllers cannot be designed for the staged settings.
+    #[error("{0}; not in force, still staged")]
+    Design(SettingsError),
+    /// A value was not staged.
+    #[error(transparent)]
+    Set(#[from] SetError),
+    /// The settings were not saved.
+    #[error(transparent)]
+    Flash(#[from] FlashError),
+    /// Settings of another board.
+    #[error("these lines belong to the board {theirs}, this is {own}; `revert` drops them")]
+    WrongBoard {
+        /// The board of the lines.
+        theirs: &'static str,
+        /// This board.
+        own: &'static str,
+    },
+    /// The board is not confirmed.
+    #[error(
+        "the board's polarities, dead time and scales are assumed, or were changed: do the bench steps that `board` lists, then `confirm board`"
+    )]
+    NotConfirmed,
+    /// Values are staged.
+    #[error("there are staged values: `apply` or `revert` first")]
+    Staged,
+    /// The commissioning has found nothing new.
+    #[error("nothing new was found: `commission` first")]
+    NothingFound,
+    /// There is nothing to learn on top of.
+    #[error("nothing is learned with these settings: `learn` first")]
+    NothingLearned,
+    /// A number of a homing.
+    #[error(transparent)]
+    Homing(#[from] OutOfRange),
+    /// Changes would be lost.
+    #[error("settings that were not saved would be lost: `save` first, or `reboot now`")]
+    Unsaved,
+    /// The bus sets a setting of the hardware.
+    #[error("{} belongs to the hardware: set it at the console", .0.name())]
+    Hardware(Key),
+    /// The bus repeats its run command after a stop from elsewhere.
+    #[error("the drive has stopped for another reason: write a stop first")]
+    Ended,
+}
+
+/// Refusal by the side that commands, in the order of [`Commander`].
+const AUTHORITY: [&str; 2] = [
+    "the console commands: `set bus.commands bus` lets the bus",
+    "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over",
+];
+
+impl Refusal {
+    /// Its number in the register of the bus, and the meaning there. A number keeps its meaning.
+    pub fn code(&self) -> u16 {
+        match self {
+            Self::Authority(_) => 1,
+            Self::MustBeOff => 2,
+            Self::NotConfirmed => 3,
+            Self::NothingLearned | Self::Command(CommandError::Refused(Refused::NotLearned)) => 4,
+            Self::Command(CommandError::Refused(Refused::Fault(_))) => 5,
+            Self::Set(_) | Self::Design(_) => 6,
+            Self::Hardware(_) => 7,
+            Self::Flash(_) => 8,
+            Self::Ended => 9,
+            Self::Command(CommandError::NoAnswer | CommandError::NotStarted(_)) => 10,
+            Self::Command(CommandError::Refused(_)) => 11,
+            Self::WrongBoard { .. }
+            | Self::Staged
+            | Self::NothingFound
+            | Self::Homing(_)
+            | Self::Unsaved => 12,
+        }
+    }
+}

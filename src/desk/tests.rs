@@ -1,0 +1,164 @@
+//! Orders by state and source: one table.
+
+use drive_commission::Step;
+use drive_core::homing::Plan;
+use drive_core::{Drive, Hardware, Measured, Mode, Stop};
+use drive_settings::value::Value;
+
+use super::order::{Order, Refusal};
+use super::*;
+use crate::boards;
+use crate::console::tests::FakeDrive;
+use crate::settings::keys;
+
+/// The situations of the columns below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Situation {
+    Off,
+    Starting,
+    Fault,
+    NoControl,
+    NotConfirmed,
+    Staged,
+}
+
+const SITUATIONS: [Situation; 6] = [
+    Situation::Off,
+    Situation::Starting,
+    Situation::Fault,
+    Situation::NoControl,
+    Situation::NotConfirmed,
+    Situation::Staged,
+];
+
+/// A desk and a drive in a situation; `commander` commands.
+fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
+    let mut settings = FirmwareSettings::of_the_board();
+    settings.command.wiring_checked = true;
+    settings.drive.angle_source = drive_core::AngleSource::Encoder;
+    settings.bus.commander = commander;
+    if situation != Situation::NotConfirmed {
+        settings.confirm_board();
+    }
+    let mut drive = FakeDrive::new(Drive::new(settings.build().unwrap()));
+    let mut desk = Desk::new(settings);
+    match situation {
+        Situation::Off | Situation::NotConfirmed => {}
+        Situation::Starting => drop(drive.command(Command::Start(Mode::Speed)).unwrap()),
+        Situation::Fault => {
+            drive.command(Command::Start(Mode::Speed)).unwrap();
+            drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
+        }
+        Situation::NoControl => drive.running = false,
+        Situation::Staged => {
+            let values = [(keys::find("bus.address").unwrap(), Value::Whole(7))];
+            let order = Order::Set(values.into_iter().collect());
+            desk.order(commander, order, &mut drive).unwrap();
+        }
+    }
+    drive.commands.clear();
+    (desk, drive)
+}
+
+/// Each order, and by situation (`Off`, `Starting`, `Fault`, `NoControl`, `NotConfirmed`, `Staged`): `+` taken, `d` refused by the
+/// drive, `o` must be off, `c` no control, `n` not confirmed, `s` values are staged, `-` nothing found or learned, `u` unsaved.
+fn orders() -> Vec<(Order, &'static str)> {
+    let key = keys::find("motor.r_s").unwrap();
+    let plan = Plan { rpm: 60.0, i_q: 0.5, turns: 2.0 };
+    vec![
+        (Order::Start(Mode::Torque), "+ddcn+"),
+        (Order::Start(Mode::Speed), "+ddcn+"),
+        (Order::Learn { again: false }, "dddcnd"),
+        (Order::Learn { again: true }, "-d--n-"),
+        (Order::Commission(Step::Nameplate, Step::LAST), "+odcn+"),
+        (Order::Accept, "-o-c--"),
+        (Order::Stop(Stop::Coast), "+++c++"),
+        (Order::Stop(Stop::Ramp), "+++c++"),
+        (Order::Relock, "dddcdd"),
+        (Order::Torque(1.0), "dddcdd"),
+        (Order::Speed(60.0), "d+dcdd"),
+        (Order::Jog(60.0), "dddcdd"),
+        (Order::Position(1.0), "dddcdd"),
+        (Order::Home(plan), "dddcdd"),
+        (Order::Clear, "+++c++"),
+        (Order::Set([(key, Value::Number(5.5))].into_iter().collect()), "+o+c++"),
+        (Order::Defaults, "+o+c++"),
+        (Order::Apply, "++++++"),
+        (Order::Revert, "++++++"),
+        (Order::Save, "+o++++"),
+        (Order::Echo(true), "++++++"),
+        (Order::Reboot(false), "+o+++u"),
+        (Order::Reboot(true), "+o++++"),
+        (Order::BoardIs(boards::ALL[0]), "++++++"),
+        (Order::Confirm, "+o+++s"),
+    ]
+}
+
+fn letter(answer: &Answer) -> char {
+    match answer {
+        Ok(_) => '+',
+        Err(Refusal::Command(CommandError::Refused(_))) => 'd',
+        Err(Refusal::MustBeOff) => 'o',
+        Err(Refusal::Command(_)) => 'c',
+        Err(Refusal::NotConfirmed) => 'n',
+        Err(Refusal::Staged) => 's',
+        Err(Refusal::NothingFound | Refusal::NothingLearned) => '-',
+        Err(Refusal::Unsaved) => 'u',
+        Err(other) => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn each_order_in_each_situation() {
+    let mut wrong = Vec::new();
+    for (order, expected) in orders() {
+        let found: String = SITUATIONS
+            .iter()
+            .map(|situation| {
+                let (mut desk, mut drive) = desk(*situation, Commander::Console);
+                let before = drive.commands.len();
+                let answer = desk.order(Commander::Console, order.clone(), &mut drive);
+                // A refusal of the desk itself never reaches the drive.
+                let refused = matches!(&answer, Err(why) if !matches!(why, Refusal::Command(_)));
+                assert!(!refused || drive.commands.len() == before, "{order:?}, {situation:?}");
+                letter(&answer)
+            })
+            .collect();
+        if found != expected {
+            wrong.push(format!("{order:?}: {found}, not {expected}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Who does not command is refused all that is for the commander, in each situation, and nothing happens.
+#[test]
+fn the_other_side_may_stop_and_nothing_else_that_moves() {
+    for situation in SITUATIONS {
+        for (order, _) in orders() {
+            for (from, commander) in
+                [(Commander::Bus, Commander::Console), (Commander::Console, Commander::Bus)]
+            {
+                let (mut desk, mut drive) = desk(situation, commander);
+                let answer = desk.order(from, order.clone(), &mut drive);
+                let authority = Err(Refusal::Authority(commander));
+                assert_eq!(answer == authority, order.is_for_the_commander(from), "{order:?}");
+                if answer == authority {
+                    assert!(drive.commands.is_empty() && !desk.is_busy(), "{order:?}");
+                    // The register has the reason, and it is announced once.
+                    if from == Commander::Bus {
+                        assert_eq!(desk.refusal().map(Refusal::code), Some(1));
+                        let told = |desk: &mut Desk, drive: &mut FakeDrive| {
+                            (0..9).filter(|_| desk.news(drive, 0) == Some(News::BusRefused)).count()
+                        };
+                        let expected = usize::from(situation != Situation::NoControl);
+                        assert_eq!(told(&mut desk, &mut drive), expected);
+                        desk.order(from, order.clone(), &mut drive).unwrap_err();
+                        assert_eq!(told(&mut desk, &mut drive), 0);
+                    }
+                }
+            }
+        }
+    }
+    assert!(!Order::Stop(Stop::Coast).is_for_the_commander(Commander::Bus));
+}

@@ -1,0 +1,45 @@
+//! The front of the firmware: the desk with its front ends, and the order in which the main loop serves them.
+
+use crate::console::Console;
+use crate::console::handle::{Firmware, Port};
+use crate::desk::Desk;
+use crate::modbus::{self, bus::Bus};
+use crate::settings::FirmwareSettings;
+
+/// See the head of the module.
+pub struct Front {
+    /// The desk.
+    pub desk: Desk,
+    /// The console.
+    pub console: Console,
+    /// The field bus.
+    pub bus: Bus,
+}
+
+impl Front {
+    /// The drive has these settings.
+    pub fn new(settings: FirmwareSettings) -> Self {
+        Self { desk: Desk::new(settings), console: Console::new(), bus: Bus::default() }
+    }
+
+    /// A pass of the main loop. Takes seconds if controllers are designed; `line` answers by itself meanwhile. `now_ms` wraps.
+    pub fn pass(
+        &mut self,
+        port: &mut impl Port,
+        line: &mut impl modbus::Port,
+        drive: &mut impl Firmware,
+        now_ms: u32,
+    ) {
+        let Self { desk, console, bus } = self;
+        desk.follow(drive);
+        console.poll(port, desk, drive, now_ms);
+        bus.serve(line, desk, drive, now_ms);
+        if desk.is_busy() && console.has_said_all() {
+            line.set_busy(Some(desk.settings().in_force().bus.own()));
+            desk.go_on(drive, now_ms);
+            line.set_busy(None);
+        } else {
+            desk.watch_silence(drive, now_ms);
+        }
+    }
+}

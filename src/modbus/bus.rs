@@ -1,0 +1,310 @@
+//! The field bus as a front end of the desk: registers to orders, refusals to exceptions.
+//!
+//! A run command holds until a stop; when the drive stopped for another reason (console, time-out, fault), a master that repeats its run
+//! command does not start it again before it has written a stop.
+
+use drive_core::{Mode, Stop};
+use modbus_core::Exception;
+
+use super::Port;
+use super::cia402;
+use super::faults::FaultLog;
+use super::float::from_float;
+use super::registers::{
+    COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, SETTINGS_END, STAGED, View,
+};
+use super::slave::{self, Registers, Words};
+use crate::desk::Desk;
+use crate::desk::handle::DriveHandle;
+use crate::desk::order::{Order, Refusal};
+use crate::settings::bus::Commander;
+use crate::settings::keys;
+use crate::settings::staging::{Assignments, MOST};
+
+/// Fields of the command word: what to do, and the direction. Other bits are refused.
+const ACTION: u16 = 0b11;
+const STOP: u16 = 1;
+const FORWARD: u16 = 1 << 4;
+const REVERSE: u16 = 1 << 5;
+/// Bit of the reset register.
+const CLEAR: u16 = 1 << 1;
+
+/// The run command of the master.
+#[derive(Clone, Copy, Default, PartialEq)]
+enum Run {
+    /// None, or a stop.
+    #[default]
+    Stop,
+    /// A start was taken; the controllers are being designed.
+    Starting,
+    /// The drive runs for the bus.
+    Running,
+    /// The drive has stopped for another reason.
+    Ended,
+}
+
+/// See the head of the module.
+#[derive(Default)]
+pub struct Bus {
+    run: Run,
+    reverse: bool,
+    /// The frequency that was written last, 0.01 Hz.
+    frequency: u16,
+    /// The speed that the drive was given last since its start, rpm.
+    given: Option<f32>,
+    /// Number of the desk's last design that was noticed.
+    designs: u32,
+    faults: FaultLog,
+    seconds: u32,
+    second_ms: u32,
+}
+
+impl Bus {
+    /// Answers a frame of the bus, if there is one, and follows its run command; never waits. `now_ms` wraps.
+    #[inline(never)] // its stack does not add to that of a design
+    pub fn serve(
+        &mut self,
+        port: &mut impl Port,
+        desk: &mut Desk,
+        drive: &mut impl DriveHandle,
+        now_ms: u32,
+    ) {
+        let settings = desk.settings().in_force().bus;
+        port.set_line(settings.baud, settings.format);
+        while now_ms.wrapping_sub(self.second_ms) >= 1000 {
+            self.second_ms = self.second_ms.wrapping_add(1000);
+            self.seconds += 1;
+        }
+        if let Some(status) = drive.status() {
+            self.faults.watch(status.state, self.seconds);
+        }
+        if !desk.is_busy() {
+            self.follow_run(desk, drive);
+        }
+        let frame = port.receive();
+        // An answer to a request from before a design, which the master has given up, would be taken for that to another.
+        let late = core::mem::replace(&mut self.designs, desk.designs()) != self.designs;
+        let Some(frame) = frame.filter(|_| !late) else { return };
+        let mut access = Access { bus: self, desk, drive };
+        // A master counts as alive by its writes: a panel that only reads does not stand in for it.
+        if slave::answer(&frame, settings.own(), &mut access, |answer| port.send(answer)) {
+            desk.note_activity(Commander::Bus, now_ms);
+        }
+    }
+
+    /// Gives the drive the speed of a run command, and ends the command if the drive has stopped.
+    fn follow_run(&mut self, desk: &mut Desk, drive: &mut impl DriveHandle) {
+        let stopping = drive.status().is_some_and(|s| s.state.is_stopping());
+        match self.run {
+            Run::Starting | Run::Running if drive.is_off() || stopping => self.run = Run::Ended,
+            Run::Starting | Run::Running => {
+                self.run = Run::Running;
+                // The answer has been given; a refusal is announced.
+                let _ = self.send_reference(desk, drive);
+            }
+            Run::Stop | Run::Ended => {}
+        }
+    }
+
+    /// Gives the speed, if it is another than before.
+    fn send_reference(
+        &mut self,
+        desk: &mut Desk,
+        drive: &mut impl DriveHandle,
+    ) -> Result<(), Refusal> {
+        let pole_pairs = f32::from(desk.settings().in_force().drive.motor.pole_pairs);
+        let rpm = f32::from(self.frequency) * 60.0 / (100.0 * pole_pairs);
+        let rpm = if self.reverse { -rpm } else { rpm };
+        if self.given == Some(rpm) {
+            return Ok(());
+        }
+        self.given = Some(rpm);
+        desk.order(Commander::Bus, Order::Speed(rpm), drive).map(drop)
+    }
+
+    fn command(&self) -> u16 {
+        let direction = if self.reverse { REVERSE } else { FORWARD };
+        if matches!(self.run, Run::Running | Run::Starting) { RUN | direction } else { STOP }
+    }
+}
+
+/// A refusal is a failure of the device, except of a value.
+impl From<Refusal> for Exception {
+    fn from(why: Refusal) -> Self {
+        match why {
+            Refusal::Set(_) => Self::IllegalDataValue,
+            _ => Self::ServerDeviceFailure,
+        }
+    }
+}
+
+/// The registers, with the drive behind them.
+struct Access<'a, D> {
+    bus: &'a mut Bus,
+    desk: &'a mut Desk,
+    drive: &'a mut D,
+}
+
+impl<D: DriveHandle> Access<'_, D> {
+    fn order(&mut self, order: Order) -> Result<(), Exception> {
+        Ok(self.desk.order(Commander::Bus, order, self.drive).map(drop)?)
+    }
+
+    fn refuse(&mut self, why: Refusal) -> Result<(), Exception> {
+        self.desk.note_refusal(why.clone());
+        Err(why.into())
+    }
+
+    fn send_reference(&mut self) -> Result<(), Exception> {
+        Ok(self.bus.send_reference(self.desk, self.drive)?)
+    }
+
+    fn command(&mut self, word: u16) -> Result<(), Exception> {
+        if word & !(ACTION | FORWARD | REVERSE) != 0 || word & ACTION == ACTION {
+            return Err(Exception::IllegalDataValue);
+        }
+        let commands = self.desk.commander() == Commander::Bus;
+        // Anybody may stop the drive. A release by a master that does not command changes nothing.
+        if word & ACTION == STOP || (word == 0 && commands) {
+            return self.stop(Stop::Coast);
+        }
+        if word == 0 {
+            return Ok(());
+        }
+        self.may_command()?;
+        self.bus.reverse = match word & (FORWARD | REVERSE) {
+            0 => self.bus.reverse,
+            FORWARD => false,
+            REVERSE => true,
+            _ => !self.bus.reverse,
+        };
+        match word & ACTION {
+            RUN => self.run(),
+            _ if self.bus.run == Run::Running => self.send_reference(),
+            _ => Ok(()),
+        }
+    }
+
+    fn run(&mut self) -> Result<(), Exception> {
+        match self.bus.run {
+            Run::Starting => Ok(()),
+            Run::Running => self.send_reference(),
+            Run::Ended => self.refuse(Refusal::Ended),
+            Run::Stop => {
+                self.order(Order::Start(Mode::Speed))?;
+                (self.bus.run, self.bus.given) = (Run::Starting, None);
+                Ok(())
+            }
+        }
+    }
+
+    /// A control word of CiA 402. A run keeps the direction.
+    fn control(&mut self, word: u16) -> Result<(), Exception> {
+        if word & cia402::FAULT_RESET != 0 {
+            self.order(Order::Clear)?;
+        }
+        match cia402::stop(word) {
+            Some(stop) => self.stop(stop),
+            None => self.command(RUN),
+        }
+    }
+
+    fn stop(&mut self, stop: Stop) -> Result<(), Exception> {
+        self.bus.run = Run::Stop;
+        self.order(Order::Stop(stop))
+    }
+
+    fn frequency(&mut self, word: u16) -> Result<(), Exception> {
+        self.may_command()?;
+        self.bus.frequency = word;
+        if self.bus.run == Run::Running { self.send_reference() } else { Ok(()) }
+    }
+
+    fn may_command(&mut self) -> Result<(), Exception> {
+        match self.desk.commander() {
+            Commander::Bus => Ok(()),
+            other => self.refuse(Refusal::Authority(other)),
+        }
+    }
+
+    /// Stages settings, whole ones.
+    fn stage(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
+        self.may_command()?;
+        let first = usize::from(at - SETTINGS);
+        if !first.is_multiple_of(2) || !words.count().is_multiple_of(2) || words.count() > 2 * MOST
+        {
+            return Err(Exception::IllegalDataValue);
+        }
+        let mut values = Assignments::new();
+        for n in 0..words.count() / 2 {
+            let key = keys::number(first / 2 + n).ok_or(Exception::IllegalDataAddress)?;
+            let half = |place| u32::from(words.get(2 * n + place).unwrap_or(0));
+            let float = f32::from_bits(half(0) << 16 | half(1));
+            if key.hardware() {
+                return self.refuse(Refusal::Hardware(key));
+            }
+            // There is room.
+            let _ = values.push((key, from_float(key, self.desk.settings().latest(), float)?));
+        }
+        self.order(Order::Set(values))
+    }
+
+    fn staged(&mut self, word: u16) -> Result<(), Exception> {
+        match word {
+            1 | 2 if !self.drive.is_off() => {
+                self.may_command()?;
+                self.refuse(Refusal::MustBeOff)
+            }
+            1 => self.order(Order::Apply),
+            2 => self.order(Order::Save),
+            3 => self.order(Order::Revert),
+            _ => Err(Exception::IllegalDataValue),
+        }
+    }
+}
+
+impl<D: DriveHandle> Registers for Access<'_, D> {
+    fn is_busy(&self) -> bool {
+        self.desk.is_busy()
+    }
+
+    fn read(&mut self, at: u16) -> Result<u16, Exception> {
+        let (settings, bus) = (self.desk.settings(), &*self.bus);
+        let view = View {
+            status: self.drive.status(),
+            settings: settings.in_force(),
+            latest: settings.latest(),
+            staged: if at == STAGED { settings.count() } else { 0 },
+            command: bus.command(),
+            frequency: bus.frequency,
+            faults: &bus.faults,
+            seconds: bus.seconds,
+            refusal: self.desk.refusal().map_or(0, Refusal::code),
+        };
+        view.read(at)
+    }
+
+    fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
+        let word = words.get(0).unwrap_or(0);
+        match (at, words.get(1)) {
+            (SETTINGS..SETTINGS_END, _) => self.stage(at, words),
+            // The frequency first: a run command begins with it.
+            (COMMAND, Some(frequency)) if words.count() == 2 => {
+                if word & ACTION == RUN {
+                    self.frequency(frequency)?;
+                }
+                self.command(word)
+            }
+            (COMMAND, None) => self.command(word),
+            (FREQUENCY, None) => self.frequency(word),
+            (RESET, None) => match word {
+                0 => Ok(()),
+                CLEAR => self.order(Order::Clear),
+                _ => Err(Exception::IllegalDataValue),
+            },
+            (CONTROL, None) => self.control(word),
+            (STAGED, None) => self.staged(word),
+            _ => Err(Exception::IllegalDataAddress),
+        }
+    }
+}

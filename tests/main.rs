@@ -1,0 +1,25 @@
+//! The procedures of the drive on the simulated bench, and recorded runs: one program, a module a procedure.
+
+mod asymmetry_at_start;
+mod command_turns;
+mod common;
+mod demodulator_truth;
+mod encoder_orientation;
+mod five_demodulators;
+mod homing;
+mod learning;
+mod lock_monitor;
+mod online_tracking;
+mod position_step;
+mod protections;
+mod replay;
+mod saliency_check;
+mod sensorless_position;
+mod sensorless_speed;
+mod sensorless_torque;
+mod silent_sensors;
+mod stops;
+mod thermal_limit;
+mod turning_start;
+mod volts_per_hertz;
+mod wiring_check;
