@@ -252,9 +252,8 @@ impl Scenario {
         let record = self.record(context)?;
         let mut outcome = Outcome::default();
         if let Some(fault) = &record.fault {
-            let learned = context.config.prepare.learn;
-            let unlearned = if learned { "" } else { ", and had not learned (`prepare.learn`)" };
-            outcome.remark(format!("The drive stopped itself with {fault}{unlearned}."));
+            let hint = if context.config.prepare.learn { "" } else { ", and had not learned" };
+            outcome.remark(format!("The drive stopped itself with {fault}{hint}."));
             outcome.faults.push(fault.clone());
         }
         if let Some((t, value, taken)) = record.limited {

@@ -7,6 +7,7 @@ use drive_core::Mode;
 use super::assumptions;
 use super::scenario::{Metric, Record, Statistic, position_step};
 use super::{BENCH, Context, DRIVE, Experiment, learning};
+use crate::columns;
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -172,22 +173,20 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
     m.set("stopped_runs", held.iter().filter(|h| h.fault.is_some()).count() as f64);
 
-    let mut table = Table::new("Drift of a position that is held", &[]).note(
+    let columns = columns![|_, h: &HeldPosition|
+        "load (Nm)" => Cell::fixed(h.load_nm, 1);
+        "r_r, true over believed" => Cell::fixed(h.belief.0, 2);
+        "learned so" => Cell::from(if h.belief.1 { "yes" } else { "no" });
+        "mean iq (A)" => Cell::fixed(h.iq, 2);
+        "drift (°/min)" => Cell::fixed(h.drift(), 1);
+        "beside it (° rms)" => Cell::fixed(h.wander(), 2);
+        "angle error rms (°)" => Cell::fixed(h.angle_error.rms(), 2);
+    ];
+    let table = Table::of("Drift of a position that is held", &columns, held.iter().enumerate());
+    outcome.tables.push(table.note(
         "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \
          the load.",
-    );
-    for h in &held {
-        table.record([
-            ("load (Nm)", Cell::fixed(h.load_nm, 1)),
-            ("r_r, true over believed", Cell::fixed(h.belief.0, 2)),
-            ("learned so", Cell::from(if h.belief.1 { "yes" } else { "no" })),
-            ("mean iq (A)", Cell::fixed(h.iq, 2)),
-            ("drift (°/min)", Cell::fixed(h.drift(), 1)),
-            ("beside it (° rms)", Cell::fixed(h.wander(), 2)),
-            ("angle error rms (°)", Cell::fixed(h.angle_error.rms(), 2)),
-        ]);
-    }
-    outcome.tables.push(table);
+    ));
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     outcome.remarks = assumptions(config);

@@ -99,7 +99,7 @@ macro_rules! columns {
             head: $head,
             cell: {
                 #[allow(unused_variables)]
-                let cell = move |$number, $record: $type| $cell;
+                let cell = move |$number: usize, $record: $type| $cell;
                 Box::new(cell)
             },
         }),+]

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial};
+use crate::columns;
 use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
 use crate::stats::Stats;
 
@@ -190,25 +191,23 @@ pub fn by_kind(trials: &[Trial]) -> Table {
 
 /// The silent runs, each with its disturbances in words.
 pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table {
-    let mut table = Table::new("Silently wrong", &[])
-        .note("Disturbances: of the page Statistics, in relation to their full sizes.");
-    for (number, trial) in trials.iter().enumerate().filter(|(_, trial)| trial.is_silent()) {
-        let end = match trial.trip {
-            Some(fault) => format!("fault {fault}"),
-            None if trial.stuck => "stuck".to_owned(),
-            None => "sound".to_owned(),
-        };
-        table.record([
-            ("run", Cell::from(number.to_string())),
-            ("seed", Cell::from(trial.seed.to_string())),
-            ("kind", Cell::from(trial.kind.map(Kind::name).unwrap_or_default())),
-            ("wrong (s)", Cell::fixed(trial.wrong_s, 2)),
-            ("flux off (s)", Cell::fixed(trial.flux_off_s, 2)),
-            ("end", Cell::from(end)),
-            ("disturbances", Cell::from(disturbances(number))),
-        ]);
-    }
-    table
+    let (disturbances, end) = (&disturbances, |trial: &Trial| match trial.trip {
+        Some(fault) => format!("fault {fault}"),
+        None if trial.stuck => "stuck".to_owned(),
+        None => "sound".to_owned(),
+    });
+    let columns = columns![|number, trial: &Trial|
+        "run" => Cell::from(number.to_string());
+        "seed" => Cell::from(trial.seed.to_string());
+        "kind" => Cell::from(trial.kind.map(Kind::name).unwrap_or_default());
+        "wrong (s)" => Cell::fixed(trial.wrong_s, 2);
+        "flux off (s)" => Cell::fixed(trial.flux_off_s, 2);
+        "end" => Cell::from(end(trial));
+        "disturbances" => Cell::from(disturbances(number));
+    ];
+    let silent = trials.iter().enumerate().filter(|(_, trial)| trial.is_silent());
+    Table::of("Silently wrong", &columns, silent)
+        .note("Disturbances: of the page Statistics, in relation to their full sizes.")
 }
 
 /// Rms and largest error of every run, by its number.
