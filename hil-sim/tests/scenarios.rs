@@ -147,7 +147,7 @@ fn a_name_that_is_gone_is_answered_with_the_command_that_took_its_place() {
 /// The page has a row for each column.
 #[test]
 fn every_column_is_documented() {
-    let page = include_str!("../../docs/simulator.md");
+    let page = include_str!("../scenarios/README.md");
     for quantity in QUANTITIES {
         assert!(page.contains(&format!("`{}`", quantity.name)), "{}", quantity.name);
     }

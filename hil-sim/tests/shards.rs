@@ -177,7 +177,7 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
         (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
         (
             &["run", "monte-carlo", "--shard", "3/2"],
-            "allowed: I/N with N from 1 to 100000 and I from 1 to N",
+            "allowed: env, or I/N with N from 1 to 100000 and I from 1 to N",
         ),
         (
             &["run", "monte-carlo", "--shard", "1/2", "--out", "page"],
@@ -268,4 +268,34 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
         std::os::unix::fs::symlink(place.expect(tool), tools.join(tool)).unwrap();
     }
     assert_eq!(recipe(Some(&tools), "with-xargs"), whole);
+}
+
+/// A row a run, with what was drawn and what came out; the rows of a shard are those of its runs.
+#[test]
+fn rows_of_runs_can_be_analysed() {
+    let folder = folder("shards-rows");
+    let all = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--rows", "all.csv"]].concat());
+    assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
+    let read = |name: &str| {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        text.lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect::<Vec<Vec<_>>>()
+    };
+    let rows = read("all.csv");
+    assert_eq!(rows.len(), 7);
+    let column = |name: &str| rows[0].iter().position(|head| head == name).expect(name);
+    let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    assert_eq!((number(3, "run"), number(3, "case_seed")), (2.0, 1_000_005.0));
+    assert!((0.5..=3.0).contains(&number(3, "case_iq_a").abs()));
+    let page = include_str!("../../docs/statistics.md");
+    assert!(rows[0].iter().all(|head| page.contains(&format!("`{head}`"))), "{:?}", rows[0]);
+    // The worst of the rows is the worst of the result.
+    let worst = (1..7).map(|row| number(row, "error_rms_deg")).fold(0.0, f64::max);
+    assert_eq!(object(&all)["metrics"]["worst_run_rms_deg"], worst);
+    let shard = ["--shard", "2/3", "--rows", "two.csv"];
+    hil_sim(&folder, &[MONTE_CARLO, &shard].concat());
+    assert_eq!(read("two.csv"), [rows[0].clone(), rows[2].clone(), rows[5].clone()]);
+    let output = hil_sim(&folder, &["run", "torque-steps", "--rows", "x.csv"]);
+    assert!(text(&output.stderr).contains("does not consist of independent runs"));
 }

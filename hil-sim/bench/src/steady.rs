@@ -20,6 +20,7 @@ pub struct OperatingPoint {
     /// Speed, rpm.
     pub rpm: f64,
     /// Torque current, A.
+    #[serde(rename = "iq_a")]
     pub iq: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -33,7 +34,7 @@ pub struct SteadyRun {
     /// Angle error, degrees.
     pub error: Stats,
     /// Mean torque, Nm.
-    #[serde(with = "exact")]
+    #[serde(with = "exact", rename = "torque_nm")]
     pub torque: f64,
     /// Whether the error went beyond 45° at any time, or the drive stopped itself.
     pub lost: bool,

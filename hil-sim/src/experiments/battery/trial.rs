@@ -46,9 +46,12 @@ pub struct Trial {
     pub seed: u64,
     /// Its kind, in the battery.
     pub kind: Option<Kind>,
+    /// Kind and region, in the whole range.
+    pub case: String,
     /// Speed, rpm on four poles, and torque current, A, that were drawn for the whole range.
     pub rpm: f64,
     /// See `rpm`.
+    #[serde(rename = "iq_a")]
     pub i_q: f64,
     /// Angle error while the drive regulated, true minus estimated, degrees.
     pub error: Stats,

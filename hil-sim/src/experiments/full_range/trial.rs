@@ -122,7 +122,7 @@ impl<'a> Run<'a> {
         let held = case.shaft(rpm) != Shaft::Free;
         let load = if held { Load::Speed { speed: 0.0 } } else { Load::Free { torque: 0.0 } };
         let mut bench = Bench::new(config, &plant, drive, load, seed)?;
-        (bench.trial.rpm, bench.trial.i_q) = (rpm, i_q);
+        bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
         bench.trace = traced.then(Vec::new);
         let machine = (plant.machine.rs, plant.machine.rr);
