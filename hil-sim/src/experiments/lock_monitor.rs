@@ -45,11 +45,6 @@ pub struct LockMonitor {
 }
 
 impl LockMonitor {
-    /// The forced offset of a trial, and its name.
-    fn offset(&self, number: usize) -> Option<(f64, &'static str)> {
-        OFFSETS.get(number / self.runs).copied()
-    }
-
     /// Starts, and relocks, at each speed.
     fn starts_each(&self) -> usize {
         self.runs.div_ceil(5)
@@ -135,7 +130,7 @@ impl LockMonitor {
     fn columns(&self) -> Vec<Column<'_, Trial>> {
         let fault = |r: &Trial| r.fault.map(|fault| fault.to_string()).unwrap_or_default();
         columns![|n, r: &Trial|
-            "forced by (°)" => Cell::or_dash(self.offset(n).map(|(degrees, _)| Cell::fixed(degrees, 0)));
+            "forced by (°)" => Cell::or_dash(OFFSETS.get(n / self.runs).map(|o| Cell::fixed(o.0, 0)));
             "seed" => Cell::from(r.case.seed.to_string());
             "kind" => Cell::from(r.kind.map_or("", HealthyKind::name));
             "iq (A)" => Cell::fixed(r.case.iq, 3);

@@ -88,8 +88,11 @@ pub struct Column<'a, R> {
     /// Head, with the unit; the name in CSV is made of it.
     pub head: &'a str,
     /// Its value of a record, which has a number.
-    pub cell: Box<dyn Fn(usize, &R) -> Cell + 'a>,
+    pub cell: OfRecord<'a, R>,
 }
+
+/// A cell of the number of a record and the record.
+pub type OfRecord<'a, R> = Box<dyn Fn(usize, &R) -> Cell + 'a>;
 
 /// Columns: heads, and cells of a number and a record.
 #[macro_export]
@@ -97,11 +100,8 @@ macro_rules! columns {
     (|$number:tt, $record:tt: $type:ty| $($head:expr => $cell:expr;)+) => {
         vec![$($crate::outcome::Column {
             head: $head,
-            cell: {
-                #[allow(unused_variables)]
-                let cell = move |$number: usize, $record: $type| $cell;
-                Box::new(cell)
-            },
+            #[allow(unused_variables)]
+            cell: Box::new(move |$number: usize, $record: $type| $cell),
         }),+]
     };
 }

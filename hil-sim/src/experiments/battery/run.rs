@@ -65,6 +65,9 @@ pub fn trial(
     };
     let mut bench = Bench::new(config, plant, drive, load, seed)?;
     bench.trial.kind = Some(kind);
+    let references = parts.iter().map(|part| part.reference.1);
+    let drawn = if mode == Mode::Speed { &mut bench.trial.rpm } else { &mut bench.trial.i_q };
+    *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     bench.trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
     bench.rig.command(&Command::Start(mode))?;
     match bench.wait(LONGEST_START_S) {

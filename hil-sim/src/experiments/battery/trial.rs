@@ -48,7 +48,7 @@ pub struct Trial {
     pub kind: Option<Kind>,
     /// Kind and region, in the whole range.
     pub case: String,
-    /// Speed, rpm on four poles, and torque current, A, that were drawn for the whole range.
+    /// Speed, rpm on four poles, and torque current, A, that were drawn; in the battery the largest reference.
     pub rpm: f64,
     /// See `rpm`.
     #[serde(rename = "iq_a")]
