@@ -6,8 +6,8 @@ use std::{env, fs, io};
 
 /// Sources that a result of an experiment depends on, beside the packages of `Cargo.lock`. A published package has no
 /// neighbours: the versions of these are fixed then.
-const SOURCES: [&str; 6] =
-    ["src", "bench/src", "lab/src", "plant/src", "../drive-core/src", "../motors"];
+const SOURCES: [&str; 7] =
+    ["src", "scenarios", "bench/src", "lab/src", "plant/src", "../drive-core/src", "../motors"];
 
 fn main() -> io::Result<()> {
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());

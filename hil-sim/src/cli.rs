@@ -63,7 +63,7 @@ enum Command {
     },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run {
-        /// Name of the experiment, as `list` shows it
+        /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
         name: String,
         /// For `profile`: CSV file with the profile
         #[arg(long = "input", value_name = "FILE")]

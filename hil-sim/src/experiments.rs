@@ -11,19 +11,17 @@ mod losses;
 mod machines;
 mod monte_carlo;
 mod orientation;
-mod position;
-mod profile;
 mod record;
+pub mod scenario;
 mod sensorless_position;
 mod smallest_slope;
-mod speed_profile;
-mod torque;
 mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
 
 pub use sim_bench::experiment::{
-    BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING, TURNING, assumptions,
+    BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
+    assumptions,
 };
 use sim_bench::{bode, steady};
 pub use sim_bench::{learning, statistics};
@@ -40,7 +38,7 @@ use statistics::Statistical;
 use std::path::Path;
 
 use crate::config::Config;
-use crate::error::{Error, nearest};
+use crate::error::Error;
 use crate::outcome::Outcome;
 
 /// All experiments, in the order of the report.
@@ -60,13 +58,13 @@ pub const EXPERIMENTS: &[Experiment] = &[
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
-    position::EXPERIMENT,
+    scenario::POSITION,
     sensorless_position::EXPERIMENT,
-    torque::STEPS,
-    torque::RAMP,
-    torque::REVERSAL,
+    scenario::STEPS,
+    scenario::RAMP,
+    scenario::REVERSAL,
     perturbation::EXPERIMENT,
-    speed_profile::EXPERIMENT,
+    scenario::SPEED,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
     commission::EXPERIMENT,
@@ -90,7 +88,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
 ];
 
 /// The experiments that need an input file; they are no part of the report.
-pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
+pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE];
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
 pub const EVERYDAY: [&str; 10] = [
@@ -133,6 +131,13 @@ pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     })
 }
 
+/// Experiments that are gone, and what does the same.
+const REPLACED: &[(&str, &str)] = &[
+    ("tracking", "`run record`, `run torque-steps` and `run perturbation`"),
+    ("torque-drift", "`run record --set record.minutes=1`"),
+    ("speed-torque-sweep", "`run full-range --set full_range.kind=constant`"),
+    ("saliency-check", "`run smallest-slope`"),
+];
 /// Checks that a file is given to an experiment that needs one, and to no other.
 ///
 /// # Errors
@@ -165,12 +170,16 @@ pub fn named(name: &str) -> Vec<&str> {
 /// The experiment with this name.
 ///
 /// # Errors
-/// [`Error::UnknownExperiment`] with the most similar name.
+/// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with what took the place of an experiment that is gone.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
-    let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
-    all().find(|experiment| experiment.name == name).ok_or_else(|| Error::UnknownExperiment {
-        name: name.to_owned(),
-        nearest: nearest(name, all().map(|experiment| experiment.name)).map(str::to_owned),
+    let mut all = EXPERIMENTS.iter().chain(WITH_INPUT);
+    if let Some(experiment) = all.find(|experiment| experiment.name == name) {
+        return Ok(experiment);
+    }
+    let names = EXPERIMENTS.iter().chain(WITH_INPUT).map(|experiment| experiment.name);
+    Err(match REPLACED.iter().find(|(old, _)| *old == name) {
+        Some((_, by)) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
+        None => Error::unknown("experiment", name, names),
     })
 }
 

@@ -12,7 +12,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 pub use console::{paragraph, table, text};
-pub use csv::csv;
+pub use csv::{csv, of_table};
 pub use page::{Section, page};
 pub use plot::svg;
 

@@ -1,12 +1,13 @@
 //! Shards: the runs of a statistical experiment shared between processes or machines, kept one by one, and merged.
 //!
 //! Run `k`, counted from 0, belongs to shard `1 + k mod n` of `n`. What a run is depends on its number, the seed and
-//! the settings, not on the shard. A shard is a JSON object with a [`Header`] and the records of its runs; merging
+//! the settings, not on the shard. A shard is a [`Header`] and the records of its runs, a line each; merging
 //! puts the records of all shards in their order and computes the outcome of them, as the whole run does.
 
 mod header;
 mod journal;
 mod merge;
+mod rows;
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,6 +20,7 @@ use serde_json::Value;
 pub use header::Header;
 pub use journal::Journal;
 pub use merge::{Merged, merge};
+pub use rows::rows;
 
 use crate::error::Error;
 use crate::experiments::Context;
@@ -43,6 +45,24 @@ impl Shard {
     pub fn new(index: u32, count: u32) -> Option<Self> {
         let exists = (1..=Self::MOST).contains(&count) && (1..=count).contains(&index);
         exists.then_some(Self { index, count })
+    }
+
+    /// The shard of this process in an array of jobs, by the variables of the scheduler.
+    fn of_array(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+        let Some((index, count, first)) =
+            ARRAYS.iter().find(|(index, ..)| variable(index).is_some())
+        else {
+            let names = ARRAYS.map(|(index, ..)| index).join(", ");
+            return Err(format!("this is no array of jobs: none of {names} is set"));
+        };
+        let number = |name: &str| {
+            let text = variable(name).ok_or_else(|| format!("{index} is set, but not {name}"))?;
+            text.parse::<u32>().map_err(|_| format!("{name} = {text} is not a number"))
+        };
+        let from = if first.is_empty() { 0 } else { number(first)? };
+        let (job, jobs) = (number(index)?, number(count)?);
+        let shard = job.checked_sub(from).and_then(|place| Self::new(place + 1, jobs));
+        shard.ok_or_else(|| format!("job {job} of {jobs} from {from} on is no shard"))
     }
 
     /// The numbers of its runs.
@@ -71,13 +91,26 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == "env" {
+            return Self::of_array(|name| std::env::var(name).ok());
+        }
         let numbers = text.split_once('/');
         let shard =
             numbers.and_then(|(index, count)| Self::new(index.parse().ok()?, count.parse().ok()?));
         let most = Self::MOST;
-        shard.ok_or_else(|| format!("allowed: I/N with N from 1 to {most} and I from 1 to N"))
+        shard.ok_or_else(|| {
+            format!("allowed: env, or I/N with N from 1 to {most} and I from 1 to N")
+        })
     }
 }
+
+/// Variables of Slurm, Kubernetes and AWS Batch: index of a job of an array, number of jobs, and the first index if it is not 0.
+/// Kubernetes does not give the number: the job sets it.
+const ARRAYS: [(&str, &str, &str); 3] = [
+    ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
+    ("JOB_COMPLETION_INDEX", "JOB_COMPLETIONS", ""),
+    ("AWS_BATCH_JOB_ARRAY_INDEX", "AWS_BATCH_JOB_ARRAY_SIZE", ""),
+];
 
 /// A run and what it left.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,14 +120,6 @@ pub struct Run {
     pub run: usize,
     /// Its record.
     pub record: Value,
-}
-
-/// The JSON form of a shard.
-#[derive(Serialize, Deserialize)]
-struct ShardFile {
-    #[serde(flatten)]
-    header: Header,
-    records: Vec<Run>,
 }
 
 /// Does the runs of a shard that the journal does not have yet, and returns all of them in their order.
@@ -107,7 +132,7 @@ pub fn runs(
     header: &Header,
     journal: Option<&Journal>,
 ) -> Result<Vec<Run>, Error> {
-    let before = journal.iter().flat_map(|journal| journal.runs().iter().cloned());
+    let before = journal.iter().flat_map(|journal| journal.runs.iter().cloned());
     let done: Mutex<BTreeMap<usize, Value>> =
         Mutex::new(before.map(|run| (run.run, run.record)).collect());
     let missing: Vec<usize> = {
@@ -124,13 +149,16 @@ pub fn runs(
     Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
 }
 
-/// The JSON object of a shard.
+/// A shard as text, JSON Lines.
 ///
 /// # Errors
 /// [`Error::Internal`] when JSON cannot be made.
-pub fn to_json(header: Header, records: Vec<Run>) -> Result<String, Error> {
-    serde_json::to_string(&ShardFile { header, records })
-        .map_err(|e| Error::Internal(e.to_string()))
+pub fn text(header: &Header, runs: &[Run]) -> Result<String, Error> {
+    let mut bytes = journal::line(header)?;
+    for run in runs {
+        bytes.extend(journal::line(run)?);
+    }
+    String::from_utf8(bytes).map_err(|e| Error::Internal(e.to_string()))
 }
 
 #[cfg(test)]
@@ -155,7 +183,42 @@ mod tests {
         assert_eq!(Shard::new(3, 8).unwrap().to_string(), "3/8");
         for wrong in ["0/3", "4/3", "1/0", "3", "a/b", "1/100001", "-1/2", "1/2/3", ""] {
             let error = wrong.parse::<Shard>().unwrap_err();
-            assert_eq!(error, "allowed: I/N with N from 1 to 100000 and I from 1 to N", "{wrong}");
+            assert_eq!(
+                error, "allowed: env, or I/N with N from 1 to 100000 and I from 1 to N",
+                "{wrong}"
+            );
         }
+    }
+
+    /// Indices of Slurm begin where the user lets them, those of the others at 0.
+    #[test]
+    fn a_job_of_an_array_knows_its_shard() {
+        let shard = |set: &[(&str, &str)]| {
+            Shard::of_array(|name| {
+                set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        let slurm = |id| {
+            [
+                ("SLURM_ARRAY_TASK_ID", id),
+                ("SLURM_ARRAY_TASK_COUNT", "8"),
+                ("SLURM_ARRAY_TASK_MIN", "5"),
+            ]
+        };
+        assert_eq!(shard(&slurm("5")), Ok(Shard { index: 1, count: 8 }));
+        assert_eq!(shard(&slurm("12")), Ok(Shard { index: 8, count: 8 }));
+        assert_eq!(shard(&slurm("13")).unwrap_err(), "job 13 of 8 from 5 on is no shard");
+        assert!(shard(&slurm("4")).is_err());
+        let kubernetes = [("JOB_COMPLETION_INDEX", "0"), ("JOB_COMPLETIONS", "3")];
+        assert_eq!(shard(&kubernetes), Ok(Shard { index: 1, count: 3 }));
+        let error = shard(&kubernetes[..1]).unwrap_err();
+        assert_eq!(error, "JOB_COMPLETION_INDEX is set, but not JOB_COMPLETIONS");
+        let aws = [("AWS_BATCH_JOB_ARRAY_INDEX", "2"), ("AWS_BATCH_JOB_ARRAY_SIZE", "3")];
+        assert_eq!(shard(&aws), Ok(Shard { index: 3, count: 3 }));
+        let error = shard(&[("AWS_BATCH_JOB_ARRAY_INDEX", "x"), ("AWS_BATCH_JOB_ARRAY_SIZE", "3")]);
+        assert_eq!(error.unwrap_err(), "AWS_BATCH_JOB_ARRAY_INDEX = x is not a number");
+        assert!(
+            shard(&[]).unwrap_err().contains("none of SLURM_ARRAY_TASK_ID, JOB_COMPLETION_INDEX")
+        );
     }
 }

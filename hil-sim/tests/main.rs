@@ -36,6 +36,7 @@ mod promises;
 mod record;
 mod saliency_families;
 mod same_json;
+mod scenarios;
 mod shards;
 mod shown_commands;
 mod starts_after_a_run;

@@ -97,12 +97,12 @@ fn the_shards_of_a_run_have_its_runs_and_their_seeds() {
     shards(&folder, MONTE_CARLO, 4);
     let seeds = |name: &str| {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
-        let shard: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let records = shard["records"].as_array().unwrap().clone();
-        let pair = |run: &serde_json::Value| {
+        let pair = |line: &str| {
+            let run: serde_json::Value = serde_json::from_str(line).unwrap();
             (run["run"].as_u64().unwrap(), run["record"]["case"]["seed"].as_u64().unwrap())
         };
-        records.iter().map(pair).collect::<Vec<_>>()
+        // Behind the head.
+        text.lines().skip(1).map(pair).collect::<Vec<_>>()
     };
     assert_eq!(seeds("1.json"), [(0, 1_000_003), (4, 1_000_007)]);
     assert_eq!(seeds("4.json"), [(3, 1_000_006)]);
@@ -128,11 +128,9 @@ fn shards_that_do_not_belong_together_are_refused_by_name() {
     let version = format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION"));
     write("version.json", &|text| text.replace(&version, "\"version\":\"0.0.7\""));
     write("sources.json", &|text| text.replace("\"sources\":\"", "\"sources\":\"0"));
-    write("torn.json", &|text| text[..text.len() / 2].to_owned());
+    write("torn.json", &|text| text[..text.len() - 9].to_owned());
     write("less.json", &|text| {
-        let mut shard: serde_json::Value = serde_json::from_str(&text).unwrap();
-        shard["records"].as_array_mut().unwrap().remove(0);
-        shard.to_string()
+        text.lines().filter(|line| !line.contains("\"run\":1,")).map(|l| format!("{l}\n")).collect()
     });
     write("more.json", &|text| text.replace("\"run\":4", "\"run\":5"));
     let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat());
@@ -148,10 +146,10 @@ fn shards_that_do_not_belong_together_are_refused_by_name() {
         (&["1.json", "version.json"], &["version.json", "version is 0.0.7"]),
         (&["version.json"], &["not made by this program", "version is 0.0.7"]),
         (&["1.json", "sources.json"], &["sources.json", "sources is 0"]),
-        (&["1.json", "torn.json"], &["torn.json", "torn"]),
+        (&["1.json", "torn.json"], &["torn.json", "line 3 is torn"]),
         (&["1.json", "less.json"], &["less.json", "shard 2/3 has not its runs 1"]),
-        (&["1.json", "more.json"], &["more.json", "shard 2/3 has not its runs 4"]),
-        (&["whole.json"], &["whole.json", "not a shard"]),
+        (&["1.json", "more.json"], &["more.json, line 3", "no record of a run of this shard"]),
+        (&["whole.json"], &["whole.json, line 1", "not the head of a shard"]),
     ];
     for (names, parts) in cases {
         let output = merge(&folder, names);
@@ -179,7 +177,7 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
         (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
         (
             &["run", "monte-carlo", "--shard", "3/2"],
-            "allowed: I/N with N from 1 to 100000 and I from 1 to N",
+            "allowed: env, or I/N with N from 1 to 100000 and I from 1 to N",
         ),
         (
             &["run", "monte-carlo", "--shard", "1/2", "--out", "page"],
@@ -270,4 +268,34 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
         std::os::unix::fs::symlink(place.expect(tool), tools.join(tool)).unwrap();
     }
     assert_eq!(recipe(Some(&tools), "with-xargs"), whole);
+}
+
+/// A row a run, with what was drawn and what came out; the rows of a shard are those of its runs.
+#[test]
+fn rows_of_runs_can_be_analysed() {
+    let folder = folder("shards-rows");
+    let all = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--rows", "all.csv"]].concat());
+    assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
+    let read = |name: &str| {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        text.lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect::<Vec<Vec<_>>>()
+    };
+    let rows = read("all.csv");
+    assert_eq!(rows.len(), 7);
+    let column = |name: &str| rows[0].iter().position(|head| head == name).expect(name);
+    let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    assert_eq!((number(3, "run"), number(3, "case_seed")), (2.0, 1_000_005.0));
+    assert!((0.5..=3.0).contains(&number(3, "case_iq_a").abs()));
+    let page = include_str!("../../docs/statistics.md");
+    assert!(rows[0].iter().all(|head| page.contains(&format!("`{head}`"))), "{:?}", rows[0]);
+    // The worst of the rows is the worst of the result.
+    let worst = (1..7).map(|row| number(row, "error_rms_deg")).fold(0.0, f64::max);
+    assert_eq!(object(&all)["metrics"]["worst_run_rms_deg"], worst);
+    let shard = ["--shard", "2/3", "--rows", "two.csv"];
+    hil_sim(&folder, &[MONTE_CARLO, &shard].concat());
+    assert_eq!(read("two.csv"), [rows[0].clone(), rows[2].clone(), rows[5].clone()]);
+    let output = hil_sim(&folder, &["run", "torque-steps", "--rows", "x.csv"]);
+    assert!(text(&output.stderr).contains("does not consist of independent runs"));
 }

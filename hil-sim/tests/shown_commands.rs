@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 31] = [
+const ELSEWHERE: [(&str, &str); 32] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -37,6 +37,7 @@ const ELSEWHERE: [(&str, &str); 31] = [
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
+    ("cargo sim run hil-sim/scenarios/", "a test runs these files"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),
     ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
     ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, nearest};
+use crate::error::{Error, unknown};
 
 /// Named columns of equal length.
 #[derive(Debug)]
@@ -92,10 +92,7 @@ impl Columns {
     pub fn only(&self, allowed: &[&str]) -> Result<(), Error> {
         let other = self.names.iter().find(|name| !allowed.contains(&name.as_str()));
         let Some(other) = other else { return Ok(()) };
-        let guess = nearest(other, allowed.iter().copied())
-            .map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-        let allowed = allowed.join(", ");
-        Err(self.at(0, format!("unknown column `{other}`{guess}; allowed: {allowed}")))
+        Err(self.at(0, unknown("column", other, allowed)))
     }
 
     /// An error of the file as a whole.

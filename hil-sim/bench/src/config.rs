@@ -77,7 +77,7 @@ impl Config {
     /// Sets one key; on an error nothing changes.
     ///
     /// # Errors
-    /// [`Error::UnknownKey`]; [`Error::Value`] with the key, the value and the allowed values.
+    /// [`Error::Unknown`]; [`Error::Value`] with the key, the value and the allowed values.
     pub fn set(&mut self, name: &str, value: &Value) -> Result<(), Error> {
         let (name, value) = alias::today(name, value);
         let mut changed = self.clone();

@@ -6,29 +6,17 @@ use std::path::{Path, PathBuf};
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// No experiment has this name.
-    #[error("there is no experiment `{name}`{}; `list` and `list --lab` show all of them", did_you_mean(.nearest))]
-    UnknownExperiment {
+    /// Nothing has this name.
+    #[error("there is no {what} `{name}`{}; {list}", did_you_mean(.nearest))]
+    Unknown {
+        /// What it should be a name of.
+        what: &'static str,
         /// The name that was given.
         name: String,
-        /// The experiment with the most similar name.
+        /// The most similar name.
         nearest: Option<String>,
-    },
-    /// No motor has this name.
-    #[error("there is no motor `{name}`{}; `motors` shows all of them, and a name that ends in .toml is a file", did_you_mean(.nearest))]
-    UnknownMotor {
-        /// The name that was given.
-        name: String,
-        /// The motor with the most similar name.
-        nearest: Option<String>,
-    },
-    /// No key has this name.
-    #[error("there is no key `{key}`{}; `keys` shows all of them", did_you_mean(.nearest))]
-    UnknownKey {
-        /// The name that was given.
-        key: String,
-        /// The key with the most similar name.
-        nearest: Option<String>,
+        /// Where the names are.
+        list: &'static str,
     },
     /// A key cannot have this value.
     #[error("{key} = {value}: {problem}; allowed: {allowed}")]
@@ -123,6 +111,21 @@ impl Error {
         Self::Refused(reason.to_string())
     }
 
+    /// The error of a name that is none of the known ones: that of a key, an experiment or a motor.
+    pub fn unknown<'a>(
+        what: &'static str,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        let list = match what {
+            "key" => "`keys` shows all of them",
+            "experiment" => "`list` and `list --lab` show all of them",
+            _ => "`motors` shows all of them, and a name that ends in .toml is a file",
+        };
+        let nearest = nearest(name, known.into_iter()).map(str::to_owned);
+        Self::Unknown { what, name: name.to_owned(), nearest, list }
+    }
+
     /// The error of a failure to write `path`.
     pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { path: path.to_owned(), source }
@@ -146,6 +149,12 @@ fn line_text(line: &Option<u64>) -> String {
 
 fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+}
+
+/// The message about a name that is none of those which are allowed.
+pub fn unknown(what: &str, name: &str, allowed: &[&str]) -> String {
+    let guess = nearest(name, allowed.iter().copied()).map(str::to_owned);
+    format!("unknown {what} `{name}`{}; allowed: {}", did_you_mean(&guess), allowed.join(", "))
 }
 
 /// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.

@@ -6,11 +6,9 @@ mod json;
 pub mod name;
 mod table;
 
-use serde::ser::{Serialize, Serializer};
-
 pub use figure::{Curve, Figure, Panel, Series, Style};
 pub use json::{SCHEMA_VERSION, group};
-pub use table::{Cell, Table};
+pub use table::{Cell, Column, Table};
 
 /// The outcome of an experiment.
 #[derive(Clone, Debug, Default)]
@@ -40,8 +38,8 @@ pub struct Outcome {
 const MOST_FAULTS: usize = 10;
 
 /// Numbers by name, in the order in which they were added.
-#[derive(Clone, Debug, Default)]
-pub struct Metrics(Vec<(String, f64)>);
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Metrics(#[serde(serialize_with = "json::as_map")] Vec<(String, f64)>);
 
 impl Metrics {
     /// Adds a number, or replaces the one of this name.
@@ -98,12 +96,6 @@ impl Metrics {
 
 fn is_flag(name: &str) -> bool {
     name == "lost" || name.ends_with("_lost")
-}
-
-impl Serialize for Metrics {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.iter())
-    }
 }
 
 /// One level of a torque experiment, averaged over its settled part.

@@ -312,16 +312,6 @@ fn mode_word(mode: Mode) -> &'static str {
     }
 }
 
-/// A quantity over time: means over `samples` points, at the time of the first of them.
-pub fn means_over(
-    samples: usize,
-    points: &[Point],
-    quantity: impl Fn(&Point) -> f64,
-) -> Vec<(f64, f64)> {
-    let mean = |part: &[Point]| part.iter().map(&quantity).sum::<f64>() / part.len() as f64;
-    points.chunks(samples).map(|part| (part[0].t, mean(part))).collect()
-}
-
 /// An angle in radians as degrees within ±180.
 pub fn wrapped_degrees(radians: f64) -> f64 {
     let turns = radians / TAU;

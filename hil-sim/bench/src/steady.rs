@@ -15,11 +15,12 @@ use crate::statistics::fault_code;
 use crate::stats::{Stats, exact};
 
 /// Operating point and seed of a run.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct OperatingPoint {
     /// Speed, rpm.
     pub rpm: f64,
     /// Torque current, A.
+    #[serde(rename = "iq_a")]
     pub iq: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -33,7 +34,7 @@ pub struct SteadyRun {
     /// Angle error, degrees.
     pub error: Stats,
     /// Mean torque, Nm.
-    #[serde(with = "exact")]
+    #[serde(with = "exact", rename = "torque_nm")]
     pub torque: f64,
     /// Whether the error went beyond 45° at any time, or the drive stopped itself.
     pub lost: bool,
@@ -62,15 +63,9 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
-    let mut rig = without_torque(&config.drive, config, case)?;
-    rig.command(&Command::Torque(case.iq as f32))?;
-    Ok(rig)
-}
-
-/// The same before it is given its torque; it may have stopped itself on the way.
-fn without_torque(drive: &Settings, config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
-    let mut rig = prepared(drive, config, case.seed)?;
+    let mut rig = prepared(&config.drive, config, case.seed)?;
     bring_up(&mut rig, case.rpm)?;
+    rig.command(&Command::Torque(case.iq as f32))?;
     Ok(rig)
 }
 

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use crate::config::motors::Motor;
 use crate::config::{Config, Key, Value, file};
-use crate::error::{Error, nearest};
+use crate::error::Error;
 use crate::experiments::{EVERYDAY, EXPERIMENTS, Experiment, WITH_INPUT};
 use crate::input::Input;
 use crate::outcome::{Cell, Table};
@@ -41,7 +41,7 @@ fn pretty(value: &serde_json::Value) -> Result<String, Error> {
 /// The keys that begin with `prefix`, or the configuration as TOML.
 ///
 /// # Errors
-/// As [`Input::config`]; [`Error::UnknownKey`] when no key begins so.
+/// As [`Input::config`]; [`Error::Unknown`] when no key begins so.
 pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String, Error> {
     let config = input.config()?;
     let prefix = prefix.unwrap_or_default();
@@ -51,12 +51,8 @@ pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String
         Key::all().chain(after).filter(|key| key.assigned_name().starts_with(prefix)).collect();
     if found.is_empty() {
         let groups = Key::all().filter_map(|key| key.name().split_once('.'));
-        let known: Vec<&str> =
-            groups.map(|(group, _)| group).chain(Key::all().map(Key::name)).collect();
-        return Err(Error::UnknownKey {
-            key: prefix.to_owned(),
-            nearest: nearest(prefix, known.into_iter()).map(str::to_owned),
-        });
+        let known = groups.map(|(group, _)| group).chain(Key::all().map(Key::name));
+        return Err(Error::unknown("key", prefix, known));
     }
     if as_toml {
         return Ok(file::toml(&config, &found));

@@ -8,18 +8,23 @@ use super::say;
 use crate::error::Error;
 use crate::experiments::{self, Context, Experiment};
 use crate::outcome::Outcome;
+use crate::report;
 use crate::shards::{self, Header, Journal, Shard};
 
 /// Which runs are done, and where they are kept.
 #[derive(Args, Default)]
 pub struct Part {
-    /// Do every Nth run only, from the Ith on, and print them as one JSON object for `merge`
+    /// Do every Nth run only, from the Ith on, and print them for `merge`; `env`: those of this job of an array of Slurm,
+    /// Kubernetes or AWS Batch
     #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "csv"])]
     shard: Option<Shard>,
     /// Keep every finished run in this file, or in a file of its own in this folder, and do not repeat those that are
     /// there
     #[arg(long, value_name = "PATH")]
     resume: Option<PathBuf>,
+    /// Write a CSV file with a row for each run: what was drawn for it, and what came out
+    #[arg(long, value_name = "FILE")]
+    rows: Option<PathBuf>,
 }
 
 impl Part {
@@ -39,7 +44,7 @@ impl Part {
         context: &Context<'_>,
         quiet: bool,
     ) -> Result<Option<Outcome>, Error> {
-        if self.shard.is_none() && self.resume.is_none() {
+        if self.shard.is_none() && self.resume.is_none() && self.rows.is_none() {
             return (experiment.run)(context).map(Some);
         }
         let statistical = experiments::statistical(experiment.name)?;
@@ -54,8 +59,11 @@ impl Part {
             note(journal, &header, quiet);
         }
         let runs = shards::runs(statistical, context, &header, journal.as_ref())?;
+        if let Some(path) = &self.rows {
+            report::write_whole(path, &report::of_table(&shards::rows(&runs))?)?;
+        }
         if self.is_shard() {
-            say(&format!("{}\n", shards::to_json(header, runs)?))?;
+            say(&shards::text(&header, &runs)?)?;
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();
@@ -65,11 +73,11 @@ impl Part {
 
 /// What was found in a journal, on standard error. A torn line is named even if little is to be said.
 fn note(journal: &Journal, header: &Header, quiet: bool) {
-    let path = journal.path().display();
-    if let Some(line) = journal.torn() {
+    let path = journal.path.display();
+    if let Some(line) = journal.torn {
         eprintln!("note: {path}, line {line}, was torn; its run is done again");
     }
-    let (done, all) = (journal.runs().len(), header.shard.numbers(header.runs).count());
+    let (done, all) = (journal.runs.len(), header.shard.numbers(header.runs).count());
     if done > 0 && !quiet {
         eprintln!("note: {done} of {all} runs are in {path}");
     }

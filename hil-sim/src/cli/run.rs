@@ -8,7 +8,7 @@ use super::part::Part;
 use super::{say, used};
 use crate::config::Config;
 use crate::error::Error;
-use crate::experiments::{self, Context, Experiment, identify_trace as trace};
+use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
 use crate::outcome::{self, Origin, Outcome};
 use crate::report::{self, Section};
@@ -114,12 +114,17 @@ pub fn run(
     part: &Part,
     output: &Output,
 ) -> Result<(), Error> {
-    let names = experiments::named(name);
-    let chosen: Vec<_> =
-        names.iter().map(|name| experiments::find(name)).collect::<Result<_, _>>()?;
-    if let Some(one) = chosen.first() {
+    let own = scenario::own(name);
+    let chosen: Vec<_> = match &own {
+        Some(own) => vec![own],
+        None => {
+            experiments::named(name).into_iter().map(experiments::find).collect::<Result<_, _>>()?
+        }
+    };
+    if let (None, Some(one)) = (&own, chosen.first()) {
         experiments::check_file(one, file)?;
     }
+    let file = file.or(own.as_ref().map(|_| Path::new(name)));
     let config = input.config()?;
     used::check(name, &chosen, input)?;
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
@@ -133,6 +138,7 @@ pub fn run(
         };
         let Some(outcome) = part.run(experiment, &context, input.quiet)? else { continue };
         let command = match file {
+            Some(_) if own.is_some() => format!("run {name}"),
             Some(file) => format!("run {} --input {}", experiment.name, file.display()),
             None => format!("run {}", experiment.name),
         };

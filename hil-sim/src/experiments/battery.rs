@@ -17,16 +17,16 @@ use std::sync::OnceLock;
 pub(super) use bench::{Bench, Moment};
 pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_nm};
 pub(super) use kind::{LoadTorque, Part, Shaft};
-pub(super) use run::{LONGEST_START_S, bring_up, follow};
+pub(super) use run::{LONGEST_START_S, bring_up, follow, held};
 pub use run::{learned, trial};
 pub use summary::Summary;
-pub use trial::Trial;
+pub use trial::{Refused, Trial, UNNOTICED_S};
 
 use drive_core::carrier::DemodulatorKind;
 use drive_core::{AngleSource, Drive};
 
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, built, check_model, plant_settings};
 use crate::error::Error;
@@ -136,7 +136,7 @@ impl Study for Battery {
                 kind.add(&mut bench);
                 trial(&bench, &plant_settings(&bench), drive, kind, seed)
             }
-            Err(fault) => Ok(Trial::refused(kind, seed, *fault)),
+            Err(fault) => Ok(Trial { kind: Some(kind), ..Trial::unlearned(seed, *fault) }),
         }
     }
 

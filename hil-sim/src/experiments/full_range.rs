@@ -15,12 +15,12 @@ use drive_core::{AngleSource, Drive};
 use drive_settings::Flux;
 
 use case::Case;
-use trial::{Run, Trial};
+use trial::Run;
 
-use super::battery::{Moment, learned};
+use super::assumptions;
+use super::battery::{Moment, Trial, learned};
 use super::commission::commissioned;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};
 use crate::error::Error;
@@ -132,24 +132,24 @@ impl FullRange {
     }
 
     /// Does a run; with `traced` it is recorded.
-    fn done(&self, number: usize, traced: bool) -> Result<(Run, Vec<Moment>), Error> {
+    fn done(&self, number: usize, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
         let (case, seed) = (self.case(number), seed_of(self.seed, number));
         let mut config = self.config.clone();
         trial::set_up(case, &mut config);
         let mut bench = config.after_learning()?;
         let drive = match self.drive(case, &config)? {
-            Err(fault) => return Ok((Run::unlearned(seed, *fault), Vec::new())),
+            Err(fault) => return Ok((Trial::unlearned(seed, *fault), Vec::new())),
             Ok(drive) => drive,
         };
         if case.kind == RangeKind::WrongParameters {
             bench = self.changed(number, &bench);
         }
-        Trial::new(case, &bench, drive, seed, traced)?.run(seed)
+        Run::new(case, &bench, drive, seed, traced)?.run()
     }
 }
 
 impl Study for FullRange {
-    type Record = Run;
+    type Record = Trial;
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
@@ -171,13 +171,13 @@ impl Study for FullRange {
         self.numbers.len()
     }
 
-    fn run(&self, place: usize) -> Result<Run, Error> {
+    fn run(&self, place: usize) -> Result<Trial, Error> {
         Ok(self.done(self.numbers[place], false)?.0)
     }
 
-    fn outcome(&self, _: &Context<'_>, runs: Vec<Run>) -> Result<Outcome, Error> {
+    fn outcome(&self, _: &Context<'_>, runs: Vec<Trial>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
-        let done: Vec<(Case, usize, Run)> =
+        let done: Vec<(Case, usize, Trial)> =
             self.numbers.iter().zip(runs).map(|(&n, run)| (self.case(n), n, run)).collect();
         summary::of(&self.cases, &done, &mut outcome);
         if let Some(index) = self.config.full_range.index {

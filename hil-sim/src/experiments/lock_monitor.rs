@@ -2,15 +2,15 @@
 
 mod trials;
 
-use serde::{Deserialize, Serialize};
-
-use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
+pub use self::trials::Trial;
+use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
+use crate::columns;
 use crate::config::Config;
 use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::outcome::{Cell, Column, Figure, Outcome, Panel, Series, Table};
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.
@@ -42,19 +42,6 @@ pub struct LockMonitor {
     config: Config,
     seed: u64,
     runs: usize,
-}
-
-/// The result of a trial.
-#[derive(Serialize, Deserialize)]
-pub enum Trial {
-    /// The angle forced off.
-    Forced(ForcedTrial),
-    /// A run that the drive must not stop.
-    Healthy(HealthyRun),
-    /// A shaft driven past the limit.
-    OverSpeed(OverSpeedTrial),
-    /// A start or a relock on a turning shaft.
-    Start(StartTrial),
 }
 
 impl LockMonitor {
@@ -100,40 +87,33 @@ impl Study for LockMonitor {
                 // The figure shows the first.
                 trial.loss.clear();
             }
-            return Ok(Trial::Forced(trial));
+            return Ok(trial);
         }
         n -= OFFSETS.len() * self.runs;
         if n < self.healthy_runs() {
             let kind = KINDS[n % KINDS.len()];
-            return trials::healthy(&self.config, seed(10, n), kind).map(Trial::Healthy);
+            return trials::healthy(&self.config, seed(10, n), kind);
         }
         n -= self.healthy_runs();
         if n < self.runs {
             let limit = self.over_speed_limit();
-            return trials::over_speed(&self.config, seed(11, n), limit).map(Trial::OverSpeed);
+            return trials::over_speed(&self.config, seed(11, n), limit);
         }
         n -= self.runs;
         let (group, n) = (n / self.starts_each(), n % self.starts_each());
         let (rpm, relock) = (START_RPM[group / 2], group % 2 == 1);
-        trials::start(&self.config, rpm, seed(20 + group, n), relock).map(Trial::Start)
+        trials::start(&self.config, rpm, seed(20 + group, n), relock)
     }
 
     fn outcome(&self, _: &Context<'_>, records: Vec<Trial>) -> Result<Outcome, Error> {
-        let (mut forced, mut healthy) = (Vec::new(), Vec::new());
-        let (mut over_speed, mut starts) = (Vec::new(), Vec::new());
-        for trial in records {
-            match trial {
-                Trial::Forced(trial) => forced.push(trial),
-                Trial::Healthy(run) => healthy.push(run),
-                Trial::OverSpeed(trial) => over_speed.push(trial),
-                Trial::Start(trial) => starts.push(trial),
-            }
-        }
         let mut outcome = Outcome::default();
-        self.forced(&forced, &mut outcome);
-        Self::healthy(&healthy, &mut outcome);
-        self.over_speed(&over_speed, &mut outcome);
-        self.starts(&starts, &mut outcome);
+        let (forced, rest) = records.split_at(OFFSETS.len() * self.runs);
+        let (healthy, rest) = rest.split_at(self.healthy_runs());
+        let (over_speed, starts) = rest.split_at(self.runs);
+        self.forced(forced, &mut outcome);
+        self.healthy(healthy, &mut outcome);
+        self.over_speed(over_speed, &mut outcome);
+        self.starts(starts, &mut outcome);
         outcome.metrics.set("runs", self.runs as f64);
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(format!(
@@ -146,67 +126,88 @@ impl Study for LockMonitor {
 }
 
 impl LockMonitor {
-    fn forced(&self, all: &[ForcedTrial], outcome: &mut Outcome) {
-        let mut table = Table::new("Angle forced off: how long it stays wrong", &[]);
-        let mut late = Table::new("Not in time", &[]);
-        let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
-        let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
-        for ((degrees, name), trials) in OFFSETS.into_iter().zip(all.chunks(self.runs)) {
+    /// The columns of all trials; tables take some of them.
+    fn columns(&self) -> Vec<Column<'_, Trial>> {
+        let fault = |r: &Trial| r.fault.map(|fault| fault.to_string()).unwrap_or_default();
+        columns![|n, r: &Trial|
+            "forced by (°)" => Cell::or_dash(OFFSETS.get(n / self.runs).map(|o| Cell::fixed(o.0, 0)));
+            "seed" => Cell::from(r.case.seed.to_string());
+            "kind" => Cell::from(r.kind.map_or("", HealthyKind::name));
+            "iq (A)" => Cell::fixed(r.case.iq, 3);
+            "speed (rpm)" => Cell::fixed(r.case.rpm, 1);
+            "wrong for (s)" => Cell::fixed(r.wrong_s, 3);
+            "fault" => Cell::from(fault(r));
+            "rpm/s" => Cell::fixed(r.rpm_per_s, 0);
+        ]
+    }
+
+    /// A table of those trials of a part which something is wrong with, with these of the columns; none without trials.
+    fn listed<const N: usize>(
+        &self,
+        title: &str,
+        heads: [&str; N],
+        trials: Vec<(usize, &Trial)>,
+        outcome: &mut Outcome,
+    ) {
+        let mut columns = self.columns();
+        columns.retain(|column| heads.contains(&column.head));
+        if !trials.is_empty() {
+            outcome.tables.push(Table::of(title, &columns, trials));
+        }
+    }
+
+    fn forced(&self, all: &[Trial], outcome: &mut Outcome) {
+        let parts: Vec<_> = OFFSETS.into_iter().zip(all.chunks(self.runs)).collect();
+        let wrong = |trials: &[Trial], share: f64| {
             let mut wrong: Vec<f64> = trials.iter().map(|t| t.wrong_s).collect();
             wrong.sort_by(f64::total_cmp);
-            let at = |share: f64| {
-                wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
-            };
-            let stopped = trials.iter().filter(|t| t.fault.is_some()).count();
-            let missed: Vec<&ForcedTrial> = trials.iter().filter(|t| !t.is_in_time()).collect();
-            let count = |n: usize| Cell::fixed(n as f64, 0);
-            table.record([
-                ("forced by (°)", Cell::fixed(degrees, 0)),
-                ("trials", count(trials.len())),
-                ("stopped", count(stopped)),
-                ("recovered", count(trials.len() - stopped)),
-                ("median (s)", Cell::fixed(at(0.5), 3)),
-                ("99 % (s)", Cell::fixed(at(0.99), 3)),
-                ("longest (s)", Cell::fixed(at(1.0), 3)),
-                ("not in time", count(missed.len())),
-            ]);
-            for t in &missed {
-                late.record([
-                    ("forced by (°)", Cell::fixed(degrees, 0)),
-                    ("seed", Cell::from(t.case.seed.to_string())),
-                    ("iq (A)", Cell::fixed(t.case.iq, 3)),
-                    ("speed (rpm)", Cell::fixed(t.case.rpm, 1)),
-                    ("wrong for (s)", Cell::fixed(t.wrong_s, 3)),
-                ]);
-            }
+            wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
+        };
+        let stopped = |trials: &[Trial]| trials.iter().filter(|t| t.fault.is_some()).count();
+        let missed = |trials: &[Trial]| trials.iter().filter(|t| !t.is_in_time()).count();
+        let count = |n: usize| Cell::fixed(n as f64, 0);
+        let columns = columns![|_, ((degrees, _), trials): &((f64, &str), &[Trial])|
+            "forced by (°)" => Cell::fixed(*degrees, 0);
+            "trials" => count(trials.len());
+            "stopped" => count(stopped(trials));
+            "recovered" => count(trials.len() - stopped(trials));
+            "median (s)" => Cell::fixed(wrong(trials, 0.5), 3);
+            "99 % (s)" => Cell::fixed(wrong(trials, 0.99), 3);
+            "longest (s)" => Cell::fixed(wrong(trials, 1.0), 3);
+            "not in time" => count(missed(trials));
+        ];
+        let title = "Angle forced off: how long it stays wrong";
+        outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
+        let late = all.iter().enumerate().filter(|(_, t)| !t.is_in_time()).collect();
+        let heads = ["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"];
+        self.listed("Not in time", heads, late, outcome);
+        let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
+        let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
+        for ((degrees, name), trials) in parts {
             let m = &mut outcome.metrics;
-            m.set(format!("not_in_time_{name}"), missed.len() as f64);
-            m.set(format!("stopped_{name}"), stopped as f64);
-            m.set(format!("wrong_longest_{name}_s"), at(1.0));
+            m.set(format!("not_in_time_{name}"), missed(trials) as f64);
+            m.set(format!("stopped_{name}"), stopped(trials) as f64);
+            m.set(format!("wrong_longest_{name}_s"), wrong(trials, 1.0));
             let label = format!("{degrees}°");
             let points = trials.iter().map(|t| (t.case.iq, t.wrong_s)).collect();
             times = times.with(Series::points(label.clone(), points));
             losses = losses.with(Series::line(label, trials[0].loss.clone()));
         }
-        outcome.tables.push(table);
-        if !late.rows.is_empty() {
-            outcome.tables.push(late);
-        }
-        outcome
-            .figures
-            .push(Figure::new("forced", "Angle forced off", "").panel(times).panel(losses));
+        let figure = Figure::new("forced", "Angle forced off", "").panel(times).panel(losses);
+        outcome.figures.push(figure);
     }
 
-    fn healthy(runs: &[HealthyRun], outcome: &mut Outcome) {
-        let alarms: Vec<&HealthyRun> = runs.iter().filter(|r| r.fault.is_some()).collect();
-        let largest = |of: fn(&HealthyRun) -> f64| runs.iter().map(of).fold(0.0, f64::max);
-        let bound = upper_bound_95(alarms.len() as u64, runs.len() as u64);
+    fn healthy(&self, runs: &[Trial], outcome: &mut Outcome) {
+        let alarms: Vec<_> = runs.iter().enumerate().filter(|(_, r)| r.fault.is_some()).collect();
+        let largest = |of: fn(&Trial) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let (largest_loss, bound) =
+            (largest(|r| r.largest_loss), upper_bound_95(alarms.len() as u64, runs.len() as u64));
         let m = &mut outcome.metrics;
         m.set("false_alarms", alarms.len() as f64);
         m.set("false_alarm_runs", runs.len() as f64);
         m.set("false_alarm_rate_95", bound);
-        m.set("healthy_loss_max", largest(|r| r.largest_loss));
-        m.set("healthy_error_max_deg", largest(|r| r.largest_error));
+        m.set("healthy_loss_max", largest_loss);
+        m.set("healthy_error_max_deg", largest(|r| r.largest_deg));
         let mut table = Table::new("False alarms", &[]).note(
             "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
              within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
@@ -215,35 +216,24 @@ impl LockMonitor {
             ("runs", Cell::fixed(runs.len() as f64, 0)),
             ("false alarms", Cell::fixed(alarms.len() as f64, 0)),
             ("rate per run, 95 % bound", Cell::significant(bound, 2)),
-            ("largest loss seen", Cell::fixed(largest(|r| r.largest_loss), 2)),
+            ("largest loss seen", Cell::fixed(largest_loss, 2)),
         ]);
         outcome.tables.push(table);
-        if !alarms.is_empty() {
-            let mut table = Table::new("Every false alarm", &[]);
-            for r in alarms {
-                table.record([
-                    ("seed", Cell::from(r.case.seed.to_string())),
-                    ("kind", Cell::from(r.kind.name())),
-                    ("iq (A)", Cell::fixed(r.case.iq, 3)),
-                    ("speed (rpm)", Cell::fixed(r.case.rpm, 1)),
-                    ("fault", Cell::from(r.fault.map(|f| f.to_string()).unwrap_or_default())),
-                ]);
-            }
-            outcome.tables.push(table);
-        }
+        let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
+        self.listed("Every false alarm", heads, alarms, outcome);
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
         for kind in KINDS {
-            let of_kind = runs.iter().filter(|r| r.kind == kind);
+            let of_kind = runs.iter().filter(|r| r.kind == Some(kind));
             let points = of_kind.map(|r| (r.case.iq, r.largest_loss)).collect();
             panel = panel.with(Series::points(kind.name(), points));
         }
         outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
     }
 
-    fn over_speed(&self, trials: &[OverSpeedTrial], outcome: &mut Outcome) {
+    fn over_speed(&self, trials: &[Trial], outcome: &mut Outcome) {
         let limit = self.over_speed_limit();
-        let late: Vec<&OverSpeedTrial> =
-            trials.iter().filter(|t| t.fault.is_none() || t.late_s > OVER_SPEED_S).collect();
+        let is_late = |t: &Trial| t.fault.is_none() || t.late_s > OVER_SPEED_S;
+        let late: Vec<_> = trials.iter().enumerate().filter(|(_, t)| is_late(t)).collect();
         let latest = trials.iter().map(|t| t.late_s).fold(0.0, f64::max);
         let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
         outcome.metrics.set("over_speed_late", late.len() as f64);
@@ -258,39 +248,26 @@ impl LockMonitor {
             ("not in time", Cell::fixed(late.len() as f64, 0)),
         ]);
         outcome.tables.push(table);
-        if !late.is_empty() {
-            let mut table = Table::new("Over-speed not in time", &["seed", "iq (A)", "rpm/s"]);
-            for t in late {
-                let seed = Cell::from(t.case.seed.to_string());
-                table.row([seed, Cell::fixed(t.case.iq, 3), Cell::fixed(t.rpm_per_s, 0)]);
-            }
-            outcome.tables.push(table);
-        }
+        self.listed("Over-speed not in time", ["seed", "iq (A)", "rpm/s"], late, outcome);
     }
 
-    fn starts(&self, all: &[StartTrial], outcome: &mut Outcome) {
+    fn starts(&self, all: &[Trial], outcome: &mut Outcome) {
         let each = self.starts_each();
-        let mut table = Table::new("Starts and relocks accepted on a turning shaft", &[]);
-        let (mut wrong_all, mut refused_at_rest) = (0, 0);
-        for (rpm, trials) in START_RPM.into_iter().zip(all.chunks(2 * each)) {
-            let (starts, relocks) = trials.split_at(each);
-            let accepted = |all: &[StartTrial]| all.iter().filter(|s| s.accepted).count();
-            let wrong = trials.iter().filter(|s| !s.is_honest()).count();
-            if rpm == 0.0 {
-                refused_at_rest = 2 * each - accepted(starts) - accepted(relocks);
-            }
-            let count = |n: usize| Cell::fixed(n as f64, 0);
-            table.record([
-                ("speed (rpm)", Cell::fixed(rpm, 0)),
-                ("of each", count(each)),
-                ("starts", count(accepted(starts))),
-                ("relocks", count(accepted(relocks))),
-                ("accepted at a wrong angle", count(wrong)),
-            ]);
-            wrong_all += wrong;
-        }
-        outcome.metrics.set("refused_at_rest", refused_at_rest as f64);
-        outcome.metrics.set("wrong_starts", wrong_all as f64);
-        outcome.tables.push(table);
+        let parts: Vec<_> = START_RPM.into_iter().zip(all.chunks(2 * each)).collect();
+        let count = |trials: &[Trial], is: fn(&Trial) -> bool| {
+            trials.iter().filter(|trial| is(trial)).count() as f64
+        };
+        let columns = columns![|_, (rpm, trials): &(f64, &[Trial])|
+            "speed (rpm)" => Cell::fixed(*rpm, 0);
+            "of each" => Cell::fixed(each as f64, 0);
+            "starts" => Cell::fixed(count(&trials[..each], |s| s.accepted), 0);
+            "relocks" => Cell::fixed(count(&trials[each..], |s| s.accepted), 0);
+            "accepted at a wrong angle" => Cell::fixed(count(trials, |s| !s.is_honest()), 0);
+        ];
+        let title = "Starts and relocks accepted on a turning shaft";
+        outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
+        let at_rest = |s: &Trial| s.case.rpm == 0.0 && !s.accepted;
+        outcome.metrics.set("refused_at_rest", count(all, at_rest));
+        outcome.metrics.set("wrong_starts", count(all, |s| !s.is_honest()));
     }
 }

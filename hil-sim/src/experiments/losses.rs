@@ -1,16 +1,16 @@
 //! Copper loss of the motor against the least one that its torque can have, with and without `flux.economy`.
 
-use drive_core::{Command, Drive, Mode};
+use drive_core::Drive;
 
-use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up};
+use super::assumptions;
+use super::battery::held;
 use super::full_range::for_the_range;
-use super::torque::assumptions;
 use super::torque_limit::learned_limit;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
 use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
-use crate::plant::{Load, MachineSettings};
+use crate::plant::MachineSettings;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -78,15 +78,9 @@ fn measure(
     (nm, mut i_q): (f64, f64),
     seed: u64,
 ) -> Result<[f64; 3], Error> {
-    let on = |regulates: bool| {
-        let lost = || Error::Refused(format!("the drive did not regulate {nm:.2} Nm"));
-        regulates.then_some(()).ok_or_else(lost)
-    };
-    let plant = plant_settings(config);
-    let mut bench = Bench::new(config, &plant, drive, Load::Speed { speed: 0.0 }, seed)?;
-    bench.rig.command(&Command::Start(Mode::Torque))?;
-    on(bench.wait(LONGEST_START_S).regulates())?;
-    on(bring_up(&mut bench, Shaft::Held(RPM), config)?)?;
+    let lost = || Error::Refused(format!("the drive did not regulate {nm:.2} Nm"));
+    let on = |regulates: bool| regulates.then_some(()).ok_or_else(lost);
+    let mut bench = held(config, drive, RPM, seed)?.ok_or_else(lost)?;
     for _ in 0..CORRECTIONS {
         bench.torque(i_q as f32)?;
         on(bench.watch(CORRECTED_S))?;
@@ -96,7 +90,7 @@ fn measure(
     let mut mean = [0.0; 3];
     for _ in 0..SAMPLES {
         on(bench.watch(SAMPLE_S))?;
-        let (plant, machine) = (&bench.rig.plant, &plant.machine);
+        let (plant, machine) = (&bench.rig.plant, plant_settings(config).machine);
         let (psi, i) = (plant.rotor_flux(), plant.current());
         let rotor = (psi - i * machine.lm) / (machine.lm + machine.llr);
         let loss = 1.5 * (machine.rs * i.norm_sqr() + machine.rr * rotor.norm_sqr());

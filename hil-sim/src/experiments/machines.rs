@@ -1,14 +1,16 @@
 //! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
 //! drawn around it.
 
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::assumptions;
+use super::commission::machine::around;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::{Config, PlantModel, plant_settings};
+use crate::columns;
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::Rig;
@@ -103,24 +105,10 @@ pub(super) fn runs(
     Ok(runs)
 }
 
-/// A machine whose resistances, inductances and saliencies are each multiplied by a factor of its own, and whose drive
-/// knows the circuit.
+/// A machine drawn around the motor, whose drive knows the circuit.
 fn drawn(config: &Config, seed: u64) -> Config {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let most = config.spread.machine.ln();
-    let mut factor = || random.random_range(-most..=most).exp();
-    let mut drawn = config.clone();
-    let saliency = plant_settings(config).saliency;
-    let (m, leakage) = (&mut drawn.motor, factor());
-    m.r_s *= factor();
-    m.r_r *= factor();
-    m.l_m *= factor();
-    m.l_ls *= leakage;
-    m.l_lr *= leakage;
-    if config.model.plant == PlantModel::A {
-        drawn.saliency.a_psi = saliency.a_psi * factor();
-        drawn.saliency.b1 = Some(saliency.b1 * factor());
-    }
+    let mut drawn = around(config, &mut random, config.spread.machine);
     let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
     (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);
     (drive.l_ls, drive.l_lr, drive.l_m) = (m.l_ls as f32, m.l_lr as f32, m.l_m as f32);
@@ -203,27 +191,24 @@ impl Study for Machines {
             m.set("largest_deg", machines.iter().map(Machine::largest).fold(0.0, f64::max));
         }
         let title = if self.draws { "Machines, the worst first" } else { "The motor" };
-        let mut table = Table::new(title, &[]).note(format!(
-            "Good: every run within {}° rms and {}° at most, none lost.",
-            GOOD_DEG.0, GOOD_DEG.1
-        ));
-        for machine in machines.iter().take(LISTED) {
-            let (motor, drive) = (&machine.config.motor, &machine.config.drive);
-            let saliency = plant_settings(&machine.config).saliency;
-            table.record([
-                ("r_s (ohm)", Cell::fixed(motor.r_s, 3)),
-                ("r_r (ohm)", Cell::fixed(motor.r_r, 3)),
-                ("σL_s (mH)", Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2)),
-                ("L_m (mH)", Cell::fixed(1e3 * motor.l_m, 1)),
-                ("a (%)", Cell::fixed(100.0 * saliency.a_psi, 2)),
-                ("b (%/A)", Cell::fixed(100.0 * saliency.b1, 2)),
-                ("carrier (V)", Cell::fixed(drive.carrier_v().into(), 1)),
-                ("worst rms (°)", Cell::fixed(machine.rms(), 2)),
-                ("largest (°)", Cell::fixed(machine.largest(), 2)),
-                ("verdict", Cell::from(machine.verdict())),
-            ]);
-        }
-        outcome.tables.push(table);
+        let saliency = |m: &Machine| plant_settings(&m.config).saliency;
+        let sigma_l_s = |m: &Machine| f64::from(m.config.drive.motor.sigma_l_s());
+        let columns = columns![|_, m: &Machine|
+            "r_s (ohm)" => Cell::fixed(m.config.motor.r_s, 3);
+            "r_r (ohm)" => Cell::fixed(m.config.motor.r_r, 3);
+            "σL_s (mH)" => Cell::fixed(1e3 * sigma_l_s(m), 2);
+            "L_m (mH)" => Cell::fixed(1e3 * m.config.motor.l_m, 1);
+            "a (%)" => Cell::fixed(100.0 * saliency(m).a_psi, 2);
+            "b (%/A)" => Cell::fixed(100.0 * saliency(m).b1, 2);
+            "carrier (V)" => Cell::fixed(m.config.drive.carrier_v().into(), 1);
+            "worst rms (°)" => Cell::fixed(m.rms(), 2);
+            "largest (°)" => Cell::fixed(m.largest(), 2);
+            "verdict" => Cell::from(m.verdict());
+        ];
+        let (rms, most) = GOOD_DEG;
+        let note = format!("Good: every run within {rms}° rms and {most}° at most, none lost.");
+        let listed = machines.iter().take(LISTED).enumerate();
+        outcome.tables.push(Table::of(title, &columns, listed).note(note));
         let points = |of: &dyn Fn(&Machine) -> f64| -> Vec<(f64, f64)> {
             let sound = machines.iter().filter(|m| m.runs.is_ok());
             sound.map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()

@@ -3,10 +3,11 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::assumptions;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
+use crate::columns;
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
@@ -94,26 +95,22 @@ impl Study for MonteCarlo {
         m.set("lost_runs", (runs.len() - kept.len()) as f64);
         m.set("runs", runs.len() as f64);
 
-        let of_case = |case: &OperatingPoint| {
-            [Cell::from(case.seed.to_string()), Cell::fixed(case.iq, 3), Cell::fixed(case.rpm, 1)]
-        };
-        let mut table = Table::new("Lost runs", &["seed", "iq (A)", "speed (rpm)"]);
-        for run in runs.iter().filter(|run| run.lost) {
-            table.row(of_case(&run.case));
+        let columns = columns![|_, run: &SteadyRun|
+            "seed" => Cell::from(run.case.seed.to_string());
+            "iq (A)" => Cell::fixed(run.case.iq, 3);
+            "speed (rpm)" => Cell::fixed(run.case.rpm, 1);
+            "rms (°)" => Cell::fixed(run.error.rms(), 2);
+            "mean (°)" => Cell::fixed(run.error.mean(), 2);
+            "largest (°)" => Cell::fixed(run.error.largest(), 2);
+        ];
+        if kept.len() < runs.len() {
+            let lost = runs.iter().filter(|run| run.lost).enumerate();
+            outcome.tables.push(Table::of("Lost runs", &columns[..3], lost));
         }
-        if !table.rows.is_empty() {
-            outcome.tables.push(table);
-        }
-        let heads = ["seed", "iq (A)", "speed (rpm)", "rms (°)", "mean (°)", "largest (°)"];
-        let mut table = Table::new("Worst runs", &heads);
         let mut by_rms = kept.clone();
         by_rms.sort_by(|a, b| b.error.rms().total_cmp(&a.error.rms()));
-        for run in by_rms.iter().take(WORST) {
-            let error = &run.error;
-            let errors = [error.rms(), error.mean(), error.largest()];
-            table.row(of_case(&run.case).into_iter().chain(errors.map(|e| Cell::fixed(e, 2))));
-        }
-        outcome.tables.push(table);
+        let worst = by_rms.into_iter().take(WORST).enumerate();
+        outcome.tables.push(Table::of("Worst runs", &columns, worst));
         let points = |of: fn(&SteadyRun) -> f64| kept.iter().map(|r| (r.case.iq, of(r))).collect();
         outcome.figures.push(
             Figure::new("runs", "Angle error of every run over its torque current", "").panel(

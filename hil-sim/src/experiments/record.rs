@@ -5,11 +5,12 @@ mod held;
 use drive_core::Command;
 
 use self::held::{Held, Standstill, reversing};
+use super::assumptions;
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
-use super::torque::assumptions;
 use super::torque_limit::{BEYOND_A, TorqueLimit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
+use crate::columns;
 use crate::config::{Config, open_phase, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -144,30 +145,25 @@ fn hold(config: &Config, mut rig: Rig, course: Course, i_q: f64) -> Result<Held,
 }
 
 fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
-    let mut table = Table::new("The torque limit held", &[]).note(
+    let degrees = |value: f64| Cell::fixed(value, 2);
+    let columns = columns![|n, held: &Held|
+        "course" => Cell::from(COURSES[n].0.name());
+        "torque (Nm)" => Cell::fixed(COURSES[n].1 * torque.nm, 2);
+        "of rated (%)" => Cell::fixed(COURSES[n].1 * torque.percent, 0);
+        "mean error (°)" => degrees(held.error.mean());
+        "first (°)" => degrees(held.first.mean());
+        "last (°)" => degrees(held.last.mean());
+        "rms (°)" => degrees(held.error.rms());
+        "largest (°)" => degrees(held.error.largest());
+        "torque of the command (%)" =>
+            Cell::fixed(100.0 * held.torque.mean() / (COURSES[n].1 * torque.nm), 2);
+        "speed (rpm)" => Cell::fixed(held.speed.mean(), 2);
+        "end" => Cell::from(held.fault.as_deref().unwrap_or("regulates"));
+    ];
+    Table::of("The torque limit held", &columns, all.iter().enumerate()).note(
         "First and last: means over the first and the last minute, or tenth of a shorter time than ten minutes. Torque: mean in relation to that of the \
          current; it includes the shape of the error.",
-    );
-    for ((course, sign), held) in COURSES.iter().zip(all) {
-        let degrees = |value: f64| Cell::fixed(value, 2);
-        table.record([
-            ("course", Cell::from(course.name())),
-            ("torque (Nm)", Cell::fixed(sign * torque.nm, 2)),
-            ("of rated (%)", Cell::fixed(sign * torque.percent, 0)),
-            ("mean error (°)", degrees(held.error.mean())),
-            ("first (°)", degrees(held.first.mean())),
-            ("last (°)", degrees(held.last.mean())),
-            ("rms (°)", degrees(held.error.rms())),
-            ("largest (°)", degrees(held.error.largest())),
-            (
-                "torque of the command (%)",
-                Cell::fixed(100.0 * held.torque.mean() / (sign * torque.nm), 2),
-            ),
-            ("speed (rpm)", Cell::fixed(held.speed.mean(), 2)),
-            ("end", Cell::from(held.fault.clone().unwrap_or_else(|| "regulates".to_owned()))),
-        ]);
-    }
-    table
+    )
 }
 
 fn held_figure(course: Course, all: &[Held]) -> Figure {

@@ -3,17 +3,17 @@
 use std::f64::consts::TAU;
 
 use drive_core::Mode;
-use drive_core::carrier::CARRIER_SAMPLES;
 
-use super::position::{final_error_deg, overshoot_and_settling, step};
-use super::torque::assumptions;
+use super::assumptions;
+use super::scenario::{Metric, Record, Statistic, position_step};
 use super::{BENCH, Context, DRIVE, Experiment, learning};
+use crate::columns;
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, means_over};
+use crate::rig::Rig;
 use crate::stats::{Stats, StraightLine};
 use drive_core::AngleSource;
 
@@ -112,8 +112,8 @@ fn hold(
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, seed) = (context.config, context.seed);
     let step_s = context.seconds.unwrap_or(STEP_S);
-    let (with, fault_with) = step(config, AngleSource::Encoder, seed, step_s)?;
-    let (without, fault_without) = step(config, AngleSource::Injection, seed, step_s)?;
+    let [with, without] = [true, false].map(|encoder| position_step(context, encoder, step_s));
+    let (with, without) = (with?, without?);
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
     let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
@@ -124,24 +124,32 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
-    outcome.faults.extend(fault_with.map(|fault| format!("with the encoder: {fault}")));
-    outcome.faults.extend(fault_without.map(|fault| format!("without it: {fault}")));
+    for (record, which) in [(&with, "with the encoder"), (&without, "without it")] {
+        outcome.faults.extend(record.fault.iter().map(|fault| format!("{which}: {fault}")));
+    }
     let stopped = |h: &HeldPosition| {
         let fault = h.fault.as_ref()?;
         Some(format!("held under {} Nm: {fault}", h.load_nm))
     };
     outcome.faults.extend(held.iter().filter_map(stopped));
     let m = &mut outcome.metrics;
-    for (points, suffix) in [(&without, ""), (&with, "_encoder")] {
-        let (overshoot, settling) = overshoot_and_settling(points);
-        m.set(format!("overshoot{suffix}_pct"), overshoot);
-        m.set(format!("settling{suffix}_s"), settling);
-        m.set(format!("final_error{suffix}_deg"), final_error_deg(points));
-        let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
-        m.set(format!("angle_error{suffix}_rms_deg"), error.rms());
-        m.set(format!("angle_error{suffix}_max_deg"), error.largest());
-        let seen = points.iter().map(|p| (p.turns_estimate - p.turns) * 360.0);
-        m.set(format!("position_estimate_error{suffix}_max_deg"), Stats::of(seen).largest());
+    for (record, suffix) in [(&without, ""), (&with, "_encoder")] {
+        let mut set = |name: &str, unit: &str, of: &str, statistic: Statistic| {
+            // It has arrived within one mechanical degree.
+            let metric = Metric { within: 1.0 / 360.0, ..Metric::of(name, of, statistic) };
+            m.set(format!("{name}{suffix}_{unit}"), record.statistic(&metric));
+        };
+        set("overshoot", "pct", "position_turns", Statistic::Overshoot);
+        set("settling", "s", "reference_error", Statistic::Settling);
+        set("final_error", "deg", "position_error_deg", Statistic::Last);
+        set("angle_error", "rms_deg", "angle_error_deg", Statistic::Rms);
+        set("angle_error", "max_deg", "angle_error_deg", Statistic::Largest);
+        set(
+            "position_estimate_error",
+            "max_deg",
+            "position_estimate_error_deg",
+            Statistic::Largest,
+        );
     }
     let of = |belief: (f64, bool)| held.iter().filter(move |h| h.belief == belief);
     let drift = |belief| of(belief).map(|h| h.drift().abs()).fold(0.0, f64::max);
@@ -161,26 +169,24 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("drift_deg_per_min_a_per_pct_rr", (per_ampere(BELIEFS[2]) - base) / 10.0);
     m.set("drift_learned_deg_per_min_a", per_ampere(BELIEFS[3]));
     m.set("wander_deg", held[0].wander());
-    let rest = without.iter().filter(|p| p.t > 4.0);
+    let rest = without.points.iter().filter(|p| p.t > 4.0);
     m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
     m.set("stopped_runs", held.iter().filter(|h| h.fault.is_some()).count() as f64);
 
-    let mut table = Table::new("Drift of a position that is held", &[]).note(
+    let columns = columns![|_, h: &HeldPosition|
+        "load (Nm)" => Cell::fixed(h.load_nm, 1);
+        "r_r, true over believed" => Cell::fixed(h.belief.0, 2);
+        "learned so" => Cell::from(if h.belief.1 { "yes" } else { "no" });
+        "mean iq (A)" => Cell::fixed(h.iq, 2);
+        "drift (°/min)" => Cell::fixed(h.drift(), 1);
+        "beside it (° rms)" => Cell::fixed(h.wander(), 2);
+        "angle error rms (°)" => Cell::fixed(h.angle_error.rms(), 2);
+    ];
+    let table = Table::of("Drift of a position that is held", &columns, held.iter().enumerate());
+    outcome.tables.push(table.note(
         "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \
          the load.",
-    );
-    for h in &held {
-        table.record([
-            ("load (Nm)", Cell::fixed(h.load_nm, 1)),
-            ("r_r, true over believed", Cell::fixed(h.belief.0, 2)),
-            ("learned so", Cell::from(if h.belief.1 { "yes" } else { "no" })),
-            ("mean iq (A)", Cell::fixed(h.iq, 2)),
-            ("drift (°/min)", Cell::fixed(h.drift(), 1)),
-            ("beside it (° rms)", Cell::fixed(h.wander(), 2)),
-            ("angle error rms (°)", Cell::fixed(h.angle_error.rms(), 2)),
-        ]);
-    }
-    outcome.tables.push(table);
+    ));
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     outcome.remarks = assumptions(config);
@@ -200,20 +206,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn step_figure(without: &[Point], with: &[Point]) -> Figure {
-    let x = "time (s)";
-    let panel = |label: &str, of: fn(&Point) -> f64| {
-        let line = |points: &[Point]| means_over(CARRIER_SAMPLES, points, of);
-        Panel::new(x, label)
+fn step_figure(without: &Record, with: &Record) -> Figure {
+    let panel = |label: &str, of: &str| {
+        let line = |record: &Record| record.means(of);
+        Panel::new("time (s)", label)
             .with(Series::line("without encoder", line(without)))
             .with(Series::line("with encoder", line(with)))
     };
     Figure::new("step", "Position step without and with the encoder", "Figure 37")
-        .panel(panel("position (° mechanical)", |p| p.turns * 360.0))
-        .panel(panel("seen − true (° mechanical)", |p| (p.turns_estimate - p.turns) * 360.0))
-        .panel(panel("speed (rpm)", |p| p.speed_rpm))
-        .panel(panel("quadrature current (A)", |p| p.iq))
-        .panel(panel("flux angle error (° electrical)", |p| p.angle_error_deg))
+        .panel(panel("position (° mechanical)", "position_deg"))
+        .panel(panel("seen − true (° mechanical)", "position_estimate_error_deg"))
+        .panel(panel("speed (rpm)", "speed_rpm"))
+        .panel(panel("quadrature current (A)", "torque_current_a"))
+        .panel(panel("flux angle error (° electrical)", "angle_error_deg"))
 }
 
 fn drift_figure(held: &[HeldPosition]) -> Figure {

@@ -1,16 +1,15 @@
 //! The largest torque over speed and dc link, motoring and generating, as the drive gives it.
 
-use drive_core::{Command, Drive, Mode};
+use drive_core::Drive;
 
-use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up};
+use super::assumptions;
+use super::battery::held;
 use super::full_range::{I_D_A, for_the_range};
-use super::torque::assumptions;
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
-use crate::config::{Config, plant_settings};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::plant::Load;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -61,20 +60,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Mean torque, Nm, in the direction asked for, and largest phase current, A.
 fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Measured, Error> {
-    let (load, plant) = (Load::Speed { speed: 0.0 }, plant_settings(config));
-    let mut bench = Bench::new(config, &plant, drive, load, seed)?;
-    bench.rig.command(&Command::Start(Mode::Torque))?;
-    if !bench.wait(LONGEST_START_S).regulates()
-        || !bring_up(&mut bench, Shaft::Held(point.rpm), config)?
-    {
-        return Ok(None);
-    }
+    let Some(mut bench) = held(config, drive, point.rpm, seed)? else { return Ok(None) };
     let volts = config.inverter.dc_link_v * point.link;
     bench.rig.plant.set_dc_link(volts).map_err(Error::refused)?;
     bench.torque((point.sign * config.amperes(BEYOND_A)) as f32)?;
     bench.counted_from = Some(bench.time() + SETTLING_S);
     let still = bench.watch(SETTLING_S + MEAN_S);
-    Ok(still.then(|| (point.sign * bench.torque.mean(), bench.peak_a)))
+    Ok(still.then(|| (point.sign * bench.torque.mean(), bench.trial.peak_a)))
 }
 
 fn outcome(

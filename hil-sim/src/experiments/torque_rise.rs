@@ -7,9 +7,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use num_complex::Complex64;
 
 use self::rise::{Response, Rise};
+use super::assumptions;
 use super::full_range::for_the_range;
 use super::steady::{bring_up, prepared};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;

@@ -105,26 +105,9 @@ pub fn paragraph(text: &str, indent: usize) -> String {
 
 /// Breaks a paragraph into lines of at most 100 characters, each behind one of the two indents.
 fn wrap(paragraph: &str, first: &str, others: &str) -> String {
-    let mut text = first.to_owned();
-    let mut used = first.chars().count();
-    let mut fresh = true;
-    for word in paragraph.split_whitespace() {
-        let width = word.chars().count();
-        if !fresh && used + 1 + width > WIDTH {
-            text.push('\n');
-            text.push_str(others);
-            used = others.chars().count();
-            fresh = true;
-        }
-        if !fresh {
-            text.push(' ');
-            used += 1;
-        }
-        text.push_str(word);
-        used += width;
-        fresh = false;
-    }
-    text
+    let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(others);
+    let options = options.word_splitter(textwrap::WordSplitter::NoHyphenation).break_words(false);
+    textwrap::fill(&paragraph.split_whitespace().collect::<Vec<_>>().join(" "), options)
 }
 
 #[cfg(test)]

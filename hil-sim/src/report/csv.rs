@@ -54,7 +54,11 @@ fn of_figure(figure: &Figure) -> Result<String, Error> {
     records(heads, (0..length).map(|k| row(k).collect()))
 }
 
-fn of_table(table: &Table) -> Result<String, Error> {
+/// A table.
+///
+/// # Errors
+/// As [`csv`].
+pub fn of_table(table: &Table) -> Result<String, Error> {
     let mut taken = Vec::new();
     let mut head = |label: &String| match snake(label) {
         none if none.is_empty() => unique("item".to_owned(), &mut taken),

@@ -77,6 +77,11 @@ impl Header {
         Ok(config)
     }
 
+    /// Whether there is such a run, and it belongs to the shard.
+    pub fn has(&self, run: &super::Run) -> bool {
+        run.run < self.runs && self.shard.has(run.run)
+    }
+
     /// The first difference between runs of two headers that do not belong together, `NAME is ..., there ...`.
     pub fn difference(&self, there: &Self) -> Option<String> {
         let fields = [

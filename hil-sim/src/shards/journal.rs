@@ -1,6 +1,5 @@
-//! A file to which every finished run is added at once, so that a process that was ended can be continued.
-//!
-//! JSON Lines: the header first, then one run a line. A process that is ended while it writes leaves a torn last line.
+//! Files of runs as JSON Lines: a head, then a line a run. A shard is printed so, and `--resume` keeps finished runs so; a process
+//! that is killed while it writes leaves a torn last line.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -10,16 +9,67 @@ use std::sync::{Mutex, PoisonError};
 use super::{Header, Run};
 use crate::error::Error;
 
-/// The file of a shard.
+/// A file that is read.
+pub struct Lines {
+    /// Its head.
+    pub header: Header,
+    /// The runs that it has.
+    pub runs: Vec<Run>,
+    /// The last line, if it is torn.
+    pub torn: Option<u64>,
+    /// Length of what is before that, bytes.
+    good: u64,
+}
+
+impl Lines {
+    /// Reads what is in a file.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the line that is no record of a run of the shard.
+    pub fn of(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
+        let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
+        let whole = |line: &&[u8]| line.ends_with(b"\n");
+        let first = lines.next().filter(whole);
+        let header = first.and_then(|line| serde_json::from_slice(line).ok()).ok_or_else(|| {
+            let problem = "not the head of a shard or of a file for --resume, or torn";
+            data(path, 1, problem.to_owned())
+        })?;
+        let good = first.map_or(0, <[u8]>::len) as u64;
+        let mut read = Self { header, runs: Vec::new(), torn: None, good };
+        let mut lines = lines.zip(2..).peekable();
+        while let Some((line, number)) = lines.next() {
+            let run = Some(line).filter(whole).and_then(|line| serde_json::from_slice(line).ok());
+            match run {
+                Some(run) if read.header.has(&run) => read.runs.push(run),
+                None if lines.peek().is_none() => {
+                    read.torn = Some(number);
+                    break;
+                }
+                _ => {
+                    let problem =
+                        "no record of a run of this shard; give another file, or take the line out";
+                    return Err(data(path, number, problem.to_owned()));
+                }
+            }
+            read.good += line.len() as u64;
+        }
+        Ok(read)
+    }
+}
+
+/// A file to which finished runs are added.
 pub struct Journal {
-    path: PathBuf,
+    /// Its path.
+    pub path: PathBuf,
+    /// The runs that it had when it was opened.
+    pub runs: Vec<Run>,
+    /// The line that was torn.
+    pub torn: Option<u64>,
     file: Mutex<File>,
-    runs: Vec<Run>,
-    torn: Option<u64>,
 }
 
 impl Journal {
-    /// The place of the journal of a shard: `path`, or a file in it when it is a folder or ends in a separator.
+    /// The file that `--resume PATH` names: the path itself, or in a folder a file with the name of the run.
     pub fn place(path: &Path, header: &Header) -> PathBuf {
         let text = path.to_string_lossy();
         if path.is_dir() || text.ends_with(std::path::is_separator) {
@@ -30,11 +80,11 @@ impl Journal {
         }
     }
 
-    /// Opens the journal of a shard, or begins one. A torn last line is taken away.
+    /// Opens a file, or makes it, for the runs of a shard, and takes a torn last line away. No other process can open it meanwhile.
     ///
     /// # Errors
-    /// [`Error::Data`] for a file that is no journal, that of other runs, or damaged before its last line;
-    /// [`Error::Refused`] while another process writes it; [`Error::Write`].
+    /// [`Error::Write`] when it cannot be read or written; [`Error::Refused`] while another process writes it;
+    /// as [`Lines::of`]; [`Error::Data`] when it is of another run. It stays as it is then.
     pub fn open(path: &Path, header: &Header) -> Result<Self, Error> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder {
@@ -43,91 +93,51 @@ impl Journal {
         let options =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         let mut file = options.map_err(Error::write(path))?;
-        // Some network file systems have no locks: there it is left to the user.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let path = path.display();
             return Err(Error::Refused(format!("{path}: another process writes it")));
         }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(Error::write(path))?;
-        let mut first = serde_json::to_vec(header).map_err(|e| Error::Internal(e.to_string()))?;
-        first.push(b'\n');
-        let (mut runs, mut torn) = (Vec::new(), None);
-        let mut good = 0;
-        if first.len() > bytes.len() && first.starts_with(&bytes) {
-            torn = (!bytes.is_empty()).then_some(1);
+        let first = line(header)?;
+        let mut read = if first.len() > bytes.len() && first.starts_with(&bytes) {
+            let torn = (!bytes.is_empty()).then_some(1);
+            Lines { header: header.clone(), runs: Vec::new(), torn, good: 0 }
         } else {
-            let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
-            for (line, number) in lines.iter().zip(1..) {
-                let text = std::str::from_utf8(line).ok().filter(|text| text.ends_with('\n'));
-                if number == 1 {
-                    check(path, text, header)?;
-                } else if let Some(run) = text.and_then(|text| of_line(text, header)) {
-                    runs.push(run);
-                } else if number == lines.len() as u64 {
-                    torn = Some(number);
-                    break;
-                } else {
-                    let problem =
-                        "no record of a run of this shard; give another file, or take the line out";
-                    return Err(data(path, number, problem.to_owned()));
-                }
-                good += line.len() as u64;
-            }
+            Lines::of(path, &bytes)?
+        };
+        let (here, there) = (header.shard, read.header.shard);
+        let difference = header
+            .difference(&read.header)
+            .or_else(|| (here != there).then(|| format!("the shard is {here}, there {there}")));
+        if let Some(text) = difference {
+            return Err(data(path, 1, format!("of another run: here {text}; give another file")));
         }
-        file.set_len(good).map_err(Error::write(path))?;
+        file.set_len(read.good).map_err(Error::write(path))?;
         file.seek(SeekFrom::End(0)).map_err(Error::write(path))?;
-        if good == 0 {
+        if read.good == 0 {
             file.write_all(&first).map_err(Error::write(path))?;
         }
-        Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn })
+        let runs = std::mem::take(&mut read.runs);
+        Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn: read.torn })
     }
 
-    /// Its file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The runs that it had when it was opened.
-    pub fn runs(&self) -> &[Run] {
-        &self.runs
-    }
-
-    /// The number of the torn line that was taken away.
-    pub fn torn(&self) -> Option<u64> {
-        self.torn
-    }
-
-    /// Adds a run.
+    /// Adds a run, at once.
     ///
     /// # Errors
     /// [`Error::Write`].
     pub fn append(&self, run: &Run) -> Result<(), Error> {
-        let mut line = serde_json::to_vec(run).map_err(|e| Error::Internal(e.to_string()))?;
-        line.push(b'\n');
+        let line = line(run)?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.write_all(&line).map_err(Error::write(&self.path))
     }
 }
 
-/// Checks that the first line is the header of the same runs.
-fn check(path: &Path, line: Option<&str>, header: &Header) -> Result<(), Error> {
-    let found: Header = line
-        .and_then(|line| serde_json::from_str(line).ok())
-        .ok_or_else(|| data(path, 1, "not the head of a file for --resume".to_owned()))?;
-    let difference = header.difference(&found).or_else(|| {
-        let (here, there) = (header.shard, found.shard);
-        (here != there).then(|| format!("the shard is {here}, there {there}"))
-    });
-    match difference {
-        Some(text) => Err(data(path, 1, format!("of another run: here {text}; give another file"))),
-        None => Ok(()),
-    }
-}
-
-fn of_line(text: &str, header: &Header) -> Option<Run> {
-    let run: Run = serde_json::from_str(text).ok()?;
-    (run.run < header.runs && header.shard.has(run.run)).then_some(run)
+/// A head or a run as a line.
+pub fn line(of: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
+    let mut line = serde_json::to_vec(of).map_err(|e| Error::Internal(e.to_string()))?;
+    line.push(b'\n');
+    Ok(line)
 }
 
 fn data(path: &Path, line: u64, problem: String) -> Error {
@@ -177,10 +187,10 @@ mod tests {
             std::fs::write(&place.0, &whole[..length]).unwrap();
             let journal = Journal::open(&place.0, &header(1)).unwrap();
             let lines = whole[..length].iter().filter(|&&byte| byte == b'\n').count();
-            assert_eq!(journal.runs(), &runs[..lines.saturating_sub(1)], "{length} bytes");
+            assert_eq!(journal.runs, runs[..lines.saturating_sub(1)], "{length} bytes");
             let is_whole = length == 0 || whole[length - 1] == b'\n';
-            assert_eq!(journal.torn().is_none(), is_whole, "{length} bytes");
-            let missing = &runs[journal.runs().len()..];
+            assert_eq!(journal.torn.is_none(), is_whole, "{length} bytes");
+            let missing = &runs[journal.runs.len()..];
             missing.iter().for_each(|run| journal.append(run).unwrap());
             drop(journal);
             assert_eq!(std::fs::read(&place.0).unwrap(), whole, "{length} bytes");

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{Header, Shard, ShardFile};
+use super::Header;
+use super::journal::Lines;
 use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::{Context, Experiment, statistical};
@@ -30,8 +31,11 @@ pub struct Merged {
 /// [`Error::Data`] with the file that is no shard, torn, of another run, or there twice; [`Error::Refused`] with the
 /// shards that are missing.
 pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
-    let files: Vec<(&Path, ShardFile)> =
-        paths.iter().map(|path| Ok((path.as_path(), read(path)?))).collect::<Result<_, Error>>()?;
+    let mut files: Vec<(&Path, Lines)> = Vec::new();
+    for path in paths {
+        let bytes = std::fs::read(path).map_err(|e| data(path, e.to_string()))?;
+        files.push((path, Lines::of(path, &bytes)?));
+    }
     let Some((first_path, first)) = files.first() else {
         return Err(Error::Refused("there are no shards to merge".to_owned()));
     };
@@ -49,9 +53,17 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         if let Some(before) = places.insert(shard.index, path) {
             return Err(data(path, format!("shard {shard} is in {} already", before.display())));
         }
-        let found: Vec<usize> = file.records.iter().map(|run| run.run).collect();
-        check_runs(path, shard, &found, header.runs)?;
-        records.extend(file.records.into_iter().map(|run| (run.run, run.record)));
+        if let Some(line) = file.torn {
+            let problem =
+                format!("line {line} is torn; do this shard again, or continue it with --resume");
+            return Err(data(path, problem));
+        }
+        records.extend(file.runs.into_iter().map(|run| (run.run, run.record)));
+        let missing = shard.numbers(header.runs).filter(|run| !records.contains_key(run));
+        let missing = missing.map(|run| run.to_string()).collect::<Vec<_>>();
+        if !missing.is_empty() {
+            return Err(data(path, format!("shard {shard} has not its runs {}", listed(&missing))));
+        }
     }
     let count = header.shard.count;
     let missing: Vec<String> = (1..=count)
@@ -59,11 +71,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         .map(|index| format!("{index}/{count}"))
         .collect();
     if !missing.is_empty() {
-        let (number, some) = (missing.len(), missing[..missing.len().min(LISTED)].join(", "));
-        let more = if number > LISTED { ", ..." } else { "" };
-        return Err(Error::Refused(format!(
-            "{number} of {count} shards are missing: {some}{more}"
-        )));
+        let (number, some) = (missing.len(), listed(&missing));
+        return Err(Error::Refused(format!("{number} of {count} shards are missing: {some}")));
     }
     let statistical = statistical(&header.experiment)?;
     let (seed, seconds) = (header.seed, config.extent.seconds);
@@ -76,20 +85,10 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
 /// Missing shards and runs that a message lists.
 const LISTED: usize = 10;
 
-fn read(path: &Path) -> Result<ShardFile, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| data(path, e.to_string()))?;
-    serde_json::from_str(&text).map_err(|e| {
-        let problem = match e.classify() {
-            serde_json::error::Category::Eof => {
-                "the file is torn: its end is missing; do this shard again".to_owned()
-            }
-            serde_json::error::Category::Data => {
-                format!("not a shard, which `run NAME --shard I/N` prints: {e}")
-            }
-            _ => format!("not JSON: {e}"),
-        };
-        data(path, problem)
-    })
+/// The first of these.
+fn listed(all: &[String]) -> String {
+    let more = if all.len() > LISTED { ", ..." } else { "" };
+    format!("{}{more}", all[..all.len().min(LISTED)].join(", "))
 }
 
 /// Checks that this program is the one that made the shards: the outcome is computed here.
@@ -102,27 +101,6 @@ fn check_program(path: &Path, header: &Header, config: &Config) -> Result<(), Er
         )),
         None => Ok(()),
     }
-}
-
-/// Checks that a shard has each of its runs once.
-fn check_runs(path: &Path, shard: Shard, found: &[usize], runs: usize) -> Result<(), Error> {
-    let wanted: Vec<usize> = shard.numbers(runs).collect();
-    if found == wanted {
-        return Ok(());
-    }
-    let listed = |numbers: Vec<usize>| {
-        let some = numbers[..numbers.len().min(LISTED)].iter().map(usize::to_string);
-        let more = if numbers.len() > LISTED { ", ..." } else { "" };
-        format!("{}{more}", some.collect::<Vec<_>>().join(", "))
-    };
-    let missing: Vec<usize> = wanted.iter().copied().filter(|run| !found.contains(run)).collect();
-    let foreign: Vec<usize> = found.iter().copied().filter(|run| !wanted.contains(run)).collect();
-    let problem = match (missing.is_empty(), foreign.is_empty()) {
-        (false, _) => format!("shard {shard} has not its runs {}", listed(missing)),
-        (_, false) => format!("runs {} do not belong to shard {shard}", listed(foreign)),
-        _ => format!("shard {shard} has a run twice, or not in order"),
-    };
-    Err(data(path, problem))
 }
 
 fn data(path: &Path, problem: String) -> Error {

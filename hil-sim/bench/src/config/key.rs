@@ -5,7 +5,7 @@ use drive_settings::{SETTINGS, Settings, find, value as drive};
 
 use super::value::Field as _;
 use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
-use crate::error::{Error, nearest};
+use crate::error::Error;
 
 /// A key of the bench or of the drive.
 #[derive(Clone, Copy)]
@@ -36,7 +36,7 @@ impl Key {
     /// The keys that an assignment to `name` sets, one or two.
     ///
     /// # Errors
-    /// [`Error::UnknownKey`] with the most similar name.
+    /// [`Error::Unknown`] with the most similar name.
     pub fn named(name: &str) -> Result<Vec<Self>, Error> {
         if let Some(key) = Self::after().find(|key| key.name() == name) {
             return Ok(vec![key]);
@@ -49,10 +49,7 @@ impl Key {
             bench.map(Self::Bench).into_iter().chain(drive.map(Self::Drive)).collect();
         if keys.is_empty() {
             let known = Self::all().chain(Self::after()).map(Self::name);
-            return Err(Error::UnknownKey {
-                key: name.to_owned(),
-                nearest: nearest(name, known).map(str::to_owned),
-            });
+            return Err(Error::unknown("key", name, known));
         }
         Ok(keys)
     }

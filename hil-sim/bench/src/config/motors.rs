@@ -9,7 +9,7 @@ use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
 use super::{Config, Key, Value, alias, flattened};
-use crate::error::{Error, nearest};
+use crate::error::Error;
 
 static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
 
@@ -73,7 +73,7 @@ impl Motor {
     /// The motor with this name, or of this file when the name ends in `.toml`.
     ///
     /// # Errors
-    /// [`Error::UnknownMotor`] with the most similar name; [`Error::ConfigFile`].
+    /// [`Error::Unknown`] with the most similar name; [`Error::ConfigFile`].
     pub fn find(name: &str) -> Result<Self, Error> {
         if name.ends_with(".toml") {
             let path = Path::new(name);
@@ -82,12 +82,9 @@ impl Motor {
             return parse(name, &text).map_err(|e| failed(e.to_string()));
         }
         let all = Self::all();
-        let names: Vec<String> = all.iter().map(|motor| motor.name.clone()).collect();
-        let found = all.into_iter().find(|motor| motor.name == name);
-        found.ok_or_else(|| Error::UnknownMotor {
-            name: name.to_owned(),
-            nearest: nearest(name, names.iter().map(String::as_str)).map(str::to_owned),
-        })
+        let names = || all.iter().map(|motor| motor.name.as_str());
+        let found = all.iter().find(|motor| motor.name == name);
+        found.cloned().ok_or_else(|| Error::unknown("motor", name, names()))
     }
 
     /// The motor of a text in the form of the files.

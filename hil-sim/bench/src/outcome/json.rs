@@ -1,6 +1,7 @@
 //! The JSON form of an outcome.
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde::Serialize;
+use serde::ser::Serializer;
 
 use super::{Entry, Figure, Metrics, Origin, Outcome, Step, Table};
 
@@ -8,100 +9,70 @@ use super::{Entry, Figure, Metrics, Origin, Outcome, Step, Table};
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// The one JSON object of an experiment.
-#[derive(serde::Serialize)]
+#[derive(Serialize)]
 struct Json<'a> {
     schema_version: u32,
     version: &'a str,
     experiment: &'a str,
     seed: u64,
-    settings: Settings<'a>,
+    #[serde(serialize_with = "as_map")]
+    settings: Vec<(String, serde_json::Value)>,
     metrics: &'a Metrics,
-    series: AllSeries<'a>,
-    #[serde(skip_serializing_if = "AllEvents::is_empty")]
-    events: AllEvents<'a>,
+    #[serde(serialize_with = "as_map")]
+    series: Vec<(String, Points<'a>)>,
+    #[serde(serialize_with = "as_map", skip_serializing_if = "Vec::is_empty")]
+    events: Vec<(String, &'a [(f64, String)])>,
     #[serde(skip_serializing_if = "Option::is_none")]
     steps: &'a Option<Vec<Step>>,
-    #[serde(skip_serializing_if = "Rows::is_empty")]
-    table: Rows<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<Rows<'a>>,
     remarks: &'a [String],
     faults: &'a [String],
 }
 
-/// Names and values; a value that is a number or a switch is one in JSON too.
-struct Settings<'a>(&'a [(String, String)]);
-
-impl Serialize for Settings<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, value)| (name, typed(value))))
-    }
+/// Pairs as the entries of an object, in their order.
+pub(super) fn as_map<S: Serializer, V: Serialize>(
+    pairs: &[(String, V)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
 }
 
-fn typed(text: &str) -> serde_json::Value {
-    match serde_json::from_str(text) {
-        Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
-        _ => serde_json::Value::from(text),
-    }
-}
-
-impl Origin {
-    /// Names and values of the settings as they stand in JSON.
-    pub fn typed_settings(&self) -> impl Iterator<Item = (String, serde_json::Value)> {
-        self.settings.iter().map(|(name, value)| (name.clone(), typed(value)))
-    }
+/// A curve.
+#[derive(Serialize)]
+struct Points<'a> {
+    x_label: &'a str,
+    y_label: &'a str,
+    x: Vec<f64>,
+    y: Vec<f64>,
 }
 
 /// Content of `table` in JSON.
-#[derive(serde::Serialize)]
+#[derive(Serialize)]
 #[serde(untagged)]
 enum Rows<'a> {
     Tables(&'a [Table]),
     Entries(&'a [Entry]),
 }
 
-impl Rows<'_> {
-    fn is_empty(&self) -> bool {
-        matches!(self, Self::Tables([]) | Self::Entries([]))
+impl Origin {
+    /// Names and values of the settings as they stand in JSON: what is a number or a switch is one there too.
+    pub fn typed_settings(&self) -> impl Iterator<Item = (String, serde_json::Value)> {
+        let typed = |text: &String| match serde_json::from_str(text) {
+            Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
+            _ => serde_json::Value::from(text.as_str()),
+        };
+        self.settings.iter().map(move |(name, value)| (name.clone(), typed(value)))
     }
 }
 
-struct AllSeries<'a>(&'a [Figure]);
-
-impl Serialize for AllSeries<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(serde::Serialize)]
-        struct Points<'a> {
-            x_label: &'a str,
-            y_label: &'a str,
-            x: Vec<f64>,
-            y: Vec<f64>,
-        }
-        let mut map = serializer.serialize_map(None)?;
-        for figure in self.0 {
-            for curve in figure.curves() {
-                let key = format!("{}/{}", figure.name, curve.name);
-                let (x, y) = curve.series.points.iter().copied().unzip();
-                let (x_label, y_label) = (&curve.panel.x_label, &curve.panel.y_label);
-                map.serialize_entry(&key, &Points { x_label, y_label, x, y })?;
-            }
-        }
-        map.end()
-    }
-}
-
-/// Events of the figures that have any.
-struct AllEvents<'a>(&'a [Figure]);
-
-impl AllEvents<'_> {
-    fn is_empty(&self) -> bool {
-        self.0.iter().all(|figure| figure.events.is_empty())
-    }
-}
-
-impl Serialize for AllEvents<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let with = self.0.iter().filter(|figure| !figure.events.is_empty());
-        serializer.collect_map(with.map(|figure| (&figure.name, &figure.events)))
-    }
+/// The curves of a figure, by `FIGURE/CURVE`.
+fn series(figure: &Figure) -> impl Iterator<Item = (String, Points<'_>)> {
+    figure.curves().into_iter().map(|curve| {
+        let (x, y) = curve.series.points.iter().copied().unzip();
+        let (x_label, y_label) = (&curve.panel.x_label, &curve.panel.y_label);
+        (format!("{}/{}", figure.name, curve.name), Points { x_label, y_label, x, y })
+    })
 }
 
 impl Outcome {
@@ -112,19 +83,21 @@ impl Outcome {
     /// # Errors
     /// As [`serde_json::to_string`].
     pub fn to_json(&self, experiment: &str, origin: &Origin) -> serde_json::Result<String> {
+        let with_events = self.figures.iter().filter(|figure| !figure.events.is_empty());
         serde_json::to_string(&Json {
             schema_version: SCHEMA_VERSION,
             version: env!("CARGO_PKG_VERSION"),
             experiment,
             seed: origin.seed,
-            settings: Settings(&origin.settings),
+            settings: origin.typed_settings().collect(),
             metrics: &self.metrics,
-            series: AllSeries(&self.figures),
-            events: AllEvents(&self.figures),
+            series: self.figures.iter().flat_map(series).collect(),
+            events: with_events.map(|figure| (figure.name.clone(), &*figure.events)).collect(),
             steps: &self.steps,
-            table: match self.entries.as_slice() {
-                [] => Rows::Tables(&self.tables),
-                entries => Rows::Entries(entries),
+            table: match (self.entries.as_slice(), self.tables.as_slice()) {
+                ([], []) => None,
+                ([], tables) => Some(Rows::Tables(tables)),
+                (entries, _) => Some(Rows::Entries(entries)),
             },
             remarks: &self.remarks,
             faults: &self.faults,

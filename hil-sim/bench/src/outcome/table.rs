@@ -47,6 +47,20 @@ impl Table {
         self.rows.push(cells);
     }
 
+    /// A row for each record, with its number.
+    pub fn of<'a, R: 'a>(
+        title: impl Into<String>,
+        columns: &[Column<'_, R>],
+        records: impl IntoIterator<Item = (usize, &'a R)>,
+    ) -> Self {
+        let row = |(number, record): (usize, &R)| {
+            columns.iter().map(|column| (column.cell)(number, record)).collect()
+        };
+        let heads = columns.iter().map(|column| column.head.to_owned()).collect();
+        let rows = records.into_iter().map(row).collect();
+        Self { title: title.into(), columns: heads, rows, note: String::new() }
+    }
+
     /// With this note below it.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
@@ -67,6 +81,29 @@ impl Table {
         }
         table
     }
+}
+
+/// A column of records: one description for the printed table, the page, JSON and CSV.
+pub struct Column<'a, R> {
+    /// Head, with the unit; the name in CSV is made of it.
+    pub head: &'a str,
+    /// Its value of a record, which has a number.
+    pub cell: OfRecord<'a, R>,
+}
+
+/// A cell of the number of a record and the record.
+pub type OfRecord<'a, R> = Box<dyn Fn(usize, &R) -> Cell + 'a>;
+
+/// Columns: heads, and cells of a number and a record.
+#[macro_export]
+macro_rules! columns {
+    (|$number:tt, $record:tt: $type:ty| $($head:expr => $cell:expr;)+) => {
+        vec![$($crate::outcome::Column {
+            head: $head,
+            #[allow(unused_variables)]
+            cell: Box::new(move |$number: usize, $record: $type| $cell),
+        }),+]
+    };
 }
 
 /// The mean over a level, which a lost run does not reach.

@@ -7,7 +7,7 @@ use drive_core::{Accepted, Command, Drive, State};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::{Config, open_phase};
 use crate::error::Error;
-use crate::experiments::torque::LOST_DEG;
+use crate::experiments::LOST_DEG;
 use crate::plant::{Complex, Load, Plant, PlantSettings};
 use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;
@@ -70,18 +70,12 @@ pub struct Bench {
     pub counted_from: Option<f64>,
     /// Torque of the motor over the same time, Nm.
     pub torque: Stats,
-    /// Angle error over the same time, degrees.
-    pub error: Stats,
+    /// What is seen of the run so far.
+    pub trial: Trial,
     /// Angle error at the last sample, degrees.
     pub error_deg: f64,
-    /// Largest error since the start, degrees.
-    pub largest_deg: f64,
     /// An error beyond this, degrees, is wrong.
     pub wrong_deg: f64,
-    /// Largest phase current, A.
-    pub peak_a: f64,
-    /// Least and largest voltage of the dc link, V.
-    pub dc_link_v: (f64, f64),
     /// The record of the run, where one is wanted.
     pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
@@ -111,17 +105,15 @@ impl Bench {
         settings.mechanics.load = load;
         let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
         plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
+        let dc_link_v = (settings.inverter.vdc, settings.inverter.vdc);
         Ok(Self {
             rig: Rig::of(plant, drive.clone()),
             nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
             counted_from: None,
             torque: Stats::default(),
-            error: Stats::default(),
+            trial: Trial { seed, dc_link_v, ..Trial::default() },
             error_deg: 0.0,
-            largest_deg: 0.0,
             wrong_deg: WRONG_DEG,
-            peak_a: 0.0,
-            dc_link_v: (settings.inverter.vdc, settings.inverter.vdc),
             trace: None,
             counts: vec![0; LARGEST_CLASS + 1],
             wrong: Lasting::default(),
@@ -143,11 +135,11 @@ impl Bench {
         let is_recorded = self.trace.is_some() && self.rig.periods().is_multiple_of(TRACE_EVERY);
         let t = self.time();
         self.rig.step();
-        let plant = &self.rig.plant;
-        self.peak_a = plant.phase_currents().iter().fold(self.peak_a, |a, i| a.max(i.abs()));
-        let (least, most) = self.dc_link_v;
+        let (plant, seen) = (&self.rig.plant, &mut self.trial);
+        seen.peak_a = plant.phase_currents().iter().fold(seen.peak_a, |a, i| a.max(i.abs()));
+        let (least, most) = seen.dc_link_v;
         let v = plant.dc_link();
-        self.dc_link_v = (least.min(v), most.max(v));
+        seen.dc_link_v = (least.min(v), most.max(v));
         if is_recorded {
             self.record(t);
         }
@@ -167,11 +159,6 @@ impl Bench {
             flux: plant.rotor_flux(),
             dc_link: plant.dc_link(),
         });
-    }
-
-    /// Longest time for which the angle was wrong, s.
-    pub fn wrong_s(&self) -> f64 {
-        self.wrong.longest
     }
 
     /// For some seconds, whatever the drive does.
@@ -231,10 +218,10 @@ impl Bench {
             self.flux_off.push(t, flux_off);
             self.is_off = wrong || flux_off;
             if !self.turned {
-                self.largest_deg = self.largest_deg.max(error.abs());
+                self.trial.largest_deg = self.trial.largest_deg.max(error.abs());
             }
             if self.counted_from.is_some_and(|from| t >= from) {
-                self.error.push(error);
+                self.trial.error.push(error);
                 self.torque.push(torque);
                 self.counts[(error.abs() * CLASSES_PER_DEG) as usize] += 1;
             }
@@ -243,20 +230,20 @@ impl Bench {
         true
     }
 
-    /// Fills in what was seen of the run; `still` says whether the drive regulated to its end.
-    pub fn finish(self, still: bool, trial: &mut Trial) {
+    /// The result of the run, and its record; `still` says whether the drive regulated to its end.
+    pub fn finish(self, still: bool) -> (Trial, Vec<Moment>) {
+        let mut trial = self.trial;
         if !still && let State::Fault(fault) = self.rig.drive.state() {
             trial.trip = Some(fault.code());
             trial.sound_stop = !self.was_off;
         }
-        trial.error = self.error;
-        trial.largest_deg = self.largest_deg;
         trial.wrong_s = self.wrong.longest;
         trial.lost_s = self.lost.longest;
         trial.flux_off_s = self.flux_off.longest;
         trial.stuck = still && self.is_off && trial.is_silent();
         let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);
         trial.histogram = classes.collect();
+        (trial, self.trace.unwrap_or_default())
     }
 }
 

@@ -8,8 +8,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::bench::Bench;
 use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, torque_nm};
-use super::trial::Trial;
-use crate::config::Config;
+use super::trial::{Refused, Trial};
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::plant::{Load, PlantSettings};
 
@@ -57,19 +57,25 @@ pub fn trial(
 ) -> Result<Trial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let parts = kind.parts(&mut random);
-    let mut trial = Trial::new(kind, seed);
     let nominal = nominal_limit_a(config);
-    trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
     let (load, mode) = match kind.shaft() {
         Shaft::Locked => (Load::Locked, Mode::Torque),
         Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
         Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
     };
     let mut bench = Bench::new(config, plant, drive, load, seed)?;
+    bench.trial.kind = Some(kind);
+    let references = parts.iter().map(|part| part.reference.1);
+    let drawn = if mode == Mode::Speed { &mut bench.trial.rpm } else { &mut bench.trial.i_q };
+    *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+    bench.trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
     bench.rig.command(&Command::Start(mode))?;
     match bench.wait(LONGEST_START_S) {
         state if state.regulates() => {}
-        State::Fault(fault) => return Ok(Trial { refused: Some(fault.code()), ..trial }),
+        State::Fault(fault) => {
+            bench.trial.refused = Some(Refused::Start(fault.code()));
+            return Ok(bench.finish(true).0);
+        }
         other => return Err(Error::Internal(format!("after a start the drive is {other}"))),
     }
     let mut still = bring_up(&mut bench, kind.shaft(), config)?;
@@ -78,13 +84,25 @@ pub fn trial(
         let taken = follow(&mut bench, mode, config, &parts)?;
         still = taken.is_some();
         let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
-        trial.torque_error = constant.map(|i_q| {
+        bench.trial.torque_error = constant.map(|i_q| {
             let error = (bench.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
             error / torque_nm(config, nominal)
         });
     }
-    bench.finish(still, &mut trial);
-    Ok(trial)
+    Ok(bench.finish(still).0)
+}
+
+/// A bench whose drive regulates torque while a dynamometer holds this speed, rpm; none when it did not get there.
+///
+/// # Errors
+/// When the plant is refused, or the drive refuses to start.
+pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Option<Bench>, Error> {
+    let (load, plant) = (Load::Speed { speed: 0.0 }, plant_settings(config));
+    let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+    bench.rig.command(&Command::Start(Mode::Torque))?;
+    let regulates =
+        bench.wait(LONGEST_START_S).regulates() && bring_up(&mut bench, Shaft::Held(rpm), config)?;
+    Ok(regulates.then_some(bench))
 }
 
 /// Brings a held shaft up to speed without torque; says whether the drive regulated to the end.
@@ -153,7 +171,6 @@ pub fn follow(
 mod tests {
     use super::super::disturbed::Asymmetry;
     use super::*;
-    use crate::config::plant_settings;
 
     /// A lower limit is seen in every run, and the torque is judged by the command that was taken: with 0.5 A for any
     /// command the error stays that of a sound drive, a few per cent of the torque at the limit.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial};
+use crate::columns;
 use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
 use crate::stats::Stats;
 
@@ -72,7 +73,10 @@ impl Summary {
             all.limit_share = trial.limit_share.into_iter().chain(all.limit_share).reduce(f64::min);
             trial.torque_error.into_iter().for_each(|error| all.torque_error.push(error));
             trial.trip.into_iter().for_each(|fault| *all.trips.entry(fault).or_default() += 1);
-            trial.refused.into_iter().for_each(|fault| *all.refused.entry(fault).or_default() += 1);
+            trial
+                .refused_by()
+                .into_iter()
+                .for_each(|fault| *all.refused.entry(fault).or_default() += 1);
             for &(class, count) in &trial.histogram {
                 *histogram.entry(class).or_default() += u64::from(count);
             }
@@ -166,7 +170,7 @@ fn quantile(histogram: &BTreeMap<u32, u64>, share: f64) -> f64 {
 /// The runs of each kind.
 pub fn by_kind(trials: &[Trial]) -> Table {
     let mut table = Table::new("By kind", &[]);
-    let mut kinds: Vec<Kind> = Vec::new();
+    let mut kinds: Vec<Option<Kind>> = Vec::new();
     for trial in trials {
         if !kinds.contains(&trial.kind) {
             kinds.push(trial.kind);
@@ -174,7 +178,11 @@ pub fn by_kind(trials: &[Trial]) -> Table {
     }
     for kind in kinds {
         let cells = Summary::of(trials.iter().filter(|trial| trial.kind == kind)).cells();
-        table.record([("kind", Cell::from(kind.name()))].into_iter().chain(cells));
+        table.record(
+            [("kind", Cell::from(kind.map(Kind::name).unwrap_or_default()))]
+                .into_iter()
+                .chain(cells),
+        );
     }
     let all = Summary::of(trials).cells();
     table.record([("kind", Cell::from("all"))].into_iter().chain(all));
@@ -183,25 +191,23 @@ pub fn by_kind(trials: &[Trial]) -> Table {
 
 /// The silent runs, each with its disturbances in words.
 pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table {
-    let mut table = Table::new("Silently wrong", &[])
-        .note("Disturbances: of the page Statistics, in relation to their full sizes.");
-    for (number, trial) in trials.iter().enumerate().filter(|(_, trial)| trial.is_silent()) {
-        let end = match trial.trip {
-            Some(fault) => format!("fault {fault}"),
-            None if trial.stuck => "stuck".to_owned(),
-            None => "sound".to_owned(),
-        };
-        table.record([
-            ("run", Cell::from(number.to_string())),
-            ("seed", Cell::from(trial.seed.to_string())),
-            ("kind", Cell::from(trial.kind.name())),
-            ("wrong (s)", Cell::fixed(trial.wrong_s, 2)),
-            ("flux off (s)", Cell::fixed(trial.flux_off_s, 2)),
-            ("end", Cell::from(end)),
-            ("disturbances", Cell::from(disturbances(number))),
-        ]);
-    }
-    table
+    let (disturbances, end) = (&disturbances, |trial: &Trial| match trial.trip {
+        Some(fault) => format!("fault {fault}"),
+        None if trial.stuck => "stuck".to_owned(),
+        None => "sound".to_owned(),
+    });
+    let columns = columns![|number, trial: &Trial|
+        "run" => Cell::from(number.to_string());
+        "seed" => Cell::from(trial.seed.to_string());
+        "kind" => Cell::from(trial.kind.map(Kind::name).unwrap_or_default());
+        "wrong (s)" => Cell::fixed(trial.wrong_s, 2);
+        "flux off (s)" => Cell::fixed(trial.flux_off_s, 2);
+        "end" => Cell::from(end(trial));
+        "disturbances" => Cell::from(disturbances(number));
+    ];
+    let silent = trials.iter().enumerate().filter(|(_, trial)| trial.is_silent());
+    Table::of("Silently wrong", &columns, silent)
+        .note("Disturbances: of the page Statistics, in relation to their full sizes.")
 }
 
 /// Rms and largest error of every run, by its number.
@@ -223,8 +229,7 @@ mod tests {
     use super::*;
 
     fn sound(errors: &[f64]) -> Trial {
-        let mut trial = Trial::refused(Kind::Steps, 1, 0);
-        trial.refused = None;
+        let mut trial = Trial { kind: Some(Kind::Steps), ..Trial::default() };
         trial.error = Stats::of(errors.iter().copied());
         let mut counts: BTreeMap<u32, u32> = BTreeMap::new();
         errors
@@ -241,7 +246,7 @@ mod tests {
         let errors: Vec<f64> = (0..1000).map(|n| (f64::from(n) + 0.5) * 0.1).collect();
         let (even, odd): (Vec<f64>, Vec<f64>) =
             errors.iter().partition(|e| ((*e * 10.0) as u32).is_multiple_of(2));
-        let trials = [sound(&even), sound(&odd), Trial::refused(Kind::Steps, 2, 25)];
+        let trials = [sound(&even), sound(&odd), Trial::unlearned(2, 25)];
         let summary = Summary::of(&trials);
         assert!((summary.p99_deg - 99.0).abs() < 1e-9, "{}", summary.p99_deg);
         assert!((summary.error.rms() - Stats::of(errors).rms()).abs() < 1e-9);

@@ -1,10 +1,12 @@
 //! The result of a run of the battery.
 
+use std::fmt;
+
 use drive_core::Fault;
 use serde::{Deserialize, Serialize};
 
 use super::kind::Kind;
-use crate::experiments::torque::LOST_DEG;
+use crate::experiments::LOST_DEG;
 use crate::stats::Stats;
 
 /// A state that lasts longer, s, should have been noticed.
@@ -16,13 +18,41 @@ pub const LARGEST_CLASS: usize = (180.0 * CLASSES_PER_DEG) as usize;
 /// A learned limit below this share of the nominal one is a lower one.
 const LIMITED_SHARE: f64 = 0.999;
 
-/// The result of a run.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// Why a run has not begun.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Refused {
+    /// The drive refused to start with the fault of this number.
+    Start(u8),
+    /// It refused to learn before.
+    Learning(u8),
+    /// It refused the command, or did not get as far as to regulate.
+    Otherwise(String),
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Start(fault) => write!(f, "fault {fault}"),
+            Self::Learning(fault) => write!(f, "fault {fault} while it learned"),
+            Self::Otherwise(why) => f.write_str(why),
+        }
+    }
+}
+
+/// The result of a run of the battery or of the whole range; what the experiment does not give is at its default.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Trial {
-    /// Its kind.
-    pub kind: Kind,
     /// Its seed.
     pub seed: u64,
+    /// Its kind, in the battery.
+    pub kind: Option<Kind>,
+    /// Kind and region, in the whole range.
+    pub case: String,
+    /// Speed, rpm on four poles, and torque current, A, that were drawn; in the battery the largest reference.
+    pub rpm: f64,
+    /// See `rpm`.
+    #[serde(rename = "iq_a")]
+    pub i_q: f64,
     /// Angle error while the drive regulated, true minus estimated, degrees.
     pub error: Stats,
     /// How often the magnitude was in each class of 0.1° that occurred: number of the class, and of samples.
@@ -38,6 +68,12 @@ pub struct Trial {
     pub flux_off_s: f64,
     /// Whether the angle was wrong or the flux off to the end of the run, and long enough to be noticed.
     pub stuck: bool,
+    /// Largest phase current, A; in the whole range from the start on a turning shaft on, where there is one.
+    pub peak_a: f64,
+    /// Least and largest voltage of the dc link, V.
+    pub dc_link_v: (f64, f64),
+    /// Time until a turning shaft was caught, or a stop had ended, s.
+    pub took_s: Option<f64>,
     /// Torque current that the drive allows, in relation to the [nominal limit](super::nominal_limit_a).
     pub limit_share: Option<f64>,
     /// Mean torque of the motor minus that of the torque current that the drive has taken, in the direction of the
@@ -47,33 +83,22 @@ pub struct Trial {
     pub trip: Option<u8>,
     /// Whether angle and flux were sound from the first reference until then.
     pub sound_stop: bool,
-    /// Number of the fault with which the drive refused to start, or before that to learn.
-    pub refused: Option<u8>,
+    /// Why it has not begun.
+    pub refused: Option<Refused>,
 }
 
 impl Trial {
-    pub(super) fn new(kind: Kind, seed: u64) -> Self {
-        Self {
-            kind,
-            seed,
-            error: Stats::default(),
-            histogram: Vec::new(),
-            largest_deg: 0.0,
-            wrong_s: 0.0,
-            lost_s: 0.0,
-            flux_off_s: 0.0,
-            stuck: false,
-            limit_share: None,
-            torque_error: None,
-            trip: None,
-            sound_stop: false,
-            refused: None,
-        }
+    /// A run with a drive that refused to learn, with this fault.
+    pub fn unlearned(seed: u64, fault: u8) -> Self {
+        Self { seed, refused: Some(Refused::Learning(fault)), ..Self::default() }
     }
 
-    /// A run that was refused with this fault.
-    pub fn refused(kind: Kind, seed: u64, fault: u8) -> Self {
-        Self { refused: Some(fault), ..Self::new(kind, seed) }
+    /// The fault with which start or learning was refused.
+    pub fn refused_by(&self) -> Option<u8> {
+        match self.refused {
+            Some(Refused::Start(fault) | Refused::Learning(fault)) => Some(fault),
+            _ => None,
+        }
     }
 
     /// Whether the error was beyond 45° while the drive regulated.
@@ -113,9 +138,9 @@ impl Trial {
             let text = fault.map_or(String::new(), |fault| format!(": {fault}"));
             format!("fault {code}{text}")
         };
-        let stops = self.trip.filter(|_| !self.kind.turns_flux());
+        let stops = self.trip.filter(|_| !self.kind.is_some_and(Kind::turns_flux));
         let reasons = [
-            self.refused.map(|code| format!("start refused with {}", fault(code))),
+            self.refused_by().map(|code| format!("start refused with {}", fault(code))),
             self.is_wrong().then(|| format!("angle wrong for {:.2} s", self.wrong_s)),
             self.is_flux_off().then(|| format!("flux off for {:.2} s", self.flux_off_s)),
             self.is_lost().then(|| format!("angle error beyond {LOST_DEG}°")),
@@ -125,6 +150,7 @@ impl Trial {
         if reason.is_empty() {
             return None;
         }
-        Some(format!("{}, seed {}: {reason}", self.kind.name(), self.seed))
+        let kind = self.kind.map(Kind::name).unwrap_or_default();
+        Some(format!("{kind}, seed {}: {reason}", self.seed))
     }
 }

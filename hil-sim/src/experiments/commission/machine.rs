@@ -1,6 +1,6 @@
 //! Machines to be commissioned: the truth about them, and random ones.
 
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::config::{Config, LoadMode, PlantModel, plant_settings};
@@ -50,27 +50,38 @@ impl Circuit {
     }
 }
 
+/// A factor up to `most`, or down to its reciprocal.
+fn factor(random: &mut impl Rng, most: f64) -> f64 {
+    random.random_range(-most.ln()..=most.ln()).exp()
+}
+
+/// A machine whose resistances, inductances and saliencies are each multiplied by a factor of its own, up to `spread`.
+pub fn around(config: &Config, random: &mut impl Rng, spread: f64) -> Config {
+    let mut factor = || factor(random, spread);
+    let mut drawn = config.clone();
+    let saliency = plant_settings(config).saliency;
+    let (m, leakage) = (&mut drawn.motor, factor());
+    m.r_s *= factor();
+    m.r_r *= factor();
+    m.l_m *= factor();
+    m.l_ls *= leakage;
+    m.l_lr *= leakage;
+    let (a_psi, b1) = (factor(), factor());
+    if config.model.plant == PlantModel::A {
+        drawn.saliency.a_psi = saliency.a_psi * a_psi;
+        drawn.saliency.b1 = Some(saliency.b1 * b1);
+    }
+    drawn
+}
+
 /// A machine and a board around those of the configuration: each parameter and saliency times or over a factor up to
 /// `spread.machine` (2 unless set), free shaft, dead time 2 to 5 us, further drop 0.5 to 3 V at 311 V, gain errors up to
 /// 0.5 % and offsets up to 0.7 % of the range. The drive knows its dead time.
 pub fn drawn(config: &Config, seed: u64) -> Config {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let spread = if config.spread.machine > 1.0 { config.spread.machine } else { 2.0 };
-    let mut factor = |most: f64| random.random_range(-most.ln()..=most.ln()).exp();
-    let mut drawn = config.clone();
-    let saliency = plant_settings(config).saliency;
-    let (m, leakage) = (&mut drawn.motor, factor(spread));
-    m.r_s *= factor(spread);
-    m.r_r *= factor(spread);
-    m.l_m *= factor(spread);
-    m.l_ls *= leakage;
-    m.l_lr *= leakage;
-    let (a_psi, b1) = (factor(spread), factor(spread));
-    if config.model.plant == PlantModel::A {
-        drawn.saliency.a_psi = saliency.a_psi * a_psi;
-        drawn.saliency.b1 = Some(saliency.b1 * b1);
-    }
-    drawn.motor.inertia *= (factor(5.0) * 0.632_456).clamp(0.2, 2.0);
+    let mut drawn = around(config, &mut random, spread);
+    drawn.motor.inertia *= (factor(&mut random, 5.0) * 0.632_456).clamp(0.2, 2.0);
     drawn.motor.friction = 1e-4;
     drawn.load.mode = LoadMode::Free;
     let volts = config.inverter.dc_link_v / 311.0;

@@ -3,9 +3,8 @@
 use drive_core::Fault;
 
 use super::case::Case;
-use super::trial::Run;
 use crate::config::RangeKind;
-use crate::experiments::battery::Moment;
+use crate::experiments::battery::{Moment, Refused, Trial, UNNOTICED_S};
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::Stats;
 
@@ -17,8 +16,10 @@ pub const REMARK: &str = "Error: true minus estimated, over all samples that cou
     Silent: beyond 45° for more than 0.5 s while the drive regulates. Current: the largest of a phase, carrier included. Took: until \
     a turning shaft was caught, or a braked one stood.";
 
-/// Longest time beyond 45° that is not silent, s.
-const SILENT_S: f64 = 0.5;
+/// Lost: stopped by a fault, or beyond 45°; after a turn of the flux neither counts.
+fn is_lost(case: &Case, run: &Trial) -> bool {
+    run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
+}
 
 /// The verdict on some runs.
 struct Verdict {
@@ -34,8 +35,8 @@ struct Verdict {
 }
 
 impl Verdict {
-    fn of(done: &[&(Case, usize, Run)]) -> Self {
-        let count = |is: &dyn Fn(&Case, &Run) -> bool| {
+    fn of(done: &[&(Case, usize, Trial)]) -> Self {
+        let count = |is: &dyn Fn(&Case, &Trial) -> bool| {
             done.iter().filter(|(case, _, run)| is(case, run)).count()
         };
         let started = || done.iter().map(|(_, _, run)| run).filter(|run| run.refused.is_none());
@@ -43,10 +44,10 @@ impl Verdict {
         started().for_each(|run| error.add(&run.error));
         Self {
             runs: done.len(),
-            lost: count(&|case, run| run.is_lost(case.kind)),
+            lost: count(&|case, run| is_lost(case, run)),
             refused: count(&|_, run| run.refused.is_some()),
             stopped: count(&|_, run| run.trip.is_some()),
-            silent: count(&|_, run| run.silent_s > SILENT_S),
+            silent: count(&|_, run| run.wrong_s > UNNOTICED_S),
             error,
             // Not a number where none has started.
             peak_a: started().map(|run| run.peak_a).fold(f64::NAN, f64::max),
@@ -66,7 +67,7 @@ impl Verdict {
 }
 
 /// Metrics, table and failures of all runs, each with its case and number.
-pub fn of(cases: &[Case], done: &[(Case, usize, Run)], outcome: &mut Outcome) {
+pub fn of(cases: &[Case], done: &[(Case, usize, Trial)], outcome: &mut Outcome) {
     let mut table = Table::new("By kind and region", &[]);
     for case in cases {
         let some: Vec<_> = done.iter().filter(|(of, _, _)| of == case).collect();
@@ -103,7 +104,7 @@ pub fn of(cases: &[Case], done: &[(Case, usize, Run)], outcome: &mut Outcome) {
     outcome.tables.push(table);
     outcome.faults.extend(done.iter().filter_map(|(case, number, run)| {
         let reason = failure(case, run)?;
-        let Run { seed, rpm, i_q, .. } = run;
+        let Trial { seed, rpm, i_q, .. } = run;
         let drawn = format!("{rpm:.0} rpm, {i_q:.2} A, seed {seed}");
         Some(format!("run {number}, {}: {drawn}: {reason}", case.words()))
     }));
@@ -131,20 +132,21 @@ fn cells(verdict: &Verdict) -> Vec<(&'static str, Cell)> {
 const CAUGHT_RPM: f64 = 2700.0;
 
 /// The refusal of a shaft that turns too fast to be caught: a number of the table, and no failure.
-fn too_fast(case: &Case, run: &Run) -> bool {
+fn too_fast(case: &Case, run: &Trial) -> bool {
     let turning = matches!(case.kind, RangeKind::TurningStart | RangeKind::ResidualStart);
-    let caught = format!("fault {}", Fault::NotCaught.code());
-    turning && run.rpm.abs() > CAUGHT_RPM && run.refused.as_ref() == Some(&caught)
+    turning
+        && run.rpm.abs() > CAUGHT_RPM
+        && run.refused == Some(Refused::Start(Fault::NotCaught.code()))
 }
 
 /// Why a run is none that a drive should have.
-fn failure(case: &Case, run: &Run) -> Option<String> {
+fn failure(case: &Case, run: &Trial) -> Option<String> {
     if let Some(why) = &run.refused {
         return (!too_fast(case, run)).then(|| format!("not started: {why}"));
     }
     let reasons = [
-        (run.silent_s > SILENT_S).then(|| format!("beyond 45° for {:.2} s", run.silent_s)),
-        run.is_lost(case.kind).then(|| match run.trip {
+        (run.wrong_s > UNNOTICED_S).then(|| format!("beyond 45° for {:.2} s", run.wrong_s)),
+        is_lost(case, run).then(|| match run.trip {
             Some(fault) => format!("fault {fault}, largest error {:.0}°", run.largest_deg),
             None => format!("largest error {:.0}°", run.largest_deg),
         }),

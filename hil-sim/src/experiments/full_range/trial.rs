@@ -5,17 +5,16 @@ use std::f64::consts::TAU;
 use drive_core::{Command, Drive, Mode, State, Stop};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
 
 use super::case::{Case, sign};
 use crate::config::{Config, RangeKind, plant_settings};
 use crate::error::Error;
+use crate::experiments::LOST_DEG;
 use crate::experiments::battery::{
-    Bench, LONGEST_START_S, LoadTorque, Moment, Part, Shaft, bring_up, follow, nominal_limit_a,
+    Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
+    nominal_limit_a,
 };
-use crate::experiments::torque::LOST_DEG;
 use crate::plant::Load;
-use crate::stats::Stats;
 
 /// Least and largest constant torque current, in relation to the current limit.
 const TORQUE: (f64, f64) = (1.0 / 7.0, 6.0 / 7.0);
@@ -50,58 +49,6 @@ const SAG: f64 = 230.0 / 311.0;
 const SAG_RAMP_S: f64 = 0.01;
 const SAG_S: f64 = 1.0;
 
-/// What is recorded of a run.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Run {
-    /// Seed.
-    pub seed: u64,
-    /// Speed, rpm on four poles, and torque current, A, that were drawn.
-    pub rpm: f64,
-    /// See `rpm`.
-    pub i_q: f64,
-    /// Angle error, true minus estimated, degrees.
-    pub error: Stats,
-    /// Largest error while the drive regulated, until the flux is turned.
-    pub largest_deg: f64,
-    /// Longest time beyond 45° while it regulated, s.
-    pub silent_s: f64,
-    /// Largest phase current, A; from the start on the turning shaft on, where there is one.
-    pub peak_a: f64,
-    /// Least and largest dc link, V.
-    pub dc_link_v: (f64, f64),
-    /// Number of the fault that stopped the drive.
-    pub trip: Option<u8>,
-    /// Why the drive did not start.
-    pub refused: Option<String>,
-    /// Time until a turning shaft was caught, or a stop had ended, s.
-    pub took_s: Option<f64>,
-}
-
-impl Run {
-    /// That of a drive that refused to learn.
-    pub fn unlearned(seed: u64, fault: u8) -> Self {
-        Self {
-            seed,
-            rpm: 0.0,
-            i_q: 0.0,
-            error: Stats::default(),
-            largest_deg: 0.0,
-            silent_s: 0.0,
-            peak_a: 0.0,
-            dc_link_v: (0.0, 0.0),
-            trip: None,
-            refused: Some(format!("fault {fault} while it learned")),
-            took_s: None,
-        }
-    }
-
-    /// Lost: stopped by a fault, or beyond 45°; after a turn of the flux neither counts.
-    pub fn is_lost(&self, kind: RangeKind) -> bool {
-        let stopped = self.trip.is_some() && kind != RangeKind::TurnedFlux;
-        stopped || self.largest_deg > LOST_DEG
-    }
-}
-
 /// Gives a configuration what the shaft and the dc link of a case need.
 pub fn set_up(case: Case, config: &mut Config) {
     if case.kind == RangeKind::Braking {
@@ -117,7 +64,7 @@ pub fn set_up(case: Case, config: &mut Config) {
 }
 
 /// A run: the bench, and what was drawn for it.
-pub struct Trial<'a> {
+pub struct Run<'a> {
     case: Case,
     config: &'a Config,
     machine: (f64, f64),
@@ -127,13 +74,12 @@ pub struct Trial<'a> {
     turn_deg: f64,
     off_s: f64,
     bench: Bench,
-    took_s: Option<f64>,
 }
 
 /// Why a run has ended before its time.
 enum End {
     /// The drive does not start.
-    Refused(String),
+    Refused(Refused),
     /// It no longer regulates.
     Stopped,
     Failed(Error),
@@ -150,7 +96,7 @@ fn still(regulates: bool) -> Result<(), End> {
     if regulates { Ok(()) } else { Err(End::Stopped) }
 }
 
-impl<'a> Trial<'a> {
+impl<'a> Run<'a> {
     /// With a copy of a drive that is off; the configuration is one of [`set_up`].
     ///
     /// # Errors
@@ -176,41 +122,28 @@ impl<'a> Trial<'a> {
         let held = case.shaft(rpm) != Shaft::Free;
         let load = if held { Load::Speed { speed: 0.0 } } else { Load::Free { torque: 0.0 } };
         let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+        bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
         bench.trace = traced.then(Vec::new);
         let machine = (plant.machine.rs, plant.machine.rr);
-        Ok(Self { case, config, machine, rpm, i_q, sign, turn_deg, off_s, bench, took_s: None })
+        Ok(Self { case, config, machine, rpm, i_q, sign, turn_deg, off_s, bench })
     }
 
     /// Does the run; returns its record too, where there is one.
     ///
     /// # Errors
     /// When the plant is refused, or the drive refuses a reference.
-    pub fn run(mut self, seed: u64) -> Result<(Run, Vec<Moment>), Error> {
-        let refused = match self.course() {
-            Ok(()) | Err(End::Stopped) => None,
-            Err(End::Refused(why)) => Some(why),
+    pub fn run(mut self) -> Result<(Trial, Vec<Moment>), Error> {
+        let still = match self.course() {
+            Ok(()) => true,
+            Err(End::Stopped) => false,
+            Err(End::Refused(why)) => {
+                self.bench.trial.refused = Some(why);
+                true
+            }
             Err(End::Failed(error)) => return Err(error),
         };
-        let bench = self.bench;
-        let trip = match bench.rig.drive.state() {
-            State::Fault(fault) if refused.is_none() => Some(fault.code()),
-            _ => None,
-        };
-        let run = Run {
-            seed,
-            rpm: self.rpm,
-            i_q: self.i_q,
-            error: bench.error,
-            largest_deg: bench.largest_deg,
-            silent_s: bench.wrong_s(),
-            peak_a: bench.peak_a,
-            dc_link_v: bench.dc_link_v,
-            trip,
-            refused,
-            took_s: self.took_s,
-        };
-        Ok((run, bench.trace.unwrap_or_default()))
+        Ok(self.bench.finish(still))
     }
 
     fn course(&mut self) -> Result<(), End> {
@@ -269,11 +202,11 @@ impl<'a> Trial<'a> {
     /// Starts, and waits until the drive regulates.
     fn start(&mut self) -> Result<(), End> {
         let started = self.bench.rig.command(&Command::Start(self.mode()));
-        started.map_err(|why| End::Refused(why.to_string()))?;
+        started.map_err(|why| End::Refused(Refused::Otherwise(why.to_string())))?;
         match self.bench.wait(LONGEST_START_S) {
             state if state.regulates() => Ok(()),
-            State::Fault(fault) => Err(End::Refused(format!("fault {}", fault.code()))),
-            other => Err(End::Refused(format!("the drive is {other}"))),
+            State::Fault(fault) => Err(End::Refused(Refused::Start(fault.code()))),
+            other => Err(End::Refused(Refused::Otherwise(format!("the drive is {other}")))),
         }
     }
 
@@ -326,10 +259,10 @@ impl<'a> Trial<'a> {
         let speed = self.config.rpm(self.rpm) * TAU / 60.0;
         self.bench.rig.set_load(Load::Speed { speed })?;
         let (from, i_q) = (self.bench.time(), self.sign * CAUGHT_A);
-        self.bench.peak_a = 0.0;
+        self.bench.trial.peak_a = 0.0;
         self.start()?;
         // The error of the first samples belongs to the catching.
-        let before = self.bench.largest_deg;
+        let before = self.bench.trial.largest_deg;
         loop {
             still(self.bench.watch(1.0 / 600.0))?;
             if self.bench.error_deg.abs() < CAUGHT_DEG {
@@ -339,8 +272,8 @@ impl<'a> Trial<'a> {
                 return Ok(());
             }
         }
-        self.bench.largest_deg = before;
-        self.took_s = Some(self.bench.time() - from);
+        self.bench.trial.largest_deg = before;
+        self.bench.trial.took_s = Some(self.bench.time() - from);
         self.counted(0.1, &[Part::constant(i_q, 0.7)])
     }
 
@@ -356,7 +289,7 @@ impl<'a> Trial<'a> {
                 return Ok(());
             }
         }
-        self.took_s = Some(self.bench.time() - from);
+        self.bench.trial.took_s = Some(self.bench.time() - from);
         Ok(())
     }
 

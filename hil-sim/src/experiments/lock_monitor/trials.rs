@@ -36,30 +36,42 @@ pub fn case(seed: u64, bound: f64) -> OperatingPoint {
     OperatingPoint { rpm: random.random_range(-bound..=bound), iq: sign * length, seed }
 }
 
-/// A trial with the angle forced off.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct ForcedTrial {
+/// The result of a trial of any part; what the part does not give is at its default.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Trial {
     /// Where.
     pub case: OperatingPoint,
-    /// The last moment, s after the angle was forced off, at which the drive was on with an error of
-    /// 15° or more.
-    pub wrong_s: f64,
     /// The fault with which the drive stopped.
     #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
-    /// Loss of saliency over time.
+    /// With the angle forced off: the last moment, s after that, at which the drive was on with an error of 15° or more.
+    pub wrong_s: f64,
+    /// Loss of saliency over time; only of the first trial of each offset, for the figure.
     pub loss: Vec<(f64, f64)>,
+    /// Disturbance of a run that the drive must not stop, and the largest loss that the monitor saw.
+    pub kind: Option<HealthyKind>,
+    /// See `kind`.
+    pub largest_loss: f64,
+    /// Largest angle error of such a run, or in the half second after an accepted start, degrees.
+    pub largest_deg: f64,
+    /// Of a shaft that is driven past the limit: acceleration, rpm/s, and time from the limit to off, s; not more than zero
+    /// when the drive stopped before.
+    pub rpm_per_s: f64,
+    /// See `rpm_per_s`.
+    pub late_s: f64,
+    /// Whether the drive went on after a start or a relock on a turning shaft.
+    pub accepted: bool,
 }
 
-impl ForcedTrial {
-    /// Time within which the drive must be right or off, s.
-    pub fn deadline(&self) -> f64 {
-        if self.case.iq.abs() > IQ_A.0 { 0.5 } else { 1.5 }
+impl Trial {
+    /// Whether a drive with its angle forced off was right or off in time.
+    pub fn is_in_time(&self) -> bool {
+        self.wrong_s <= if self.case.iq.abs() > IQ_A.0 { 0.5 } else { 1.5 }
     }
 
-    /// Whether it was.
-    pub fn is_in_time(&self) -> bool {
-        self.wrong_s <= self.deadline()
+    /// Whether a start was refused, or right.
+    pub fn is_honest(&self) -> bool {
+        !self.accepted || self.largest_deg < LOCKED_DEG
     }
 }
 
@@ -67,7 +79,7 @@ impl ForcedTrial {
 ///
 /// # Errors
 /// As [`at_speed`], or when the drive stops before that moment.
-pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<ForcedTrial, Error> {
+pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Trial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
     rig.run(0.8 + random.random_range(0.0..0.2), |_| {});
@@ -91,7 +103,7 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<For
     }
     loss.truncate(loss.len() - loss.len() % 10);
     let loss = loss.chunks(10).map(|c| c[9]).collect();
-    Ok(ForcedTrial { case, wrong_s, fault: fault(&rig), loss })
+    Ok(Trial { case, wrong_s, fault: fault(&rig), loss, ..Trial::default() })
 }
 
 /// Disturbance in a run that the drive must not stop.
@@ -123,32 +135,16 @@ impl HealthyKind {
 pub const KINDS: [HealthyKind; 4] =
     [HealthyKind::Slow, HealthyKind::Fast, HealthyKind::Reversal, HealthyKind::LoadStep];
 
-/// A run that the drive must not stop.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct HealthyRun {
-    /// Where.
-    pub case: OperatingPoint,
-    /// Its disturbance.
-    pub kind: HealthyKind,
-    /// Largest loss that the monitor saw.
-    pub largest_loss: f64,
-    /// Largest angle error, degrees.
-    pub largest_error: f64,
-    /// The fault with which the drive stopped nevertheless.
-    #[serde(with = "fault_code")]
-    pub fault: Option<Fault>,
-}
-
 /// Two seconds, after 0.3 s to settle, with the disturbance after one.
 ///
 /// # Errors
 /// As [`at_speed`].
-pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<HealthyRun, Error> {
+pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<Trial, Error> {
     let case = case(seed, if kind == HealthyKind::Fast { 300.0 } else { 150.0 });
-    let mut result = HealthyRun { case, kind, largest_loss: 0.0, largest_error: 0.0, fault: None };
+    let mut result = Trial { case, kind: Some(kind), ..Trial::default() };
     let mut look = |p: &Point| {
         result.largest_loss = result.largest_loss.max(p.loss);
-        result.largest_error = result.largest_error.max(p.angle_error_deg.abs());
+        result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs());
     };
     let mut rig = if kind == HealthyKind::LoadStep {
         load_step(config, case, &mut look)?
@@ -202,20 +198,6 @@ fn load_step(
     Ok(rig)
 }
 
-/// A shaft that is driven past the limit.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct OverSpeedTrial {
-    /// Where it began.
-    pub case: OperatingPoint,
-    /// Acceleration, rpm/s.
-    pub rpm_per_s: f64,
-    /// Time from the limit to off, s; not more than zero when it stopped before.
-    pub late_s: f64,
-    /// The fault with which the drive stopped.
-    #[serde(with = "fault_code")]
-    pub fault: Option<Fault>,
-}
-
 /// Time for which a drive beyond the limit is watched, s.
 pub const OVER_SPEED_S: f64 = 0.5;
 
@@ -223,7 +205,7 @@ pub const OVER_SPEED_S: f64 = 0.5;
 ///
 /// # Errors
 /// As [`at_speed`].
-pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeedTrial, Error> {
+pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x0ff);
     let mut case = case(seed, limit);
     case.rpm = 0.7 * limit.copysign(case.rpm);
@@ -237,33 +219,18 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeedTri
         rig.run(0.001, |_| {});
         late_s = (rpm - limit) / rpm_per_s;
     }
-    Ok(OverSpeedTrial { case, rpm_per_s, late_s, fault: fault(&rig) })
-}
-
-/// A start on a shaft that turns.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct StartTrial {
-    /// Whether the drive went on.
-    pub accepted: bool,
-    /// Largest angle error in the half second after that, degrees.
-    pub error_deg: f64,
-}
-
-impl StartTrial {
-    /// Whether it was refused, or right.
-    pub fn is_honest(&self) -> bool {
-        !self.accepted || self.error_deg < LOCKED_DEG
-    }
+    Ok(Trial { case, rpm_per_s, late_s, fault: fault(&rig), ..Trial::default() })
 }
 
 /// A start, or a relock of a drive that runs, at `rpm`.
 ///
 /// # Errors
 /// As [`Rig::from_config`] and [`at_speed`].
-pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<StartTrial, Error> {
-    let mut result = StartTrial { accepted: false, error_deg: 0.0 };
+pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial, Error> {
+    let case = OperatingPoint { rpm, iq: if relock { 1.0 } else { 0.0 }, seed };
+    let mut result = Trial { case, ..Trial::default() };
     let mut rig = if relock {
-        let mut rig = at_speed(config, OperatingPoint { rpm, iq: 1.0, seed })?;
+        let mut rig = at_speed(config, case)?;
         rig.run(0.5, |_| {});
         // Refused while the shaft turns.
         if rig.command(&Command::Relock).is_err() {
@@ -286,7 +253,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start
     };
     if fault(&rig).is_none() {
         result.accepted = true;
-        rig.run(0.5, |p| result.error_deg = result.error_deg.max(p.angle_error_deg.abs()));
+        rig.run(0.5, |p| result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs()));
         // A drive that stops by itself in this time has not accepted the start.
         result.accepted = fault(&rig).is_none();
     }

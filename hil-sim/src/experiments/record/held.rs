@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::config::Config;
 use crate::error::Error;
-use crate::experiments::torque::LOST_DEG;
+use crate::experiments::LOST_DEG;
 use crate::plant::{Load, Plant};
 use crate::rig::{Rig, wrapped_degrees};
 use crate::stats::Stats;

@@ -1,7 +1,7 @@
 //! Angle error at standstill over the amplitude of the carrier.
 
+use super::assumptions;
 use super::steady::{OperatingPoint, steady_run};
-use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};

@@ -1,0 +1,357 @@
+//! Scenarios as they are written: a TOML file, or the rows of a CSV file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use drive_core::Stop;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::quantity::Named;
+use super::{Part, REFERENCES, Reference, Scenario, Shaft};
+use crate::columns::Columns;
+use crate::config::{Config, Value, flattened};
+use crate::error::{Error, unknown};
+
+/// A value from the beginning to the end of a part, straight between them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ramp(pub f64, pub f64);
+
+impl Ramp {
+    /// From a number, or from two in a list.
+    fn of(value: &toml::Value) -> Option<Self> {
+        let number = |value: &toml::Value| match Value::from_toml(value) {
+            Value::Number(number) if number.is_finite() => Some(number),
+            _ => None,
+        };
+        match value {
+            toml::Value::Array(two) if two.len() == 2 => {
+                Some(Self(number(&two[0])?, number(&two[1])?))
+            }
+            one => number(one).map(|value| Self(value, value)),
+        }
+    }
+}
+
+/// The columns of a part: references of the drive, and the shaft; the first five are those of a CSV file.
+#[rustfmt::skip] // one a line
+static COLUMNS: [(&str, Result<&Reference, Shaft>); 7] = [
+    ("torque_current_a", Ok(&REFERENCES[0])),
+    ("speed_rpm", Ok(&REFERENCES[1])),
+    ("position_turns", Ok(&REFERENCES[2])),
+    ("load_nm", Err(Shaft::Free)),
+    ("load_rpm", Err(Shaft::Held)),
+    ("torque_current", Ok(&REFERENCES[0])),
+    ("load", Err(Shaft::Free)),
+];
+const IN_ROWS: usize = 5;
+
+/// What a metric is of the values of a quantity.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Statistic {
+    /// Root of the mean square.
+    #[default]
+    Rms,
+    /// Mean.
+    Mean,
+    /// Largest magnitude.
+    Largest,
+    /// Largest value.
+    Highest,
+    /// Last value.
+    Last,
+    /// How far the highest is beyond the last reference, %.
+    Overshoot,
+    /// When the magnitude was beyond `within` for the last time, s.
+    Settling,
+}
+
+/// The samples that count.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Over {
+    /// All of them.
+    #[default]
+    All,
+    /// From half a second after the first reference on, or a tenth of a shorter run than five.
+    AfterStart,
+    /// The last half second of each part.
+    Settled,
+}
+
+/// A number made of the values of a quantity.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Metric {
+    /// Name for programs; a bound has none.
+    #[serde(default)]
+    pub name: String,
+    /// The quantity.
+    pub of: Named,
+    /// The number.
+    #[serde(default)]
+    pub statistic: Statistic,
+    /// The samples that count.
+    #[serde(default)]
+    pub over: Over,
+    /// For [`Statistic::Settling`]; of a bound, the largest magnitude.
+    #[serde(default)]
+    pub within: f64,
+}
+
+/// A line of a panel.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// The quantity.
+    pub of: Named,
+    /// Name in the legend.
+    #[serde(default)]
+    pub name: String,
+    /// Whether it is drawn as a reference.
+    #[serde(default)]
+    pub dashed: bool,
+}
+
+/// Axes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanelText {
+    /// Label; unless given, that of the first line.
+    pub label: Option<String>,
+    /// Shown only with the synchronous demodulation, or only with others.
+    pub synchronous: Option<bool>,
+    /// The lines.
+    pub lines: Vec<Line>,
+}
+
+/// A file.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Text {
+    part: Vec<BTreeMap<Spanned<String>, Spanned<toml::Value>>>,
+    settings: BTreeMap<String, Spanned<toml::Value>>,
+    /// Whether the values are those of the dissertation's motor, in proportion on others.
+    pub in_proportion: bool,
+    /// Load whose multiples the parts give, unless `load.torque_nm` is set; Nm.
+    pub load_nm: f64,
+    /// Whether means over the second half of each constant part are listed.
+    pub levels: bool,
+    /// Numbers for programs.
+    pub metrics: Option<Vec<Metric>>,
+    /// Bounds; a run beyond one is lost.
+    pub judge: Option<Vec<Metric>>,
+    /// Name of the figure for programs, its title, and what it reproduces.
+    pub figure: String,
+    /// See `figure`.
+    pub title: String,
+    /// See `figure`.
+    pub source: String,
+    /// Its panels, and quantities that have a panel of their own.
+    pub panel: Vec<PanelText>,
+    /// See `panel`.
+    pub columns: Vec<Named>,
+    /// Samples whose mean is a point; 0 for those of a carrier period.
+    pub samples: usize,
+    /// For the reader; `{KEY}` is the value of a key, `{load_nm}` the load.
+    pub remarks: Vec<String>,
+}
+
+impl Text {
+    /// What is not given is the usual, for a reference of this name.
+    fn completed(mut self, column: &str) -> Result<Self, Error> {
+        let (quantity, unit) = column.rsplit_once('_').unwrap_or((column, ""));
+        let usual = include_str!("../../../scenarios/usual.toml").replace("{column}", column);
+        let usual = usual.replace("{error}", &format!("{quantity}_error_rms_{unit}"));
+        let usual: Self = toml::from_str(&usual).map_err(|e| Error::Internal(e.to_string()))?;
+        self.metrics = self.metrics.or(usual.metrics);
+        self.judge = self.judge.or(usual.judge);
+        if self.figure.is_empty() {
+            (self.figure, self.title) = (usual.figure, usual.title);
+        }
+        if self.panel.is_empty() && self.columns.is_empty() {
+            (self.panel, self.columns) = (usual.panel, usual.columns);
+            self.columns.retain(|of| of.0.name != column);
+        }
+        Ok(self)
+    }
+}
+
+impl Scenario {
+    /// Reads a TOML file; the configuration gives its values their scale.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the line.
+    pub fn read(path: &Path, config: &Config) -> Result<Self, Error> {
+        let failed = |e: std::io::Error| data(path, None, e.to_string());
+        Self::of_toml(path, &std::fs::read_to_string(path).map_err(failed)?, config)
+    }
+
+    /// The same from the text of the file.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the line.
+    pub fn of_toml(path: &Path, text: &str, config: &Config) -> Result<Self, Error> {
+        let at = |offset: usize, problem: String| {
+            data(path, Some(1 + text[..offset].matches('\n').count() as u64), problem)
+        };
+        let mut text: Text = toml::from_str(text)
+            .map_err(|e| at(e.span().unwrap_or_default().start, e.message().to_owned()))?;
+        let (parts, settings) =
+            (std::mem::take(&mut text.part), std::mem::take(&mut text.settings));
+        let mut scenario = Self { text, ..Self::default() };
+        for text in parts {
+            let mut part = scenario.next();
+            for (key, value) in &text {
+                let problem = |problem| at(key.span().start, problem);
+                scenario.set(&mut part, config, key.get_ref(), value.get_ref()).map_err(problem)?;
+            }
+            let place = text.keys().next().map_or(0, |key| key.span().start);
+            let has = |name: &&str| text.keys().any(|key| key.get_ref() == *name);
+            for two in [["torque_current_a", "torque_current"], ["load_nm", "load"]] {
+                if two.iter().all(has) {
+                    return Err(at(place, format!("{} exclude each other", two.join(" and "))));
+                }
+            }
+            if part.seconds == 0.0 {
+                return Err(at(place, "a part without `seconds`".into()));
+            }
+            scenario.parts.push(part);
+        }
+        for (name, value) in settings {
+            let place = value.span().start;
+            for (name, value) in flattened(&toml::Table::from_iter([(name, value.into_inner())])) {
+                Config::default().set(&name, &value).map_err(|e| at(place, e.to_string()))?;
+                scenario.settings.push((name, value));
+            }
+        }
+        let reference = scenario.reference.ok_or_else(|| {
+            data(path, None, format!("no [[part]] gives a reference: {}", references()))
+        })?;
+        Ok(Self { text: scenario.text.completed(reference.column)?, ..scenario })
+    }
+
+    /// Reads the rows of a CSV file: straight lines between them; two rows of the same time are a step.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the line.
+    pub fn of_csv(path: &Path, config: &Config) -> Result<Self, Error> {
+        let columns = Columns::read(path)?;
+        let names = &COLUMNS.each_ref().map(|column| column.0)[..IN_ROWS];
+        columns.only(&[&["time_s"], names].concat())?;
+        let time = columns.need("time_s")?;
+        let given: Vec<_> =
+            names.iter().filter_map(|name| Some((*name, columns.get(name)?))).collect();
+        let is_reference = |name: &str| REFERENCES.iter().any(|known| known.column == name);
+        if given.iter().filter(|(name, _)| is_reference(name)).count() != 1 {
+            let names = references();
+            return Err(
+                columns.error(format!("one of the columns {names} must be there, and only one"))
+            );
+        }
+        if columns.len() < 2 {
+            return Err(columns.error(format!("{} rows; a profile has two or more", columns.len())));
+        }
+        if time[0] != 0.0 {
+            return Err(columns.at(1, format!("time_s = {}; the first row is at 0", time[0])));
+        }
+        if time[time.len() - 1] == 0.0 {
+            return Err(columns.error("all rows are at the time 0".into()));
+        }
+        let mut scenario = Self { from_rows: true, ..Self::default() };
+        for row in 1..time.len() {
+            let (this, before) = (time[row], time[row - 1]);
+            if this < before {
+                return Err(columns
+                    .at(row + 1, format!("time_s = {this} after {before}: it must not decrease")));
+            }
+            let mut part = Part { begin: before, seconds: this - before, ..scenario.next() };
+            for (name, values) in &given {
+                let ramp = Ramp(values[row - 1], values[row]);
+                scenario.put(&mut part, config, name, ramp).map_err(|e| columns.error(e))?;
+            }
+            scenario.parts.push(part);
+        }
+        let text = Text::default().completed(scenario.reference().column)?;
+        Ok(Self { text, ..scenario })
+    }
+
+    /// A part behind the others, with their last values.
+    fn next(&self) -> Part {
+        let Some(last) = self.parts.last() else { return Part::default() };
+        let stays = |Ramp(_, value)| Ramp(value, value);
+        let (reference, load) = (stays(last.reference), stays(last.load));
+        Part { begin: last.begin + last.seconds, reference, load, ..Part::default() }
+    }
+
+    /// Takes a key of a part.
+    fn set(
+        &mut self,
+        part: &mut Part,
+        config: &Config,
+        name: &str,
+        value: &toml::Value,
+    ) -> Result<(), String> {
+        let (text, ramp) = (value.as_str(), Ramp::of(value));
+        let wrong = |allowed: &str| format!("{name} = {value}; allowed: {allowed}");
+        match (name, text) {
+            ("seconds", _) => {
+                let seconds = ramp.filter(|ramp| ramp.0 > 0.0 && ramp.1 == ramp.0);
+                part.seconds = seconds.ok_or_else(|| wrong("a time of more than 0 s"))?.0;
+            }
+            ("start", _) => part.start = value.as_bool().ok_or_else(|| wrong("true, false"))?,
+            ("stop", Some("coast")) => part.stop = Some(Stop::Coast),
+            ("stop", Some("ramp")) => part.stop = Some(Stop::Ramp),
+            ("stop", Some("quick")) => part.stop = Some(Stop::Quick),
+            ("stop", _) => return Err(wrong("coast, ramp, quick")),
+            _ => {
+                let known = COLUMNS.iter().map(|column| column.0);
+                if !known.clone().any(|known| known == name) {
+                    let known: Vec<_> = known.chain(["seconds", "start", "stop"]).collect();
+                    return Err(unknown("column", name, &known));
+                }
+                let ramp = ramp.ok_or_else(|| wrong("a finite number, or two of them: [FROM, TO]"));
+                self.put(part, config, name, ramp?)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the value of a column into a part. All parts regulate the same, and have the same kind of shaft.
+    fn put(
+        &mut self,
+        part: &mut Part,
+        config: &Config,
+        name: &str,
+        Ramp(from, to): Ramp,
+    ) -> Result<(), String> {
+        let value = Ramp(self.scaled(config, name, from), self.scaled(config, name, to));
+        match COLUMNS.iter().find(|column| column.0 == name).map(|column| column.1) {
+            Some(Ok(reference)) => {
+                let before = self.reference.get_or_insert(reference).column;
+                if before != reference.column {
+                    return Err(format!("{before} and {name} exclude each other"));
+                }
+                part.reference = value;
+            }
+            Some(Err(shaft)) => {
+                if ![Shaft::AsSet, shaft].contains(&self.shaft) {
+                    return Err("load_nm and load_rpm exclude each other: a shaft turns freely against a torque, or its speed is held".into());
+                }
+                (self.shaft, part.load) = (shaft, value);
+            }
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// The names of the references.
+fn references() -> String {
+    REFERENCES.each_ref().map(|reference| reference.column).join(", ")
+}
+
+fn data(path: &Path, line: Option<u64>, problem: String) -> Error {
+    Error::Data { path: path.to_owned(), line, problem }
+}

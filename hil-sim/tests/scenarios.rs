@@ -1,0 +1,154 @@
+//! Scenarios: the files of the program as files of a user, an own one, and what is refused with file and line.
+
+use crate::cli_common::{files, folder, hil_sim, object, text};
+use hil_sim::experiments::scenario::QUANTITIES;
+
+/// A file of the program gives, as a file of a user, what the experiment of its name gives.
+#[test]
+fn a_shipped_file_runs_as_its_experiment() {
+    let folder = folder("scenario-shipped");
+    for name in ["torque-steps", "speed-profile", "position-step"] {
+        let file = format!("{}/scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let more = ["--json", "--quiet", "--seconds", "2"];
+        let own = hil_sim(&folder, &[&["run", &file][..], &more].concat());
+        assert_eq!(own.status.code(), Some(0), "{}", text(&own.stderr));
+        let known = hil_sim(&folder, &[&["run", name][..], &more].concat());
+        assert_eq!(text(&own.stdout), text(&known.stdout), "{name}");
+    }
+    assert!(files(&folder).is_empty());
+}
+
+/// Speed regulated with a ramp, a load that comes slowly, and a stop: the drive follows, is off at the end, and only the columns that
+/// are asked for are shown.
+const OWN: &str = r#"
+columns = ["speed_rpm", "torque_nm"]
+metrics = [
+    { name = "settled_error_rms_rpm", of = "reference_error", over = "settled" },
+    { name = "last_rpm", of = "speed_rpm", statistic = "last" },
+    { name = "last_nm", of = "torque_nm", statistic = "last" },
+]
+
+[settings]
+angle_source = "encoder"
+
+[[part]]
+seconds = 2
+speed_rpm = [0, 200]
+load_nm = 0
+
+[[part]]
+seconds = 2
+load_nm = [0, 0.4]
+
+[[part]]
+seconds = 3
+load_nm = 0
+stop = "ramp"
+"#;
+
+#[test]
+fn an_own_scenario_follows_its_parts_and_stops() {
+    let folder = folder("scenario-own");
+    std::fs::write(folder.join("lift.toml"), OWN).unwrap();
+    let output =
+        hil_sim(&folder, &["run", "lift.toml", "--out", "page", "--csv", "data", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let result = object(&output);
+    assert_eq!(result["experiment"], "lift");
+    let metric = |name: &str| result["metrics"][name].as_f64().unwrap();
+    // The last half second of the ramp, of the load, and of the time after the stop, when the reference is still 200 rpm.
+    assert!((metric("settled_error_rms_rpm") - 200.0 / 3f64.sqrt()).abs() < 6.0, "{result}");
+    assert!(metric("last_rpm").abs() < 5.0 && metric("last_nm").abs() < 0.05);
+    assert_eq!(metric("lost"), 0.0);
+    let series = result["series"].as_object().unwrap();
+    assert_eq!(series.keys().collect::<Vec<_>>(), ["profile/speed_rpm", "profile/torque_nm"]);
+    // At 4 s the motor carries the load of 0.4 Nm and the friction of 0.001 Nm s/rad.
+    let torque = &series["profile/torque_nm"];
+    let at = |array: &str, n: usize| torque[array][n].as_f64().unwrap();
+    let last = (0..).find(|&n| at("x", n) > 3.99).unwrap();
+    let mean = (last - 30..last).map(|n| at("y", n)).sum::<f64>() / 30.0;
+    assert!((mean - 0.42).abs() < 0.04, "{mean}");
+    let page = std::fs::read_to_string(folder.join("page/lift.html")).unwrap();
+    assert!(page.contains("run lift.toml"), "the command that repeats it");
+    let csv = std::fs::read_to_string(folder.join("data/lift-profile.csv")).unwrap();
+    assert!(csv.starts_with("time_s,speed_rpm,torque_nm\n"), "{}", &csv[..80]);
+}
+
+/// With the locked shaft of the default a torque beyond a bound of its judge is lost; the bound is the only difference.
+#[test]
+fn a_judge_decides_what_is_lost() {
+    let folder = folder("scenario-judge");
+    let run = |within: f64| {
+        let text = format!(
+            "judge = [{{ of = \"torque_nm\", within = {within} }}]\n[[part]]\nseconds = 1\ntorque_current_a = 1.0\n"
+        );
+        std::fs::write(folder.join("judged.toml"), text).unwrap();
+        hil_sim(&folder, &["run", "judged.toml", "--json"])
+    };
+    assert_eq!(object(&run(10.0))["metrics"]["lost"], 0.0);
+    let lost = run(0.1);
+    assert_eq!((lost.status.code(), &object(&lost)["metrics"]["lost"]), (Some(1), &1.0.into()));
+}
+
+#[test]
+fn what_is_wrong_is_named_with_file_and_line() {
+    let folder = folder("scenario-wrong");
+    let part = "[[part]]\nseconds = 1\n";
+    let cases = [
+        (
+            format!("{part}speed_rp = 1\n"),
+            "s.toml, line 3: unknown column `speed_rp`; did you mean `speed_rpm`",
+        ),
+        (format!("{part}torque = 1\n"), "allowed: torque_current_a, speed_rpm, position_turns"),
+        (format!("{part}speed_rpm = nan\n"), "line 3: speed_rpm = nan; allowed: a finite number"),
+        (format!("{part}speed_rpm = [0, 1, 2]\n"), "line 3: speed_rpm = [0, 1, 2]; allowed"),
+        (format!("{part}speed_rpm = 1\nload_nm = 1\nload_rpm = 1\n"), "exclude each other"),
+        (
+            format!("{part}speed_rpm = 1\n{part}torque_current_a = 1\n"),
+            "line 6: speed_rpm and torque",
+        ),
+        (format!("{part}load = 1\nload_nm = 1\n"), "load_nm and load exclude each other"),
+        ("[[part]]\nseconds = -1\nspeed_rpm = 1\n".into(), "line 2: seconds = -1; allowed: a time"),
+        ("[[part]]\nspeed_rpm = 1\n".into(), "line 2: a part without `seconds`"),
+        (part.into(), "no [[part]] gives a reference: torque_current_a, speed_rpm"),
+        (
+            format!("{part}speed_rpm = 1\nstop = \"now\"\n"),
+            "line 4: stop = \"now\"; allowed: coast",
+        ),
+        (format!("columns = [\"speed\"]\n{part}"), "s.toml, line 1: unknown column `speed`"),
+        (format!("shown = 1\n{part}"), "s.toml, line 1: unknown field `shown`, expected one of"),
+        (
+            format!("[settings]\nmotor.r_x = 1\n{part}"),
+            "s.toml, line 2: there is no key `motor.r_x`",
+        ),
+        ("speed".into(), "s.toml, line 1: "),
+    ];
+    for (scenario, message) in cases {
+        std::fs::write(folder.join("s.toml"), &scenario).unwrap();
+        let output = hil_sim(&folder, &["run", "s.toml"]);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{scenario}: {error}");
+        assert!(error.contains(message), "{scenario}: `{message}` is not in: {error}");
+        assert_eq!(files(&folder).len(), 1, "{scenario}");
+    }
+    let output = hil_sim(&folder, &["run", "none.toml"]);
+    assert!(text(&output.stderr).contains("none.toml: No such file"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_name_that_is_gone_is_answered_with_the_command_that_took_its_place() {
+    let folder = folder("scenario-gone");
+    let output = hil_sim(&folder, &["run", "torque-drift"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("`torque-drift` is gone; use `run record"), "{message}");
+}
+
+/// The page has a row for each column.
+#[test]
+fn every_column_is_documented() {
+    let page = include_str!("../scenarios/README.md");
+    for quantity in QUANTITIES {
+        assert!(page.contains(&format!("`{}`", quantity.name)), "{}", quantity.name);
+    }
+}
