@@ -365,7 +365,9 @@ impl Desk {
             self.task = Some((from, order));
             return Ok(Reply::Designing);
         }
-        let applied = self.settings.prepare().is_some().then(|| self.adopt()).unwrap_or_default();
+        let staged = self.settings.prepare().is_some();
+        self.unsaved |= staged;
+        let applied = if staged { self.settings.adopt() } else { Applied::default() };
         self.finish(&order, applied, drive)
     }
 
@@ -427,19 +429,13 @@ impl Desk {
             && let Some(settings) = self.settings.prepare()
         {
             configure(drive, settings)?;
-            applied = self.adopt();
+            (applied, self.unsaved) = (self.settings.adopt(), true);
             drive.configured(self.settings.in_force());
         }
         if matches!(order, Order::Learn { again: false }) {
             self.settings.begin_learning(false, |settings| configure(drive, settings))?;
         }
         Ok(applied)
-    }
-
-    /// Takes the prepared settings as those in force.
-    fn adopt(&mut self) -> Applied {
-        self.unsaved = true;
-        self.settings.adopt()
     }
 
     /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its

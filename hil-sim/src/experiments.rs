@@ -5,6 +5,7 @@ mod anti_windup;
 pub mod battery;
 pub mod commission;
 mod current_step;
+pub mod drawn_machine;
 pub mod full_range;
 mod lock_monitor;
 mod losses;

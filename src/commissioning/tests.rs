@@ -2,7 +2,7 @@ use drive_core::{Command, Drive, Mode, Refused, State};
 use drive_settings::PlantSource;
 use hil_sim::Config;
 use hil_sim::config::{LoadMode, plant_settings};
-use hil_sim::experiments::commission::machine::Circuit;
+use hil_sim::experiments::drawn_machine::Circuit;
 use hil_sim::rig::Rig;
 
 use super::*;

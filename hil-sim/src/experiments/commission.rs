@@ -1,6 +1,5 @@
 //! The commissioning: one session on the motor of the configuration, or statistics over machines drawn around it.
 
-pub mod machine;
 pub mod refusals;
 mod session;
 
@@ -12,6 +11,7 @@ use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plan
 use drive_settings::value::Words as _;
 use serde::{Deserialize, Serialize};
 
+use super::drawn_machine::{Circuit, drawn};
 use super::statistics::{Study, seed_of, whole};
 use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
 use crate::config::{Config, PlantModel, built, plant_settings};
@@ -19,7 +19,6 @@ use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::Rig;
 use crate::stats::exact;
-use machine::{Circuit, drawn};
 use session::{Abort, Session, unaware};
 
 /// Not in the source, which asks for it as future work.

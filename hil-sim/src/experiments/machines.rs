@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::assumptions;
-use super::commission::machine::around;
+use super::drawn_machine::around;
 use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};

@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result, bail};
 use hil_sim::Config;
-use hil_sim::experiments::commission::machine::{Circuit, drawn};
+use hil_sim::experiments::drawn_machine::{Circuit, drawn};
 use virtual_board::{Board, Image, Options};
 
 /// Machines, unless the environment gives another `MACHINES`.

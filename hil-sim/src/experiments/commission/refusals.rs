@@ -6,9 +6,9 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
+use super::super::drawn_machine::drawn;
 use super::super::statistics::{Study, seed_of, whole};
 use super::super::{BENCH, Context, DRIVE, Experiment};
-use super::machine::drawn;
 use super::session::{Abort, Session, unaware};
 use crate::config::{Config, FluxLevel, LoadMode, OpenPhase, PlantModel};
 use crate::error::Error;
