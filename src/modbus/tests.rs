@@ -5,13 +5,20 @@ use std::fmt::Write as _;
 use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
+use drive_core::{Fault, Refused};
+use drive_settings::SettingsError;
+
 use super::Frame;
 use super::cia402::Power;
 use super::registers::{FAULTS, ROWS, Shown};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
+use crate::desk::handle::CommandError;
+use crate::desk::order::Refusal;
 use crate::generated;
-use crate::settings::bus::{Baud, Format};
+use crate::settings::bus::{Baud, Commander, Format};
+use crate::settings::keys;
+use crate::store::FlashError;
 
 /// Registers 0x2000 to 0x20ff, of which the last cannot be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -262,4 +269,64 @@ fn the_manual_lists_the_registers() {
     table("registers", "| address | size | unit | | meaning |", rows());
     table("states", "| state | bits |", states());
     assert_eq!(FAULTS, 0x5100);
+}
+
+/// The register of the last refusal: each number, an example of its reason, and the cure.
+#[test]
+fn the_manual_lists_the_refusals() {
+    let key = keys::find("inverter.dead_time_s").unwrap();
+    let refused = |why| Refusal::Command(CommandError::Refused(why));
+    let range = SettingsError::Word("a", "b", "c");
+    let rows = [
+        (
+            Refusal::Authority(Commander::Console),
+            "the other side commands",
+            "`set bus.commands bus` at the console",
+        ),
+        (Refusal::MustBeOff, "the drive is not off", "write a stop first"),
+        (
+            Refusal::NotConfirmed,
+            "the board is not confirmed",
+            "the bench steps that `board` lists, then `confirm board`, at the console",
+        ),
+        (
+            refused(Refused::NotLearned),
+            "nothing is learned of this motor with these settings",
+            "lock the shaft, `learn` at the console",
+        ),
+        (
+            refused(Refused::Fault(Fault::Break)),
+            "a fault is latched; `0x2100` has its number",
+            "bit 1 of `0x2002` clears it",
+        ),
+        (
+            Refusal::Design(range),
+            "a value, or the settings together, are not possible",
+            "`get` and `apply` at the console say which",
+        ),
+        (Refusal::Hardware(key), "a setting of the hardware", "set it at the console"),
+        (Refusal::Flash(FlashError::Erase(0)), "the flash was not written", "save again"),
+        (Refusal::Ended, "the drive has stopped for another reason", "write a stop, then the run"),
+        (
+            Refusal::Command(CommandError::NoAnswer),
+            "the control does not run",
+            "`version` and `faults` at the console",
+        ),
+        (
+            refused(Refused::NotCharged),
+            "the drive is in a state that does not allow it",
+            "read the state, `0x2101` or `0x6041`",
+        ),
+        (
+            Refusal::Staged,
+            "staged values, or lines of another board",
+            "`apply` or `revert` at the console",
+        ),
+    ];
+    let mut table = "| value | reason | cure |\n|---|---|---|\n".to_owned();
+    for (number, (refusal, reason, cure)) in (1..).zip(rows) {
+        assert_eq!(refusal.code(), number, "{refusal}");
+        table += &format!("| {number} | {reason} | {cure} |\n");
+    }
+    generated::check("modbus.md", "refusals", &table);
 }

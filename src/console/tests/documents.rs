@@ -3,6 +3,7 @@
 use std::fs;
 
 use super::grammar::parse;
+use super::help::HELP;
 use crate::generated;
 
 /// A typed line stands behind `> ` in a block `console`.
@@ -22,4 +23,15 @@ fn every_line_of_the_pages_is_understood() {
         }
     }
     assert!(understood > 20, "{understood} lines");
+}
+
+#[test]
+fn the_manual_lists_the_commands() {
+    let mut table = "| command | effect |\n|---|---|\n".to_owned();
+    let (_, commands) = HELP.split_last().unwrap();
+    for line in commands {
+        let (usage, meaning) = line.split_once("  ").unwrap();
+        table += &format!("| `{}` | {} |\n", usage.replace('|', "\\|"), meaning.trim());
+    }
+    generated::check("console.md", "commands", &table);
 }
