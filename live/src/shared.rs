@@ -143,7 +143,8 @@ impl Shared {
     /// A page has come; its number. It takes over from another one. The drive is stopped then: nobody is to drive what
     /// another has started.
     pub fn page_comes(&self) -> u64 {
-        if self.inner().answered.is_some() {
+        // Also one that has gone so lately that its loss was not noticed yet: a reload.
+        if self.inner().watched {
             self.stop("another page took over");
         }
         let mut inner = self.inner();

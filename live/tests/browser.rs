@@ -177,6 +177,8 @@ fn the_page_shows_and_drives_the_virtual_board() {
     // Closed while the drive runs: it stops in time.
     page.value("view('view-live'); $('start').click()");
     state(&mut page, "regulating torque");
+    // The connection that the set-up has closed was told as well.
+    live.lines.try_iter().for_each(drop);
     let closed = Instant::now();
     page.close();
     let (stopped, why) = live.line("drive stopped: the page was ", PATIENCE);

@@ -363,3 +363,25 @@ fn figures_of_the_loops_are_those_of_the_design() {
     let refused = loops::of(&[set("motor.r_s", "0")]);
     assert!(refused["error"].as_str().unwrap().contains("r_s in ohm"), "{refused}");
 }
+
+/// A page that is reloaded stops the drive each time, however soon it is back.
+#[test]
+fn a_page_that_is_reloaded_stops_the_drive() {
+    let served = served();
+    let mut page = served.own();
+    until(&mut page, "hello");
+    for reloads in 1..=20 {
+        page.close(None).unwrap();
+        while page.read().is_ok() {}
+        page = served.own();
+        until(&mut page, "hello");
+        let stops = || served.lines.lock().unwrap().iter().filter(|(_, l)| l == "stop").count();
+        let began = Instant::now();
+        while stops() < reloads {
+            // Before the page is lost, which answers no more.
+            let waited = began.elapsed();
+            assert!(waited < Duration::from_millis(200), "{} stops of {reloads}", stops());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
