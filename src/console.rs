@@ -26,6 +26,7 @@ use core::fmt;
 
 use crate::commissioning::News;
 use crate::desk::Desk;
+use crate::desk::order::Reply;
 use crate::link::trace::Plan;
 use crate::settings::bus::Commander;
 use crate::settings::staging::Applied;
@@ -98,7 +99,8 @@ impl Console {
         if self.flushed(port)
             && let Some((applied, answer)) = desk.done.take()
         {
-            if applied != Applied::default() {
+            // The answer to `apply` has the remarks itself.
+            if applied != Applied::default() && !matches!(answer, Ok(Reply::Applied(_))) {
                 self.out.news(format_args!("applied{applied}"));
             }
             self.reply(&answer);

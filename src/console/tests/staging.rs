@@ -146,6 +146,9 @@ fn start_and_save_put_staged_values_in_force_first() {
         ]
     );
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.6);
+    talk.ask("set inverter.dead_time_s 2.9e-6");
+    let remark = "ok: the dead time holds from the next reset on, if saved";
+    assert_eq!(talk.say("apply\n"), ["* designing...", remark]);
 }
 
 /// The time of a design, seconds, is not silence of the user.
