@@ -37,7 +37,7 @@ const ELSEWHERE: [(&str, &str); 32] = [
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
-    ("cargo sim run hil-sim/scenarios/", "a test runs these files"),
+    ("cargo sim run FILE.toml", "a placeholder"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),
     ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
     ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
@@ -89,7 +89,14 @@ fn commands_of_the_documents_run() {
         if elsewhere(command).is_some() {
             left += 1;
         } else if let Some(arguments) = command.strip_prefix("cargo sim") {
-            let arguments: Vec<_> = arguments.split_whitespace().collect();
+            // A file of the repository, wherever it is run.
+            let here =
+                |word: &str| match Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(word) {
+                    path if word.contains('/') && path.is_file() => path.display().to_string(),
+                    _ => word.to_owned(),
+                };
+            let arguments: Vec<_> = arguments.split_whitespace().map(here).collect();
+            let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
             let output = hil_sim(&folder, &arguments);
             if !output.status.success() {
                 wrong.push(format!("{document}: `{command}` fails: {}", text(&output.stderr)));

@@ -57,7 +57,7 @@ fn of_figure(figure: &Figure) -> Result<String, Error> {
 /// A table.
 ///
 /// # Errors
-/// As [`csv`].
+/// As [`csv()`].
 pub fn of_table(table: &Table) -> Result<String, Error> {
     let mut taken = Vec::new();
     let mut head = |label: &String| match snake(label) {

@@ -84,7 +84,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`Error::Write`] when it cannot be read or written; [`Error::Refused`] while another process writes it;
-    /// as [`Lines::of`]; [`Error::Data`] when it is of another run. It stays as it is then.
+    /// as `Lines::of`; [`Error::Data`] when it is of another run. It stays as it is then.
     pub fn open(path: &Path, header: &Header) -> Result<Self, Error> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder {

@@ -18,7 +18,7 @@ pub struct Sampled {
     pub currents: [u16; 3],
     /// Code of the thermistor.
     pub heat_sink: u16,
-    /// 0 off, 1 starting, 2 running, 3 stopping, [`FAULT`] + N in fault N.
+    /// 0 off, 1 starting, 2 running, 3 stopping, 100 + N in fault N.
     pub state: u8,
     /// Why the torque is smaller than asked for: number of the [`Limiting`].
     pub limit: u8,
