@@ -35,7 +35,7 @@ struct Results {
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<String>,
     columns: Vec<Column>,
-    /// What stands for `{}` in the commands and the metrics of a row.
+    /// Words that replace `{}` in the commands and the metrics of a row.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     keys: Vec<String>,
     /// Texts, numbers, lists of numbers, or nothing.
@@ -182,7 +182,7 @@ impl Column {
     }
 }
 
-/// What `cargo sim ...` prints as JSON.
+/// The JSON that `cargo sim ...` prints.
 fn printed_json(command: &str) -> Value {
     let arguments = command.strip_prefix("cargo sim ").expect("a command of the simulator");
     println!("{command}");

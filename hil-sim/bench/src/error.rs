@@ -9,7 +9,7 @@ pub enum Error {
     /// Nothing has this name.
     #[error("there is no {what} `{name}`{}; {list}", did_you_mean(.nearest))]
     Unknown {
-        /// What it should be a name of.
+        /// The kind of thing that it should name.
         what: &'static str,
         /// The name that was given.
         name: String,

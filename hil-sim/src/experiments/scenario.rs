@@ -1,7 +1,7 @@
 //! Runs over time: what the drive is asked for part by part, what turns its shaft, what is recorded and how it is judged.
 //!
-//! A scenario is a TOML file (`hil-sim/scenarios/` has those of the program) or the rows of a CSV file, the experiment
-//! `profile`. `docs/simulator.md` describes both.
+//! A scenario is a TOML file, or the rows of a CSV file, the experiment `profile`. `hil-sim/scenarios/` has the files of the program;
+//! its `README.md` describes their keys.
 
 mod file;
 mod quantity;
@@ -164,7 +164,7 @@ pub struct Scenario {
     settings: Vec<(String, Value)>,
     /// Whether it comes from rows: `--seconds` cuts or holds it, instead of stretching it.
     from_rows: bool,
-    /// What is made of the record.
+    /// Figures, metrics and judge.
     text: Text,
 }
 

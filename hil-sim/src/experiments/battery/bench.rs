@@ -70,7 +70,7 @@ pub struct Bench {
     pub counted_from: Option<f64>,
     /// Torque of the motor over the same time, Nm.
     pub torque: Stats,
-    /// What is seen of the run so far.
+    /// The run so far.
     pub trial: Trial,
     /// Angle error at the last sample, degrees.
     pub error_deg: f64,

@@ -6,12 +6,12 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use super::super::drawn_machine::drawn;
 use super::super::statistics::{Study, seed_of, whole};
 use super::super::{BENCH, Context, DRIVE, Experiment};
 use super::session::{Abort, Session, unaware};
 use crate::config::{Config, FluxLevel, LoadMode, OpenPhase, PlantModel};
 use crate::error::Error;
+use crate::experiments::drawn_machine::drawn;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::plant::{Channel, CurrentFault};
 use crate::rig::Rig;

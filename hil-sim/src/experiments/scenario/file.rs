@@ -46,7 +46,7 @@ static COLUMNS: [(&str, Result<&Reference, Shaft>); 7] = [
 ];
 const IN_ROWS: usize = 5;
 
-/// What a metric is of the values of a quantity.
+/// The number that a metric takes from the values of a quantity.
 #[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Statistic {
@@ -159,7 +159,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// What is not given is the usual, for a reference of this name.
+    /// Fills keys that the file does not give from `usual.toml`, for a reference of this name.
     fn completed(mut self, column: &str) -> Result<Self, Error> {
         let (quantity, unit) = column.rsplit_once('_').unwrap_or((column, ""));
         let usual = include_str!("../../../scenarios/usual.toml").replace("{column}", column);

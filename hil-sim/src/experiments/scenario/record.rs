@@ -23,7 +23,7 @@ const DUST_S: f64 = 1e-9;
 /// it is settled; s.
 const SETTLING_S: f64 = 0.5;
 
-/// What was seen; times count from the first reference, positions from where the shaft was then.
+/// The samples of a run; times count from the first reference, positions from where the shaft was then.
 pub struct Record {
     /// The samples, and the reference that was in force at each.
     pub points: Vec<Point>,
