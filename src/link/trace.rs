@@ -89,8 +89,12 @@ pub struct Reader<'a, const N: usize>(&'a Trace<N>);
 impl<const N: usize> Trace<N> {
     /// An empty trace.
     pub const fn new() -> Self {
-        // SAFETY: zeros are no records and a plan. Anything else would take 32 KiB of the flash as the initial contents.
-        let inner = UnsafeCell::new(unsafe { core::mem::zeroed() });
+        // Zeros only: otherwise 32 KiB of the flash would hold the initial contents.
+        let choice = SignalChoice::none();
+        let plan = Plan { records: 0, divider: 0, choice, trigger: Trigger::Now };
+        let records = [[0.0; MOST]; N];
+        let inner = Inner { records, plan, next: 0, written: 0, left: None, behind: 0, wait: 0 };
+        let inner = UnsafeCell::new(inner);
         Self { taken: AtomicBool::new(false), stage: AtomicU8::new(IDLE), inner }
     }
 

@@ -18,8 +18,9 @@
 //! All but number 36 are in single precision. An earlier firmware had none from 38 on; a drive with such a record has to learn
 //! again before it starts without an encoder. A later one had none from 58 on.
 
-use core::mem::{offset_of, transmute};
+use core::mem::offset_of;
 
+use bytemuck::{Pod, Zeroable, must_cast};
 use drive_core::carrier::Asymmetry;
 use drive_core::learned::{Fitted, Learned, Verdict};
 use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
@@ -27,6 +28,7 @@ use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
 use crate::hash;
 
 /// The values in their order.
+#[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Stored {
     reference: [f32; POINTS - 1],
@@ -97,7 +99,7 @@ pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     let asymmetry = |Asymmetry { constant, sin, cos }| [constant, sin, cos];
     let [_, reference @ ..] = *learned.reference.points();
     let [_, carrier @ ..] = learned.carrier.map_or([0.0; POINTS], |table| *table.points());
-    let stored = Stored {
+    must_cast(Stored {
         reference,
         carrier,
         spread: learned.spread,
@@ -117,16 +119,13 @@ pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
         limit_a: learned.limit_a,
         asymmetry: asymmetry(learned.asymmetry),
         at_start: asymmetry(learned.at_start.unwrap_or_default()),
-    };
-    // SAFETY: numbers of four bytes each, without padding.
-    unsafe { transmute(stored) }
+    })
 }
 
 /// The result with these values, if it is one that a learning accepts. `present` has a bit for each value that was
 /// read.
 pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
-    // SAFETY: numbers of four bytes each, without padding, of which every value is valid.
-    let stored: Stored = unsafe { transmute(*words) };
+    let stored: Stored = must_cast(*words);
     let has = |flag: u32| stored.flags & flag != 0;
     let with_slope = present >= WITH_ASYMMETRY;
     if !is_whole(present) || (has(HAS_SLOPE) && !with_slope) {
