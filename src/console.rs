@@ -26,7 +26,6 @@ use core::fmt;
 
 use crate::commissioning::News;
 use crate::desk::Desk;
-use crate::desk::order::Reply;
 use crate::link::trace::Plan;
 use crate::settings::bus::Commander;
 use crate::settings::staging::Applied;
@@ -93,14 +92,13 @@ impl Console {
             self.reader.spoil(LineError::Lost);
         }
         // The time that a design takes is not silence.
-        if core::mem::replace(&mut self.designs, desk.designs()) != self.designs {
+        if desk.has_designed(&mut self.designs) {
             self.line_ms = None;
         }
         if self.flushed(port)
             && let Some((applied, answer)) = desk.done.take()
         {
-            // The answer to `apply` has the remarks itself.
-            if applied != Applied::default() && !matches!(answer, Ok(Reply::Applied(_))) {
+            if applied != Applied::default() {
                 self.out.news(format_args!("applied{applied}"));
             }
             self.reply(&answer);

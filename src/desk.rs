@@ -30,6 +30,8 @@ const REBOOT_MS: u32 = 100;
 
 /// The answer to an order.
 pub type Answer = Result<Reply, Refusal>;
+/// Remarks on settings that an order has put in force, beside its answer.
+type Done = (Applied, Answer);
 
 /// See the head of the module.
 pub struct Desk {
@@ -42,8 +44,8 @@ pub struct Desk {
     task: Option<(Commander, Order)>,
     /// Time of an order to reset the chip.
     reboot_ms: Option<u32>,
-    /// How the console's last task has ended, until the console takes it; and remarks on the settings that it has put in force.
-    pub(crate) done: Option<(Applied, Answer)>,
+    /// How the console's last task has ended, until the console takes it.
+    pub(crate) done: Option<Done>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
     designs: u32,
     announcer: Announcer,
@@ -105,9 +107,9 @@ impl Desk {
         self.task.is_some()
     }
 
-    /// Number of designs of the controllers, wrapping: who has waited for more than one pass of the main loop sees another.
-    pub fn designs(&self) -> u32 {
-        self.designs
+    /// Whether controllers were designed, for seconds, since the call before with the same `seen`.
+    pub fn has_designed(&self, seen: &mut u32) -> bool {
+        core::mem::replace(seen, self.designs) != self.designs
     }
 
     /// The last refusal of the bus.
@@ -140,7 +142,7 @@ impl Desk {
         if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
     }
 
-    /// Follows the drive. Called at the begin of each pass of the main loop.
+    /// Follows the drive. Called at the beginning of each pass of the main loop.
     pub fn follow(&mut self, drive: &mut impl DriveHandle) {
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
@@ -228,7 +230,6 @@ impl Desk {
     ///
     /// # Errors
     /// Nothing has changed, for this reason. A refusal of the bus is announced.
-    #[inline(never)]
     pub fn order(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         let answer = if order.is_for_the_commander(from) && self.commander() != from {
             Err(Refusal::Authority(self.commander()))
@@ -252,9 +253,7 @@ impl Desk {
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
                 // Off is news for the console if the bus stops the drive.
-                if from == Commander::Console {
-                    self.announcer.stopped = true;
-                }
+                self.announcer.stopped |= from == Commander::Console;
                 give(Command::Stop(stop), "", drive)
             }
             Order::Relock => give(Command::Relock, "", drive),
@@ -299,14 +298,18 @@ impl Desk {
         }
     }
 
+    /// Passes if no values are staged.
+    ///
     /// # Errors
     /// Values are staged.
     pub fn nothing_staged(&self) -> Result<(), Refusal> {
         if self.settings.is_staged() { Err(Refusal::Staged) } else { Ok(()) }
     }
 
+    /// Passes if the lines belong to this board.
+    ///
     /// # Errors
-    /// The lines belong to another board.
+    /// They belong to another.
     fn is_own_board(&self) -> Result<(), Refusal> {
         let own = self.settings.in_force().board.name;
         self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
@@ -368,7 +371,7 @@ impl Desk {
         let staged = self.settings.prepare().is_some();
         self.unsaved |= staged;
         let applied = if staged { self.settings.adopt() } else { Applied::default() };
-        self.finish(&order, applied, drive)
+        self.finish(&order, applied, drive).1
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
@@ -384,33 +387,34 @@ impl Desk {
         }
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
-        let (applied, answer) = match self.apply(&order, drive) {
-            Ok(applied) => (applied, self.finish(&order, applied, drive)),
+        let done = match self.apply(&order, drive) {
+            Ok(applied) => self.finish(&order, applied, drive),
             Err(why) => (Applied::default(), Err(why)),
         };
-        match (from, answer) {
-            (Commander::Console, answer) => self.done = Some((applied, answer)),
-            (Commander::Bus, Err(why)) => self.note_refusal(why),
-            (Commander::Bus, Ok(_)) => {}
+        match (from, done) {
+            (Commander::Console, done) => self.done = Some(done),
+            (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
+            (Commander::Bus, _) => {}
         }
     }
 
-    /// Finishes an order whose settings are in force.
-    fn finish(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Answer {
-        match *order {
-            Order::Apply => Ok(Reply::Applied(applied)),
+    /// Finishes an order whose settings are in force, with these remarks, which the answer to [`Order::Apply`] takes.
+    fn finish(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Done {
+        let answer = match *order {
+            Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
             Order::Start(mode) => self.start(mode, drive),
             Order::Learn { again: true } if self.settings.in_force().learned.is_none() => {
                 Err(Refusal::NothingLearned)
             }
             Order::Learn { again } => {
                 // The drive has been given the settings without what is learned, if that must not act.
-                self.settings.begin_learning(again, |_| Ok::<_, Refusal>(()))?;
-                self.start(Mode::Learning, drive)
+                let begun = self.settings.begin_learning(again, |_| Ok(()));
+                begun.and_then(|()| self.start(Mode::Learning, drive))
             }
             Order::Commission(first, last) => self.commission(first, last, drive),
             _ => self.save(Reply::Done, drive),
-        }
+        };
+        (applied, answer)
     }
 
     /// Saves the settings in force.

@@ -18,7 +18,6 @@ const UNEXPLAINED: f32 = 0.002;
 
 impl Console {
     /// Writes the next news, if there are any, on lines of their own.
-    #[inline(never)]
     pub(super) fn announce(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
         let typed = desk.settings().in_force().command.echo && self.reader.begun();
         if typed {
@@ -26,9 +25,7 @@ impl Console {
         }
         let empty = self.out.as_str().len();
         if let Some((news, line)) = self.commissioned {
-            let (text, next) = told(&news, line);
-            self.out.news(format_args!("commissioning: {text}"));
-            self.commissioned = next.map(|line| (news, line));
+            self.tell_commissioning(news, line);
         } else if let Some(news) = desk.news(drive, now_ms) {
             self.tell(news, desk);
         } else if self.armed && !drive.tracing() {
@@ -42,6 +39,14 @@ impl Console {
         }
     }
 
+    /// Writes a line about the commissioning, and keeps the news for the next.
+    fn tell_commissioning(&mut self, news: commissioning::News, line: usize) {
+        let (text, next) = told(&news, line);
+        self.out.news(format_args!("commissioning: {text}"));
+        self.commissioned = next.map(|line| (news, line));
+    }
+
+    /// Writes news.
     pub(super) fn tell(&mut self, news: News, desk: &Desk) {
         let out = &mut self.out;
         match news {
@@ -65,11 +70,7 @@ impl Console {
                     out.news(format_args!("learned: {tracked}"));
                 }
             }
-            News::Commissioning(news) => {
-                let (text, next) = told(&news, 0);
-                out.news(format_args!("commissioning: {text}"));
-                self.commissioned = next.map(|line| (news, line));
-            }
+            News::Commissioning(news) => self.tell_commissioning(news, 0),
             News::Homed(Ok(())) => out.news(format_args!("homing: position 0 is at the stop")),
             News::Homed(Err(why)) => out.news(format_args!("homing: {why}")),
             News::Stopped(Ok(s)) => out.news(format_args!("stopped: no command for {s} s")),

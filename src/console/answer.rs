@@ -21,16 +21,13 @@ const DIGITS: usize = 4;
 impl Console {
     #[inline(never)]
     pub(super) fn answer(&mut self, request: Request, desk: &mut Desk, drive: &mut impl Firmware) {
-        let settings = desk.settings();
         match request {
-            Request::Order(order) => {
-                self.reply(&desk.order(Commander::Console, order, drive));
-            }
+            Request::Order(order) => self.reply(&desk.order(Commander::Console, order, drive)),
             Request::Set(values) => self.reply(&desk.set(&values, drive)),
             Request::Help => self.begin(ListKind::Help),
             Request::Status => self.status(desk, drive),
             Request::Get(key) => {
-                let setting = reply::Setting::new(key, settings);
+                let setting = reply::Setting::new(key, desk.settings());
                 self.out.answer(format_args!("{setting}; {}", key.help()));
             }
             Request::List(prefix) => self.begin(ListKind::Settings(prefix)),
@@ -147,7 +144,7 @@ impl Console {
     }
 }
 
-/// What follows the `ok` of a reply.
+/// The text behind the `ok` of a reply.
 fn remark(reply: Reply) -> impl fmt::Display {
     fmt::from_fn(move |f| match reply {
         Reply::Done | Reply::Designing => Ok(()),

@@ -7,8 +7,10 @@ use thiserror::Error;
 
 /// Longest tag of a request, characters.
 pub const LONGEST_TAG: usize = 8;
-/// Longest line that is taken, characters without its end: a request of 120 behind `@TAG `.
-pub const LONGEST: usize = 120 + LONGEST_TAG + 2;
+/// Longest request, characters.
+const LONGEST_REQUEST: usize = 120;
+/// Longest line that is taken, characters without its end: a request behind `@TAG `.
+pub const LONGEST: usize = "@ ".len() + LONGEST_TAG + LONGEST_REQUEST;
 /// Room for text that goes out, bytes: the longest line, that of `status`, or one of `describe` and what was typed so far.
 pub const OUTPUT: usize = 504;
 

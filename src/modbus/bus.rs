@@ -83,7 +83,7 @@ impl Bus {
         }
         let frame = port.receive();
         // An answer to a request from before a design, which the master has given up, would be taken for that to another.
-        let late = core::mem::replace(&mut self.designs, desk.designs()) != self.designs;
+        let late = desk.has_designed(&mut self.designs);
         let Some(frame) = frame.filter(|_| !late) else { return };
         let mut access = Access { bus: self, desk, drive };
         // A master counts as alive by its writes: a panel that only reads does not stand in for it.

@@ -36,6 +36,11 @@ pub fn tagged(tag: u32, request: &str) -> String {
     format!("@{tag:x} {request}")
 }
 
+/// The tag of a line and the text behind it, if it has one.
+pub fn split_tag(line: &str) -> Option<(&str, &str)> {
+    line.strip_prefix('@')?.split_once(' ')
+}
+
 /// The meaning of a line while the answer to `request`, sent with `tag`, is awaited. Tags count up, and wrap.
 pub fn meaning<'a>(tag: u32, request: &str, line: &'a str) -> Meaning<'a> {
     if is_unasked(line) {
@@ -44,8 +49,8 @@ pub fn meaning<'a>(tag: u32, request: &str, line: &'a str) -> Meaning<'a> {
     if line.starts_with('@') && tagged(tag, request).starts_with(line) {
         return Meaning::Echo;
     }
-    let words = line.strip_prefix('@').and_then(|rest| rest.split_once(' '));
-    let known = words.and_then(|(tag, rest)| Some((u32::from_str_radix(tag, 16).ok()?, rest)));
+    let known =
+        split_tag(line).and_then(|(tag, rest)| Some((u32::from_str_radix(tag, 16).ok()?, rest)));
     match known {
         Some((theirs, rest)) if theirs == tag => Meaning::Last(rest),
         Some((theirs, rest)) if tag.wrapping_sub(theirs) < 1 << 31 => Meaning::Older(rest),

@@ -77,8 +77,7 @@ impl Route {
 
     /// Shows a line that nobody awaits, without its tag.
     fn unawaited(&mut self, line: &str) {
-        let rest = line.strip_prefix('@').and_then(|tagged| tagged.split_once(' '));
-        (self.show)(rest.map_or(line, |(_, rest)| rest));
+        (self.show)(answer::split_tag(line).map_or(line, |(_, rest)| rest));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use hil_sim::console::answer::split_tag;
 use induction_drive::console::line::UNASKED;
 
 /// Where a line came from.
@@ -50,8 +51,7 @@ impl Line {
     /// The text of a line that changes what the drive does, or reports a fault or a reset.
     fn event(&self, references: bool) -> Option<&str> {
         let text = self.text.trim();
-        let (_, text) =
-            text.strip_prefix('@').and_then(|tagged| tagged.split_once(' ')).unwrap_or(("", text));
+        let text = split_tag(text).map_or(text, |(_, request)| request);
         let first = text.split_whitespace().next()?;
         match self.source {
             Source::Typed if CHANGES.contains(&first) => Some(text),
