@@ -280,6 +280,23 @@ fn a_late_check_takes_the_compare_values_back() {
     assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
 }
 
+/// The period that leaves time is the one behind which nothing else of the carrier period is computed.
+#[test]
+fn one_period_of_ten_leaves_time_for_a_command() {
+    let off = drive();
+    assert!(off.has_time());
+    let (mut drive, mut load) = running();
+    let times: Vec<bool> = (0..40)
+        .map(|_| {
+            period(&mut drive, &mut load);
+            drive.has_time()
+        })
+        .collect();
+    let first = times.iter().position(|&time| time).unwrap();
+    let expected = (0..40).map(|n| n % CARRIER_SAMPLES == first);
+    assert!(first < CARRIER_SAMPLES && times.iter().copied().eq(expected), "{times:?}");
+}
+
 #[test]
 fn commands_are_taken_limited_or_refused() {
     let mut d = drive();
