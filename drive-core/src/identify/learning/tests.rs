@@ -22,14 +22,19 @@ fn start() -> Start {
     Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER, at_start: None }
 }
 
-/// Goes through all points with the signal that `q(i_q, lead, theta)` gives and the voltage `v(i_q)`.
+/// Goes through all points with the signal that `q(i_q, lead, theta)` gives and the voltage `v(i_q)`. One that ends has lasted as
+/// long as was expected at each of its points.
 fn learn(
     q: impl Fn(f64, f64, f64) -> f64,
     v: impl Fn(f32) -> Dq,
 ) -> (Result<(), Fault>, LearningState) {
     let (learning, mut state) = (learning(), LearningState::default());
     let (mut point, mut theta) = (Operate { i_q: 0.0, lead: 0.0 }, 0.25_f64);
-    for _ in 0..3_000_000 {
+    let mut begun = vec![];
+    for n in 0..3_000_000 {
+        if begun.len() == state.point {
+            begun.push(n);
+        }
         let (sin, cos) = point.lead.sin_cos();
         let (i_d, i_q) = (0.7 * cos + point.i_q * sin, point.i_q * cos - 0.7 * sin);
         let step = i_q / (i_d * 0.186) * PERIOD_S / TAU;
@@ -44,7 +49,14 @@ fn learn(
         };
         match learning.step(&mut state, &sample) {
             Ok(Some(next)) => point = next,
-            Ok(None) => return (Ok(()), state),
+            Ok(None) => {
+                for (number, begun) in begun.into_iter().enumerate() {
+                    let (left, expected) = ((n - begun) as f32, learning.seconds_left(number + 1));
+                    let off = left * PERIOD_S - expected;
+                    assert!(off.abs() < 0.03 * expected + 0.01, "{number}: {expected} s, {off}");
+                }
+                return (Ok(()), state);
+            }
             Err(fault) => return (Err(fault), state),
         }
     }
@@ -231,9 +243,15 @@ fn the_flux_turns_at_every_point() {
 #[test]
 fn a_moving_shaft_is_noticed() {
     let q = sound;
-    let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
-    let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
-    for (ended, state) in [learn(q, turned), learn(q, free)] {
+    // 0.5 V is the limit, and half of the voltage of a free shaft.
+    let turned = |v: f32| move |i_q| locked(i_q) + Dq::new(0.0, v);
+    let free = |share: f32| {
+        move |i_q: f32| locked(i_q) - Dq::new(share * 0.153 * i_q * i_q / (0.7 * 0.186), 0.0)
+    };
+    for (ended, _) in [learn(q, turned(-0.48)), learn(q, free(0.45)), learn(q, free(-0.6))] {
+        assert_eq!(ended, Ok(()));
+    }
+    for (ended, state) in [learn(q, turned(-0.52)), learn(q, turned(0.52)), learn(q, free(0.55))] {
         assert_eq!(ended, Err(Fault::ShaftNotLocked));
         // A point was evaluated: it was not its length that ended it.
         assert_eq!(state.sums.count, 0);
