@@ -3,7 +3,7 @@
 use crate::common::config;
 use core::f64::consts::TAU;
 use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
-use drive_core::{Command, Mode, State, Stop};
+use drive_core::{Command, Mode, Stop};
 use hil_sim::rig::Rig;
 
 /// Stiffness of the stop, N m/rad.
@@ -99,14 +99,6 @@ fn what_is_not_a_stop_is_told() {
     let before = turns(&mut far);
     far.run(1.0, |_| {});
     assert!((turns(&mut far) - before).abs() < 0.002);
-    // A stop by the user.
-    let mut stopped = rig(&["angle.source=encoder"], 1);
-    let mut homing = Homing::new(plan, 3.0).unwrap();
-    stopped.command(&homing.begin()).unwrap();
-    stopped.run(0.2, |_| {});
-    stopped.command(&Command::Stop(Stop::Coast)).unwrap();
-    stopped.run(0.2, |_| {});
-    assert_eq!(homing.poll(&seen(&stopped)), Next::Ended(Err(Failure::Left(State::Off))));
 }
 
 /// With the encoder a start finds position 0 again, and does not move the shaft; without it the start moves it by 0.0487 turns at most in

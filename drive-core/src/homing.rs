@@ -239,3 +239,127 @@ fn check(
     let (min, max) = (*range.start(), *range.end());
     if range.contains(&value) { Ok(()) } else { Err(OutOfRange { name, value, min, max, unit }) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Control periods from one report to the next.
+    const EVERY: u32 = 60;
+
+    /// A rigid shaft.
+    struct Shaft<'a> {
+        /// Distance of the stop, turns, the n-th time that it comes there.
+        stop: &'a dyn Fn(usize) -> f32,
+        /// Torque current against it, A, and what is possible, backwards and forward.
+        presses: [f32; 2],
+        room: [f32; 2],
+        held: bool,
+    }
+
+    /// The outcome within a minute, and all commands, each with its time, s, and where the shaft was, turns.
+    type Homed = (Option<Result<(), Failure>>, Vec<(Command, f32, f32)>);
+
+    fn home(plan: Plan, shaft: &Shaft) -> Homed {
+        let mut homing = Homing::new(plan, 3.0).unwrap();
+        let mut given = vec![(homing.begin(), 0.0, 0.0)];
+        let (mut turns, mut rpm, towards) = (0.0_f32, plan.rpm, plan.rpm.signum());
+        for n in 0..6000 {
+            let end = (shaft.stop)(given.len() / 2);
+            turns += if shaft.held { 0.0 } else { rpm / 60.0 * EVERY as f32 / 6000.0 };
+            turns = towards * end.min(turns * towards);
+            let presses =
+                if shaft.held || turns * towards == end { shaft.presses } else { [0.0; 2] };
+            let seen = Seen {
+                // Wraps on the way.
+                periods: (n * EVERY).wrapping_sub(10_000),
+                state: State::Position,
+                turns,
+                i_q: if rpm < 0.0 { -presses[0] } else { presses[1] },
+                room: (-shaft.room[0], shaft.room[1]),
+            };
+            match homing.poll(&seen) {
+                Next::Wait => assert_eq!(homing.poll(&seen), Next::Wait, "the same report"),
+                Next::Command(command) => {
+                    given.push((command, (n * EVERY) as f32 / 6000.0, turns));
+                    rpm = if let Command::Press(rpm, _) = command { rpm } else { 0.0 };
+                }
+                Next::Ended(outcome) => return (Some(outcome), given),
+            }
+        }
+        (None, given)
+    }
+
+    const PLAN: Plan = Plan { rpm: 30.0, i_q: 0.5, turns: 3.0 };
+    const SHAFT: Shaft = Shaft { stop: &|_| 1.3, presses: [0.5; 2], room: [3.0; 2], held: false };
+
+    #[test]
+    fn the_stop_is_where_the_shaft_stands_twice() {
+        for (rpm, presses) in [(30.0, [0.5; 2]), (-30.0, [0.5; 2]), (30.0, [0.0, 0.26])] {
+            let (outcome, given) = home(Plan { rpm, ..PLAN }, &Shaft { presses, ..SHAFT });
+            let [towards, back, again, (Command::Home(zero), ..)] = given[..] else {
+                panic!("{given:?}")
+            };
+            assert_eq!(outcome, Some(Ok(())));
+            assert_eq!(
+                [towards.0, back.0, again.0],
+                [rpm, -rpm, rpm].map(|rpm| Command::Press(rpm, 0.5))
+            );
+            // It takes 2.6 s to the stop and stands for a second, turns back by a tenth of a turn, and comes again.
+            assert!((zero - 1.3 * rpm.signum()).abs() < 1e-5, "{zero}");
+            assert!((3.54..3.62).contains(&back.1), "{back:?}");
+            assert!((0.099..0.106).contains(&(back.2 - again.2).abs()), "{again:?}");
+        }
+        // Half of the current has to press, or of that which is possible in this direction.
+        for (rpm, presses, room, found) in [
+            (30.0, [0.0, 0.24], [3.0; 2], false),
+            (-30.0, [0.24, 0.0], [3.0; 2], false),
+            (30.0, [0.0, 0.16], [3.0, 0.3], true),
+            (-30.0, [0.16, 0.0], [0.3, 3.0], true),
+            (30.0, [0.0, 0.14], [3.0, 0.3], false),
+        ] {
+            let outcome = home(Plan { rpm, ..PLAN }, &Shaft { presses, room, ..SHAFT }).0;
+            assert_eq!(outcome, found.then_some(Ok(())), "{rpm} {presses:?} {room:?}");
+        }
+    }
+
+    #[test]
+    fn the_shaft_stays_where_no_stop_is_found() {
+        for (stop, held, why, commands) in [
+            (&(|_| 9.0_f32) as &dyn Fn(usize) -> f32, false, Failure::NoStop(3.0), 2),
+            (&|_| 1.3, true, Failure::Held, 3),
+            (&|n| 1.3 + 0.021 * n as f32, false, Failure::Unsteady, 10),
+        ] {
+            for rpm in [30.0, -30.0] {
+                let (outcome, given) = home(Plan { rpm, ..PLAN }, &Shaft { stop, held, ..SHAFT });
+                assert_eq!((outcome, given.len()), (Some(Err(why)), commands));
+                let (last, at) = (given.last().unwrap(), given[commands - 1].2);
+                assert!(matches!(last.0, Command::Position(turns) if (turns - at).abs() < 0.001));
+                assert!(why != Failure::NoStop(3.0) || (3.0..3.01).contains(&at.abs()), "{at}");
+            }
+        }
+        let stop = &|n| 1.3 + 0.019 * n as f32;
+        assert_eq!(home(PLAN, &Shaft { stop, ..SHAFT }).0, Some(Ok(())));
+        let off = Seen { periods: 1, state: State::Off, turns: 0.0, i_q: 0.0, room: (-3.0, 3.0) };
+        let left = Homing::new(PLAN, 3.0).unwrap().poll(&off);
+        assert_eq!(left, Next::Ended(Err(Failure::Left(State::Off))));
+    }
+
+    #[test]
+    fn a_plan_out_of_range_is_refused_by_name() {
+        let text =
+            |rpm, i_q, turns| Homing::new(Plan { rpm, i_q, turns }, 3.0).map_err(|e| e.to_string());
+        for (rpm, i_q, turns) in [(5.0, 0.0, 0.1), (-60.0, 3.0, 1000.0)] {
+            assert!(text(rpm, i_q, turns).is_ok());
+        }
+        for (plan, expected) in [
+            ((-4.9, 1.0, 1.0), "the speed = 4.9: outside 5 to 60 rpm"),
+            ((61.0, 1.0, 1.0), "the speed = 61: outside 5 to 60 rpm"),
+            ((30.0, -0.1, 1.0), "the current = -0.1: outside 0 to 3 A"),
+            ((30.0, f32::NAN, 1.0), "the current = NaN: outside 0 to 3 A"),
+            ((30.0, 1.0, 0.09), "the way = 0.09: outside 0.1 to 1000 turns"),
+        ] {
+            assert_eq!(text(plan.0, plan.1, plan.2).unwrap_err(), expected);
+        }
+    }
+}

@@ -261,5 +261,9 @@ fn nothing_is_limited_where_nothing_has_to_be() {
     let half = step(365.0, 1300.0);
     assert!((half.i_q.0 + 1.5).abs() < 1e-5 && (half.flux_a - 1.0).abs() < 1e-5, "{half:?}");
     assert_eq!(step(365.0, 1100.0).flux_a, 0.0);
+    // A reference at its limit is not limited.
+    let (least, largest) = (half.i_q.0, step(365.0, -1300.0).i_q.1);
+    assert_eq!(half.hold(least), (least, Limiting::None));
+    assert_eq!(step(365.0, -1300.0).hold(largest), (largest, Limiting::None));
     assert!(step(f32::NAN, 1000.0).i_q.0.is_nan());
 }

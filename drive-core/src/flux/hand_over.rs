@@ -186,6 +186,70 @@ mod tests {
         assert_eq!(blind, [0, 0, 3, 3]);
     }
 
+    /// Up and down, both ways round: the first frequencies, tenths of a hertz, at which the source or the carrier has changed. The
+    /// carrier comes on below 24 Hz, and the observer leads at least for the eight carrier periods of the demodulation.
+    #[test]
+    fn sources_and_carrier_change_at_their_frequencies() {
+        for (source, sign, expected) in [
+            (Source::Both, 1.0, [161, 261, 240, 120]),
+            (Source::Both, -1.0, [161, 261, 240, 120]),
+            (Source::Slip, 1.0, [161, 261, 240, 120]),
+            (Source::Injection, 1.0, [0, 261, 240, 0]),
+            (Source::Nothing, 1.0, [0, 0, 0, 0]),
+        ] {
+            let mut state = HandOver::default();
+            let mut changes = [0; 4];
+            // Half a step beside the frequencies themselves.
+            for tenth in (0..=300).chain((0..300).rev()) {
+                let (led, was_off) = (state.leads, state.is_carrier_off());
+                for _ in 0..20 {
+                    state.update(sign * (tenth as f32 - 0.5) * (0.1 * PERIOD_S), source);
+                }
+                for (n, changed) in [
+                    state.leads && !led,
+                    state.is_carrier_off() && !was_off,
+                    was_off && !state.is_carrier_off(),
+                    led && !state.leads,
+                ]
+                .into_iter()
+                .enumerate()
+                {
+                    changes[n] += if changed { tenth } else { 0 };
+                }
+            }
+            assert_eq!(changes, expected, "{source:?}");
+            assert_eq!(state.is_carrier_off(), source == Source::Nothing);
+        }
+        let mut state = HandOver::default();
+        state.update(27.0 * PERIOD_S, Source::Both);
+        let filling = (0..20).take_while(|_| {
+            state.update(0.0, Source::Both);
+            assert_eq!(state.demodulates(), !state.leads);
+            state.leads
+        });
+        assert_eq!(filling.count(), usize::from(FILLED) - 1);
+        state.update(20.0 * PERIOD_S, Source::Both);
+        assert!(state.leads);
+        state.switch_carrier_off();
+        assert!(state.is_carrier_off() && !state.leads);
+    }
+
+    /// The mean of the last ten turns and its age while the carrier is on, the last turn without it.
+    #[test]
+    fn a_turn_is_averaged_over_the_carrier_period() {
+        let mut state = HandOver::default();
+        for n in 0..40 {
+            let turn = state.turning(n % CARRIER_SAMPLES, n as f32, 0.5, 2.0);
+            let turned = if n < 10 { 0.05 * (n * (n + 1)) as f32 } else { n as f32 - 4.5 };
+            assert!((turn.turned - turned).abs() < 1e-4, "{n}: {turn:?}");
+            assert_eq!((turn.leads, turn.slip, turn.age), (false, 0.5, 7.5));
+            assert_eq!(state.mean_turn(), turn.turned);
+        }
+        state.switch_carrier_off();
+        let turn = state.turning(0, 7.0, 0.5, 2.0);
+        assert_eq!(turn, Turning { leads: false, turned: 7.0, slip: 0.5, age: 3.0 });
+    }
+
     /// Noise is judged where the injection has led for so many carrier periods, and not where the observer leads.
     #[test]
     fn noise_is_judged_some_time_after_the_observer_has_left() {

@@ -357,3 +357,27 @@ fn wired(i: AlphaBeta) -> Result<(), Fault> {
         Err(Fault::WiringNoCurrent)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The answer to a voltage along phase a, by the direction of the current in degrees.
+    #[test]
+    fn the_direction_of_the_current_tells_the_wiring() {
+        for (from, to, expected) in [
+            (-34, 34, Ok(())),
+            (36, 38, Err(Fault::WiringNoCurrent)),
+            (39, 89, Err(Fault::WiringPolarityB)),
+            (91, 141, Err(Fault::WiringExchanged)),
+            (142, 269, Err(Fault::WiringPolarityA)),
+            (271, 324, Err(Fault::WiringNoCurrent)),
+        ] {
+            for degrees in from..=to {
+                let axis = Angle::from_turns(degrees as f32 / 360.0).unit_vector();
+                assert_eq!(wired(AlphaBeta::along(axis, 0.7)), expected, "{degrees}");
+            }
+        }
+        assert_eq!(wired(AlphaBeta::ZERO), Err(Fault::WiringNoCurrent));
+    }
+}
