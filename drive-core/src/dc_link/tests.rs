@@ -261,6 +261,21 @@ fn nothing_is_limited_where_nothing_has_to_be() {
     let half = step(365.0, 1300.0);
     assert!((half.i_q.0 + 1.5).abs() < 1e-5 && (half.flux_a - 1.0).abs() < 1e-5, "{half:?}");
     assert_eq!(step(365.0, 1100.0).flux_a, 0.0);
+    // At twice the speed of 60 Hz the same power is half the torque: bands are twice as wide, that of generating torque 1.4 times.
+    for (v, rpm, generates, motors) in [
+        (355.0, 3600.0, 1.5, I_Q),
+        (355.0, -3600.0, 1.5, I_Q),
+        (265.0, 1800.0, I_Q, I_Q),
+        (265.0, 3600.0, I_Q, 1.5),
+        (265.0, -3600.0, I_Q, 1.5),
+        (245.0, 1800.0, I_Q, -1.5),
+        (245.0, 3600.0, I_Q, -0.75),
+    ] {
+        let (least, largest) = step(v, rpm).i_q;
+        let (least, largest) = if rpm < 0.0 { (-largest, -least) } else { (least, largest) };
+        let near = (least + generates).abs() < 1e-4 && (largest - motors).abs() < 1e-4;
+        assert!(near, "{v} V, {rpm} rpm: {least} to {largest}");
+    }
     // A reference at its limit is not limited.
     let (least, largest) = (half.i_q.0, step(365.0, -1300.0).i_q.1);
     assert_eq!(half.hold(least), (least, Limiting::None));

@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn the_rotor_turns_no_faster_than_it_can() {
         // 60 turns/s are 100 counts a period; two more are allowed.
-        for (counts, possible) in [(101, true), (-101, true), (104, false), (-104, false)] {
+        for (counts, possible) in [(102, true), (-102, true), (103, false), (-103, false)] {
             let mut state = IndirectState::default();
             indirect().angle(&mut state, 7).unwrap();
             let moved = indirect().angle(&mut state, 7_u32.wrapping_add_signed(counts));

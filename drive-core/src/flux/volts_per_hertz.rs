@@ -361,6 +361,7 @@ fn wired(i: AlphaBeta) -> Result<(), Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     /// The answer to a voltage along phase a, by the direction of the current in degrees.
     #[test]
@@ -379,5 +380,27 @@ mod tests {
             }
         }
         assert_eq!(wired(AlphaBeta::ZERO), Err(Fault::WiringNoCurrent));
+    }
+
+    /// More than 0.4 of the current turns backwards for half a second, at 8 Hz or faster without a break.
+    #[test]
+    fn a_current_that_turns_backwards_is_an_open_phase() {
+        let coefficients = Settings::default().build().unwrap().volts_per_hertz.unwrap();
+        for (hz, share, slow_at, expected) in [
+            (8.1, 0.41, 0, Some(3001)),
+            (-8.1, 0.41, 0, Some(3001)),
+            (8.1, 0.41, 2000, Some(5001)),
+            (8.1, 0.39, 0, None),
+            (7.9, 0.9, 0, None),
+        ] {
+            let slow = Dq { d: 1.2, q: -1.6 };
+            let mut state = VoltsPerHertzState { slow, ..Default::default() };
+            let backwards = Dq { d: 1.6 * share, q: 1.2 * share };
+            let found = (1..9000).find(|&n| {
+                state.freq = PERIOD_S * if n == slow_at { 7.9 } else { hz };
+                coefficients.judge(&mut state, backwards) == Err(Fault::CurrentNotAsPredicted)
+            });
+            assert_eq!(found, expected, "{hz} Hz, {share}");
+        }
     }
 }
