@@ -363,6 +363,10 @@ mod tests {
     use super::*;
     use crate::settings::Settings;
 
+    fn coefficients() -> VoltsPerHertz {
+        Settings::default().build().unwrap().volts_per_hertz.unwrap()
+    }
+
     /// The answer to a voltage along phase a, by the direction of the current in degrees.
     #[test]
     fn the_direction_of_the_current_tells_the_wiring() {
@@ -382,10 +386,34 @@ mod tests {
         assert_eq!(wired(AlphaBeta::ZERO), Err(Fault::WiringNoCurrent));
     }
 
+    /// At its limit below 4 Hz for two seconds, or for a part of the time for longer: more than a fifth of it counts.
+    #[test]
+    fn a_motor_at_its_limit_that_hardly_turns_stands() {
+        let coefficients = coefficients();
+        let limit = coefficients.limit_a;
+        let demand =
+            Demand { freq: 10.0 * PERIOD_S, quick: false, i_q: (-limit, limit), largest_v: 170.0 };
+        for (hz, every, expected) in [
+            (3.9, 1, Some(12_001)),
+            (-3.9, 1, Some(12_001)),
+            (3.9, 4, Some(4 * 47_997 + 1)),
+            (3.9, 6, None),
+            (4.1, 1, None),
+        ] {
+            let mut state = VoltsPerHertzState::default();
+            let found = (1..200_000).find(|n| {
+                let q = if n % every == 1 % every { 0.95 * limit } else { 0.0 };
+                (state.fast, state.rotor_freq) = (Dq { d: 0.0, q }, hz * PERIOD_S);
+                coefficients.follow(&mut state, &demand) == Err(Fault::Stalled)
+            });
+            assert_eq!(found, expected, "{hz} Hz, one of {every}");
+        }
+    }
+
     /// More than 0.4 of the current turns backwards for half a second, at 8 Hz or faster without a break.
     #[test]
     fn a_current_that_turns_backwards_is_an_open_phase() {
-        let coefficients = Settings::default().build().unwrap().volts_per_hertz.unwrap();
+        let coefficients = coefficients();
         for (hz, share, slow_at, expected) in [
             (8.1, 0.41, 0, Some(3001)),
             (-8.1, 0.41, 0, Some(3001)),

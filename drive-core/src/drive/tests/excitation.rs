@@ -45,8 +45,13 @@ fn the_current_along_phase_a_is_the_reference_and_a_carrier_comes_on_top() {
     assert!((load.current.alpha - 1.0).abs() < 0.005, "{}", load.current.alpha);
     assert!(load.current.beta.abs() < 0.005, "{}", load.current.beta);
     // 50 V at 600 Hz across 51.5 mH and 6.2 ohm: 0.257 A peak, and nothing of it along the axis.
+    // It rises in 200 periods: half of it after 100.
     drive.command(&current(1.0, AlphaBeta::new(0.0, 50.0))).unwrap();
-    run(&mut drive, &mut load, 600, |_| {});
+    run(&mut drive, &mut load, 95, |_| {});
+    let mut half = 0.0_f32;
+    run(&mut drive, &mut load, 10, |drive| half = half.max(drive.telemetry().measured.beta));
+    assert!((0.11..0.145).contains(&half), "{half}");
+    run(&mut drive, &mut load, 500, |_| {});
     let (mut along, mut across) = (0.0_f32, 0.0_f32);
     run(&mut drive, &mut load, 60, |drive| {
         let seen = drive.telemetry();
