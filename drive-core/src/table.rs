@@ -207,6 +207,19 @@ mod tests {
         }
     }
 
+    /// The defaults are of 3.5 A; for twice that they are the same at twice the current.
+    #[test]
+    fn a_guess_is_in_proportion_to_the_largest_current() {
+        let (reference, carrier) = (ReferenceTable::guessed(7.0), CarrierTable::guessed(7.0));
+        for n in 0..POINTS {
+            let (i_q, twice) = (0.25 * n as f32, reference.grid().current(n));
+            assert!((twice - 2.0 * i_q).abs() < 1e-5);
+            assert!((reference.at(twice) - ReferenceTable::default().at(i_q)).abs() < 1e-6);
+        }
+        assert_eq!(carrier.grid(), reference.grid());
+        assert_eq!(carrier.points(), CarrierTable::default().points());
+    }
+
     #[test]
     fn slopes_have_one_sign_and_bounded_inverses() {
         let mut k = [-0.04; POINTS];

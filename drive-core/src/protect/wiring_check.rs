@@ -279,6 +279,28 @@ mod tests {
         assert_eq!(check(0.0515, |i| Abc::new(0.3 * i.a, i.b, 0.0)).0, Ok(()));
     }
 
+    /// Answers at the threshold and between equals pass; one to another phase alone is told from none.
+    #[test]
+    fn answers_at_the_bounds_are_told_apart() {
+        let l = LEAST_SHARE * EXPECTED_A;
+        let less = 0.99 * l;
+        for (answers, expected) in [
+            ([[l, 0.0], [0.0, l], [0.0; 2]], Ok(())),
+            ([[l, l], [-l, l], [0.0; 2]], Ok(())),
+            ([[l, 0.0], [0.0, l], [l, -l]], Ok(())),
+            ([[less, -less], [less, l], [less, 0.0]], Err(Fault::WiringNoCurrent)),
+            ([[l, less], [0.0, less], [0.0, -less]], Err(Fault::WiringNoCurrent)),
+            ([[0.0, 0.0], [l, l], [0.0; 2]], Err(Fault::WiringExchanged)),
+            ([[0.0, 0.0], [0.0, l], [-l, 0.0]], Err(Fault::WiringExchanged)),
+            ([[l, -l], [0.0, 0.0], [0.0; 2]], Err(Fault::WiringExchanged)),
+            ([[l, 0.0], [0.0, 0.0], [0.0, l]], Err(Fault::WiringExchanged)),
+            ([[-l, 0.0], [0.0, -l], [0.0; 2]], Err(Fault::WiringPolarityA)),
+            ([[l, 0.0], [0.0, -l], [0.0; 2]], Err(Fault::WiringPolarityB)),
+        ] {
+            assert_eq!(pulses(0.0515).judge(&answers), expected, "{answers:?}");
+        }
+    }
+
     #[test]
     fn too_little_inductance_ends_it_within_the_bound() {
         for share in [0.4, 0.3, 0.21] {
