@@ -16,7 +16,7 @@ pub use estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 pub use indirect::{Indirect, TAU_R_LIMITS};
 pub use observer::{Leakage, Observer};
 pub use schedule::GainSchedule;
-pub use tracker::Tracker;
+pub use tracker::{Tracker, TrackerState};
 pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
 
 /// The source of the flux angle.

@@ -12,6 +12,21 @@ use super::hand_over::Turning;
 use crate::Angle;
 
 /// Coefficients of the PII tracker.
+///
+/// ```
+/// use induction_drive_core::flux::{Tracker, TrackerState};
+///
+/// // The gains of section 3.11; at most 600 Hz at 6 kHz.
+/// let tracker = Tracker::new(0.132_546, 0.9, 0.1);
+/// let mut state = TrackerState::default();
+/// // A steady error of 1 mA turns the axis faster and faster: two integrators.
+/// let turned: Vec<f32> = (0..30).map(|_| { assert!(tracker.step(&mut state, 1e-3)); state.freq }).collect();
+/// assert!(turned.windows(2).all(|pair| pair[1] > pair[0]));
+/// // Without an error it keeps the frequency that it has.
+/// let freq = { tracker.step(&mut state, 0.0); state.freq };
+/// tracker.step(&mut state, 0.0);
+/// assert_eq!(state.freq, freq);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracker {
     /// Gain, turns per period and ampere.
