@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
+use crate::settings::{or_zero, settings};
 
 /// Load on the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,49 +26,39 @@ pub enum Load {
     },
 }
 
-/// Inertia, friction and load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MechanicsSettings {
-    /// Inertia of everything that turns, kg m^2. The default is assumed: the source gives none.
-    pub inertia: f64,
-    /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
-    pub friction: f64,
-    /// Static friction: the torque to break away, and that against the motion, N m.
-    pub static_torque: f64,
-    /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
-    pub once_torque: f64,
-    /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
-    pub stops: f64,
-    /// Stiffness of a stop, N m/rad.
-    pub stop_stiffness: f64,
-    /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
-    pub stop_damping: f64,
-    /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
-    pub load_inertia: f64,
-    /// Stiffness of the coupling, N m/rad.
-    pub stiffness: f64,
-    /// Damping of the coupling, N m s/rad.
-    pub damping: f64,
-    /// Load at the start.
-    pub load: Load,
+settings! {
+    /// Inertia, friction and load.
+    MechanicsSettings "mechanics." |s| {
+        /// Inertia of everything that turns, kg m^2. The default is assumed: the source gives none.
+        inertia: f64 = 0.012, 1e-6..=1000.0, "kg m^2";
+        /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
+        friction: f64 = 0.001, 0.0..=10.0, "N m s/rad";
+        /// Static friction: the torque to break away, and that against the motion, N m.
+        static_torque: f64 = 0.0, 0.0..=1000.0, "N m";
+        /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
+        once_torque: f64 = 0.0, 0.0..=1000.0, "N m";
+        /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
+        stops: f64 = 0.0, 0.0..=1e4, "rad";
+        /// Stiffness of a stop, N m/rad; with the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
+        stop_stiffness: f64 = 100.0, 0.0..=(s.inertia * 628.0 * 628.0).max(100.0), "N m/rad";
+        /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
+        stop_damping: f64 = 0.3, 0.0..=1000.0, "N m s/rad";
+        /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
+        load_inertia: f64 = 0.0, or_zero(s.load_inertia, 1e-6..=1000.0), "kg m^2";
+        /// Stiffness of the coupling, N m/rad.
+        stiffness: f64 = 100.0, 1e-3..=s.stiffest(), "N m/rad";
+        /// Damping of the coupling, N m s/rad.
+        damping: f64 = 0.0, 0.0..=1000.0, "N m s/rad";
+        /// Load at the start.
+        load: Load = Load::Free { torque: 0.0 };
+    }
 }
 
-impl Default for MechanicsSettings {
-    fn default() -> Self {
-        Self {
-            inertia: 0.012,
-            friction: 0.001,
-            static_torque: 0.0,
-            once_torque: 0.0,
-            stops: 0.0,
-            stop_stiffness: 100.0,
-            stop_damping: 0.3,
-            load_inertia: 0.0,
-            stiffness: 100.0,
-            damping: 0.0,
-            load: Load::Free { torque: 0.0 },
-        }
+impl MechanicsSettings {
+    /// Largest stiffness of the coupling, N m/rad: a resonance of at most 500 Hz, which the integration follows.
+    fn stiffest(&self) -> f64 {
+        let parallel = self.inertia * self.load_inertia / (self.inertia + self.load_inertia);
+        if self.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 }
     }
 }
 
@@ -127,25 +118,8 @@ impl Mechanics {
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
-    pub fn new(settings: &MechanicsSettings) -> Result<Self, PlantError> {
-        check("mechanics.inertia", settings.inertia, 1e-6..=1000.0, "kg m^2")?;
-        check("mechanics.friction", settings.friction, 0.0..=10.0, "N m s/rad")?;
-        let s = settings;
-        check("mechanics.static_torque", s.static_torque, 0.0..=1000.0, "N m")?;
-        check("mechanics.once_torque", s.once_torque, 0.0..=1000.0, "N m")?;
-        check("mechanics.stops", s.stops, 0.0..=1e4, "rad")?;
-        // With the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
-        let most = s.inertia * 628.0 * 628.0;
-        check("mechanics.stop_stiffness", s.stop_stiffness, 0.0..=most.max(100.0), "N m/rad")?;
-        check("mechanics.stop_damping", s.stop_damping, 0.0..=1000.0, "N m s/rad")?;
-        if s.load_inertia != 0.0 {
-            check("mechanics.load_inertia", s.load_inertia, 1e-6..=1000.0, "kg m^2")?;
-        }
-        // A resonance of at most 500 Hz: the integration follows it.
-        let parallel = s.inertia * s.load_inertia / (s.inertia + s.load_inertia);
-        let most = if s.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 };
-        check("mechanics.stiffness", s.stiffness, 1e-3..=most, "N m/rad")?;
-        check("mechanics.damping", s.damping, 0.0..=1000.0, "N m s/rad")?;
+    pub fn new(s: &MechanicsSettings) -> Result<Self, PlantError> {
+        s.check()?;
         let coupling = (s.load_inertia > 0.0).then_some(Coupling {
             inertia: s.load_inertia,
             stiffness: s.stiffness,
@@ -167,14 +141,14 @@ impl Mechanics {
             speed: 0.0,
         };
         let mut mechanics = Self {
-            inertia: settings.inertia,
-            friction: settings.friction,
+            inertia: s.inertia,
+            friction: s.friction,
             load: Load::Locked,
             load_torque: 0.0,
             mobility: 0.0,
             extras: (!plain).then_some(extras),
         };
-        mechanics.set_load(settings.load)?;
+        mechanics.set_load(s.load)?;
         Ok(mechanics)
     }
 
