@@ -22,15 +22,8 @@ pub use run::{learned, trial};
 pub use summary::Summary;
 pub use trial::{Refused, Trial, UNNOTICED_S};
 
+use crate::prelude::*;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::{AngleSource, Drive};
-
-use super::assumptions;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, built, check_model, plant_settings};
-use crate::error::Error;
-use crate::outcome::Outcome;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -9,15 +9,10 @@ use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
 use drive_settings::value::Words as _;
-use serde::{Deserialize, Serialize};
 
 use super::drawn_machine::{Circuit, drawn};
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
-use crate::config::{Config, PlantModel, built, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Outcome, Table};
-use crate::rig::Rig;
+use super::{machines, steady};
+use crate::prelude::*;
 use crate::stats::exact;
 use session::{Abort, Session, unaware};
 

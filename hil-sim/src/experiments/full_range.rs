@@ -11,20 +11,15 @@ mod trial;
 use std::sync::OnceLock;
 
 use drive_core::carrier::DemodulatorKind;
-use drive_core::{AngleSource, Drive};
 use drive_settings::Flux;
 
 use case::Case;
 use trial::Run;
 
-use super::assumptions;
 use super::battery::{Moment, Trial, learned};
 use super::commission::commissioned;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};
-use crate::error::Error;
-use crate::outcome::Outcome;
+use crate::config::{FluxLevel, RangeKind};
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -4,13 +4,7 @@ mod trials;
 
 pub use self::trials::Trial;
 use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
-use super::assumptions;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::columns;
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::{Cell, Column, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.

@@ -1,19 +1,9 @@
 //! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
 //! drawn around it.
 
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
-use super::assumptions;
 use super::drawn_machine::around;
-use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::columns;
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::Rig;
+use crate::prelude::*;
 
 /// Not a figure of the source: whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -107,7 +97,7 @@ pub(super) fn runs(
 
 /// A machine drawn around the motor, whose drive knows the circuit.
 fn drawn(config: &Config, seed: u64) -> Config {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = seeded(seed);
     let mut drawn = around(config, &mut random, config.spread.machine);
     let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
     (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);

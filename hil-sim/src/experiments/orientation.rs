@@ -1,14 +1,6 @@
 //! Field orientation with the encoder: where the drive believes the flux to be, and the torque.
 
-use drive_core::{Command, Mode};
-
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
-use crate::config::LoadMode;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::Rig;
-use crate::stats::Stats;
-use drive_core::AngleSource;
+use crate::prelude::*;
 
 /// Section 2.3.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -2,20 +2,13 @@
 
 mod held;
 
-use drive_core::Command;
-
 use self::held::{Held, Standstill, reversing};
-use super::assumptions;
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
 use super::torque_limit::{BEYOND_A, TorqueLimit};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::columns;
-use crate::config::{Config, open_phase, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::config::open_phase;
 use crate::plant::Plant;
-use crate::rig::Rig;
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -2,20 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Mode;
-
-use super::assumptions;
+use super::learning;
 use super::scenario::{Metric, Record, Statistic, position_step};
-use super::{BENCH, Context, DRIVE, Experiment, learning};
-use crate::columns;
-use crate::config::plant_settings;
-use crate::config::{Config, LoadMode};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::plant::Load;
-use crate::rig::Rig;
-use crate::stats::{Stats, StraightLine};
-use drive_core::AngleSource;
+use crate::prelude::*;
+use crate::stats::StraightLine;
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {

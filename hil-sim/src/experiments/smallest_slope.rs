@@ -1,14 +1,9 @@
 //! The smallest slope of the saliency signal at which a drive that has learned still works: the source of the motor's
 //! saliency is weakened step by step, and the battery runs at each.
 
-use super::assumptions;
 use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
-use super::statistics::{Study, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 use crate::progress::Progress;
 
 /// Not in the source.

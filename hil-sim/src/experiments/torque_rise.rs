@@ -7,14 +7,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use num_complex::Complex64;
 
 use self::rise::{Response, Rise};
-use super::assumptions;
 use super::full_range::for_the_range;
 use super::steady::{bring_up, prepared};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
-use crate::rig::{Point, RATE_HZ, Rig};
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

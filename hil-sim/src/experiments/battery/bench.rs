@@ -2,15 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Accepted, Command, Drive, State};
+use drive_core::Accepted;
 
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
-use crate::config::{Config, open_phase};
-use crate::error::Error;
-use crate::experiments::LOST_DEG;
-use crate::plant::{Complex, Load, Plant, PlantSettings};
-use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
-use crate::stats::Stats;
+use crate::config::open_phase;
+use crate::plant::{Complex, Plant, PlantSettings};
+use crate::prelude::*;
 
 /// An error beyond this, degrees, is wrong, unless the run says otherwise.
 const WRONG_DEG: f64 = 30.0;

@@ -1,10 +1,6 @@
 //! Disturbances of the bench: what a real inverter, real sensors and a real motor add, all together.
 
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
-
-use crate::config::Config;
+use crate::prelude::*;
 
 /// A disturbance.
 pub struct Disturbance {
@@ -91,7 +87,7 @@ impl Asymmetry {
 
 /// Sizes of disturbances, each in relation to its full size: those of the configuration, and what is drawn.
 pub fn sizes(config: &Config, all: &[Disturbance], seed: u64) -> Vec<f64> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = seeded(seed);
     let (together, most) = (config.disturbed.together, config.disturbed.drawn);
     let size = |disturbance: &Disturbance| {
         let drawn = random.random_range(-1.0..=1.0);

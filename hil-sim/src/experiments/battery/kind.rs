@@ -1,12 +1,10 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
-use drive_core::{Accepted, Command, Drive, Mode};
-use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
+use drive_core::Accepted;
 
 use super::disturbed::Asymmetry;
-use crate::config::{BatteryRuns, Config, PlantModel};
-use crate::error::Error;
+use crate::config::BatteryRuns;
+use crate::prelude::*;
 
 /// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -248,7 +246,7 @@ impl Kind {
 
     /// The parts of a run, drawn at random.
     pub fn parts(self, random: &mut impl Rng) -> Vec<Part> {
-        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+        let sign = sign(random);
         match self {
             Self::Constant(_) => {
                 vec![Part::constant(sign * random.random_range(LEAST_A..=MOST_A), 3.0)]
@@ -321,8 +319,7 @@ impl Kind {
 
 /// A turn of the flux, degrees, of either sign.
 fn turn(random: &mut impl Rng) -> f64 {
-    let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-    sign * random.random_range(TURN_DEG.0..=TURN_DEG.1)
+    sign(random) * random.random_range(TURN_DEG.0..=TURN_DEG.1)
 }
 
 /// The torque current that a drive which is off would take when it is asked for this one, A peak.
@@ -340,8 +337,6 @@ pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
     use crate::config::Value;
@@ -358,7 +353,7 @@ mod tests {
         config.battery.load_share = 0.62;
         let (kinds, runs) = chosen(&config);
         assert_eq!((kinds.as_slice(), runs), (&[Kind::LoadStep(620)][..], 32));
-        let parts = kinds[0].parts(&mut Xoshiro256PlusPlus::seed_from_u64(1));
+        let parts = kinds[0].parts(&mut seeded(1));
         let loads: Vec<f64> =
             parts.iter().map(|part| part.load.newton_metres(&config).abs()).collect();
         assert_eq!((loads[0], loads[2]), (0.0, 0.0));
@@ -386,7 +381,7 @@ mod tests {
     fn restless_commands_never_rest() {
         for kind in RESTLESS {
             let Kind::Restless { hz, forced } = kind else { continue };
-            let parts = kind.parts(&mut Xoshiro256PlusPlus::seed_from_u64(3));
+            let parts = kind.parts(&mut seeded(3));
             assert_eq!(parts.len(), 5 * usize::from(hz));
             let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
             assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial};
-use crate::columns;
-use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference on. Lost: beyond 45° at \

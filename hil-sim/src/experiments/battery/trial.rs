@@ -2,12 +2,8 @@
 
 use std::fmt;
 
-use drive_core::Fault;
-use serde::{Deserialize, Serialize};
-
 use super::kind::Kind;
-use crate::experiments::LOST_DEG;
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// A state that lasts longer, s, should have been noticed.
 pub const UNNOTICED_S: f64 = 0.5;

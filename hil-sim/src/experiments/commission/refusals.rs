@@ -1,20 +1,13 @@
 //! Defects of motor, wiring, sensors and board: are they refused, by name?
 
 use drive_commission::{Commissioning, Meaning, Refusal, Step};
-use drive_core::{Fault, Sample, State};
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
+use drive_core::Sample;
 
-use super::super::statistics::{Study, seed_of, whole};
-use super::super::{BENCH, Context, DRIVE, Experiment};
 use super::session::{Abort, Session, unaware};
-use crate::config::{Config, FluxLevel, LoadMode, OpenPhase, PlantModel};
-use crate::error::Error;
+use crate::config::{FluxLevel, OpenPhase};
 use crate::experiments::drawn_machine::drawn;
-use crate::outcome::{Cell, Outcome, Table};
 use crate::plant::{Channel, CurrentFault};
-use crate::rig::Rig;
+use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
@@ -167,7 +160,7 @@ impl Study for Refusals {
         let mut rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
         (defect.on_bench)(&mut rig);
         let abort = defect.abort.map_or(Abort::default(), |step| {
-            let after = Xoshiro256PlusPlus::seed_from_u64(seed).random_range(1..abort_within(step));
+            let after = seeded(seed).random_range(1..abort_within(step));
             Abort { step: Some(step), after }
         });
         let commissioning = Commissioning::new(&settings);

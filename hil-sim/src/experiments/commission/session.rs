@@ -3,14 +3,11 @@
 use std::f64::consts::TAU;
 
 use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{AlphaBeta, Command, Excitation, Mode, Motor, Sample, State, Stop};
+use drive_core::{AlphaBeta, Excitation, Motor, Sample, Stop};
 use drive_settings::Settings;
 
-use crate::config::Config;
-use crate::error::Error;
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
-use crate::rig::{RATE_HZ, Rig};
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// Control periods from one poll of the main loop to the next.
 const POLL: u32 = 6;

@@ -1,9 +1,8 @@
 //! What is run: each kind in the regions of the speed that it is for.
 
-use rand::{Rng, RngExt};
-
 use crate::config::RangeKind;
 use crate::experiments::battery::Shaft;
+use crate::prelude::*;
 
 /// Ends of the regions, rpm on four poles. The injection alone gives the angle up to 450 rpm and the motor's own voltage from
 /// 600 rpm on, the carrier is off above 750 rpm, and the field is weakened in the last.
@@ -86,9 +85,4 @@ impl Case {
         );
         sign(random) * if one { ONE_RPM } else { speed }
     }
-}
-
-/// 1 or -1.
-pub fn sign(random: &mut impl Rng) -> f64 {
-    if random.random::<bool>() { 1.0 } else { -1.0 }
 }

@@ -1,12 +1,9 @@
 //! The verdict over the runs, per kind and region.
 
-use drive_core::Fault;
-
 use super::case::Case;
 use crate::config::RangeKind;
 use crate::experiments::battery::{Moment, Refused, Trial, UNNOTICED_S};
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: true minus estimated, over all samples that count: at constant torque and in reversals from 0.5 s \

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use drive_core::Stop;
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
 use crate::columns::Columns;
-use crate::config::{Config, Value, flattened};
-use crate::error::{Error, unknown};
+use crate::config::{Value, flattened};
+use crate::error::unknown;
+use crate::prelude::*;
 
 /// A value from the beginning to the end of a part, straight between them.
 #[derive(Clone, Copy, Debug, Default)]
