@@ -20,7 +20,7 @@ pub(super) use kind::{LoadTorque, Part, Shaft};
 pub(super) use run::{LONGEST_START_S, bring_up, follow, held};
 pub use run::{learned, trial};
 pub use summary::Summary;
-pub use trial::{Refused, Trial, UNNOTICED_S};
+pub use trial::{Refused, Trial};
 
 use crate::prelude::*;
 use drive_core::carrier::DemodulatorKind;

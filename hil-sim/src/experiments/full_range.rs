@@ -172,7 +172,7 @@ impl Study for FullRange {
 
     fn outcome(&self, _: &Context<'_>, runs: Vec<Trial>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
-        let done: Vec<(Case, usize, Trial)> =
+        let done: Vec<_> =
             self.numbers.iter().zip(runs).map(|(&n, run)| (self.case(n), n, run)).collect();
         summary::of(&self.cases, &done, &mut outcome);
         if let Some(index) = self.config.full_range.index {

@@ -107,11 +107,6 @@ impl Trial {
         self.wrong_s > UNNOTICED_S
     }
 
-    /// Whether the angle was lost for so long.
-    pub fn is_lost_for_long(&self) -> bool {
-        self.lost_s > UNNOTICED_S
-    }
-
     /// Whether the flux was off for so long.
     pub fn is_flux_off(&self) -> bool {
         self.flux_off_s > UNNOTICED_S
