@@ -145,6 +145,26 @@ impl<T: Field> Field for Option<T> {
     }
 }
 
+/// A value of the configuration that the plant has, too.
+pub trait CopyTo<T> {
+    /// Copies it; what is not set leaves the place as it is.
+    fn copy_to(self, place: &mut T);
+}
+
+impl<T> CopyTo<T> for T {
+    fn copy_to(self, place: &mut T) {
+        *place = self;
+    }
+}
+
+impl<T> CopyTo<T> for Option<T> {
+    fn copy_to(self, place: &mut T) {
+        if let Some(value) = self {
+            *place = value;
+        }
+    }
+}
+
 /// An enumeration whose variants are written as words.
 macro_rules! words {
     ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $word:literal,)+ }) => {
