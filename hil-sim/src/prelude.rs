@@ -1,6 +1,7 @@
 //! The names that most experiments use.
 
 pub use drive_core::{AngleSource, Command, Drive, Fault, Mode, State};
+pub use drive_settings::value::Words;
 pub use rand::{Rng, RngExt};
 pub use serde::{Deserialize, Serialize};
 pub use sim_bench::columns;

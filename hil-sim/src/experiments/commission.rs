@@ -8,7 +8,6 @@ use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
-use drive_settings::value::Words as _;
 
 use super::drawn_machine::{Circuit, drawn};
 use super::{machines, steady};

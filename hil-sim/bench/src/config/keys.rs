@@ -5,6 +5,7 @@
 //! these two tables. To add a key, add a line.
 
 use drive_settings::Settings;
+use drive_settings::value::Words as _;
 
 use super::after::After;
 use super::value::{Allowed, CopyTo as _, Field, Value};
@@ -53,7 +54,7 @@ macro_rules! keys {
     )+) => {
         $(
             #[doc = $group_doc]
-            #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+            #[derive(Clone, Debug, PartialEq)]
             pub struct $type {
                 $($(#[doc = $doc])+ pub $field: $field_type,)+
             }
@@ -66,14 +67,12 @@ macro_rules! keys {
         )+
 
         /// The configuration of an experiment.
-        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        #[derive(Clone, Debug, PartialEq)]
         pub struct Config {
             $(#[doc = $group_doc] pub $group: $type,)+
             /// The drive.
-            #[serde(skip)]
             pub drive: Settings,
             /// Keys of the plant that change after the learning.
-            #[serde(skip)]
             pub after: After,
         }
 

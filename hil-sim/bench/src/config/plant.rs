@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::Line;
 use drive_core::io::CONVERTER_CODES;
+use drive_settings::value::Words as _;
 
 use super::{Config, FluxLevel, LoadMode};
 use crate::config::value::CopyTo as _;
