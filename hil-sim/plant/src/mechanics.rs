@@ -77,11 +77,7 @@ pub struct Mechanics {
 /// What most shafts do not have, with its state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extras {
-    static_torque: f64,
-    once_torque: f64,
-    stops: f64,
-    stop_stiffness: f64,
-    stop_damping: f64,
+    settings: MechanicsSettings,
     coupling: Option<Coupling>,
     /// Torque by the angle in this period.
     by_angle: f64,
@@ -92,21 +88,19 @@ struct Extras {
 impl Extras {
     /// Torque of the stop that the shaft has reached: it pushes, and does not pull.
     fn stop_torque(&self, angle: f64) -> f64 {
-        let beyond = angle.abs() - self.stops;
-        if self.stops == 0.0 || beyond <= 0.0 {
+        let s = &self.settings;
+        let beyond = angle.abs() - s.stops;
+        if s.stops == 0.0 || beyond <= 0.0 {
             return 0.0;
         }
         let outwards = self.speed * angle.signum();
-        (self.stop_stiffness * beyond + self.stop_damping * outwards).max(0.0) * angle.signum()
+        (s.stop_stiffness * beyond + s.stop_damping * outwards).max(0.0) * angle.signum()
     }
 }
 
 /// The elastic coupling and the inertia behind it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Coupling {
-    inertia: f64,
-    stiffness: f64,
-    damping: f64,
     twist: f64,
     speed: f64,
     /// Torque that it takes from the motor in this step.
@@ -120,26 +114,10 @@ impl Mechanics {
     /// [`PlantError::OutOfRange`].
     pub fn new(s: &MechanicsSettings) -> Result<Self, PlantError> {
         s.check()?;
-        let coupling = (s.load_inertia > 0.0).then_some(Coupling {
-            inertia: s.load_inertia,
-            stiffness: s.stiffness,
-            damping: s.damping,
-            twist: 0.0,
-            speed: 0.0,
-            torque: 0.0,
-        });
+        let coupling = (s.load_inertia > 0.0).then(Coupling::default);
         let plain =
             coupling.is_none() && (s.static_torque, s.once_torque, s.stops) == (0.0, 0.0, 0.0);
-        let extras = Extras {
-            static_torque: s.static_torque,
-            once_torque: s.once_torque,
-            stops: s.stops,
-            stop_stiffness: s.stop_stiffness,
-            stop_damping: s.stop_damping,
-            coupling,
-            by_angle: 0.0,
-            speed: 0.0,
-        };
+        let extras = Extras { settings: *s, coupling, by_angle: 0.0, speed: 0.0 };
         let mut mechanics = Self {
             inertia: s.inertia,
             friction: s.friction,
@@ -208,7 +186,7 @@ impl Mechanics {
     #[inline]
     pub(crate) fn begin_period(&mut self, angle: f64) {
         if let Some(extras) = &mut self.extras {
-            extras.by_angle = extras.once_torque * angle.cos() + extras.stop_torque(angle);
+            extras.by_angle = extras.settings.once_torque * angle.cos() + extras.stop_torque(angle);
         }
     }
 
@@ -219,10 +197,9 @@ impl Mechanics {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        let at_load = load + extras.by_angle;
+        let (s, at_load) = (&extras.settings, load + extras.by_angle);
         let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
-            coupling.torque =
-                coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
+            coupling.torque = s.stiffness * coupling.twist + s.damping * (speed - coupling.speed);
             coupling.torque
         });
         // A shaft that has come to rest, or passed it, stays where friction can hold it.
@@ -231,14 +208,14 @@ impl Mechanics {
         extras.speed = speed;
         self.mobility = 1.0 / self.inertia;
         self.load_torque = against;
-        if extras.static_torque > 0.0 {
-            if rests && driven.abs() <= extras.static_torque {
+        if s.static_torque > 0.0 {
+            if rests && driven.abs() <= s.static_torque {
                 extras.speed = 0.0;
                 self.mobility = 0.0;
                 return 0.0;
             }
             let direction = if rests { driven } else { speed };
-            self.load_torque += extras.static_torque.copysign(direction);
+            self.load_torque += s.static_torque.copysign(direction);
         }
         speed
     }
@@ -249,7 +226,8 @@ impl Mechanics {
             return;
         };
         if let Some(coupling) = &mut extras.coupling {
-            coupling.speed += h * (coupling.torque - load - extras.by_angle) / coupling.inertia;
+            coupling.speed +=
+                h * (coupling.torque - load - extras.by_angle) / extras.settings.load_inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }
