@@ -5,6 +5,7 @@
 
 mod build;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
@@ -133,16 +134,22 @@ impl Options {
 /// # Errors
 /// As [`Options::config`]; [`Error::Internal`] when a build fails or cargo does not run.
 pub fn become_board(options: &Options) -> Result<(), Error> {
+    let arguments = std::env::args_os().skip_while(|argument| argument != "board").skip(1);
+    Err(replaced_by(built(options, arguments)?))
+}
+
+/// The command that runs the virtual board with these arguments and the image.
+fn built(options: &Options, arguments: impl Iterator<Item = OsString>) -> Result<Command, Error> {
     // Wrong options are reported before the builds, which take minutes.
     options.config()?;
     let image =
         options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
     let mut command = Command::new(build::virtual_board()?);
-    command.args(std::env::args_os().skip_while(|argument| argument != "board").skip(1));
+    command.args(arguments);
     if let Some(image) = image {
         command.arg("--elf").arg(image);
     }
-    Err(replaced_by(command))
+    Ok(command)
 }
 
 /// Builds the same and starts the board as a child of this process; its standard input and output are pipes.
@@ -150,14 +157,8 @@ pub fn become_board(options: &Options) -> Result<(), Error> {
 /// # Errors
 /// As [`become_board`].
 pub fn attach(options: &Options, arguments: &[String]) -> Result<Child, Error> {
-    options.config()?;
-    let image =
-        options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
-    let mut command = Command::new(build::virtual_board()?);
-    command.args(arguments).arg("--attached");
-    if let Some(image) = image {
-        command.arg("--elf").arg(image);
-    }
+    let attached = ["--attached".to_owned()];
+    let mut command = built(options, arguments.iter().chain(&attached).map(OsString::from))?;
     let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     child.map_err(|error| Error::Internal(format!("cannot run the virtual board: {error}")))
 }
