@@ -111,9 +111,7 @@ impl Rig {
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
         rig.plant.set_open_phase(config::open_phase(config)).map_err(Error::refused)?;
-        let injecting = config.drive.angle_source == AngleSource::Injection;
-        let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
-        if config.prepare.learn && injecting && tracks {
+        if config.prepare.learn && tracks(&config.drive) {
             rig.set_load(Load::Locked)?;
             rig.learn()?;
             // The flux decays.
@@ -274,6 +272,12 @@ impl Rig {
             ..Point::default()
         }
     }
+}
+
+/// Whether a drive with these settings tracks the saliency, and can learn.
+pub fn tracks(settings: &Settings) -> bool {
+    settings.angle_source == AngleSource::Injection
+        && settings.injection.demodulator == DemodulatorKind::Synchronous
 }
 
 /// A command in words.

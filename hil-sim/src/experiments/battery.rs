@@ -23,7 +23,6 @@ pub use summary::Summary;
 pub use trial::{Refused, Trial};
 
 use crate::prelude::*;
-use drive_core::carrier::DemodulatorKind;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -80,11 +79,8 @@ impl Battery {
         if let Some(drive) = self.drives[group].get() {
             return Ok(drive);
         }
-        let settings = &config.drive;
-        let drive = Drive::new(built(settings)?);
-        let tracks = settings.angle_source == AngleSource::Injection
-            && settings.injection.demodulator == DemodulatorKind::Synchronous;
-        let drive = match config.prepare.learn && tracks {
+        let drive = Drive::new(built(&config.drive)?);
+        let drive = match config.prepare.learn && tracks(&config.drive) {
             true => {
                 let mut bench = config.clone();
                 disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);

@@ -10,7 +10,6 @@ mod trial;
 
 use std::sync::OnceLock;
 
-use drive_core::carrier::DemodulatorKind;
 use drive_settings::Flux;
 
 use case::Case;
@@ -77,11 +76,11 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 /// # Errors
 /// When the settings are refused.
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Result<Drive, u8>, Error> {
-    let settings = &config.drive;
-    let drive = Drive::new(built(settings)?);
-    let tracks = settings.angle_source == AngleSource::Injection
-        && settings.injection.demodulator == DemodulatorKind::Synchronous;
-    if tracks { learned(config, &plant_settings(config), drive, seed) } else { Ok(Ok(drive)) }
+    let drive = Drive::new(built(&config.drive)?);
+    match tracks(&config.drive) {
+        true => learned(config, &plant_settings(config), drive, seed),
+        false => Ok(Ok(drive)),
+    }
 }
 
 /// A drive that has learned, or the number of the fault with which it refused to.
