@@ -202,17 +202,16 @@ impl LockMonitor {
         m.set("false_alarm_rate_95", bound);
         m.set("healthy_loss_max", largest_loss);
         m.set("healthy_error_max_deg", largest(|r| r.largest_deg));
-        let mut table = Table::new("False alarms", &[]).note(
-            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
-             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
-        );
-        table.record([
+        let row = [
             ("runs", Cell::fixed(runs.len() as f64, 0)),
             ("false alarms", Cell::fixed(alarms.len() as f64, 0)),
             ("rate per run, 95 % bound", Cell::significant(bound, 2)),
             ("largest loss seen", Cell::fixed(largest_loss, 2)),
-        ]);
-        outcome.tables.push(table);
+        ];
+        outcome.tables.push(Table::new("False alarms", &[]).records([row]).note(
+            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
+             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
+        ));
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
         self.listed("Every false alarm", heads, alarms, outcome);
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");

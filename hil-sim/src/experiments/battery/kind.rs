@@ -57,29 +57,6 @@ pub const KINDS: [Kind; 12] = [
     Kind::Load,
 ];
 
-/// The other lists of kinds, likewise.
-const FORCED: [Kind; 3] = [Kind::Forced(0), Kind::Forced(60), Kind::Forced(300)];
-const RESTLESS: [Kind; 6] = [
-    Kind::Restless { hz: 100, forced: false },
-    Kind::Restless { hz: 600, forced: false },
-    Kind::Restless { hz: 6000, forced: false },
-    Kind::Restless { hz: 100, forced: true },
-    Kind::Restless { hz: 600, forced: true },
-    Kind::Restless { hz: 6000, forced: true },
-];
-/// The last two need a motor of iron.
-const DRAGGED: [Kind; 9] = [
-    Kind::Dragged(Asymmetry::None),
-    Kind::Dragged(Asymmetry::GainA(10)),
-    Kind::Dragged(Asymmetry::GainA(-10)),
-    Kind::Dragged(Asymmetry::GainB(10)),
-    Kind::Dragged(Asymmetry::GainB(-10)),
-    Kind::Dragged(Asymmetry::CrossTalk(5)),
-    Kind::Dragged(Asymmetry::CrossTalk(-5)),
-    Kind::Dragged(Asymmetry::StatorFixed(6)),
-    Kind::Dragged(Asymmetry::StatorFixed(-6)),
-];
-
 /// The kinds that a configuration asks for, and how many runs there are unless it says.
 pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     match config.battery.runs {
@@ -88,12 +65,21 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
             (vec![Kind::LoadStep((1e3 * config.battery.load_share).round() as u16)], 32)
         }
         BatteryRuns::Hold => (vec![Kind::Hold], 64),
-        BatteryRuns::Forced => (FORCED.to_vec(), 90 * FORCED.len()),
-        BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
+        BatteryRuns::Forced => ([0, 60, 300].map(Kind::Forced).to_vec(), 90 * 3),
+        BatteryRuns::Restless => {
+            let of = |forced| [100, 600, 6000].map(|hz| Kind::Restless { hz, forced });
+            ([false, true].map(of).concat(), 16 * 6)
+        }
         BatteryRuns::Dragged => {
-            // Model A has no saliency that is fixed to the stator.
-            let ends = if config.model.plant == PlantModel::A { 7 } else { DRAGGED.len() };
-            (DRAGGED[..ends].to_vec(), 24 * ends)
+            let (a, b) = ([10, -10].map(Asymmetry::GainA), [10, -10].map(Asymmetry::GainB));
+            let mut all = [a, b, [5, -5].map(Asymmetry::CrossTalk)].concat();
+            all.insert(0, Asymmetry::None);
+            if config.model.plant != PlantModel::A {
+                // Model A has no saliency that is fixed to the stator.
+                all.extend([6, -6].map(Asymmetry::StatorFixed));
+            }
+            let runs = 24 * all.len();
+            (all.into_iter().map(Kind::Dragged).collect(), runs)
         }
     }
 }
@@ -337,7 +323,6 @@ pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
     use crate::config::Value;
 
@@ -379,7 +364,9 @@ mod tests {
     /// turned once.
     #[test]
     fn restless_commands_never_rest() {
-        for kind in RESTLESS {
+        let mut config = Config::default();
+        config.battery.runs = BatteryRuns::Restless;
+        for kind in chosen(&config).0 {
             let Kind::Restless { hz, forced } = kind else { continue };
             let parts = kind.parts(&mut seeded(3));
             assert_eq!(parts.len(), 5 * usize::from(hz));

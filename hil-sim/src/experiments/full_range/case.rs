@@ -10,21 +10,6 @@ const REGIONS_RPM: [f64; 9] = [0.0, 150.0, 350.0, 550.0, 750.0, 1200.0, 1800.0, 
 /// Speed of the kinds that have but one, rpm.
 pub const ONE_RPM: f64 = 1800.0;
 
-const KINDS: [RangeKind; 12] = [
-    RangeKind::Constant,
-    RangeKind::Reversals,
-    RangeKind::LoadSteps,
-    RangeKind::Ramps,
-    RangeKind::HotRamps,
-    RangeKind::WrongParameters,
-    RangeKind::TurnedFlux,
-    RangeKind::TurningStart,
-    RangeKind::ResidualStart,
-    RangeKind::Braking,
-    RangeKind::Outage,
-    RangeKind::Sag,
-];
-
 /// A kind in a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
@@ -37,7 +22,8 @@ pub struct Case {
 impl Case {
     /// All of one kind, or of all kinds.
     pub fn all(only: Option<RangeKind>) -> Vec<Self> {
-        let kinds = KINDS.into_iter().filter(|kind| only.is_none_or(|only| only == *kind));
+        let kinds = RangeKind::VALUES.iter().copied();
+        let kinds = kinds.filter(|kind| only.is_none_or(|only| only == *kind));
         let of = |kind| Self::regions(kind).into_iter().map(move |region| Self { kind, region });
         kinds.flat_map(of).collect()
     }
