@@ -41,8 +41,20 @@ const GROUP: usize = KINDS.len();
 const LEARNING: u64 = 1 << 40;
 const DRAWN: u64 = 2 << 40;
 
-/// The drive of a group of runs, or the number of the fault with which it refused to learn.
-type Learnt = Result<Drive, u8>;
+/// A drive, or the number of the fault with which it refused to learn.
+pub(super) type Learnt = Result<Drive, u8>;
+
+/// What is made by the first run that needs it.
+pub(super) fn once<T>(
+    place: &OnceLock<T>,
+    make: impl FnOnce() -> Result<T, Error>,
+) -> Result<&T, Error> {
+    match place.get() {
+        Some(made) => Ok(made),
+        // Two threads that came at once made the same.
+        None => make().map(|made| place.get_or_init(|| made)),
+    }
+}
 
 /// The runs.
 pub struct Battery {
@@ -76,22 +88,16 @@ impl Battery {
     /// The drive of a group; with `prepare.learn` it has learned.
     fn drive(&self, number: usize) -> Result<&Learnt, Error> {
         let (group, config) = (self.group(number), &self.config);
-        if let Some(drive) = self.drives[group].get() {
-            return Ok(drive);
-        }
-        let drive = Drive::new(built(&config.drive)?);
-        let drive = match config.prepare.learn && tracks(&config.drive) {
-            true => {
-                let mut bench = config.clone();
-                disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
-                let seed =
-                    if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
-                learned(config, &plant_settings(&bench), drive, seed)?
+        once(&self.drives[group], || {
+            let drive = Drive::new(built(&config.drive)?);
+            if !(config.prepare.learn && tracks(&config.drive)) {
+                return Ok(Ok(drive));
             }
-            false => Ok(drive),
-        };
-        // Two threads that came at once found the same.
-        Ok(self.drives[group].get_or_init(|| drive))
+            let mut bench = config.clone();
+            disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
+            let seed = if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
+            learned(config, &plant_settings(&bench), drive, seed)
+        })
     }
 }
 

@@ -15,7 +15,7 @@ use drive_settings::Flux;
 use case::Case;
 use trial::Run;
 
-use super::battery::{Moment, Trial, learned};
+use super::battery::{Learnt, Moment, Trial, learned, once};
 use super::commission::commissioned;
 use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
@@ -75,16 +75,13 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 ///
 /// # Errors
 /// When the settings are refused.
-pub fn learned_drive(config: &Config, seed: u64) -> Result<Result<Drive, u8>, Error> {
+pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
     match tracks(&config.drive) {
         true => learned(config, &plant_settings(config), drive, seed),
         false => Ok(Ok(drive)),
     }
 }
-
-/// A drive that has learned, or the number of the fault with which it refused to.
-type Learnt = Result<Drive, u8>;
 
 /// The runs: of each case one after the other, so that shards have their part of each.
 pub struct FullRange {
@@ -117,12 +114,7 @@ impl FullRange {
     /// The drive of a run, which has learned where it can.
     fn drive(&self, case: Case, config: &Config) -> Result<&Learnt, Error> {
         let place = &self.drives[usize::from(case.kind == RangeKind::Braking)];
-        if let Some(drive) = place.get() {
-            return Ok(drive);
-        }
-        let drive = learned_drive(config, self.seed)?;
-        // Two threads that came at once found the same.
-        Ok(place.get_or_init(|| drive))
+        once(place, || learned_drive(config, self.seed))
     }
 
     /// Does a run; with `traced` it is recorded.

@@ -11,15 +11,9 @@ pub const EXPERIMENT: Experiment = Experiment {
     uses: &[
         BENCH,
         DRIVE,
-        &[
-            "load.speed_rpm",
-            "prepare.learn",
-            "spread.motor",
-            "spread.noise",
-            "spread.gain",
-            "runs",
-            "seconds",
-        ],
+        &["load.speed_rpm", "prepare.learn"],
+        &["spread.motor", "spread.noise", "spread.gain"],
+        &["runs", "seconds"],
     ],
     not: &[FREE_SHAFT, SPEED_LOOP],
     run: whole::<MonteCarlo>,
