@@ -108,22 +108,18 @@ impl Options {
 
     /// The command line that repeats this session with this configuration.
     pub fn command(&self, config: &Config) -> String {
+        let file = |option: &str, file: &Option<PathBuf>| {
+            file.as_ref().map(|file| format!(" --{option} {}", file.display()))
+        };
+        let options = [
+            (self.board != "reference").then(|| format!(" --board {}", self.board)),
+            file("script", &self.script),
+            self.lenient.then(|| " --lenient".to_owned()),
+            file("flash", &self.flash),
+            self.fast.then(|| " --fast".to_owned()),
+        ];
         let mut command = self.input.command("board", config);
-        if self.board != "reference" {
-            command.push_str(&format!(" --board {}", self.board));
-        }
-        if let Some(script) = &self.script {
-            command.push_str(&format!(" --script {}", script.display()));
-        }
-        if self.lenient {
-            command.push_str(" --lenient");
-        }
-        if let Some(flash) = &self.flash {
-            command.push_str(&format!(" --flash {}", flash.display()));
-        }
-        if self.fast {
-            command.push_str(" --fast");
-        }
+        command.extend(options.into_iter().flatten());
         command
     }
 }
