@@ -9,7 +9,7 @@ pub use sim_bench::config::{PlantModel, built, check_model};
 pub use sim_bench::outcome::Column;
 pub use sim_bench::plant::Load;
 pub use sim_bench::prelude::*;
-pub use sim_bench::rig::{Point, tracks, wrapped_degrees};
-pub use sim_bench::statistics::{Study, seed_of, whole};
+pub use sim_bench::rig::{Point, fault_text, tracks, wrapped_degrees};
+pub use sim_bench::statistics::{Study, or_refusal, seed_of, whole};
 
 pub use crate::random::{seeded, sign};

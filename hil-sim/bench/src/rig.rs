@@ -6,7 +6,7 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
 use drive_core::{
-    Accepted, AngleSource, Command, Compare, Drive, FrontEndState, Mode, Sample, State, Stop,
+    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
 };
 use drive_settings::Settings;
 
@@ -248,7 +248,7 @@ impl Rig {
 
     /// The fault with which the drive has stopped itself, with its number.
     pub fn fault(&self) -> Option<String> {
-        self.drive.state().fault().map(|fault| format!("fault {}: {fault}", fault.code()))
+        self.drive.state().fault().map(fault_text)
     }
 
     /// Couples another load.
@@ -278,6 +278,11 @@ impl Rig {
 pub fn tracks(settings: &Settings) -> bool {
     settings.angle_source == AngleSource::Injection
         && settings.injection.demodulator == DemodulatorKind::Synchronous
+}
+
+/// A fault in words, with its number.
+pub fn fault_text(fault: Fault) -> String {
+    format!("fault {}: {fault}", fault.code())
 }
 
 /// A command in words.

@@ -160,7 +160,7 @@ impl Battery {
         let all =
             disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
         let acting = all.filter(|(_, size)| **size != 0.0);
-        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.name, 100.0 * size));
+        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.0, 100.0 * size));
         words.collect::<Vec<_>>().join(", ")
     }
 }

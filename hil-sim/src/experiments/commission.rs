@@ -135,15 +135,12 @@ impl Commission {
         let mut config = Config { drive: *drive, ..config.clone() };
         config.prepare.learn = true;
         config.drive.injection.synchronous.allow_unlearned = false;
-        match steady::prepared(drive, &config, seed) {
-            Ok(learned) => {
-                let runs = machines::runs(&learned, &config, seed, seconds)?;
-                Ok(Ok((machines::good(&runs), learned.learning_s)))
-            }
-            // A refusal of the drive belongs to the result; other errors do not.
-            Err(Error::Refused(why)) => Ok(Err(why)),
-            Err(other) => Err(other),
-        }
+        let learned = match or_refusal(steady::prepared(drive, &config, seed))? {
+            Ok(learned) => learned,
+            Err(why) => return Ok(Err(why)),
+        };
+        let runs = machines::runs(&learned, &config, seed, seconds)?;
+        Ok(Ok((machines::good(&runs), learned.learning_s)))
     }
 
     /// What was found beside what is filed.

@@ -125,9 +125,8 @@ impl Trial {
     /// The reason why the run is none that a drive should have, after its kind and seed.
     pub fn failure(&self) -> Option<String> {
         let fault = |code: u8| {
-            let fault = Fault::ALL.iter().find(|fault| fault.code() == code);
-            let text = fault.map_or(String::new(), |fault| format!(": {fault}"));
-            format!("fault {code}{text}")
+            let fault = Fault::ALL.iter().copied().find(|fault| fault.code() == code);
+            fault.map_or_else(|| format!("fault {code}"), fault_text)
         };
         let stops = self.trip.filter(|_| !self.kind.is_some_and(Kind::turns_flux));
         let reasons = [

@@ -31,9 +31,7 @@ impl Case {
     fn regions(kind: RangeKind) -> Vec<(f64, f64)> {
         let all = REGIONS_RPM.windows(2).map(|ends| (ends[0], ends[1]));
         match kind {
-            RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage => {
-                vec![(0.0, ONE_RPM)]
-            }
+            one if has_one_speed(one) => vec![(0.0, ONE_RPM)],
             RangeKind::Sag => all.filter(|region| region.0 >= 1200.0).collect(),
             _ => all.collect(),
         }
@@ -52,23 +50,18 @@ impl Case {
 
     /// The shaft at a speed, rpm on four poles.
     pub fn shaft(&self, rpm: f64) -> Shaft {
-        match self.kind {
-            RangeKind::LoadSteps
-            | RangeKind::Ramps
-            | RangeKind::HotRamps
-            | RangeKind::Braking
-            | RangeKind::Outage => Shaft::Free,
-            _ => Shaft::Held(rpm),
-        }
+        let free = self.kind == RangeKind::LoadSteps || has_one_speed(self.kind);
+        if free { Shaft::Free } else { Shaft::Held(rpm) }
     }
 
     /// A speed in the region, of either sign, rpm on four poles; that of the kinds that have but one.
     pub fn speed(&self, random: &mut impl Rng) -> f64 {
         let speed = random.random_range(self.region.0..=self.region.1);
-        let one = matches!(
-            self.kind,
-            RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage
-        );
-        sign(random) * if one { ONE_RPM } else { speed }
+        sign(random) * if has_one_speed(self.kind) { ONE_RPM } else { speed }
     }
+}
+
+/// Whether the runs of a kind have but one speed, which the drive regulates.
+fn has_one_speed(kind: RangeKind) -> bool {
+    matches!(kind, RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage)
 }
