@@ -137,6 +137,7 @@ impl Plant {
                 substeps: settings.substeps,
                 open: None,
                 taken: 0.0,
+                volt_seconds: Complex::ZERO,
             },
             dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
             warming: Warming::new(&settings.warming, &settings.machine)?,
@@ -172,9 +173,8 @@ impl Plant {
     #[inline]
     pub fn advance(&mut self, compare: &Compare, period_s: f64) {
         let around = &mut self.around;
-        let volt_seconds =
-            whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
-        self.applied = volt_seconds / period_s;
+        whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
+        self.applied = around.volt_seconds / period_s;
         self.encoder.follow(self.mechanical_angle());
         if self.moves {
             self.slow(period_s);
