@@ -99,6 +99,16 @@ impl Battery {
             learned(config, &plant_settings(&bench), drive, seed)
         })
     }
+
+    /// The disturbances of a run in words, in % of their full sizes.
+    fn disturbances(&self, number: usize) -> String {
+        let [always, after] = self.sizes(number);
+        let all =
+            disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
+        let acting = all.filter(|(_, size)| **size != 0.0);
+        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.0, 100.0 * size));
+        words.collect::<Vec<_>>().join(", ")
+    }
 }
 
 impl Study for Battery {
@@ -150,17 +160,5 @@ impl Study for Battery {
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(summary::REMARK.to_owned());
         Ok(outcome)
-    }
-}
-
-impl Battery {
-    /// The disturbances of a run in words, in % of their full sizes.
-    fn disturbances(&self, number: usize) -> String {
-        let [always, after] = self.sizes(number);
-        let all =
-            disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
-        let acting = all.filter(|(_, size)| **size != 0.0);
-        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.0, 100.0 * size));
-        words.collect::<Vec<_>>().join(", ")
     }
 }

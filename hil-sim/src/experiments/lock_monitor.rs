@@ -38,22 +38,6 @@ pub struct LockMonitor {
     runs: usize,
 }
 
-impl LockMonitor {
-    /// Starts, and relocks, at each speed.
-    fn starts_each(&self) -> usize {
-        self.runs.div_ceil(5)
-    }
-
-    fn healthy_runs(&self) -> usize {
-        HEALTHY_PER_RUN * self.runs
-    }
-
-    /// Speed of the over-speed trials, rpm.
-    fn over_speed_limit(&self) -> f64 {
-        f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
-    }
-}
-
 impl Study for LockMonitor {
     type Record = Trial;
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
@@ -120,6 +104,20 @@ impl Study for LockMonitor {
 }
 
 impl LockMonitor {
+    /// Starts, and relocks, at each speed.
+    fn starts_each(&self) -> usize {
+        self.runs.div_ceil(5)
+    }
+
+    fn healthy_runs(&self) -> usize {
+        HEALTHY_PER_RUN * self.runs
+    }
+
+    /// Speed of the over-speed trials, rpm.
+    fn over_speed_limit(&self) -> f64 {
+        f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
+    }
+
     /// The columns of all trials; tables take some of them.
     fn columns(&self) -> Vec<Column<'_, Trial>> {
         let fault = |r: &Trial| r.fault.map(|fault| fault.to_string()).unwrap_or_default();
@@ -136,18 +134,10 @@ impl LockMonitor {
     }
 
     /// A table of those trials of a part which something is wrong with, with these of the columns; none without trials.
-    fn listed<const N: usize>(
-        &self,
-        title: &str,
-        heads: [&str; N],
-        trials: Vec<(usize, &Trial)>,
-        outcome: &mut Outcome,
-    ) {
+    fn listed(&self, title: &str, heads: &[&str], of: Vec<(usize, &Trial)>) -> Option<Table> {
         let mut columns = self.columns();
         columns.retain(|column| heads.contains(&column.head));
-        if !trials.is_empty() {
-            outcome.tables.push(Table::of(title, &columns, trials));
-        }
+        (!of.is_empty()).then(|| Table::of(title, &columns, of))
     }
 
     fn forced(&self, all: &[Trial], outcome: &mut Outcome) {
@@ -174,7 +164,7 @@ impl LockMonitor {
         outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
         let late = all.iter().enumerate().filter(|(_, t)| !t.is_in_time()).collect();
         let heads = ["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"];
-        self.listed("Not in time", heads, late, outcome);
+        outcome.tables.extend(self.listed("Not in time", &heads, late));
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
         for ((degrees, name), trials) in parts {
@@ -213,7 +203,7 @@ impl LockMonitor {
              within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
         ));
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
-        self.listed("Every false alarm", heads, alarms, outcome);
+        outcome.tables.extend(self.listed("Every false alarm", &heads, alarms));
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
         for kind in KINDS {
             let of_kind = runs.iter().filter(|r| r.kind == Some(kind));
@@ -241,7 +231,11 @@ impl LockMonitor {
             ("not in time", Cell::fixed(late.len() as f64, 0)),
         ]);
         outcome.tables.push(table);
-        self.listed("Over-speed not in time", ["seed", "iq (A)", "rpm/s"], late, outcome);
+        outcome.tables.extend(self.listed(
+            "Over-speed not in time",
+            &["seed", "iq (A)", "rpm/s"],
+            late,
+        ));
     }
 
     fn starts(&self, all: &[Trial], outcome: &mut Outcome) {
