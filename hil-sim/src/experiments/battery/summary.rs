@@ -14,14 +14,18 @@ pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the
     of two at all times before. Limited: the drive allows less torque current than the nominal limit. After the flux was \
     turned at once, wrong and flux off count from there, and the error no more.";
 
+/// A time of a run, s, and the number of a fault.
+type Seconds = fn(&Trial) -> f64;
+type Number = fn(&Trial) -> Option<u8>;
+
 /// States that should not last: in the metrics, in the table, and how long they did, s.
-const LASTING: [(&str, &str, fn(&Trial) -> f64); 3] = [
+const LASTING: [(&str, &str, Seconds); 3] = [
     ("wrong", "wrong (longest)", |trial| trial.wrong_s),
     ("beyond_45_deg", "beyond 45° (longest)", |trial| trial.lost_s),
     ("flux_off", "flux off (longest)", |trial| trial.flux_off_s),
 ];
 /// Ends by a fault: all of them and each in the metrics, in the table, and the number of the fault.
-const ENDS: [(&str, &str, &str, fn(&Trial) -> Option<u8>); 2] = [
+const ENDS: [(&str, &str, &str, Number); 2] = [
     ("trips", "trips_by_fault", "trips, fault: runs", |trial| trial.trip),
     ("refused_starts", "refused_by_fault", "refused, fault: runs", Trial::refused_by),
 ];
@@ -68,7 +72,7 @@ impl<'a> Summary<'a> {
     }
 
     /// Number of runs by number of the fault.
-    fn by_fault(&self, of: fn(&Trial) -> Option<u8>) -> BTreeMap<u8, usize> {
+    fn by_fault(&self, of: Number) -> BTreeMap<u8, usize> {
         let mut faults = BTreeMap::new();
         for fault in self.0.iter().filter_map(|trial| of(trial)) {
             *faults.entry(fault).or_default() += 1;
@@ -77,7 +81,7 @@ impl<'a> Summary<'a> {
     }
 
     /// How many runs were so for long, and the longest time, s.
-    fn lasting(&self, of: fn(&Trial) -> f64) -> (usize, f64) {
+    fn lasting(&self, of: Seconds) -> (usize, f64) {
         let longest = self.0.iter().map(|trial| of(trial)).fold(0.0, f64::max);
         (self.count(|trial| of(trial) > UNNOTICED_S), longest)
     }
