@@ -138,13 +138,9 @@ impl Error {
 
     /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Write { .. }
-            | Self::Internal(_)
-            | Self::Lost { .. }
-            | Self::Incomplete { .. } => 1,
-            _ => 2,
-        }
+        use Error::{Incomplete, Internal, Lost, Write};
+        let failed = matches!(self, Write { .. } | Internal(_) | Lost { .. } | Incomplete { .. });
+        if failed { 1 } else { 2 }
     }
 }
 

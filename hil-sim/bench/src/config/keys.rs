@@ -4,10 +4,11 @@
 //! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from
 //! these two tables. To add a key, add a line.
 
+use std::collections::BTreeMap;
+
 use drive_settings::Settings;
 use drive_settings::value::Words as _;
 
-use super::after::After;
 use super::value::{Allowed, CopyTo as _, Field, Value};
 pub use super::words::*;
 use crate::plant::{IronSettings, PlantSettings};
@@ -72,13 +73,13 @@ macro_rules! keys {
             $(#[doc = $group_doc] pub $group: $type,)+
             /// The drive.
             pub drive: Settings,
-            /// Keys of the plant that change after the learning.
-            pub after: After,
+            /// Values that keys of the plant have after the learning, by the name of the key; the others keep theirs.
+            pub after: BTreeMap<&'static str, Value>,
         }
 
         impl Default for Config {
             fn default() -> Self {
-                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: After::default() };
+                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: BTreeMap::new() };
                 // The saliency of the simulated motor is known, and so are its tables at 0.7 A.
                 config.drive.injection.synchronous.allow_unlearned = true;
                 config.calibrate();

@@ -240,11 +240,10 @@ impl Kind {
             Self::Hold => {
                 vec![Part::constant(sign * random.random_range(0.75..=1.0) * MOST_A, 6.0)]
             }
-            Self::Steps => std::iter::repeat_with(|| {
-                Part::constant(random.random_range(-MOST_A..=MOST_A), LEVEL_S)
-            })
-            .take(6)
-            .collect(),
+            Self::Steps => {
+                let mut i_q = || random.random_range(-MOST_A..=MOST_A);
+                (0..6).map(|_| Part::constant(i_q(), LEVEL_S)).collect()
+            }
             Self::Reversals => (0..4)
                 .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, 1.0))
                 .collect(),
@@ -258,13 +257,11 @@ impl Kind {
             }
             Self::Load | Self::LoadStep(_) => {
                 let rpm = LOAD_RPM[random.random_range(0..LOAD_RPM.len())];
-                Part::loaded(
-                    rpm,
-                    match self {
-                        Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
-                        _ => LoadTorque::Nm(sign * LOAD_NM),
-                    },
-                )
+                let load = match self {
+                    Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
+                    _ => LoadTorque::Nm(sign * LOAD_NM),
+                };
+                Part::loaded(rpm, load)
             }
             Self::Forced(_) => {
                 let i_q = sign * random.random_range(0.0..=MOST_A);
