@@ -2,7 +2,7 @@
 //! are those of [`drive_settings::SETTINGS`].
 //!
 //! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from
-//! these two tables. To add a key, add a line.
+//! these two tables. To add a key, add a line. Behind `=>` stands the place in the settings of the plant that has the same value.
 
 use std::collections::BTreeMap;
 
