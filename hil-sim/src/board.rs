@@ -5,6 +5,7 @@
 
 mod build;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
@@ -107,22 +108,18 @@ impl Options {
 
     /// The command line that repeats this session with this configuration.
     pub fn command(&self, config: &Config) -> String {
+        let file = |option: &str, file: &Option<PathBuf>| {
+            file.as_ref().map(|file| format!(" --{option} {}", file.display()))
+        };
+        let options = [
+            (self.board != "reference").then(|| format!(" --board {}", self.board)),
+            file("script", &self.script),
+            self.lenient.then(|| " --lenient".to_owned()),
+            file("flash", &self.flash),
+            self.fast.then(|| " --fast".to_owned()),
+        ];
         let mut command = self.input.command("board", config);
-        if self.board != "reference" {
-            command.push_str(&format!(" --board {}", self.board));
-        }
-        if let Some(script) = &self.script {
-            command.push_str(&format!(" --script {}", script.display()));
-        }
-        if self.lenient {
-            command.push_str(" --lenient");
-        }
-        if let Some(flash) = &self.flash {
-            command.push_str(&format!(" --flash {}", flash.display()));
-        }
-        if self.fast {
-            command.push_str(" --fast");
-        }
+        command.extend(options.into_iter().flatten());
         command
     }
 }
@@ -133,16 +130,22 @@ impl Options {
 /// # Errors
 /// As [`Options::config`]; [`Error::Internal`] when a build fails or cargo does not run.
 pub fn become_board(options: &Options) -> Result<(), Error> {
+    let arguments = std::env::args_os().skip_while(|argument| argument != "board").skip(1);
+    Err(replaced_by(built(options, arguments)?))
+}
+
+/// The command that runs the virtual board with these arguments and the image.
+fn built(options: &Options, arguments: impl Iterator<Item = OsString>) -> Result<Command, Error> {
     // Wrong options are reported before the builds, which take minutes.
     options.config()?;
     let image =
         options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
     let mut command = Command::new(build::virtual_board()?);
-    command.args(std::env::args_os().skip_while(|argument| argument != "board").skip(1));
+    command.args(arguments);
     if let Some(image) = image {
         command.arg("--elf").arg(image);
     }
-    Err(replaced_by(command))
+    Ok(command)
 }
 
 /// Builds the same and starts the board as a child of this process; its standard input and output are pipes.
@@ -150,14 +153,8 @@ pub fn become_board(options: &Options) -> Result<(), Error> {
 /// # Errors
 /// As [`become_board`].
 pub fn attach(options: &Options, arguments: &[String]) -> Result<Child, Error> {
-    options.config()?;
-    let image =
-        options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
-    let mut command = Command::new(build::virtual_board()?);
-    command.args(arguments).arg("--attached");
-    if let Some(image) = image {
-        command.arg("--elf").arg(image);
-    }
+    let attached = ["--attached".to_owned()];
+    let mut command = built(options, arguments.iter().chain(&attached).map(OsString::from))?;
     let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     child.map_err(|error| Error::Internal(format!("cannot run the virtual board: {error}")))
 }

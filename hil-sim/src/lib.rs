@@ -7,6 +7,8 @@ pub mod cli;
 pub mod console;
 pub mod experiments;
 pub mod input;
+mod prelude;
+mod random;
 pub mod report;
 pub mod shards;
 

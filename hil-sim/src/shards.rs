@@ -132,20 +132,18 @@ pub fn runs(
     header: &Header,
     journal: Option<&Journal>,
 ) -> Result<Vec<Run>, Error> {
-    let before = journal.iter().flat_map(|journal| journal.runs.iter().cloned());
-    let done: Mutex<BTreeMap<usize, Value>> =
-        Mutex::new(before.map(|run| (run.run, run.record)).collect());
-    let missing: Vec<usize> = {
-        let done = done.lock().unwrap_or_else(PoisonError::into_inner);
-        header.shard.numbers(header.runs).filter(|run| !done.contains_key(run)).collect()
-    };
+    let before = journal.iter().flat_map(|journal| &journal.runs);
+    let mut done: BTreeMap<_, _> = before.map(|run| (run.run, run.record.clone())).collect();
+    let numbers = header.shard.numbers(header.runs);
+    let missing: Vec<usize> = numbers.filter(|run| !done.contains_key(run)).collect();
+    let new = Mutex::new(Vec::new());
     (statistical.some)(context, &missing, &|run, record| {
         let run = Run { run, record };
         journal.map_or(Ok(()), |journal| journal.append(&run))?;
-        done.lock().unwrap_or_else(PoisonError::into_inner).insert(run.run, run.record);
+        new.lock().unwrap_or_else(PoisonError::into_inner).push((run.run, run.record));
         Ok(())
     })?;
-    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.extend(new.into_inner().unwrap_or_else(PoisonError::into_inner));
     Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
 }
 

@@ -19,11 +19,7 @@ impl Columns {
     /// # Errors
     /// [`Error::Data`] with the line of a cell that is not a finite number, or of a row with another width than the header.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let failed = |line: Option<u64>, problem: String| Error::Data {
-            path: path.to_owned(),
-            line,
-            problem,
-        };
+        let failed = |line, problem: String| Error::data(path, line, problem);
         let of_csv = |error: csv::Error| {
             let line = error.position().map(csv::Position::line);
             let problem = match error.kind() {
@@ -97,7 +93,7 @@ impl Columns {
 
     /// An error of the file as a whole.
     pub fn error(&self, problem: String) -> Error {
-        Error::Data { path: self.path.clone(), line: None, problem }
+        Error::data(&self.path, None, problem)
     }
 
     /// An error of a row, counted from 1; 0 for the header.
@@ -106,6 +102,6 @@ impl Columns {
             0 => Some(1),
             row => self.rows.get(row - 1).map(|(line, _)| *line),
         };
-        Error::Data { path: self.path.clone(), line, problem }
+        Error::data(&self.path, line, problem)
     }
 }

@@ -5,7 +5,6 @@
 //! the drive alone, which is then wrong about the bench. Assignments count in their order; in a file, those of `drive.`
 //! come last. `after.NAME` is a key of the plant whose value changes after the learning.
 
-mod after;
 mod alias;
 pub mod file;
 mod key;
@@ -20,7 +19,6 @@ use std::path::Path;
 use drive_core::{Coefficients, Line};
 use drive_settings::{Settings, SettingsError, find, value as drive};
 
-pub use after::After;
 use file::FileAssignment;
 pub use key::{Key, check_model};
 pub use keys::*;

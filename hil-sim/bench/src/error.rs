@@ -126,6 +126,11 @@ impl Error {
         Self::Unknown { what, name: name.to_owned(), nearest, list }
     }
 
+    /// The error of data in a file, on a line or as a whole.
+    pub fn data(path: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
+        Self::Data { path: path.to_owned(), line, problem: problem.into() }
+    }
+
     /// The error of a failure to write `path`.
     pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { path: path.to_owned(), source }
@@ -133,13 +138,9 @@ impl Error {
 
     /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Write { .. }
-            | Self::Internal(_)
-            | Self::Lost { .. }
-            | Self::Incomplete { .. } => 1,
-            _ => 2,
-        }
+        use Error::{Incomplete, Internal, Lost, Write};
+        let failed = matches!(self, Write { .. } | Internal(_) | Lost { .. } | Incomplete { .. });
+        if failed { 1 } else { 2 }
     }
 }
 

@@ -6,7 +6,7 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
 use drive_core::{
-    Accepted, AngleSource, Command, Compare, Drive, FrontEndState, Mode, Sample, State, Stop,
+    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
 };
 use drive_settings::Settings;
 
@@ -111,9 +111,7 @@ impl Rig {
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
         rig.plant.set_open_phase(config::open_phase(config)).map_err(Error::refused)?;
-        let injecting = config.drive.angle_source == AngleSource::Injection;
-        let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
-        if config.prepare.learn && injecting && tracks {
+        if config.prepare.learn && tracks(&config.drive) {
             rig.set_load(Load::Locked)?;
             rig.learn()?;
             // The flux decays.
@@ -250,7 +248,7 @@ impl Rig {
 
     /// The fault with which the drive has stopped itself, with its number.
     pub fn fault(&self) -> Option<String> {
-        self.drive.state().fault().map(|fault| format!("fault {}: {fault}", fault.code()))
+        self.drive.state().fault().map(fault_text)
     }
 
     /// Couples another load.
@@ -274,6 +272,17 @@ impl Rig {
             ..Point::default()
         }
     }
+}
+
+/// Whether a drive with these settings tracks the saliency, and can learn.
+pub fn tracks(settings: &Settings) -> bool {
+    settings.angle_source == AngleSource::Injection
+        && settings.injection.demodulator == DemodulatorKind::Synchronous
+}
+
+/// A fault in words, with its number.
+pub fn fault_text(fault: Fault) -> String {
+    format!("fault {}: {fault}", fault.code())
 }
 
 /// A command in words.

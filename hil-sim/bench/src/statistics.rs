@@ -41,6 +41,18 @@ pub trait Study: Sized + Sync {
     fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error>;
 }
 
+/// A refusal of the drive as a result; other errors are none.
+///
+/// # Errors
+/// All but [`Error::Refused`].
+pub fn or_refusal<T>(result: Result<T, Error>) -> Result<Result<T, String>, Error> {
+    match result {
+        Ok(value) => Ok(Ok(value)),
+        Err(Error::Refused(why)) => Ok(Err(why)),
+        Err(other) => Err(other),
+    }
+}
+
 /// The seed of a run of an experiment with this seed.
 pub fn seed_of(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(1_000_003).wrapping_add(number as u64)

@@ -10,7 +10,7 @@ use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::experiment::LOST_DEG;
 use crate::plant::Load;
-use crate::rig::Rig;
+use crate::rig::{Rig, fault_text};
 use crate::statistics::fault_code;
 use crate::stats::{Stats, exact};
 
@@ -47,10 +47,8 @@ impl SteadyRun {
     /// The reason why the run was lost, after its operating point; nothing for one that was not.
     pub fn lost_text(&self) -> Option<String> {
         let OperatingPoint { rpm, iq, seed } = self.case;
-        let reason = match self.fault {
-            Some(fault) => format!("fault {}: {fault}", fault.code()),
-            None => format!("angle error beyond {LOST_DEG}°"),
-        };
+        let angle = || format!("angle error beyond {LOST_DEG}°");
+        let reason = self.fault.map_or_else(angle, fault_text);
         self.lost.then(|| format!("{iq:.2} A at {rpm:.0} rpm, seed {seed}: {reason}"))
     }
 }

@@ -2,74 +2,50 @@
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
-use serde::{Deserialize, Serialize};
-
 use crate::Plant;
-use crate::error::{PlantError, check};
+use crate::error::PlantError;
+use crate::settings::{or_zero, settings};
 
 /// The chopper goes off at this fraction of the voltage at which it goes on.
 const CHOPPER_OFF: f64 = 0.98;
 /// Range of the link, V.
 const RANGE: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
 
-/// Settings of the dc link.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DcLinkSettings {
-    /// Relative amplitude of a sine ripple on a stiff link.
-    pub ripple: f64,
-    /// Its frequency, Hz.
-    pub ripple_hz: f64,
-    /// Capacitor behind a rectifier, F; 0 is a stiff link.
-    pub capacitor: f64,
-    /// Pulses of the rectifier per mains period: 2 (one phase), 6 (three phases), or 0 for a supply without ripple.
-    pub pulses: u32,
-    /// Frequency of the mains, Hz.
-    pub mains_hz: f64,
-    /// Resistance of mains and rectifier, ohm.
-    pub source: f64,
-    /// Resistance more while the precharge relay is open, ohm; 0 without a relay.
-    pub precharge: f64,
-    /// Start and duration of a mains outage, s; none with a duration of 0.
-    pub outage_at: f64,
-    /// See `outage_at`.
-    pub outage: f64,
-    /// Start and duration of a sag of the mains, s; none with a duration of 0.
-    pub sag_at: f64,
-    /// See `sag_at`.
-    pub sag: f64,
-    /// Peak of the rectified mains meanwhile, V.
-    pub sag_v: f64,
-    /// Time in which the sag comes, and goes, s; within its duration.
-    pub sag_ramp: f64,
-    /// Power that others take from the link, W.
-    pub load: f64,
-    /// Voltage at which the brake chopper goes on by itself, V; 0 for one that the drive alone commands.
-    pub chopper_v: f64,
-    /// Its resistor, ohm.
-    pub chopper: f64,
-}
-
-impl Default for DcLinkSettings {
-    fn default() -> Self {
-        Self {
-            ripple: 0.0,
-            ripple_hz: 100.0,
-            capacitor: 0.0,
-            pulses: 6,
-            mains_hz: 50.0,
-            source: 1.0,
-            precharge: 0.0,
-            outage_at: 0.0,
-            outage: 0.0,
-            sag_at: 0.0,
-            sag: 0.0,
-            sag_v: 0.0,
-            sag_ramp: 0.01,
-            load: 0.0,
-            chopper_v: 0.0,
-            chopper: 100.0,
-        }
+settings! {
+    /// Settings of the dc link.
+    DcLinkSettings "dc_link." |s| {
+        /// Relative amplitude of a sine ripple on a stiff link.
+        ripple: f64 = 0.0, 0.0..=0.5, "";
+        /// Its frequency, Hz.
+        ripple_hz: f64 = 100.0, 0.1..=3000.0, "Hz";
+        /// Capacitor behind a rectifier, F; 0 is a stiff link.
+        capacitor: f64 = 0.0, or_zero(s.capacitor, 1e-6..=0.1), "F";
+        /// Pulses of the rectifier per mains period: 2 (one phase), 6 (three phases), or 0 for a supply without ripple.
+        pulses: u32 = 6, if s.pulses == 2 { 2.0..=2.0 } else { or_zero(s.pulses.into(), 6.0..=6.0) }, "(or 0, 2)";
+        /// Frequency of the mains, Hz.
+        mains_hz: f64 = 50.0, 1.0..=1000.0, "Hz";
+        /// Resistance of mains and rectifier, ohm.
+        source: f64 = 1.0, 0.01..=1000.0, "ohm";
+        /// Resistance more while the precharge relay is open, ohm; 0 without a relay.
+        precharge: f64 = 0.0, 0.0..=1e5, "ohm";
+        /// Start and duration of a mains outage, s; none with a duration of 0.
+        outage_at: f64 = 0.0, 0.0..=1e6, "s";
+        /// See `outage_at`.
+        outage: f64 = 0.0, 0.0..=1e6, "s";
+        /// Start and duration of a sag of the mains, s; none with a duration of 0.
+        sag_at: f64 = 0.0, 0.0..=1e6, "s";
+        /// See `sag_at`.
+        sag: f64 = 0.0, 0.0..=1e6, "s";
+        /// Peak of the rectified mains meanwhile, V.
+        sag_v: f64 = 0.0, RANGE, "V";
+        /// Time in which the sag comes, and goes, s; within its duration.
+        sag_ramp: f64 = 0.01, 1e-4..=1e6, "s";
+        /// Power that others take from the link, W.
+        load: f64 = 0.0, 0.0..=1e6, "W";
+        /// Voltage at which the brake chopper goes on by itself, V; 0 for one that the drive alone commands.
+        chopper_v: f64 = 0.0, RANGE, "V";
+        /// Its resistor, ohm.
+        chopper: f64 = 100.0, 0.1..=1e6, "ohm";
     }
 }
 
@@ -95,26 +71,7 @@ pub(crate) struct DcLink {
 
 impl DcLink {
     pub(crate) fn new(s: &DcLinkSettings, nominal: f64) -> Result<Self, PlantError> {
-        check("dc_link.ripple", s.ripple, 0.0..=0.5, "")?;
-        check("dc_link.ripple_hz", s.ripple_hz, 0.1..=3000.0, "Hz")?;
-        if s.capacitor != 0.0 {
-            check("dc_link.capacitor", s.capacitor, 1e-6..=0.1, "F")?;
-        }
-        if s.pulses != 0 && s.pulses != 2 {
-            check("dc_link.pulses", f64::from(s.pulses), 6.0..=6.0, "(or 0, 2)")?;
-        }
-        check("dc_link.mains_hz", s.mains_hz, 1.0..=1000.0, "Hz")?;
-        check("dc_link.source", s.source, 0.01..=1000.0, "ohm")?;
-        check("dc_link.precharge", s.precharge, 0.0..=1e5, "ohm")?;
-        check("dc_link.outage_at", s.outage_at, 0.0..=1e6, "s")?;
-        check("dc_link.outage", s.outage, 0.0..=1e6, "s")?;
-        check("dc_link.sag_at", s.sag_at, 0.0..=1e6, "s")?;
-        check("dc_link.sag", s.sag, 0.0..=1e6, "s")?;
-        check("dc_link.sag_v", s.sag_v, RANGE, "V")?;
-        check("dc_link.sag_ramp", s.sag_ramp, 1e-4..=1e6, "s")?;
-        check("dc_link.load", s.load, 0.0..=1e6, "W")?;
-        check("dc_link.chopper_v", s.chopper_v, RANGE, "V")?;
-        check("dc_link.chopper", s.chopper, 0.1..=1e6, "ohm")?;
+        s.check()?;
         Ok(Self { settings: *s, nominal, duty: 0.0, relay: false, time: 0.0, braking: false })
     }
 

@@ -2,21 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use serde::{Deserialize, Serialize};
+use crate::error::PlantError;
+use crate::settings::settings;
 
-use crate::error::{PlantError, check};
-
-/// Resolution of the encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct EncoderSettings {
-    /// Lines per turn; the counter makes four counts of each.
-    pub lines: u32,
-}
-
-impl Default for EncoderSettings {
-    fn default() -> Self {
-        Self { lines: 2500 }
+settings! {
+    /// Resolution of the encoder.
+    EncoderSettings "encoder." {
+        /// Lines per turn; the counter makes four counts of each.
+        lines: u32 = 2500, 1.0..=100_000.0, "";
     }
 }
 
@@ -49,7 +42,7 @@ impl Encoder {
     /// [`PlantError::OutOfRange`].
     pub fn new(settings: &EncoderSettings) -> Result<Self, PlantError> {
         let lines = f64::from(settings.lines);
-        check("encoder.lines", lines, 1.0..=100_000.0, "")?;
+        settings.check()?;
         Ok(Self {
             fault: EncoderFault::None,
             counts_per_radian: 4.0 * lines / TAU,

@@ -11,66 +11,45 @@
 //! first order in delay/T (1.3 %) that is the same delay.
 
 use drive_core::Compare;
-use serde::{Deserialize, Serialize};
 
 use crate::averaged::Averaged;
 use crate::complex::{Complex, clarke, phases, square};
 use crate::error::{PlantError, check};
+use crate::settings::settings;
 
-/// Settings of the inverter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct InverterSettings {
-    /// Dc-link voltage, V.
-    pub vdc: f64,
-    /// Compare value that means high side on throughout. The default is 170 MHz / (2 * 6 kHz).
-    pub timer_top: u16,
-    /// Time in which both switches of a leg are off at every edge, us (section 3.9).
-    pub dead_time_us: f64,
-    /// Time from the command to the first switch acting, us (section 3.9).
-    pub propagation_us: f64,
-    /// Drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
-    pub residual_v: f64,
-    /// Further dead time, of which the drive does not know, us; negative is less than it believes.
-    pub extra_dead_time_us: f64,
-    /// Capacitance of the output node of each leg, F. During the dead time the current has to
-    /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
-    pub node_capacitance: f64,
-    /// Resistance of a switch that conducts, ohm.
-    pub on_resistance: f64,
-    /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.
-    pub more_ohm: [f64; 3],
-    /// Further dead time of each leg, us. Averaged inverter only.
-    pub more_dead_time_us: [f64; 3],
-    /// Whether to integrate between the exact instants of the edges rather than averages.
-    pub switched: bool,
-}
-
-impl Default for InverterSettings {
-    fn default() -> Self {
-        Self::REFERENCE
+settings! {
+    /// Settings of the inverter.
+    InverterSettings "inverter." |s| {
+        /// Dc-link voltage, V.
+        vdc: f64 = 311.0;
+        /// Compare value that means high side on throughout. The default is 170 MHz / (2 * 6 kHz).
+        timer_top: u16 = 14_167, 100.0..=65_535.0, "";
+        /// Time in which both switches of a leg are off at every edge, us (section 3.9).
+        dead_time_us: f64 = 2.2;
+        /// Time from the command to the first switch acting, us (section 3.9).
+        propagation_us: f64 = 2.2, 0.0..=10.0, "us";
+        /// Drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
+        residual_v: f64 = 1.64, 0.0..=20.0, "V";
+        /// Further dead time, of which the drive does not know, us; negative is less than it believes.
+        extra_dead_time_us: f64 = 0.0, -s.dead_time_us..=10.0, "us";
+        /// Capacitance of the output node of each leg, F. During the dead time the current has to
+        /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
+        node_capacitance: f64 = 0.0, 0.0..=if s.switched { 0.0 } else { 1e-6 }, "F";
+        /// Resistance of a switch that conducts, ohm.
+        on_resistance: f64 = 0.0, 0.0..=100.0, "ohm";
+        /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.
+        more_ohm: [f64; 3] = [0.0; 3];
+        /// Further dead time of each leg, us. Averaged inverter only.
+        more_dead_time_us: [f64; 3] = [0.0; 3];
+        /// Whether to integrate between the exact instants of the edges rather than averages.
+        switched: bool = false;
     }
 }
 
 impl InverterSettings {
-    /// The inverter of section 3.9.
-    const REFERENCE: Self = Self {
-        vdc: 311.0,
-        timer_top: 14_167,
-        dead_time_us: 2.2,
-        propagation_us: 2.2,
-        residual_v: 1.64,
-        extra_dead_time_us: 0.0,
-        node_capacitance: 0.0,
-        on_resistance: 0.0,
-        more_ohm: [0.0; 3],
-        more_dead_time_us: [0.0; 3],
-        switched: false,
-    };
-
     /// No dead time, no delay, no drop.
     pub const IDEAL: Self =
-        Self { dead_time_us: 0.0, propagation_us: 0.0, residual_v: 0.0, ..Self::REFERENCE };
+        Self { dead_time_us: 0.0, propagation_us: 0.0, residual_v: 0.0, ..Self::DEFAULT };
 }
 
 /// The inverter.
@@ -103,16 +82,8 @@ impl Inverter {
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
-    pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
-        let s = settings;
-        check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
-        check("inverter.propagation_us", s.propagation_us, 0.0..=10.0, "us")?;
-        check("inverter.residual_v", s.residual_v, 0.0..=20.0, "V")?;
-        let least = -s.dead_time_us;
-        check("inverter.extra_dead_time_us", s.extra_dead_time_us, least..=10.0, "us")?;
-        let most = if s.switched { 0.0 } else { 1e-6 };
-        check("inverter.node_capacitance", s.node_capacitance, 0.0..=most, "F")?;
-        check("inverter.on_resistance", s.on_resistance, 0.0..=100.0, "ohm")?;
+    pub fn new(s: &InverterSettings) -> Result<Self, PlantError> {
+        s.check()?;
         let most = if s.switched { 0.0 } else { 10.0 };
         for more in [s.more_ohm, s.more_dead_time_us].as_flattened() {
             check("inverter.more_ohm, inverter.more_dead_time_us", *more, -most..=most, "")?;

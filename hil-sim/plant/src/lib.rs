@@ -9,7 +9,7 @@
 //! use motor_plant::{Plant, PlantSettings};
 //! # fn step(_: &drive_core::Sample) -> Compare { Compare::OFF }
 //!
-//! let mut plant = Plant::new(&PlantSettings::default(), 1)?;
+//! let mut plant = Plant::new(&PlantSettings::DEFAULT, 1)?;
 //! let mut applied = Compare::OFF;
 //! for _ in 0..6000 {
 //!     let next = step(&plant.sample());
@@ -39,6 +39,7 @@ mod model;
 mod motor;
 mod period;
 mod sensors;
+mod settings;
 mod switched;
 mod terminals;
 mod warming;
@@ -49,7 +50,7 @@ use motor::{Motor, whichever};
 use period::Around;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
+use settings::settings;
 use warming::Warming;
 
 pub use complex::{Complex, clarke, phases};
@@ -65,47 +66,30 @@ pub use model::{ElectricalRate, ElectricalState, MachineModel, Rate};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
 pub use warming::WarmingSettings;
 
-/// Settings of the plant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PlantSettings {
-    /// Parameters of the machine.
-    pub machine: MachineSettings,
-    /// Its saliency in model A; of no effect with `iron`.
-    pub saliency: SaliencySettings,
-    /// The iron of the energy model; without, the machine is model A.
-    pub iron: Option<IronSettings>,
-    /// The shaft and its load.
-    pub mechanics: MechanicsSettings,
-    /// Warming of the resistances.
-    pub warming: WarmingSettings,
-    /// The dc link.
-    pub dc_link: DcLinkSettings,
-    /// The inverter.
-    pub inverter: InverterSettings,
-    /// The current sensors and the converter.
-    pub measurement: MeasurementSettings,
-    /// The encoder.
-    pub encoder: EncoderSettings,
-    /// Integration steps per PWM period. Two, the default, are within 1e-5 A of 24, and the analog
-    /// filter takes the current as straight between them.
-    pub substeps: u32,
-}
-
-impl Default for PlantSettings {
-    fn default() -> Self {
-        Self {
-            machine: MachineSettings::default(),
-            saliency: SaliencySettings::default(),
-            iron: None,
-            mechanics: MechanicsSettings::default(),
-            warming: WarmingSettings::default(),
-            dc_link: DcLinkSettings::default(),
-            inverter: InverterSettings::default(),
-            measurement: MeasurementSettings::default(),
-            encoder: EncoderSettings::default(),
-            substeps: 2,
-        }
+settings! {
+    /// Settings of the plant.
+    PlantSettings "" {
+        /// Parameters of the machine.
+        machine: MachineSettings = MachineSettings::DEFAULT;
+        /// Its saliency in model A; of no effect with `iron`.
+        saliency: SaliencySettings = SaliencySettings::DEFAULT;
+        /// The iron of the energy model; without, the machine is model A.
+        iron: Option<IronSettings> = None;
+        /// The shaft and its load.
+        mechanics: MechanicsSettings = MechanicsSettings::DEFAULT;
+        /// Warming of the resistances.
+        warming: WarmingSettings = WarmingSettings::DEFAULT;
+        /// The dc link.
+        dc_link: DcLinkSettings = DcLinkSettings::DEFAULT;
+        /// The inverter.
+        inverter: InverterSettings = InverterSettings::DEFAULT;
+        /// The current sensors and the converter.
+        measurement: MeasurementSettings = MeasurementSettings::DEFAULT;
+        /// The encoder.
+        encoder: EncoderSettings = EncoderSettings::DEFAULT;
+        /// Integration steps per PWM period. Two, the default, are within 1e-5 A of 24, and the analog
+        /// filter takes the current as straight between them.
+        substeps: u32 = 2, 1.0..=1000.0, "";
     }
 }
 
@@ -133,7 +117,7 @@ impl Plant {
     /// # Errors
     /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
-        error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
+        settings.check()?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
         let motor = match &settings.iron {
             None => {
@@ -153,6 +137,7 @@ impl Plant {
                 substeps: settings.substeps,
                 open: None,
                 taken: 0.0,
+                volt_seconds: Complex::ZERO,
             },
             dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
             warming: Warming::new(&settings.warming, &settings.machine)?,
@@ -188,9 +173,8 @@ impl Plant {
     #[inline]
     pub fn advance(&mut self, compare: &Compare, period_s: f64) {
         let around = &mut self.around;
-        let volt_seconds =
-            whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
-        self.applied = volt_seconds / period_s;
+        whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
+        self.applied = around.volt_seconds / period_s;
         self.encoder.follow(self.mechanical_angle());
         if self.moves {
             self.slow(period_s);

@@ -19,11 +19,10 @@
 //! that current, so that `|s|` stays below one whatever the currents.
 //! Iron loss, slotting, skin effect and the saturation of the main flux are absent.
 
-use serde::{Deserialize, Serialize};
-
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
 use crate::model::{ElectricalRate, ElectricalState, MachineModel, increment};
+use crate::settings::settings;
 
 /// Largest length of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
@@ -33,83 +32,50 @@ const CHI_CORNER: f64 = std::f64::consts::TAU * 60.0;
 const NO_CURRENT: f64 = 1e-9;
 const NO_FLUX_SQUARED: f64 = 1e-18;
 
-/// Parameters of the T-equivalent circuit; the defaults are Table 5 of the source.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MachineSettings {
-    /// Stator resistance, ohm.
-    pub rs: f64,
-    /// Rotor resistance, referred to the stator, ohm.
-    pub rr: f64,
-    /// Stator leakage inductance, H.
-    pub lls: f64,
-    /// Rotor leakage inductance, referred to the stator, H.
-    pub llr: f64,
-    /// Magnetising inductance, H.
-    pub lm: f64,
-    /// Pole pairs.
-    pub pole_pairs: u32,
-}
-
-impl Default for MachineSettings {
-    fn default() -> Self {
-        Self { rs: 5.4, rr: 1.1, lls: 0.0276, llr: 0.0276, lm: 0.1771, pole_pairs: 2 }
+settings! {
+    /// Parameters of the T-equivalent circuit; the defaults are Table 5 of the source.
+    MachineSettings "machine." {
+        /// Stator resistance, ohm.
+        rs: f64 = 5.4, 1e-4..=1000.0, "ohm";
+        /// Rotor resistance, referred to the stator, ohm.
+        rr: f64 = 1.1, 1e-4..=1000.0, "ohm";
+        /// Stator leakage inductance, H.
+        lls: f64 = 0.0276, 1e-7..=10.0, "H";
+        /// Rotor leakage inductance, referred to the stator, H.
+        llr: f64 = 0.0276, 1e-7..=10.0, "H";
+        /// Magnetising inductance, H.
+        lm: f64 = 0.1771, 1e-5..=100.0, "H";
+        /// Pole pairs.
+        pole_pairs: u32 = 2, 1.0..=50.0, "";
     }
 }
 
-impl MachineSettings {
-    /// Refuses what is outside its range.
-    pub(crate) fn check(&self) -> Result<(), PlantError> {
-        check("machine.rs", self.rs, 1e-4..=1000.0, "ohm")?;
-        check("machine.rr", self.rr, 1e-4..=1000.0, "ohm")?;
-        check("machine.lls", self.lls, 1e-7..=10.0, "H")?;
-        check("machine.llr", self.llr, 1e-7..=10.0, "H")?;
-        check("machine.lm", self.lm, 1e-5..=100.0, "H")?;
-        check("machine.pole_pairs", f64::from(self.pole_pairs), 1.0..=50.0, "")?;
-        Ok(())
-    }
-}
-
-/// Size of the saliency. The defaults are assumed; all zero (with any `psi_n`) is the textbook
-/// machine.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SaliencySettings {
-    /// Part fixed to the rotor flux, at the flux `psi_n`; negative is high impedance along it.
-    pub a_psi: f64,
-    /// Part fixed to the stator current, 1/A; positive is low impedance along it (saturating
-    /// leakage paths).
-    pub b1: f64,
-    /// Resistive part of Eq. 3.8, as a factor of it: 0 is none, 1 as printed. Acts well above
-    /// 60 Hz only.
-    pub chi: f64,
-    /// Current up to which the current part grows, A peak; beyond, it is held.
-    pub hold_a: f64,
-    /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
-    pub psi_n: Option<f64>,
-    /// Part fixed to the stator; positive is low impedance along its axis.
-    pub stator_fixed: f64,
-    /// That axis, electrical degrees from phase a.
-    pub stator_fixed_deg: f64,
-}
-
-impl Default for SaliencySettings {
-    fn default() -> Self {
-        Self { a_psi: -0.035, b1: 0.036, ..Self::NONE }
+settings! {
+    /// Size of the saliency. The defaults are assumed; all zero (with any `psi_n`) is the textbook
+    /// machine.
+    SaliencySettings "saliency." {
+        /// Part fixed to the rotor flux, at the flux `psi_n`; negative is high impedance along it.
+        a_psi: f64 = -0.035, -0.25..=0.25, "";
+        /// Part fixed to the stator current, 1/A; positive is low impedance along it (saturating
+        /// leakage paths).
+        b1: f64 = 0.036, -50.0..=50.0, "1/A";
+        /// Resistive part of Eq. 3.8, as a factor of it: 0 is none, 1 as printed. Acts well above
+        /// 60 Hz only.
+        chi: f64 = 0.0, 0.0..=10.0, "";
+        /// Current up to which the current part grows, A peak; beyond, it is held.
+        hold_a: f64 = 5.0, 0.01..=10_000.0, "A";
+        /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
+        psi_n: Option<f64> = None;
+        /// Part fixed to the stator; positive is low impedance along its axis.
+        stator_fixed: f64 = 0.0, -0.1..=0.1, "";
+        /// That axis, electrical degrees from phase a.
+        stator_fixed_deg: f64 = 0.0, -180.0..=180.0, "deg";
     }
 }
 
 impl SaliencySettings {
     /// No saliency: the textbook machine.
-    pub const NONE: Self = Self {
-        a_psi: 0.0,
-        b1: 0.0,
-        chi: 0.0,
-        hold_a: 5.0,
-        psi_n: None,
-        stator_fixed: 0.0,
-        stator_fixed_deg: 0.0,
-    };
+    pub const NONE: Self = Self { a_psi: 0.0, b1: 0.0, ..Self::DEFAULT };
 }
 
 /// Electrical state of the machine.
@@ -192,12 +158,7 @@ impl Machine {
     /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
         m.check()?;
-        check("saliency.a_psi", s.a_psi, -0.25..=0.25, "")?;
-        check("saliency.hold_a", s.hold_a, 0.01..=10_000.0, "A")?;
-        check("saliency.b1", s.b1, -50.0..=50.0, "1/A")?;
-        check("saliency.chi", s.chi, 0.0..=10.0, "")?;
-        check("saliency.stator_fixed", s.stator_fixed, -0.1..=0.1, "")?;
-        check("saliency.stator_fixed_deg", s.stator_fixed_deg, -180.0..=180.0, "deg")?;
+        s.check()?;
         let psi_n = s.psi_n.unwrap_or(0.7 * m.lm);
         check("saliency.psi_n", psi_n, 1e-4..=100.0, "Wb")?;
         refuse_singular(m, s, psi_n)?;

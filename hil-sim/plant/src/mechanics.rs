@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{PlantError, check};
+use crate::settings::{or_zero, settings};
 
 /// Load on the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,49 +26,39 @@ pub enum Load {
     },
 }
 
-/// Inertia, friction and load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MechanicsSettings {
-    /// Inertia of everything that turns, kg m^2. The default is assumed: the source gives none.
-    pub inertia: f64,
-    /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
-    pub friction: f64,
-    /// Static friction: the torque to break away, and that against the motion, N m.
-    pub static_torque: f64,
-    /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
-    pub once_torque: f64,
-    /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
-    pub stops: f64,
-    /// Stiffness of a stop, N m/rad.
-    pub stop_stiffness: f64,
-    /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
-    pub stop_damping: f64,
-    /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
-    pub load_inertia: f64,
-    /// Stiffness of the coupling, N m/rad.
-    pub stiffness: f64,
-    /// Damping of the coupling, N m s/rad.
-    pub damping: f64,
-    /// Load at the start.
-    pub load: Load,
+settings! {
+    /// Inertia, friction and load.
+    MechanicsSettings "mechanics." |s| {
+        /// Inertia of everything that turns, kg m^2. The default is assumed: the source gives none.
+        inertia: f64 = 0.012, 1e-6..=1000.0, "kg m^2";
+        /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
+        friction: f64 = 0.001, 0.0..=10.0, "N m s/rad";
+        /// Static friction: the torque to break away, and that against the motion, N m.
+        static_torque: f64 = 0.0, 0.0..=1000.0, "N m";
+        /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
+        once_torque: f64 = 0.0, 0.0..=1000.0, "N m";
+        /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
+        stops: f64 = 0.0, 0.0..=1e4, "rad";
+        /// Stiffness of a stop, N m/rad; with the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
+        stop_stiffness: f64 = 100.0, 0.0..=(s.inertia * 628.0 * 628.0).max(100.0), "N m/rad";
+        /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
+        stop_damping: f64 = 0.3, 0.0..=1000.0, "N m s/rad";
+        /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
+        load_inertia: f64 = 0.0, or_zero(s.load_inertia, 1e-6..=1000.0), "kg m^2";
+        /// Stiffness of the coupling, N m/rad.
+        stiffness: f64 = 100.0, 1e-3..=s.stiffest(), "N m/rad";
+        /// Damping of the coupling, N m s/rad.
+        damping: f64 = 0.0, 0.0..=1000.0, "N m s/rad";
+        /// Load at the start.
+        load: Load = Load::Free { torque: 0.0 };
+    }
 }
 
-impl Default for MechanicsSettings {
-    fn default() -> Self {
-        Self {
-            inertia: 0.012,
-            friction: 0.001,
-            static_torque: 0.0,
-            once_torque: 0.0,
-            stops: 0.0,
-            stop_stiffness: 100.0,
-            stop_damping: 0.3,
-            load_inertia: 0.0,
-            stiffness: 100.0,
-            damping: 0.0,
-            load: Load::Free { torque: 0.0 },
-        }
+impl MechanicsSettings {
+    /// Largest stiffness of the coupling, N m/rad: a resonance of at most 500 Hz, which the integration follows.
+    fn stiffest(&self) -> f64 {
+        let parallel = self.inertia * self.load_inertia / (self.inertia + self.load_inertia);
+        if self.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 }
     }
 }
 
@@ -86,11 +77,7 @@ pub struct Mechanics {
 /// What most shafts do not have, with its state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extras {
-    static_torque: f64,
-    once_torque: f64,
-    stops: f64,
-    stop_stiffness: f64,
-    stop_damping: f64,
+    settings: MechanicsSettings,
     coupling: Option<Coupling>,
     /// Torque by the angle in this period.
     by_angle: f64,
@@ -101,21 +88,19 @@ struct Extras {
 impl Extras {
     /// Torque of the stop that the shaft has reached: it pushes, and does not pull.
     fn stop_torque(&self, angle: f64) -> f64 {
-        let beyond = angle.abs() - self.stops;
-        if self.stops == 0.0 || beyond <= 0.0 {
+        let s = &self.settings;
+        let beyond = angle.abs() - s.stops;
+        if s.stops == 0.0 || beyond <= 0.0 {
             return 0.0;
         }
         let outwards = self.speed * angle.signum();
-        (self.stop_stiffness * beyond + self.stop_damping * outwards).max(0.0) * angle.signum()
+        (s.stop_stiffness * beyond + s.stop_damping * outwards).max(0.0) * angle.signum()
     }
 }
 
 /// The elastic coupling and the inertia behind it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Coupling {
-    inertia: f64,
-    stiffness: f64,
-    damping: f64,
     twist: f64,
     speed: f64,
     /// Torque that it takes from the motor in this step.
@@ -127,54 +112,21 @@ impl Mechanics {
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
-    pub fn new(settings: &MechanicsSettings) -> Result<Self, PlantError> {
-        check("mechanics.inertia", settings.inertia, 1e-6..=1000.0, "kg m^2")?;
-        check("mechanics.friction", settings.friction, 0.0..=10.0, "N m s/rad")?;
-        let s = settings;
-        check("mechanics.static_torque", s.static_torque, 0.0..=1000.0, "N m")?;
-        check("mechanics.once_torque", s.once_torque, 0.0..=1000.0, "N m")?;
-        check("mechanics.stops", s.stops, 0.0..=1e4, "rad")?;
-        // With the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
-        let most = s.inertia * 628.0 * 628.0;
-        check("mechanics.stop_stiffness", s.stop_stiffness, 0.0..=most.max(100.0), "N m/rad")?;
-        check("mechanics.stop_damping", s.stop_damping, 0.0..=1000.0, "N m s/rad")?;
-        if s.load_inertia != 0.0 {
-            check("mechanics.load_inertia", s.load_inertia, 1e-6..=1000.0, "kg m^2")?;
-        }
-        // A resonance of at most 500 Hz: the integration follows it.
-        let parallel = s.inertia * s.load_inertia / (s.inertia + s.load_inertia);
-        let most = if s.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 };
-        check("mechanics.stiffness", s.stiffness, 1e-3..=most, "N m/rad")?;
-        check("mechanics.damping", s.damping, 0.0..=1000.0, "N m s/rad")?;
-        let coupling = (s.load_inertia > 0.0).then_some(Coupling {
-            inertia: s.load_inertia,
-            stiffness: s.stiffness,
-            damping: s.damping,
-            twist: 0.0,
-            speed: 0.0,
-            torque: 0.0,
-        });
+    pub fn new(s: &MechanicsSettings) -> Result<Self, PlantError> {
+        s.check()?;
+        let coupling = (s.load_inertia > 0.0).then(Coupling::default);
         let plain =
             coupling.is_none() && (s.static_torque, s.once_torque, s.stops) == (0.0, 0.0, 0.0);
-        let extras = Extras {
-            static_torque: s.static_torque,
-            once_torque: s.once_torque,
-            stops: s.stops,
-            stop_stiffness: s.stop_stiffness,
-            stop_damping: s.stop_damping,
-            coupling,
-            by_angle: 0.0,
-            speed: 0.0,
-        };
+        let extras = Extras { settings: *s, coupling, by_angle: 0.0, speed: 0.0 };
         let mut mechanics = Self {
-            inertia: settings.inertia,
-            friction: settings.friction,
+            inertia: s.inertia,
+            friction: s.friction,
             load: Load::Locked,
             load_torque: 0.0,
             mobility: 0.0,
             extras: (!plain).then_some(extras),
         };
-        mechanics.set_load(settings.load)?;
+        mechanics.set_load(s.load)?;
         Ok(mechanics)
     }
 
@@ -234,7 +186,7 @@ impl Mechanics {
     #[inline]
     pub(crate) fn begin_period(&mut self, angle: f64) {
         if let Some(extras) = &mut self.extras {
-            extras.by_angle = extras.once_torque * angle.cos() + extras.stop_torque(angle);
+            extras.by_angle = extras.settings.once_torque * angle.cos() + extras.stop_torque(angle);
         }
     }
 
@@ -245,10 +197,9 @@ impl Mechanics {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        let at_load = load + extras.by_angle;
+        let (s, at_load) = (&extras.settings, load + extras.by_angle);
         let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
-            coupling.torque =
-                coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
+            coupling.torque = s.stiffness * coupling.twist + s.damping * (speed - coupling.speed);
             coupling.torque
         });
         // A shaft that has come to rest, or passed it, stays where friction can hold it.
@@ -257,14 +208,14 @@ impl Mechanics {
         extras.speed = speed;
         self.mobility = 1.0 / self.inertia;
         self.load_torque = against;
-        if extras.static_torque > 0.0 {
-            if rests && driven.abs() <= extras.static_torque {
+        if s.static_torque > 0.0 {
+            if rests && driven.abs() <= s.static_torque {
                 extras.speed = 0.0;
                 self.mobility = 0.0;
                 return 0.0;
             }
             let direction = if rests { driven } else { speed };
-            self.load_torque += extras.static_torque.copysign(direction);
+            self.load_torque += s.static_torque.copysign(direction);
         }
         speed
     }
@@ -275,7 +226,8 @@ impl Mechanics {
             return;
         };
         if let Some(coupling) = &mut extras.coupling {
-            coupling.speed += h * (coupling.torque - load - extras.by_angle) / coupling.inertia;
+            coupling.speed +=
+                h * (coupling.torque - load - extras.by_angle) / extras.settings.load_inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }

@@ -25,50 +25,54 @@ pub(crate) struct Around {
     pub open: Option<usize>,
     /// Energy that inverter and motor have taken from the dc link in the last period, J.
     pub taken: f64,
+    /// Terminal voltage integrated over the last period, V s.
+    pub volt_seconds: Complex,
 }
 
 impl Around {
-    /// Integrates over one period; returns the terminal voltage integrated over it, V s.
+    /// Integrates over one period.
     #[inline]
     pub(crate) fn advance<M: MachineModel>(
         &mut self,
         motor: &mut MotorModel<M>,
         compare: &Compare,
         period: f64,
-    ) -> Complex {
+    ) {
         motor.begin_period();
         self.sensors.begin_period(period);
-        self.taken = 0.0;
-        let volt_seconds = if !compare.enabled {
-            self.freewheel(motor, period)
+        (self.taken, self.volt_seconds) = (0.0, Complex::ZERO);
+        if !compare.enabled {
+            self.freewheel(motor, period);
         } else if self.inverter.switched {
             match self.open {
                 None => self.switched(All, motor, compare, period),
                 Some(open) => self.switched(|legs| Without(open, legs), motor, compare, period),
             }
         } else {
-            self.averaged(motor, compare, period)
-        };
+            self.averaged(motor, compare, period);
+        }
         self.inverter.previous = *compare;
-        volt_seconds
     }
 
-    /// One integration step of `h` seconds, done by `step`, with the shaft and the sensors.
+    /// Integration steps of `h` seconds, each done by `step`, with the shaft and the sensors.
     #[inline]
-    fn seen<M: MachineModel>(
+    fn steps<M: MachineModel>(
         &mut self,
         motor: &mut MotorModel<M>,
+        times: u32,
         h: f64,
-        step: impl FnOnce(&mut MotorModel<M>, &Inverter) -> Complex,
-    ) -> Complex {
-        let before = motor.state.electrical.current();
-        motor.begin_step();
-        let volt_seconds = step(motor, &self.inverter);
-        motor.end_step(h);
-        let after = motor.state.electrical.current();
-        self.sensors.follow(before, after, h);
-        self.taken += 1.5 * (((before + after) * 0.5).conj() * volt_seconds).re;
-        volt_seconds
+        step: impl Fn(&mut MotorModel<M>, &Inverter) -> Complex,
+    ) {
+        for _ in 0..times {
+            let before = motor.state.electrical.current();
+            motor.begin_step();
+            let volt_seconds = step(motor, &self.inverter);
+            motor.end_step(h);
+            let after = motor.state.electrical.current();
+            self.sensors.follow(before, after, h);
+            self.taken += 1.5 * (((before + after) * 0.5).conj() * volt_seconds).re;
+            self.volt_seconds += volt_seconds;
+        }
     }
 
     /// With the averages of the period as the source. An interrupted phase does not choose between ideal and
@@ -79,7 +83,7 @@ impl Around {
         motor: &mut MotorModel<M>,
         compare: &Compare,
         period: f64,
-    ) -> Complex {
+    ) {
         let source = self.inverter.averaged(compare, period);
         match self.open {
             None if source.ideal() => self.averaged_to(&All(source), motor, period),
@@ -94,13 +98,9 @@ impl Around {
         terminals: &impl Terminals,
         motor: &mut MotorModel<M>,
         period: f64,
-    ) -> Complex {
+    ) {
         let h = period / f64::from(self.substeps);
-        let mut volt_seconds = Complex::ZERO;
-        for _ in 0..self.substeps {
-            volt_seconds += self.seen(motor, h, |motor, _| averaged::step(terminals, motor, h));
-        }
-        volt_seconds
+        self.steps(motor, self.substeps, h, |motor, _| averaged::step(terminals, motor, h));
     }
 
     /// With the legs between their edges as the source.
@@ -110,32 +110,25 @@ impl Around {
         motor: &mut MotorModel<M>,
         compare: &Compare,
         period: f64,
-    ) -> Complex {
+    ) {
         let pattern = switched::Pattern::new(&self.inverter, compare, period);
         let longest = period / f64::from(self.substeps);
-        let mut volt_seconds = Complex::ZERO;
         for (duration, levels) in pattern.pieces() {
             let steps = (duration / longest).ceil().max(1.0);
             let h = duration / steps;
-            for _ in 0..steps as u32 {
-                volt_seconds += self.seen(motor, h, |motor, inverter| {
-                    let legs = Legs::new(inverter, levels, motor.state.electrical.current());
-                    motor.advance(&terminals(legs), h) * h
-                });
-            }
+            self.steps(motor, steps as u32, h, |motor, inverter| {
+                let legs = Legs::new(inverter, levels, motor.state.electrical.current());
+                motor.advance(&terminals(legs), h) * h
+            });
         }
-        volt_seconds
     }
 
-    fn freewheel<M: MachineModel>(&mut self, motor: &mut MotorModel<M>, period: f64) -> Complex {
+    fn freewheel<M: MachineModel>(&mut self, motor: &mut MotorModel<M>, period: f64) {
         let open = self.open;
         let substeps = self.substeps.max(FREEWHEEL_SUBSTEPS);
         let h = period / f64::from(substeps);
-        let mut volt_seconds = Complex::ZERO;
-        for _ in 0..substeps {
-            volt_seconds += self
-                .seen(motor, h, |motor, inverter| freewheel::step(motor, inverter.vdc, open, h));
-        }
-        volt_seconds
+        let step =
+            |motor: &mut _, inverter: &Inverter| freewheel::step(motor, inverter.vdc, open, h);
+        self.steps(motor, substeps, h, step);
     }
 }

@@ -1,25 +1,18 @@
 //! Resistances that rise with time.
 
-use serde::{Deserialize, Serialize};
-
-use crate::error::{PlantError, check};
+use crate::error::PlantError;
 use crate::machine::MachineSettings;
+use crate::settings::settings;
 
-/// Warming: each resistance goes to `1 + rise` times its value with one time constant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WarmingSettings {
-    /// Relative rise of the stator resistance.
-    pub rs: f64,
-    /// Relative rise of the rotor resistance.
-    pub rr: f64,
-    /// Time constant, s.
-    pub time_constant: f64,
-}
-
-impl Default for WarmingSettings {
-    fn default() -> Self {
-        Self { rs: 0.0, rr: 0.0, time_constant: 60.0 }
+settings! {
+    /// Warming: each resistance goes to `1 + rise` times its value with one time constant.
+    WarmingSettings "warming." {
+        /// Relative rise of the stator resistance.
+        rs: f64 = 0.0, -0.5..=2.0, "";
+        /// Relative rise of the rotor resistance.
+        rr: f64 = 0.0, -0.5..=2.0, "";
+        /// Time constant, s.
+        time_constant: f64 = 60.0, 0.01..=1e5, "s";
     }
 }
 
@@ -46,9 +39,7 @@ impl Warming {
         law: &WarmingSettings,
         machine: &MachineSettings,
     ) -> Result<Option<Self>, PlantError> {
-        check("warming.rs", law.rs, -0.5..=2.0, "")?;
-        check("warming.rr", law.rr, -0.5..=2.0, "")?;
-        check("warming.time_constant", law.time_constant, 0.01..=1e5, "s")?;
+        law.check()?;
         Ok(law.acts().then_some(Self { law: *law, cold: (machine.rs, machine.rr) }))
     }
 

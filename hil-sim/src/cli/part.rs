@@ -51,10 +51,8 @@ impl Part {
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         let all = (statistical.runs)(context)?;
         let header = Header::new(experiment.name, context.config, context.seed, shard, all)?;
-        let journal = match &self.resume {
-            Some(path) => Some(Journal::open(&Journal::place(path, &header), &header)?),
-            None => None,
-        };
+        let open = |path: &PathBuf| Journal::open(&Journal::place(path, &header), &header);
+        let journal = self.resume.as_ref().map(open).transpose()?;
         if let Some(journal) = &journal {
             note(journal, &header, quiet);
         }

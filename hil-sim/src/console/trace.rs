@@ -1,20 +1,7 @@
 //! Traces: lines of comma-separated values as the drive prints them, and a plot of them.
 
+use crate::outcome::name::split_unit;
 use crate::outcome::{Figure, Panel, Series};
-
-/// Units that the name of a column ends with, and how an axis shows them.
-const UNITS: [(&str, &str); 10] = [
-    ("_s", "s"),
-    ("_ms", "ms"),
-    ("_a", "A"),
-    ("_v", "V"),
-    ("_deg", "°"),
-    ("_hz", "Hz"),
-    ("_rpm", "rpm"),
-    ("_nm", "Nm"),
-    ("_w", "W"),
-    ("_c", "°C"),
-];
 
 /// Names of the first column: the time from the trigger, or the number of the record.
 const HEADS: [&str; 2] = ["t_s", "record"];
@@ -63,7 +50,7 @@ impl Trace {
         let mut panels: Vec<(&str, Panel)> = Vec::new();
         for (index, name) in columns.iter().enumerate() {
             let points = self.rows.iter().map(|row| (row[0], row[index + 1])).collect();
-            let unit = unit(name);
+            let unit = split_unit(name).map_or("", |(_, unit)| unit);
             match panels.iter_mut().find(|(known, _)| !unit.is_empty() && *known == unit) {
                 Some((_, panel)) => {
                     panel.series.push(Series::line(name, points));
@@ -85,18 +72,9 @@ impl Trace {
     }
 }
 
-/// The unit at the end of a name; empty if there is none.
-fn unit(name: &str) -> &'static str {
-    let known = UNITS.iter().find(|(ending, _)| name.ends_with(ending));
-    known.map_or("", |(_, unit)| unit)
-}
-
 /// A name with its unit in parentheses: `speed (rpm)` for `speed_rpm`.
 fn label(name: &str) -> String {
-    match UNITS.iter().find(|(ending, _)| name.ends_with(ending)) {
-        Some((ending, unit)) => format!("{} ({unit})", &name[..name.len() - ending.len()]),
-        None => name.to_owned(),
-    }
+    split_unit(name).map_or(name.to_owned(), |(quantity, unit)| format!("{quantity} ({unit})"))
 }
 
 #[cfg(test)]

@@ -20,17 +20,9 @@ pub(super) use kind::{LoadTorque, Part, Shaft};
 pub(super) use run::{LONGEST_START_S, bring_up, follow, held};
 pub use run::{learned, trial};
 pub use summary::Summary;
-pub use trial::{Refused, Trial, UNNOTICED_S};
+pub use trial::{Refused, Trial};
 
-use drive_core::carrier::DemodulatorKind;
-use drive_core::{AngleSource, Drive};
-
-use super::assumptions;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, built, check_model, plant_settings};
-use crate::error::Error;
-use crate::outcome::Outcome;
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -49,8 +41,20 @@ const GROUP: usize = KINDS.len();
 const LEARNING: u64 = 1 << 40;
 const DRAWN: u64 = 2 << 40;
 
-/// The drive of a group of runs, or the number of the fault with which it refused to learn.
-type Learnt = Result<Drive, u8>;
+/// A drive, or the number of the fault with which it refused to learn.
+pub(super) type Learnt = Result<Drive, u8>;
+
+/// What is made by the first run that needs it.
+pub(super) fn once<T>(
+    place: &OnceLock<T>,
+    make: impl FnOnce() -> Result<T, Error>,
+) -> Result<&T, Error> {
+    match place.get() {
+        Some(made) => Ok(made),
+        // Two threads that came at once made the same.
+        None => make().map(|made| place.get_or_init(|| made)),
+    }
+}
 
 /// The runs.
 pub struct Battery {
@@ -84,25 +88,26 @@ impl Battery {
     /// The drive of a group; with `prepare.learn` it has learned.
     fn drive(&self, number: usize) -> Result<&Learnt, Error> {
         let (group, config) = (self.group(number), &self.config);
-        if let Some(drive) = self.drives[group].get() {
-            return Ok(drive);
-        }
-        let settings = &config.drive;
-        let drive = Drive::new(built(settings)?);
-        let tracks = settings.angle_source == AngleSource::Injection
-            && settings.injection.demodulator == DemodulatorKind::Synchronous;
-        let drive = match config.prepare.learn && tracks {
-            true => {
-                let mut bench = config.clone();
-                disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
-                let seed =
-                    if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
-                learned(config, &plant_settings(&bench), drive, seed)?
+        once(&self.drives[group], || {
+            let drive = Drive::new(built(&config.drive)?);
+            if !(config.prepare.learn && tracks(&config.drive)) {
+                return Ok(Ok(drive));
             }
-            false => Ok(drive),
-        };
-        // Two threads that came at once found the same.
-        Ok(self.drives[group].get_or_init(|| drive))
+            let mut bench = config.clone();
+            disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
+            let seed = if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
+            learned(config, &plant_settings(&bench), drive, seed)
+        })
+    }
+
+    /// The disturbances of a run in words, in % of their full sizes.
+    fn disturbances(&self, number: usize) -> String {
+        let [always, after] = self.sizes(number);
+        let all =
+            disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
+        let acting = all.filter(|(_, size)| **size != 0.0);
+        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.0, 100.0 * size));
+        words.collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -155,17 +160,5 @@ impl Study for Battery {
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(summary::REMARK.to_owned());
         Ok(outcome)
-    }
-}
-
-impl Battery {
-    /// The disturbances of a run in words, in % of their full sizes.
-    fn disturbances(&self, number: usize) -> String {
-        let [always, after] = self.sizes(number);
-        let all =
-            disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
-        let acting = all.filter(|(_, size)| **size != 0.0);
-        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.name, 100.0 * size));
-        words.collect::<Vec<_>>().join(", ")
     }
 }

@@ -8,16 +8,10 @@ use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
-use drive_settings::value::Words as _;
-use serde::{Deserialize, Serialize};
 
 use super::drawn_machine::{Circuit, drawn};
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
-use crate::config::{Config, PlantModel, built, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Outcome, Table};
-use crate::rig::Rig;
+use super::{machines, steady};
+use crate::prelude::*;
 use crate::stats::exact;
 use session::{Abort, Session, unaware};
 
@@ -141,15 +135,12 @@ impl Commission {
         let mut config = Config { drive: *drive, ..config.clone() };
         config.prepare.learn = true;
         config.drive.injection.synchronous.allow_unlearned = false;
-        match steady::prepared(drive, &config, seed) {
-            Ok(learned) => {
-                let runs = machines::runs(&learned, &config, seed, seconds)?;
-                Ok(Ok((machines::good(&runs), learned.learning_s)))
-            }
-            // A refusal of the drive belongs to the result; other errors do not.
-            Err(Error::Refused(why)) => Ok(Err(why)),
-            Err(other) => Err(other),
-        }
+        let learned = match or_refusal(steady::prepared(drive, &config, seed))? {
+            Ok(learned) => learned,
+            Err(why) => return Ok(Err(why)),
+        };
+        let runs = machines::runs(&learned, &config, seed, seconds)?;
+        Ok(Ok((machines::good(&runs), learned.learning_s)))
     }
 
     /// What was found beside what is filed.
@@ -158,14 +149,12 @@ impl Commission {
         let filed = Circuit::of_plant(&self.config).values();
         let units = ["ohm", "H", "ohm", "H", "s"];
         for (n, ((name, filed), unit)) in filed.into_iter().zip(units).enumerate() {
-            let number =
-                |value: Option<&f64>, n| Cell::or_dash(value.map(|value| Cell::fixed(*value, n)));
             let found = record.found.get(n).filter(|_| record.refused.is_none());
             table.row([
                 Cell::from(format!("{name} ({unit})")),
-                number(found, 5),
+                Cell::fixed_or_dash(found.copied(), 5),
                 Cell::fixed(filed, 5),
-                number(record.errors.get(n), 2),
+                Cell::fixed_or_dash(record.errors.get(n).copied(), 2),
             ]);
         }
         table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux; the leakage is that of small changes at the bias.")
@@ -303,24 +292,23 @@ impl Study for Commission {
             }
         }
 
-        let mut heads = vec!["machine"];
-        heads.extend(names);
-        heads.extend(["seconds", "shaft (°)", "result"]);
-        let mut table = Table::new("Sessions, the worst first; errors in %", &heads);
         let mut by_error: Vec<(usize, &Record)> = records.iter().enumerate().collect();
         by_error.sort_by(|(_, a), (_, b)| {
             b.refused.is_some().cmp(&a.refused.is_some()).then(b.worst().total_cmp(&a.worst()))
         });
-        for (number, record) in by_error.into_iter().take(LISTED) {
-            let error = |n: usize| record.errors.get(n).map(|error| Cell::fixed(*error, 2));
-            let errors = (0..names.len()).map(|n| Cell::or_dash(error(n)));
-            let mut row = vec![Cell::from(number.to_string())];
-            row.extend(errors);
-            row.extend([Cell::fixed(record.seconds, 1), Cell::fixed(record.shaft_deg, 3)]);
-            row.push(Cell::from(record.result()));
-            table.row(row);
-        }
-        outcome.tables.push(table);
+        let mut columns = columns![|n, _: &Record| "machine" => Cell::from(n.to_string());];
+        columns.extend(names.into_iter().enumerate().map(|(n, head)| Column {
+            head,
+            cell: Box::new(move |_, r: &Record| Cell::fixed_or_dash(r.errors.get(n).copied(), 2)),
+        }));
+        columns.extend(columns![|_, r: &Record|
+            "seconds" => Cell::fixed(r.seconds, 1);
+            "shaft (°)" => Cell::fixed(r.shaft_deg, 3);
+            "result" => Cell::from(r.result());
+        ]);
+        let (title, listed) =
+            ("Sessions, the worst first; errors in %", by_error.into_iter().take(LISTED));
+        outcome.tables.push(Table::of(title, &columns, listed));
         if let (None, [record]) = (self.machines, records.as_slice()) {
             outcome.tables = vec![session_table(record), self.found_table(record)];
         }
@@ -330,16 +318,12 @@ impl Study for Commission {
 
 /// The session: steps with their values and verdicts.
 fn session_table(record: &Record) -> Table {
-    let mut table = Table::new(
-        "The session",
-        &["step and verdict", "found, and what nameplate and noise allow"],
-    );
+    let heads = ["step and verdict", "found, and what nameplate and noise allow"];
+    let mut table = Table::new("The session", &heads);
     for (step, values) in &record.told {
-        let first = values.first().cloned().unwrap_or_default();
-        table.row([Cell::from(step.clone()), Cell::from(first)]);
-        for value in values.iter().skip(1) {
-            table.row([Cell::from(""), Cell::from(value.clone())]);
-        }
+        let first = values.first().map_or("", String::as_str);
+        table.row([step.as_str(), first].map(Cell::from));
+        values.iter().skip(1).for_each(|value| table.row(["", value].map(Cell::from)));
     }
     table
 }

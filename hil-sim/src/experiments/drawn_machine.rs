@@ -1,9 +1,6 @@
 //! Machines to be commissioned: the truth about them, and random ones.
 
-use rand::{Rng, RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
-use crate::config::{Config, LoadMode, PlantModel, plant_settings};
+use crate::prelude::*;
 
 /// Parameters of the inverse-Gamma circuit.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +75,7 @@ pub fn around(config: &Config, random: &mut impl Rng, spread: f64) -> Config {
 /// `spread.machine` (2 unless set), free shaft, dead time 2 to 5 us, further drop 0.5 to 3 V at 311 V, gain errors up to
 /// 0.5 % and offsets up to 0.7 % of the range. The drive knows its dead time.
 pub fn drawn(config: &Config, seed: u64) -> Config {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = seeded(seed);
     let spread = if config.spread.machine > 1.0 { config.spread.machine } else { 2.0 };
     let mut drawn = around(config, &mut random, spread);
     drawn.motor.inertia *= (factor(&mut random, 5.0) * 0.632_456).clamp(0.2, 2.0);

@@ -10,21 +10,15 @@ mod trial;
 
 use std::sync::OnceLock;
 
-use drive_core::carrier::DemodulatorKind;
-use drive_core::{AngleSource, Drive};
 use drive_settings::Flux;
 
 use case::Case;
 use trial::Run;
 
-use super::assumptions;
-use super::battery::{Moment, Trial, learned};
+use super::battery::{Learnt, Moment, Trial, learned, once};
 use super::commission::commissioned;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};
-use crate::error::Error;
-use crate::outcome::Outcome;
+use crate::config::{FluxLevel, RangeKind};
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -81,16 +75,13 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 ///
 /// # Errors
 /// When the settings are refused.
-pub fn learned_drive(config: &Config, seed: u64) -> Result<Result<Drive, u8>, Error> {
-    let settings = &config.drive;
-    let drive = Drive::new(built(settings)?);
-    let tracks = settings.angle_source == AngleSource::Injection
-        && settings.injection.demodulator == DemodulatorKind::Synchronous;
-    if tracks { learned(config, &plant_settings(config), drive, seed) } else { Ok(Ok(drive)) }
+pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
+    let drive = Drive::new(built(&config.drive)?);
+    match tracks(&config.drive) {
+        true => learned(config, &plant_settings(config), drive, seed),
+        false => Ok(Ok(drive)),
+    }
 }
-
-/// A drive that has learned, or the number of the fault with which it refused to.
-type Learnt = Result<Drive, u8>;
 
 /// The runs: of each case one after the other, so that shards have their part of each.
 pub struct FullRange {
@@ -123,12 +114,7 @@ impl FullRange {
     /// The drive of a run, which has learned where it can.
     fn drive(&self, case: Case, config: &Config) -> Result<&Learnt, Error> {
         let place = &self.drives[usize::from(case.kind == RangeKind::Braking)];
-        if let Some(drive) = place.get() {
-            return Ok(drive);
-        }
-        let drive = learned_drive(config, self.seed)?;
-        // Two threads that came at once found the same.
-        Ok(place.get_or_init(|| drive))
+        once(place, || learned_drive(config, self.seed))
     }
 
     /// Does a run; with `traced` it is recorded.
@@ -177,7 +163,7 @@ impl Study for FullRange {
 
     fn outcome(&self, _: &Context<'_>, runs: Vec<Trial>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
-        let done: Vec<(Case, usize, Trial)> =
+        let done: Vec<_> =
             self.numbers.iter().zip(runs).map(|(&n, run)| (self.case(n), n, run)).collect();
         summary::of(&self.cases, &done, &mut outcome);
         if let Some(index) = self.config.full_range.index {

@@ -4,13 +4,7 @@ mod trials;
 
 pub use self::trials::Trial;
 use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
-use super::assumptions;
-use super::statistics::{Study, seed_of, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::columns;
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::{Cell, Column, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.
@@ -42,22 +36,6 @@ pub struct LockMonitor {
     config: Config,
     seed: u64,
     runs: usize,
-}
-
-impl LockMonitor {
-    /// Starts, and relocks, at each speed.
-    fn starts_each(&self) -> usize {
-        self.runs.div_ceil(5)
-    }
-
-    fn healthy_runs(&self) -> usize {
-        HEALTHY_PER_RUN * self.runs
-    }
-
-    /// Speed of the over-speed trials, rpm.
-    fn over_speed_limit(&self) -> f64 {
-        f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
-    }
 }
 
 impl Study for LockMonitor {
@@ -126,6 +104,20 @@ impl Study for LockMonitor {
 }
 
 impl LockMonitor {
+    /// Starts, and relocks, at each speed.
+    fn starts_each(&self) -> usize {
+        self.runs.div_ceil(5)
+    }
+
+    fn healthy_runs(&self) -> usize {
+        HEALTHY_PER_RUN * self.runs
+    }
+
+    /// Speed of the over-speed trials, rpm.
+    fn over_speed_limit(&self) -> f64 {
+        f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
+    }
+
     /// The columns of all trials; tables take some of them.
     fn columns(&self) -> Vec<Column<'_, Trial>> {
         let fault = |r: &Trial| r.fault.map(|fault| fault.to_string()).unwrap_or_default();
@@ -142,18 +134,10 @@ impl LockMonitor {
     }
 
     /// A table of those trials of a part which something is wrong with, with these of the columns; none without trials.
-    fn listed<const N: usize>(
-        &self,
-        title: &str,
-        heads: [&str; N],
-        trials: Vec<(usize, &Trial)>,
-        outcome: &mut Outcome,
-    ) {
+    fn listed(&self, title: &str, heads: &[&str], of: Vec<(usize, &Trial)>) -> Option<Table> {
         let mut columns = self.columns();
         columns.retain(|column| heads.contains(&column.head));
-        if !trials.is_empty() {
-            outcome.tables.push(Table::of(title, &columns, trials));
-        }
+        (!of.is_empty()).then(|| Table::of(title, &columns, of))
     }
 
     fn forced(&self, all: &[Trial], outcome: &mut Outcome) {
@@ -180,7 +164,7 @@ impl LockMonitor {
         outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
         let late = all.iter().enumerate().filter(|(_, t)| !t.is_in_time()).collect();
         let heads = ["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"];
-        self.listed("Not in time", heads, late, outcome);
+        outcome.tables.extend(self.listed("Not in time", &heads, late));
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
         for ((degrees, name), trials) in parts {
@@ -208,19 +192,18 @@ impl LockMonitor {
         m.set("false_alarm_rate_95", bound);
         m.set("healthy_loss_max", largest_loss);
         m.set("healthy_error_max_deg", largest(|r| r.largest_deg));
-        let mut table = Table::new("False alarms", &[]).note(
-            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
-             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
-        );
-        table.record([
+        let row = [
             ("runs", Cell::fixed(runs.len() as f64, 0)),
             ("false alarms", Cell::fixed(alarms.len() as f64, 0)),
             ("rate per run, 95 % bound", Cell::significant(bound, 2)),
             ("largest loss seen", Cell::fixed(largest_loss, 2)),
-        ]);
-        outcome.tables.push(table);
+        ];
+        outcome.tables.push(Table::new("False alarms", &[]).records([row]).note(
+            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
+             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
+        ));
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
-        self.listed("Every false alarm", heads, alarms, outcome);
+        outcome.tables.extend(self.listed("Every false alarm", &heads, alarms));
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
         for kind in KINDS {
             let of_kind = runs.iter().filter(|r| r.kind == Some(kind));
@@ -248,7 +231,11 @@ impl LockMonitor {
             ("not in time", Cell::fixed(late.len() as f64, 0)),
         ]);
         outcome.tables.push(table);
-        self.listed("Over-speed not in time", ["seed", "iq (A)", "rpm/s"], late, outcome);
+        outcome.tables.extend(self.listed(
+            "Over-speed not in time",
+            &["seed", "iq (A)", "rpm/s"],
+            late,
+        ));
     }
 
     fn starts(&self, all: &[Trial], outcome: &mut Outcome) {

@@ -1,16 +1,10 @@
 //! Copper loss of the motor against the least one that its torque can have, with and without `flux.economy`.
 
-use drive_core::Drive;
-
-use super::assumptions;
 use super::battery::held;
 use super::full_range::for_the_range;
 use super::torque_limit::learned_limit;
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Outcome, Table};
 use crate::plant::MachineSettings;
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -1,19 +1,9 @@
 //! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
 //! drawn around it.
 
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
-use super::assumptions;
 use super::drawn_machine::around;
-use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::columns;
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::Rig;
+use crate::prelude::*;
 
 /// Not a figure of the source: whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -107,7 +97,7 @@ pub(super) fn runs(
 
 /// A machine drawn around the motor, whose drive knows the circuit.
 fn drawn(config: &Config, seed: u64) -> Config {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = seeded(seed);
     let mut drawn = around(config, &mut random, config.spread.machine);
     let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
     (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);
@@ -151,12 +141,7 @@ impl Study for Machines {
     fn run(&self, number: usize) -> Result<Self::Record, Error> {
         let (config, seed) = self.drawn(number);
         let learned = prepared(&config.drive, &config, seed);
-        match learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)) {
-            Ok(runs) => Ok(Ok(runs)),
-            // A refusal of the drive belongs to the result; other errors do not.
-            Err(Error::Refused(why)) => Ok(Err(why)),
-            Err(other) => Err(other),
-        }
+        or_refusal(learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)))
     }
 
     fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error> {
@@ -174,14 +159,13 @@ impl Study for Machines {
                 Err(why) => outcome.faults.push(why.clone()),
             }
         }
-        let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
+        let learned = || machines.iter().filter(|machine| machine.runs.is_ok());
         let good = machines.iter().filter(|machine| machine.is_good()).count();
-        let mut rms: Vec<f64> =
-            machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();
+        let mut rms: Vec<f64> = learned().map(Machine::rms).collect();
         rms.sort_by(f64::total_cmp);
         let m = &mut outcome.metrics;
         m.set("machines", machines.len() as f64);
-        m.set("learned", learned as f64);
+        m.set("learned", rms.len() as f64);
         m.set("good", good as f64);
         m.set("good_share", good as f64 / machines.len() as f64);
         m.set("lost_runs", machines.iter().map(Machine::lost).sum::<usize>() as f64);
@@ -209,15 +193,14 @@ impl Study for Machines {
         let note = format!("Good: every run within {rms}° rms and {most}° at most, none lost.");
         let listed = machines.iter().take(LISTED).enumerate();
         outcome.tables.push(Table::of(title, &columns, listed).note(note));
-        let points = |of: &dyn Fn(&Machine) -> f64| -> Vec<(f64, f64)> {
-            let sound = machines.iter().filter(|m| m.runs.is_ok());
-            sound.map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
+        let points = |of: fn(&Machine) -> f64| {
+            learned().map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
         };
         outcome.figures.push(
             Figure::new("machines", "Worst of 16 runs over the saliency of the machine", "").panel(
                 Panel::new("saliency fixed to the flux (%)", "angle error (°)")
-                    .with(Series::points("largest", points(&|m| m.largest())))
-                    .with(Series::points("rms", points(&|m| m.rms()))),
+                    .with(Series::points("largest", points(Machine::largest)))
+                    .with(Series::points("rms", points(Machine::rms))),
             ),
         );
         outcome.remarks = assumptions(context.config);

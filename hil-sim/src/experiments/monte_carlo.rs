@@ -1,17 +1,7 @@
 //! Statistics of the angle error over random operating points.
 
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
-use super::assumptions;
-use super::statistics::{Study, seed_of, whole};
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::columns;
-use crate::config::Config;
-use crate::config::plant_settings;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -21,15 +11,9 @@ pub const EXPERIMENT: Experiment = Experiment {
     uses: &[
         BENCH,
         DRIVE,
-        &[
-            "load.speed_rpm",
-            "prepare.learn",
-            "spread.motor",
-            "spread.noise",
-            "spread.gain",
-            "runs",
-            "seconds",
-        ],
+        &["load.speed_rpm", "prepare.learn"],
+        &["spread.motor", "spread.noise", "spread.gain"],
+        &["runs", "seconds"],
     ],
     not: &[FREE_SHAFT, SPEED_LOOP],
     run: whole::<MonteCarlo>,
@@ -70,10 +54,9 @@ impl Study for MonteCarlo {
     fn run(&self, number: usize) -> Result<SteadyRun, Error> {
         // A generator of its own for every run: each can be repeated alone by its seed.
         let seed = seed_of(self.seed, number);
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+        let mut random = seeded(seed);
         let (least, most) = (self.config.amperes(IQ_A.0), self.config.amperes(IQ_A.1));
-        let iq = sign * random.random_range(least..=most);
+        let iq = sign(&mut random) * random.random_range(least..=most);
         let case = OperatingPoint { rpm: random.random_range(-self.bound..=self.bound), iq, seed };
         steady_run(&spread(&self.config, &mut random), case, self.seconds)
     }
@@ -131,7 +114,7 @@ impl Study for MonteCarlo {
 }
 
 /// The configuration with the errors of `spread` drawn at random.
-fn spread(config: &Config, random: &mut Xoshiro256PlusPlus) -> Config {
+fn spread(config: &Config, random: &mut impl Rng) -> Config {
     let mut drawn = config.clone();
     let mut factor = |largest: f64| 1.0 + random.random_range(-largest..=largest);
     let (spread, motor) = (&config.spread, &mut drawn.drive.motor);

@@ -1,14 +1,6 @@
 //! Field orientation with the encoder: where the drive believes the flux to be, and the torque.
 
-use drive_core::{Command, Mode};
-
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
-use crate::config::LoadMode;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::Rig;
-use crate::stats::Stats;
-use drive_core::AngleSource;
+use crate::prelude::*;
 
 /// Section 2.3.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -35,35 +27,32 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (with, without) = results.split_at(SPEEDS_RPM.len());
 
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Field orientation over speed", &[]).note(format!(
+    let columns = columns![|n, a: &Orientation|
+        "speed (rpm)" => Cell::fixed(SPEEDS_RPM[n], 0);
+        "angle error, delays compensated (°)" => Cell::fixed(a.0, 3);
+        "delays left in (°)" => Cell::fixed(without[n].0, 3);
+        "torque, compensated (% of Eq. 2.7)" => Cell::fixed(a.1 * 100.0, 2);
+        "left in (%)" => Cell::fixed(without[n].1 * 100.0, 2);
+    ];
+    let table = Table::of("Field orientation over speed", &columns, with.iter().enumerate());
+    outcome.tables.push(table.note(format!(
         "iq = {} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
          the torque is compared with 3/2 P (L_m/L_r) ψ i_q.",
         context.config.amperes(IQ_A)
-    ));
-    let mut lines = [Vec::new(), Vec::new()];
-    for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {
-        table.record([
-            ("speed (rpm)", Cell::fixed(rpm, 0)),
-            ("angle error, delays compensated (°)", Cell::fixed(a.0, 3)),
-            ("delays left in (°)", Cell::fixed(b.0, 3)),
-            ("torque, compensated (% of Eq. 2.7)", Cell::fixed(a.1 * 100.0, 2)),
-            ("left in (%)", Cell::fixed(b.1 * 100.0, 2)),
-        ]);
-        lines[0].push((rpm, a.0));
-        lines[1].push((rpm, b.0));
-    }
+    )));
+    let line = |name: &str, of: &[Orientation]| {
+        Series::line(name, SPEEDS_RPM.into_iter().zip(of.iter().map(|x| x.0)).collect())
+    };
     let largest = |r: &[Orientation]| r.iter().map(|x| x.0.abs()).fold(0.0, f64::max);
     outcome.metrics.set("angle_error_max_deg", largest(with));
     outcome.metrics.set("angle_error_uncompensated_max_deg", largest(without));
     let torque = with.iter().map(|x| (x.1 - 1.0).abs()).fold(0.0, f64::max);
     outcome.metrics.set("torque_error_max_pct", torque * 100.0);
-    outcome.tables.push(table);
-    let [compensated, left] = lines;
     outcome.figures.push(
         Figure::new("orientation", "Flux angle error over speed", "Eq. 2.10").panel(
             Panel::new("speed (rpm)", "mean flux angle error (° electrical)")
-                .with(Series::line("delays compensated", compensated))
-                .with(Series::line("delays left in", left)),
+                .with(line("delays compensated", with))
+                .with(line("delays left in", without)),
         ),
     );
     outcome.remark(

@@ -2,20 +2,13 @@
 
 mod held;
 
-use drive_core::Command;
-
 use self::held::{Held, Standstill, reversing};
-use super::assumptions;
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
 use super::torque_limit::{BEYOND_A, TorqueLimit};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::columns;
-use crate::config::{Config, open_phase, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::config::open_phase;
 use crate::plant::Plant;
-use crate::rig::Rig;
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -32,35 +25,18 @@ const SETTLING_S: f64 = 12.0;
 /// Speed from which, and to whose opposite, the shaft goes, rpm on four poles.
 const REVERSAL_RPM: f64 = 150.0;
 
-/// What is done at the torque limit, of either sign.
-#[derive(Clone, Copy, PartialEq)]
-enum Course {
-    Standstill,
-    Reversal,
+/// What is done at the torque limit.
+#[derive(PartialEq)]
+struct Course {
+    key: &'static str,
+    name: &'static str,
 }
 
-const COURSES: [(Course, f64); 4] = [
-    (Course::Standstill, 1.0),
-    (Course::Standstill, -1.0),
-    (Course::Reversal, 1.0),
-    (Course::Reversal, -1.0),
-];
-
-impl Course {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Standstill => "zero stator frequency",
-            Self::Reversal => "reversal of the speed",
-        }
-    }
-
-    fn key(self) -> &'static str {
-        match self {
-            Self::Standstill => "hold",
-            Self::Reversal => "reversal",
-        }
-    }
-}
+const STANDSTILL: Course = Course { key: "hold", name: "zero stator frequency" };
+const REVERSAL: Course = Course { key: "reversal", name: "reversal of the speed" };
+/// Each with either sign.
+const COURSES: [(Course, f64); 4] =
+    [(STANDSTILL, 1.0), (STANDSTILL, -1.0), (REVERSAL, 1.0), (REVERSAL, -1.0)];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = context.config.clone();
@@ -74,7 +50,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let limit = allowed_a(&rig.drive, config.amperes(BEYOND_A))?;
     let torque = TorqueLimit::new(&config, limit);
-    let held = context.in_parallel("record", &COURSES, |_, &(course, sign)| {
+    let held = context.in_parallel("record", &COURSES, |_, (course, sign)| {
         hold(&after, rig.clone(), course, sign * limit)
     })?;
     let mut outcome = Outcome::default();
@@ -82,16 +58,16 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("limit_a", limit);
     m.set("limit_nm", torque.nm);
     m.set("limit_pct_of_rated_torque", torque.percent);
-    for course in [Course::Standstill, Course::Reversal] {
+    for course in [STANDSTILL, REVERSAL] {
         let of = || COURSES.iter().zip(&held).filter(|((known, _), _)| *known == course);
         let worst = |value: &dyn Fn(&Held) -> f64| {
             of().map(|(_, held)| value(held).abs()).fold(0.0, f64::max)
         };
-        let key = course.key();
+        let key = course.key;
         m.set(format!("{key}_error_mean_deg"), worst(&|held| held.error.mean()));
         m.set(format!("{key}_error_rms_deg"), worst(&|held| held.error.rms()));
         m.set(format!("{key}_error_max_deg"), worst(&|held| held.error.largest()));
-        if course == Course::Standstill {
+        if course == STANDSTILL {
             m.set("hold_drift_deg", worst(&Held::drift_deg));
             m.set("hold_speed_rpm", worst(&|held| held.speed.mean()));
             m.set("hold_stator_hz", worst(&|held| held.stator_hz));
@@ -101,7 +77,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         m.set(format!("{key}_lost"), f64::from(u8::from(lost)));
     }
     for ((course, sign), held) in COURSES.iter().zip(&held) {
-        let name = || format!("{} at {:+.2} Nm", course.name(), torque.nm * sign);
+        let name = || format!("{} at {:+.2} Nm", course.name, torque.nm * sign);
         if let Some(fault) = &held.fault {
             outcome.faults.push(format!("{}: {fault}", name()));
         } else if held.is_lost() {
@@ -109,8 +85,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         }
     }
     outcome.tables.push(held_table(&held, &torque));
-    for course in [Course::Standstill, Course::Reversal] {
-        outcome.figures.push(held_figure(course, &held));
+    for course in [STANDSTILL, REVERSAL] {
+        outcome.figures.push(held_figure(&course, &held));
     }
     outcome.remarks = assumptions(&config);
     outcome.remarks.push(torque.text(&config));
@@ -122,32 +98,29 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// Starts the drive, gives it its torque, and watches.
-fn hold(config: &Config, mut rig: Rig, course: Course, i_q: f64) -> Result<Held, Error> {
-    let rpm = config.rpm(REVERSAL_RPM);
-    bring_up(&mut rig, if course == Course::Reversal { rpm } else { 0.0 })?;
+fn hold(config: &Config, mut rig: Rig, course: &Course, i_q: f64) -> Result<Held, Error> {
+    let reverses = *course == REVERSAL;
+    let rpm = if reverses { config.rpm(REVERSAL_RPM) } else { 0.0 };
+    bring_up(&mut rig, rpm)?;
     if rig.fault().is_none() {
         rig.command(&Command::Torque(i_q as f32))?;
     }
-    match course {
-        Course::Standstill => {
-            let mut dynamometer = Standstill::new(config);
-            let at = dynamometer.at;
-            let mut speed = |_: f64, plant: &_| dynamometer.speed(plant);
-            Held::watch(&mut rig, SETTLING_S, at, &mut speed)?;
-            Held::watch(&mut rig, 60.0 * config.record.minutes, at, speed)
-        }
-        Course::Reversal => {
-            let seconds = config.record.reversal_s;
-            Held::watch(&mut rig, SETTLING_S, 0.0, |_, plant| reversing(rpm, seconds)(0.0, plant))?;
-            Held::watch(&mut rig, seconds, 0.0, reversing(rpm, seconds))
-        }
+    if reverses {
+        let seconds = config.record.reversal_s;
+        Held::watch(&mut rig, SETTLING_S, 0.0, |_, plant| reversing(rpm, seconds)(0.0, plant))?;
+        return Held::watch(&mut rig, seconds, 0.0, reversing(rpm, seconds));
     }
+    let mut dynamometer = Standstill::new(config);
+    let at = dynamometer.at;
+    let mut speed = |_: f64, plant: &_| dynamometer.speed(plant);
+    Held::watch(&mut rig, SETTLING_S, at, &mut speed)?;
+    Held::watch(&mut rig, 60.0 * config.record.minutes, at, speed)
 }
 
 fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
     let degrees = |value: f64| Cell::fixed(value, 2);
     let columns = columns![|n, held: &Held|
-        "course" => Cell::from(COURSES[n].0.name());
+        "course" => Cell::from(COURSES[n].0.name);
         "torque (Nm)" => Cell::fixed(COURSES[n].1 * torque.nm, 2);
         "of rated (%)" => Cell::fixed(COURSES[n].1 * torque.percent, 0);
         "mean error (°)" => degrees(held.error.mean());
@@ -166,12 +139,12 @@ fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
     )
 }
 
-fn held_figure(course: Course, all: &[Held]) -> Figure {
+fn held_figure(course: &Course, all: &[Held]) -> Figure {
     let x = "time (s)";
     let labels = ["angle error (° electrical)", "torque (Nm)", "speed (rpm)"];
-    let mut figure = Figure::new(course.key(), format!("The torque limit, {}", course.name()), "");
+    let mut figure = Figure::new(course.key, format!("The torque limit, {}", course.name), "");
     for (n, label) in labels.into_iter().enumerate() {
-        let of = COURSES.iter().zip(all).filter(|((known, _), _)| *known == course);
+        let of = COURSES.iter().zip(all).filter(|((known, _), _)| known == course);
         let panel = of.fold(Panel::new(x, label), |panel, ((_, sign), held)| {
             let name = format!("{:+.0} % of the limit", 100.0 * sign);
             panel.with(Series::line(name, held.lines[n].clone()))

@@ -10,21 +10,16 @@ mod record;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use drive_core::{AngleSource, Command, Mode, Stop};
+use drive_core::Stop;
 
 pub use file::{Metric, Statistic};
 pub use quantity::QUANTITIES;
 pub use record::Record;
 
 use self::file::{Ramp, Text};
-use super::assumptions;
-use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TRACKING};
-use crate::config::{Config, Key, LoadMode, Value};
-use crate::error::Error;
-use crate::outcome::Outcome;
-use crate::plant::Load;
+use crate::config::{Key, Value};
+use crate::prelude::*;
 use crate::progress::Progress;
-use crate::rig::Point;
 
 /// Experiments that are scenarios of the program, each with the name of its file, what it stands for, the keys that it uses,
 /// those that it does not, and a sentence about it.

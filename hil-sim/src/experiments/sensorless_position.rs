@@ -2,20 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Mode;
-
-use super::assumptions;
+use super::learning;
 use super::scenario::{Metric, Record, Statistic, position_step};
-use super::{BENCH, Context, DRIVE, Experiment, learning};
-use crate::columns;
-use crate::config::plant_settings;
-use crate::config::{Config, LoadMode};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::plant::Load;
-use crate::rig::Rig;
-use crate::stats::{Stats, StraightLine};
-use drive_core::AngleSource;
+use crate::prelude::*;
+use crate::stats::StraightLine;
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -39,6 +29,7 @@ const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
 /// A position held under a load.
+#[derive(Default)]
 struct HeldPosition {
     load_nm: f64,
     belief: (f64, bool),
@@ -86,16 +77,8 @@ fn hold(
     rig.run(3.0, |_| {});
     let start = rig.time();
     let origin = rig.plant.mechanical_angle() / TAU;
-    let mut held = HeldPosition {
-        load_nm,
-        belief,
-        track: Vec::new(),
-        iq: 0.0,
-        angle_error: Stats::default(),
-        fault: None,
-    };
-    let mut iq = Stats::default();
-    let mut period = 0_u32;
+    let mut held = HeldPosition { load_nm, belief, ..HeldPosition::default() };
+    let (mut iq, mut period) = (Stats::default(), 0_u32);
     rig.run(seconds, |p| {
         iq.push(p.iq);
         held.angle_error.push(p.angle_error_deg);
@@ -144,12 +127,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         set("final_error", "deg", "position_error_deg", Statistic::Last);
         set("angle_error", "rms_deg", "angle_error_deg", Statistic::Rms);
         set("angle_error", "max_deg", "angle_error_deg", Statistic::Largest);
-        set(
-            "position_estimate_error",
-            "max_deg",
-            "position_estimate_error_deg",
-            Statistic::Largest,
-        );
+        let estimate = ("position_estimate_error", "position_estimate_error_deg");
+        set(estimate.0, "max_deg", estimate.1, Statistic::Largest);
     }
     let of = |belief: (f64, bool)| held.iter().filter(move |h| h.belief == belief);
     let drift = |belief| of(belief).map(|h| h.drift().abs()).fold(0.0, f64::max);
@@ -157,12 +136,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("drift_max_deg_per_min", drift(BELIEFS[0]));
     // Odd in the load: the error of the believed rotor resistance.
     let per_ampere = |belief| {
-        let (mut xy, mut xx) = (0.0, 0.0);
-        for h in of(belief) {
-            xy += h.drift() * h.iq;
-            xx += h.iq * h.iq;
-        }
-        xy / xx
+        let sum = |term: fn(&HeldPosition) -> f64| of(belief).map(term).sum::<f64>();
+        sum(|h| h.drift() * h.iq) / sum(|h| h.iq * h.iq)
     };
     let base = per_ampere(BELIEFS[0]);
     m.set("drift_deg_per_min_a", base);

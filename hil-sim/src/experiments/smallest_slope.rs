@@ -1,14 +1,9 @@
 //! The smallest slope of the saliency signal at which a drive that has learned still works: the source of the motor's
 //! saliency is weakened step by step, and the battery runs at each.
 
-use super::assumptions;
 use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
-use super::statistics::{Study, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 use crate::progress::Progress;
 
 /// Not in the source.
@@ -27,27 +22,29 @@ const LEAST_SHARE: f64 = 0.05;
 /// Runs at each, unless `runs` says otherwise: two of each kind.
 const RUNS: u32 = 24;
 
-/// What a motor does whose saliency has this share of its source.
-struct Step {
+/// What a motor does whose saliency has a share of its source.
+struct Step<'a> {
     share: f64,
     /// Slope dq/de without load at the drive's magnetising current, 1/rad.
     slope: Option<f64>,
-    summary: Summary,
+    summary: Summary<'a>,
 }
 
-impl Step {
+impl Step<'_> {
     /// Whether each run was accepted, and none was lost, silently wrong or stopped.
     fn works(&self) -> bool {
-        let s = &self.summary;
-        s.refused.is_empty() && s.trips.is_empty() && s.lost == 0 && s.silent == 0
+        let fails = |trial: &Trial| {
+            let ended = trial.refused_by().is_some() || trial.trip.is_some();
+            ended || trial.is_lost() || trial.is_silent()
+        };
+        self.summary.count(fails) == 0
     }
 }
 
 /// The runs of all steps, one step after the other.
 pub struct SmallestSlope {
-    shares: Vec<f64>,
-    /// The configuration and the battery of each step.
-    steps: Vec<(Config, Battery)>,
+    /// Share, configuration and battery of each step.
+    steps: Vec<(f64, Config, Battery)>,
     /// Runs of each step.
     each: usize,
 }
@@ -57,19 +54,18 @@ impl Study for SmallestSlope {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
-        let share = |n| 1.0 - (1.0 - LEAST_SHARE) * f64::from(n) / f64::from(STEPS - 1);
-        let shares: Vec<f64> = (0..STEPS).map(share).collect();
         let each = context.config.extent.runs.unwrap_or(RUNS);
-        let step = |&share: &f64| {
+        let step = |n| {
+            let share = 1.0 - (1.0 - LEAST_SHARE) * f64::from(n) / f64::from(STEPS - 1);
             let mut config = weakened(context.config, share);
             config.prepare.learn = true;
             config.extent.runs = Some(each);
             let context = Context { config: &config, progress: Progress::hidden(), ..*context };
             let battery = Battery::new(&context)?;
-            Ok((config, battery))
+            Ok((share, config, battery))
         };
-        let steps = shares.iter().map(step).collect::<Result<_, Error>>()?;
-        Ok(Self { shares, steps, each: each as usize })
+        let steps = (0..STEPS).map(step).collect::<Result<_, Error>>()?;
+        Ok(Self { steps, each: each as usize })
     }
 
     fn runs(&self) -> usize {
@@ -77,64 +73,55 @@ impl Study for SmallestSlope {
     }
 
     fn run(&self, number: usize) -> Result<Trial, Error> {
-        self.steps[number / self.each].1.run(number % self.each)
+        self.steps[number / self.each].2.run(number % self.each)
     }
 
     fn outcome(&self, context: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
-        let parts = self.shares.iter().zip(&self.steps).zip(trials.chunks(self.each));
-        let step = |((&share, (config, _)), trials): ((&f64, &(Config, Battery)), &[Trial])| {
+        let mut steps = Vec::new();
+        for ((share, config, _), trials) in self.steps.iter().zip(trials.chunks(self.each)) {
             let slope = Probe::new(config)?.slope(config.drive.i_d().into(), 0.0);
-            Ok(Step { share, slope, summary: Summary::of(trials) })
-        };
-        let steps = parts.map(step).collect::<Result<Vec<_>, Error>>()?;
-        Ok(judged(&steps, context.config))
-    }
-}
-
-/// The outcome of all steps.
-fn judged(steps: &[Step], config: &Config) -> Outcome {
-    let mut outcome = Outcome::default();
-    let mut table = Table::new("Ever weaker saliency", &[]).note(
-        "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
-         of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
-    );
-    for step in steps {
-        let slope = Cell::or_dash(step.slope.map(|slope| Cell::fixed(slope, 4)));
-        let works = if step.works() { "yes" } else { "no" };
-        let limit = step.summary.limit_share;
-        let head = [
-            ("share", Cell::fixed(step.share, 2)),
-            ("slope (1/rad)", slope),
-            ("works", Cell::from(works)),
-            ("limit (%)", Cell::or_dash(limit.map(|share| Cell::fixed(100.0 * share, 0)))),
-        ];
-        table.record(head.into_iter().chain(step.summary.cells()));
-    }
-    outcome.tables.push(table);
-    let m = &mut outcome.metrics;
-    let working = steps.iter().take_while(|step| step.works());
-    if let Some(last) = working.last() {
-        m.set("smallest_share", last.share);
-        if let Some(slope) = last.slope {
-            m.set("smallest_slope_per_rad", slope);
+            steps.push(Step { share: *share, slope, summary: Summary::of(trials) });
         }
+        let row = |step: &Step<'_>| {
+            let works = if step.works() { "yes" } else { "no" };
+            let limit = step.summary.limit_share().map(|share| 100.0 * share);
+            let head = [
+                ("share", Cell::fixed(step.share, 2)),
+                ("slope (1/rad)", Cell::fixed_or_dash(step.slope, 4)),
+                ("works", Cell::from(works)),
+                ("limit (%)", Cell::fixed_or_dash(limit, 0)),
+            ];
+            head.into_iter().chain(step.summary.cells())
+        };
+        let mut outcome = Outcome::default();
+        outcome.tables.push(Table::new("Ever weaker saliency", &[]).records(steps.iter().map(row)).note(
+            "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
+             of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
+        ));
+        let m = &mut outcome.metrics;
+        if let Some(last) = steps.iter().take_while(|step| step.works()).last() {
+            m.set("smallest_share", last.share);
+            if let Some(slope) = last.slope {
+                m.set("smallest_slope_per_rad", slope);
+            }
+        }
+        m.set("silent_runs", Summary::of(&trials).count(Trial::is_silent) as f64);
+        let points = |name: &str, of: fn(&Summary<'_>) -> f64| {
+            let regulated = steps.iter().filter(|step| step.summary.error().count() > 0);
+            let points = regulated.filter_map(|step| Some((step.slope?, of(&step.summary))));
+            Series::points(name, points.collect())
+        };
+        outcome.figures.push(
+            Figure::new("slope", "Angle error over the slope of the saliency signal", "").panel(
+                Panel::new("slope dq/de (1/rad)", "angle error (°)")
+                    .with(points("largest", |s| s.error().largest()))
+                    .with(points("99 %", |s| s.p99_deg()))
+                    .with(points("rms", |s| s.error().rms())),
+            ),
+        );
+        outcome.remarks = assumptions(context.config);
+        Ok(outcome)
     }
-    m.set("silent_runs", steps.iter().map(|step| step.summary.silent).sum::<usize>() as f64);
-    let line = |of: fn(&Summary) -> f64| {
-        let regulated = steps.iter().filter(|step| step.summary.error.count() > 0);
-        let points = regulated.filter_map(|step| Some((step.slope?, of(&step.summary))));
-        points.collect::<Vec<_>>()
-    };
-    outcome.figures.push(
-        Figure::new("slope", "Angle error over the slope of the saliency signal", "").panel(
-            Panel::new("slope dq/de (1/rad)", "angle error (°)")
-                .with(Series::points("largest", line(|s| s.error.largest())))
-                .with(Series::points("99 %", line(|s| s.p99_deg)))
-                .with(Series::points("rms", line(|s| s.error.rms()))),
-        ),
-    );
-    outcome.remarks = assumptions(config);
-    outcome
 }
 
 /// The same motor with a share of what its saliency comes from.

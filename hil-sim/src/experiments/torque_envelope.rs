@@ -1,15 +1,9 @@
 //! The largest torque over speed and dc link, motoring and generating, as the drive gives it.
 
-use drive_core::Drive;
-
-use super::assumptions;
 use super::battery::held;
 use super::full_range::{I_D_A, for_the_range};
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -2,14 +2,12 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use drive_core::Drive;
 use drive_core::table::Grid;
 use drive_settings::Flux;
 
 use super::battery::{allowed_a, torque_nm};
 use super::full_range::learned_drive;
-use crate::config::Config;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Values that differ by less, relatively, are the same limit.
 const SAME: f64 = 2e-3;

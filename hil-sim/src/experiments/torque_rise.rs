@@ -7,14 +7,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use num_complex::Complex64;
 
 use self::rise::{Response, Rise};
-use super::assumptions;
 use super::full_range::for_the_range;
 use super::steady::{bring_up, prepared};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
-use crate::rig::{Point, RATE_HZ, Rig};
+use crate::prelude::*;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -130,42 +125,38 @@ impl Physical {
 }
 
 fn table(config: &Config, cases: &[Case], seen: &[Seen], m: &mut Metrics) -> Table {
-    let mut table = Table::new("Torque steps over the speed", &[]).note(
+    let trip = f64::from(config.drive.trip_a());
+    let ms = |rise: &Rise| rise.current.time_ms(0.9);
+    let beyond = |(rise, limit_ms): &Seen| ms(rise) - 1.5 * limit_ms;
+    let columns = columns![|n, seen: &Seen|
+        "speed (rpm)" => Cell::fixed(cases[n].0, 0);
+        "torque current (A)" => Cell::fixed(seen.0.current.end(), 2);
+        "90 % after (ms)" => Cell::fixed(ms(&seen.0), 2);
+        "limit (ms)" => Cell::fixed(seen.1, 2);
+        "ratio" => Cell::fixed(ms(&seen.0) / seen.1, 2);
+        "beyond (ms)" => Cell::fixed(beyond(seen), 2);
+        "overshoot (%)" => Cell::fixed(100.0 * seen.0.current.overshoot(), 1);
+        "largest current (A)" => Cell::fixed(seen.0.peak_a, 2);
+        "of the trip (%)" => Cell::fixed(100.0 * seen.0.peak_a / trip, 0);
+        "largest angle error (°)" => Cell::fixed(seen.0.angle_deg, 2);
+    ];
+    let is_free = |(rpm, sign): &Case| *sign > 0.0 && *rpm > config.rpm(WITHOUT_CARRIER_RPM);
+    let worst = |free: bool| {
+        let of = cases.iter().zip(seen).filter(|(case, _)| is_free(case) == free);
+        of.map(|(_, seen)| beyond(seen)).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let largest =
+        |of: &dyn Fn(&Rise) -> f64| seen.iter().map(|(rise, _)| of(rise)).fold(0.0, f64::max);
+    m.set("motoring_beyond_ms", worst(true));
+    m.set("other_beyond_ms", worst(false));
+    m.set("overshoot_pct", 100.0 * largest(&|rise| rise.current.overshoot()));
+    m.set("peak_pct_of_trip", 100.0 * largest(&|rise| rise.peak_a / trip));
+    m.set("angle_error_max_deg", largest(&|rise| rise.angle_deg));
+    Table::of("Torque steps over the speed", &columns, seen.iter().enumerate()).note(
         "Means over steps at all ten samples of a carrier period. Limit: the least time in which the voltage of the dc link drives \
          the torque current, with the direct current free, and 1.5 periods. A negative torque generates. Beyond: the measured time \
          less 1.5 times the limit.",
-    );
-    let trip = f64::from(config.drive.trip_a());
-    let [mut motoring, mut other] = [f64::NEG_INFINITY; 2];
-    let (mut overshoot, mut peak, mut angle) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for (&(rpm, sign), (rise, limit_ms)) in cases.iter().zip(seen) {
-        let (i_q, ms) = (rise.current.end(), rise.current.time_ms(0.9));
-        let beyond = ms - 1.5 * limit_ms;
-        let free = sign > 0.0 && rpm > config.rpm(WITHOUT_CARRIER_RPM);
-        let worst = if free { &mut motoring } else { &mut other };
-        *worst = worst.max(beyond);
-        overshoot = overshoot.max(rise.current.overshoot());
-        peak = peak.max(rise.peak_a / trip);
-        angle = angle.max(rise.angle_deg);
-        table.record([
-            ("speed (rpm)", Cell::fixed(rpm, 0)),
-            ("torque current (A)", Cell::fixed(i_q, 2)),
-            ("90 % after (ms)", Cell::fixed(ms, 2)),
-            ("limit (ms)", Cell::fixed(*limit_ms, 2)),
-            ("ratio", Cell::fixed(ms / limit_ms, 2)),
-            ("beyond (ms)", Cell::fixed(beyond, 2)),
-            ("overshoot (%)", Cell::fixed(100.0 * rise.current.overshoot(), 1)),
-            ("largest current (A)", Cell::fixed(rise.peak_a, 2)),
-            ("of the trip (%)", Cell::fixed(100.0 * rise.peak_a / trip, 0)),
-            ("largest angle error (°)", Cell::fixed(rise.angle_deg, 2)),
-        ]);
-    }
-    m.set("motoring_beyond_ms", motoring);
-    m.set("other_beyond_ms", other);
-    m.set("overshoot_pct", 100.0 * overshoot);
-    m.set("peak_pct_of_trip", 100.0 * peak);
-    m.set("angle_error_max_deg", angle);
-    table
+    )
 }
 
 fn figure(cases: &[Case], seen: &[Seen]) -> Figure {

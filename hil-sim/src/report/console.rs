@@ -8,11 +8,9 @@ use crate::outcome::{Cell, Metrics, Outcome, Table};
 pub fn text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if let Some(steps) = &outcome.steps {
-        write_table(&mut text, &Table::of_steps(steps));
+        text.push_str(&table(&Table::of_steps(steps)));
     }
-    for table in &outcome.tables {
-        write_table(&mut text, table);
-    }
+    outcome.tables.iter().for_each(|one| text.push_str(&table(one)));
     if let Some(lost) = outcome.lost() {
         let _ = writeln!(text, "{}\n", wrap(&lost, "", ""));
     }
@@ -47,31 +45,22 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
     }
 }
 
-/// A table with aligned columns.
+/// A table with aligned columns, its title above and its note below.
 pub fn table(table: &Table) -> String {
-    let mut text = String::new();
-    write_table(&mut text, table);
-    text
-}
-
-/// A table with its title above and its note below.
-fn write_table(text: &mut String, table: &Table) {
+    let (mut text, count) = (String::new(), table.columns.len());
     let width = |column: usize| {
         let cells = table.rows.iter().filter_map(|row| row.get(column)).map(Cell::text);
         let head = table.columns[column].as_str();
         cells.chain([head]).map(|cell| cell.chars().count()).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..table.columns.len()).map(width).collect();
-    let numeric =
-        |column: usize| table.rows.iter().any(|row| row.get(column).is_some_and(Cell::is_number));
-    let right: Vec<bool> = (0..table.columns.len()).map(numeric).collect();
+    let widths: Vec<usize> = (0..count).map(width).collect();
+    let right: Vec<bool> = (0..count).map(|column| table.is_numeric(column)).collect();
     let line = |cells: Vec<&str>| {
         let padded = cells.iter().enumerate().map(|(column, cell)| {
             let width = widths.get(column).copied().unwrap_or(0);
-            if right.get(column) == Some(&true) {
-                format!("{cell:>width$}")
-            } else {
-                format!("{cell:<width$}")
+            match right.get(column) {
+                Some(true) => format!("{cell:>width$}"),
+                _ => format!("{cell:<width$}"),
             }
         });
         padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
@@ -80,11 +69,8 @@ fn write_table(text: &mut String, table: &Table) {
         let _ = writeln!(text, "{}", table.title);
     }
     let _ = writeln!(text, "{}", line(table.columns.iter().map(String::as_str).collect()));
-    let _ = writeln!(
-        text,
-        "{}",
-        "-".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1))
-    );
+    let whole = widths.iter().sum::<usize>() + 2 * count.saturating_sub(1);
+    let _ = writeln!(text, "{}", "-".repeat(whole));
     for row in &table.rows {
         let _ = writeln!(text, "{}", line(row.iter().map(Cell::text).collect()));
     }
@@ -92,6 +78,7 @@ fn write_table(text: &mut String, table: &Table) {
         let _ = writeln!(text, "{}", wrap(&table.note, "", ""));
     }
     text.push('\n');
+    text
 }
 
 /// Longest line of a paragraph, characters.

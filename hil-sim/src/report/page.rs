@@ -180,10 +180,8 @@ fn write_table(body: &mut String, table: &Table) {
     if !table.title.is_empty() {
         let _ = writeln!(body, "<caption>{}</caption>", prose(&table.title));
     }
-    let is_number =
-        |column: usize| table.rows.iter().any(|row| row.get(column).is_some_and(Cell::is_number));
     let class = |column: usize| {
-        if is_number(column) { " class=\"number\"" } else { "" }
+        if table.is_numeric(column) { " class=\"number\"" } else { "" }
     };
     body.push_str("<thead><tr>");
     for (column, head) in table.columns.iter().enumerate() {

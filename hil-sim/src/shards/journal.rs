@@ -32,7 +32,7 @@ impl Lines {
         let first = lines.next().filter(whole);
         let header = first.and_then(|line| serde_json::from_slice(line).ok()).ok_or_else(|| {
             let problem = "not the head of a shard or of a file for --resume, or torn";
-            data(path, 1, problem.to_owned())
+            Error::data(path, Some(1), problem)
         })?;
         let good = first.map_or(0, <[u8]>::len) as u64;
         let mut read = Self { header, runs: Vec::new(), torn: None, good };
@@ -48,7 +48,7 @@ impl Lines {
                 _ => {
                     let problem =
                         "no record of a run of this shard; give another file, or take the line out";
-                    return Err(data(path, number, problem.to_owned()));
+                    return Err(Error::data(path, Some(number), problem));
                 }
             }
             read.good += line.len() as u64;
@@ -111,7 +111,8 @@ impl Journal {
             .difference(&read.header)
             .or_else(|| (here != there).then(|| format!("the shard is {here}, there {there}")));
         if let Some(text) = difference {
-            return Err(data(path, 1, format!("of another run: here {text}; give another file")));
+            let problem = format!("of another run: here {text}; give another file");
+            return Err(Error::data(path, Some(1), problem));
         }
         file.set_len(read.good).map_err(Error::write(path))?;
         file.seek(SeekFrom::End(0)).map_err(Error::write(path))?;
@@ -138,10 +139,6 @@ pub fn line(of: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     let mut line = serde_json::to_vec(of).map_err(|e| Error::Internal(e.to_string()))?;
     line.push(b'\n');
     Ok(line)
-}
-
-fn data(path: &Path, line: u64, problem: String) -> Error {
-    Error::Data { path: path.to_owned(), line: Some(line), problem }
 }
 
 #[cfg(test)]

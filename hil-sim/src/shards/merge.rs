@@ -94,15 +94,12 @@ fn listed(all: &[String]) -> String {
 /// Checks that this program is the one that made the shards: the outcome is computed here.
 fn check_program(path: &Path, header: &Header, config: &Config) -> Result<(), Error> {
     let own = Header::new(&header.experiment, config, header.seed, header.shard, header.runs)?;
-    match header.difference(&own) {
-        Some(difference) => Err(data(
-            path,
-            format!("not made by this program, which has to merge it: {difference}"),
-        )),
-        None => Ok(()),
-    }
+    let problem = |difference| {
+        data(path, format!("not made by this program, which has to merge it: {difference}"))
+    };
+    header.difference(&own).map_or(Ok(()), |difference: String| Err(problem(difference)))
 }
 
 fn data(path: &Path, problem: String) -> Error {
-    Error::Data { path: path.to_owned(), line: None, problem }
+    Error::data(path, None, problem)
 }

@@ -1,41 +1,31 @@
 //! Old names of keys. They stay accepted.
 
-use super::Value;
+use super::{DRIVE, Value};
 
-/// An old name, the name of today, and the value of today.
-struct Alias {
-    old: &'static str,
-    name: &'static str,
-    value: fn(&Value) -> Value,
-}
+/// Old names, those of today, and the value of today.
+type Alias = (&'static str, &'static str, fn(&Value) -> Value);
 
-const fn renamed(old: &'static str, name: &'static str) -> Alias {
-    Alias { old, name, value: Value::clone }
-}
-
-static ALIASES: [Alias; 16] = [
-    renamed("motor.rs", "motor.r_s"),
-    renamed("motor.rr", "motor.r_r"),
-    renamed("motor.lls", "motor.l_ls"),
-    renamed("motor.llr", "motor.l_lr"),
-    renamed("motor.lm", "motor.l_m"),
-    renamed("drive.motor.rs", "drive.motor.r_s"),
-    renamed("drive.motor.rr", "drive.motor.r_r"),
-    renamed("drive.motor.lls", "drive.motor.l_ls"),
-    renamed("drive.motor.llr", "drive.motor.l_lr"),
-    renamed("drive.motor.lm", "drive.motor.l_m"),
-    renamed("inverter.vdc", "inverter.dc_link_v"),
-    Alias { old: "inverter.dead_time_us", name: "inverter.dead_time_s", value: micro },
-    renamed("angle.source", "angle_source"),
-    Alias { old: "angle.compensate_delays", name: "ignore_delays", value: negated },
-    renamed("reference.id_a", "sequence.i_d"),
-    renamed("drive.learn", "prepare.learn"),
+static ALIASES: [Alias; 11] = [
+    ("motor.rs", "motor.r_s", Value::clone),
+    ("motor.rr", "motor.r_r", Value::clone),
+    ("motor.lls", "motor.l_ls", Value::clone),
+    ("motor.llr", "motor.l_lr", Value::clone),
+    ("motor.lm", "motor.l_m", Value::clone),
+    ("inverter.vdc", "inverter.dc_link_v", Value::clone),
+    ("inverter.dead_time_us", "inverter.dead_time_s", micro),
+    ("angle.source", "angle_source", Value::clone),
+    ("angle.compensate_delays", "ignore_delays", negated),
+    ("reference.id_a", "sequence.i_d", Value::clone),
+    ("drive.learn", "prepare.learn", Value::clone),
 ];
 
 /// The name of today for a name, and the value for a value.
 pub fn today(name: &str, value: &Value) -> (String, Value) {
-    match ALIASES.iter().find(|alias| alias.old == name) {
-        Some(alias) => (alias.name.to_owned(), (alias.value)(value)),
+    // The drive has the names of the motor, too.
+    let of_drive = name.starts_with("drive.motor.");
+    let (prefix, bare) = name.split_at(if of_drive { DRIVE.len() } else { 0 });
+    match ALIASES.iter().find(|(old, ..)| *old == bare) {
+        Some((_, today, of)) => (format!("{prefix}{today}"), of(value)),
         None => (name.to_owned(), value.clone()),
     }
 }

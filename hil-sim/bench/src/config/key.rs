@@ -1,10 +1,12 @@
 //! A key of either table.
 
+use std::collections::BTreeMap;
+
 use drive_settings::entry::Entry;
 use drive_settings::{SETTINGS, Settings, find, value as drive};
 
 use super::value::Field as _;
-use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
+use super::{Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
 use crate::error::Error;
 
 /// A key of the bench or of the drive.
@@ -112,7 +114,7 @@ impl Key {
     pub fn get(self, config: &Config) -> Value {
         match self {
             Self::Bench(key) => (key.get)(config),
-            Self::After(key) => config.after.get(key.name),
+            Self::After(key) => config.after.get(key.name).cloned().unwrap_or(Value::Unset),
             Self::Drive(entry) => match entry.get(&config.drive) {
                 drive::Value::Number(value) => Value::of_single(value),
                 drive::Value::Whole(value) => Value::Number(value.into()),
@@ -171,15 +173,13 @@ fn is_of_plant(key: &BenchKey) -> bool {
 
 /// Sets a key to what it is after the learning, within the range that it always has.
 fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &'static str> {
-    let taken = match value {
-        Value::Unset => Value::Unset,
-        value => {
-            let mut checked = config.clone();
-            (key.set)(&mut checked, value)?;
-            (key.get)(&checked)
-        }
-    };
-    config.after.set(key.name, taken);
+    if *value == Value::Unset {
+        config.after.remove(key.name);
+        return Ok(());
+    }
+    let mut checked = config.clone();
+    (key.set)(&mut checked, value)?;
+    config.after.insert(key.name, (key.get)(&checked));
     Ok(())
 }
 
@@ -214,11 +214,10 @@ impl Config {
     /// # Errors
     /// [`Error::Refused`] with the reason why a value is not allowed, or as [`check_model`].
     pub fn after_learning(&self) -> Result<Self, Error> {
-        let mut config = Self { after: After::default(), ..self.clone() };
+        let mut config = Self { after: BTreeMap::new(), ..self.clone() };
         for key in BENCH {
-            match self.after.get(key.name) {
-                Value::Unset => {}
-                value => (key.set)(&mut config, &value).map_err(Error::refused)?,
+            if let Some(value) = self.after.get(key.name) {
+                (key.set)(&mut config, value).map_err(Error::refused)?;
             }
         }
         check_model(&config)?;

@@ -2,13 +2,16 @@
 //! are those of [`drive_settings::SETTINGS`].
 //!
 //! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from
-//! these two tables. To add a key, add a line.
+//! these two tables. To add a key, add a line. Behind `=>` stands the place in the settings of the plant that has the same value.
+
+use std::collections::BTreeMap;
 
 use drive_settings::Settings;
+use drive_settings::value::Words as _;
 
-use super::after::After;
-use super::value::{Allowed, Field, Value};
+use super::value::{Allowed, CopyTo as _, Field, Value};
 pub use super::words::*;
+use crate::plant::{IronSettings, PlantSettings};
 
 /// A row of the table.
 pub struct BenchKey {
@@ -41,18 +44,18 @@ macro_rules! allowed {
 }
 
 macro_rules! keys {
-    ($(
+    (|$plant:ident, $iron:ident| $(
         #[doc = $group_doc:literal]
         $prefix:literal $group:ident: $type:ident {
             $(
                 $(#[doc = $doc:literal])+
-                $field:ident: $field_type:ty = $default:expr, [$($allowed:tt)+], $unit:literal;
+                $field:ident: $field_type:ty = $default:expr, [$($allowed:tt)+], $unit:literal $(=> $place:expr)?;
             )+
         }
     )+) => {
         $(
             #[doc = $group_doc]
-            #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+            #[derive(Clone, Debug, PartialEq)]
             pub struct $type {
                 $($(#[doc = $doc])+ pub $field: $field_type,)+
             }
@@ -65,24 +68,29 @@ macro_rules! keys {
         )+
 
         /// The configuration of an experiment.
-        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        #[derive(Clone, Debug, PartialEq)]
         pub struct Config {
             $(#[doc = $group_doc] pub $group: $type,)+
             /// The drive.
-            #[serde(skip)]
             pub drive: Settings,
-            /// Keys of the plant that change after the learning.
-            #[serde(skip)]
-            pub after: After,
+            /// Values that keys of the plant have after the learning, by the name of the key; the others keep theirs.
+            pub after: BTreeMap<&'static str, Value>,
         }
 
         impl Default for Config {
             fn default() -> Self {
-                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: After::default() };
+                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: BTreeMap::new() };
                 // The saliency of the simulated motor is known, and so are its tables at 0.7 A.
                 config.drive.injection.synchronous.allow_unlearned = true;
                 config.calibrate();
                 config
+            }
+        }
+
+        impl Config {
+            /// Gives the settings of the plant the values of the keys; those that are unset stay.
+            pub(super) fn copy_to(&self, $plant: &mut PlantSettings, $iron: &mut IronSettings) {
+                $($($(self.$group.$field.copy_to(&mut $place);)?)+)+
             }
         }
 
@@ -103,44 +111,45 @@ macro_rules! keys {
 }
 
 keys! {
+    |plant, iron|
     /// The motor: T equivalent circuit of Figure 21, values of Table 5. The drive is set to the same values.
     "motor." motor: MotorConfig {
         /// Stator resistance.
-        r_s: f64 = 5.4, [0.001 .. 1000], "ohm";
+        r_s: f64 = 5.4, [0.001 .. 1000], "ohm" => plant.machine.rs;
         /// Rotor resistance, referred to the stator.
-        r_r: f64 = 1.1, [0.001 .. 1000], "ohm";
+        r_r: f64 = 1.1, [0.001 .. 1000], "ohm" => plant.machine.rr;
         /// Leakage inductance of the stator.
-        l_ls: f64 = 0.0276, [1e-6 .. 10], "H";
+        l_ls: f64 = 0.0276, [1e-6 .. 10], "H" => plant.machine.lls;
         /// Leakage inductance of the rotor, referred to the stator.
-        l_lr: f64 = 0.0276, [1e-6 .. 10], "H";
+        l_lr: f64 = 0.0276, [1e-6 .. 10], "H" => plant.machine.llr;
         /// Magnetising inductance.
-        l_m: f64 = 0.1771, [1e-5 .. 100], "H";
+        l_m: f64 = 0.1771, [1e-5 .. 100], "H" => plant.machine.lm;
         /// Pairs of poles.
-        pole_pairs: u32 = 2, [1 .. 50], "";
+        pole_pairs: u32 = 2, [1 .. 50], "" => plant.machine.pole_pairs;
         /// Inertia of rotor and load (assumed; not in the source).
-        inertia: f64 = 0.012, [1e-6 .. 1000], "kg m2";
+        inertia: f64 = 0.012, [1e-6 .. 1000], "kg m2" => plant.mechanics.inertia;
         /// Viscous friction (assumed; not in the source).
-        friction: f64 = 0.001, [0 .. 10], "Nm s/rad";
+        friction: f64 = 0.001, [0 .. 10], "Nm s/rad" => plant.mechanics.friction;
     }
     /// Differences of the motor from the textbook machine; all of them are assumed.
     "saliency." saliency: SaliencyConfig {
         /// Saliency fixed to the rotor flux, at the flux psi_n.
-        a_psi: f64 = -0.035, [-0.25 .. 0.25], "";
+        a_psi: f64 = -0.035, [-0.25 .. 0.25], "" => plant.saliency.a_psi;
         /// Saliency that follows the stator current; unset: 0.036 1/A with the dissertation's motor, in inverse proportion
         /// to the rated current.
-        b1: Option<f64> = None, [-10 .. 10], "1/A";
+        b1: Option<f64> = None, [-10 .. 10], "1/A" => plant.saliency.b1;
         /// Current beyond which that part does not grow; unset: 5 A with the dissertation's motor, in proportion to the
         /// rated current.
-        hold_a: Option<f64> = None, [0.01 .. 10000], "A";
+        hold_a: Option<f64> = None, [0.01 .. 10000], "A" => plant.saliency.hold_a;
         /// Flux at which a_psi holds; unset: that of 0.7 A with the dissertation's motor, of a current in proportion to
         /// the rated one.
         psi_n: Option<f64> = None, [0.0001 .. 100], "Wb";
         /// Weight of the high-frequency rotor resistance of Eq. 3.8.
-        chi: f64 = 0.0, [0 .. 10], "";
+        chi: f64 = 0.0, [0 .. 10], "" => plant.saliency.chi;
         /// Saliency fixed to the stator; positive is low inductance along its axis.
-        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "";
+        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "" => plant.saliency.stator_fixed;
         /// Axis of that saliency, electrical, from phase a.
-        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg";
+        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg" => plant.saliency.stator_fixed_deg;
     }
     /// Choice of the machine model.
     "" model: ModelConfig {
@@ -153,152 +162,152 @@ keys! {
     /// The iron, with plant other than a; unset: that of the family. A positive saliency is low inductance along the axis.
     "iron." iron: IronConfig {
         /// Flux at which saturation and teeth hold; unset: that of flux_level.
-        psi_n: Option<f64> = None, [0.0001 .. 100], "Wb";
+        psi_n: Option<f64> = None, [0.0001 .. 100], "Wb" => iron.psi_n;
         /// Unsaturated magnetising inductance over the chord inductance at psi_n.
-        saturation: Option<f64> = None, [1 .. 10], "";
+        saturation: Option<f64> = None, [1 .. 10], "" => iron.saturation;
         /// Exponent of the main-flux curve.
-        exponent: Option<u32> = None, [2 .. 12], "";
+        exponent: Option<u32> = None, [2 .. 12], "" => iron.exponent;
         /// Whether motor.l_m is the chord inductance at psi_n; otherwise it is the unsaturated one.
-        chord: bool = true, [switch], "";
+        chord: bool = true, [switch], "" => iron.chord;
         /// Saliency by saturated teeth at psi_n.
-        teeth: Option<f64> = None, [-0.25 .. 0.25], "";
+        teeth: Option<f64> = None, [-0.25 .. 0.25], "" => iron.teeth;
         /// What the teeth follow: 0 rotor flux, 1 air-gap flux, between them part of the way.
-        teeth_gap: Option<f64> = None, [0 .. 1], "";
+        teeth_gap: Option<f64> = None, [0 .. 1], "" => iron.teeth_gap;
         /// Constant turn of the axis of the teeth ahead of that flux.
-        teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg";
+        teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg" => iron.teeth_turn_deg;
         /// Turn of the axis of the teeth by load, per torque current behind a lag of 20 Hz.
-        teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A";
+        teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A" => iron.teeth_turn_deg_per_a;
         /// Relative loss of stator leakage inductance by current.
-        leakage_saturation: Option<f64> = None, [0 .. 50], "1/A";
+        leakage_saturation: Option<f64> = None, [0 .. 50], "1/A" => iron.leakage_saturation;
         /// Relative loss of rotor leakage inductance by current.
-        rotor_leakage_saturation: Option<f64> = None, [0 .. 50], "1/A";
+        rotor_leakage_saturation: Option<f64> = None, [0 .. 50], "1/A" => iron.rotor_leakage_saturation;
         /// Rotor resistance at high frequency over that at slip frequency (deep bars).
-        skin_ratio: Option<f64> = None, [1 .. 20], "";
+        skin_ratio: Option<f64> = None, [1 .. 20], "" => iron.skin_ratio;
         /// Rotor leakage inductance lost at high frequency.
-        skin_leakage: Option<f64> = None, [0 .. 10], "H";
+        skin_leakage: Option<f64> = None, [0 .. 10], "H" => iron.skin_leakage;
         /// Saliency that turns with the bars of the rotor.
-        slots: f64 = 0.0, [-0.1 .. 0.1], "";
+        slots: f64 = 0.0, [-0.1 .. 0.1], "" => iron.slots;
         /// Bars of the rotor.
-        bars: u32 = 28, [4 .. 400], "";
+        bars: u32 = 28, [4 .. 400], "" => iron.bars;
         /// Saliency fixed to the stator.
-        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "";
+        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "" => iron.stator_fixed;
         /// Axis of that saliency, electrical, from phase a.
-        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg";
+        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg" => iron.stator_fixed_deg;
         /// Resistance of the iron losses across the main flux; unset: none.
-        loss: Option<f64> = None, [1 .. 1e6], "ohm";
+        loss: Option<f64> = None, [1 .. 1e6], "ohm" => iron.loss;
     }
     /// Resistances that rise with time, towards their final value.
     "warming." warming: WarmingConfig {
         /// Relative rise of the stator resistance.
-        r_s: f64 = 0.0, [-0.5 .. 2], "";
+        r_s: f64 = 0.0, [-0.5 .. 2], "" => plant.warming.rs;
         /// Relative rise of the rotor resistance.
-        r_r: f64 = 0.0, [-0.5 .. 2], "";
+        r_r: f64 = 0.0, [-0.5 .. 2], "" => plant.warming.rr;
         /// Time constant.
-        time_constant_s: f64 = 60.0, [0.01 .. 1e5], "s";
+        time_constant_s: f64 = 60.0, [0.01 .. 1e5], "s" => plant.warming.time_constant;
     }
     /// The inverter.
     "inverter." inverter: InverterConfig {
         /// Voltage of the dc link. The drive's nominal one is set to the same value.
-        dc_link_v: f64 = 311.0, [10 .. 1000], "V";
+        dc_link_v: f64 = 311.0, [10 .. 1000], "V" => plant.inverter.vdc;
         /// Time during which neither switch of a leg conducts, at each edge. The drive is set to the same value.
         dead_time_s: f64 = 2.2e-6, [0 .. 6e-6], "s";
         /// Time from the command to the first switch (section 3.9).
-        propagation_us: f64 = 2.2, [0 .. 10], "us";
+        propagation_us: f64 = 2.2, [0 .. 10], "us" => plant.inverter.propagation_us;
         /// Further voltage per phase that goes with the sign of the current and that no compensation
         /// knows of; unset: 1.64 V at 311 V, 40 % of the dead time's (assumed), in proportion to the dc link.
-        residual_v: Option<f64> = None, [0 .. 20], "V";
+        residual_v: Option<f64> = None, [0 .. 20], "V" => plant.inverter.residual_v;
         /// Further dead time of which the drive does not know; not below minus the dead time.
         extra_dead_time_s: f64 = 0.0, [-6e-6 .. 6e-6], "s";
         /// Capacitance of the output node of each leg; not with switched.
-        node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F";
+        node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F" => plant.inverter.node_capacitance;
         /// Resistance of a switch that conducts.
-        on_resistance: f64 = 0.0, [0 .. 100], "ohm";
+        on_resistance: f64 = 0.0, [0 .. 100], "ohm" => plant.inverter.on_resistance;
         /// Resistance of line and winding of phase b beyond that of phase a; not with switched.
-        more_ohm_b: f64 = 0.0, [-10 .. 10], "ohm";
+        more_ohm_b: f64 = 0.0, [-10 .. 10], "ohm" => plant.inverter.more_ohm[1];
         /// Resistance of line and winding of phase c beyond that of phase a; not with switched.
-        more_ohm_c: f64 = 0.0, [-10 .. 10], "ohm";
+        more_ohm_c: f64 = 0.0, [-10 .. 10], "ohm" => plant.inverter.more_ohm[2];
         /// Dead time of leg b beyond that of leg a; not with switched.
-        more_dead_time_b_us: f64 = 0.0, [-1 .. 1], "us";
+        more_dead_time_b_us: f64 = 0.0, [-1 .. 1], "us" => plant.inverter.more_dead_time_us[1];
         /// Dead time of leg c beyond that of leg a; not with switched.
-        more_dead_time_c_us: f64 = 0.0, [-1 .. 1], "us";
+        more_dead_time_c_us: f64 = 0.0, [-1 .. 1], "us" => plant.inverter.more_dead_time_us[2];
         /// Phase that is interrupted between inverter and motor.
         open_phase: OpenPhase = OpenPhase::None, [OpenPhase], "";
         /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
-        switched: bool = false, [switch], "";
+        switched: bool = false, [switch], "" => plant.inverter.switched;
     }
     /// The dc link, whose nominal voltage is inverter.dc_link_v.
     "dc_link." dc_link: DcLinkConfig {
         /// Relative amplitude of a sine ripple on a stiff link.
-        ripple: f64 = 0.0, [0 .. 0.5], "";
+        ripple: f64 = 0.0, [0 .. 0.5], "" => plant.dc_link.ripple;
         /// Frequency of that ripple.
-        ripple_hz: f64 = 100.0, [0.1 .. 3000], "Hz";
+        ripple_hz: f64 = 100.0, [0.1 .. 3000], "Hz" => plant.dc_link.ripple_hz;
         /// Capacitor behind a rectifier, with no way back to the mains; 0 for a stiff link.
-        capacitor_f: f64 = 0.0, [0 .. 0.1], "F";
+        capacitor_f: f64 = 0.0, [0 .. 0.1], "F" => plant.dc_link.capacitor;
         /// Pulses of the rectifier per mains period: 2 or 6; 0 for a supply without ripple.
-        pulses: u32 = 6, [0 .. 6], "";
+        pulses: u32 = 6, [0 .. 6], "" => plant.dc_link.pulses;
         /// Frequency of the mains.
-        mains_hz: f64 = 50.0, [1 .. 1000], "Hz";
+        mains_hz: f64 = 50.0, [1 .. 1000], "Hz" => plant.dc_link.mains_hz;
         /// Resistance of mains and rectifier.
-        source: f64 = 1.0, [0.01 .. 1000], "ohm";
+        source: f64 = 1.0, [0.01 .. 1000], "ohm" => plant.dc_link.source;
         /// Resistance more while the precharge relay is open; 0 without one.
-        precharge: f64 = 0.0, [0 .. 1e5], "ohm";
+        precharge: f64 = 0.0, [0 .. 1e5], "ohm" => plant.dc_link.precharge;
         /// Start of a mains outage.
-        outage_at_s: f64 = 0.0, [0 .. 1e6], "s";
+        outage_at_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.outage_at;
         /// Duration of the outage; 0 for none.
-        outage_s: f64 = 0.0, [0 .. 1e6], "s";
+        outage_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.outage;
         /// Start of a sag of the mains.
-        sag_at_s: f64 = 0.0, [0 .. 1e6], "s";
+        sag_at_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.sag_at;
         /// Duration of the sag; 0 for none.
-        sag_s: f64 = 0.0, [0 .. 1e6], "s";
+        sag_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.sag;
         /// Peak of the rectified mains meanwhile.
-        sag_v: f64 = 230.0, [0 .. 1000], "V";
+        sag_v: f64 = 230.0, [0 .. 1000], "V" => plant.dc_link.sag_v;
         /// Time in which the sag comes, and goes.
-        sag_ramp_s: f64 = 0.01, [0.0001 .. 1e6], "s";
+        sag_ramp_s: f64 = 0.01, [0.0001 .. 1e6], "s" => plant.dc_link.sag_ramp;
         /// Power that others take from the link.
-        load_w: f64 = 0.0, [0 .. 1e6], "W";
+        load_w: f64 = 0.0, [0 .. 1e6], "W" => plant.dc_link.load;
         /// Voltage at which the brake chopper goes on by itself; unset: when the drive says so.
-        chopper_v: Option<f64> = None, [10 .. 1000], "V";
+        chopper_v: Option<f64> = None, [10 .. 1000], "V" => plant.dc_link.chopper_v;
         /// Resistor of the chopper.
-        chopper: f64 = 100.0, [0.1 .. 1e6], "ohm";
+        chopper: f64 = 100.0, [0.1 .. 1e6], "ohm" => plant.dc_link.chopper;
     }
     /// The sensors and their converters. The drive's scales are set to match, without the errors.
     "measurement." measurement: MeasurementConfig {
         /// End of the range of the current sensors.
-        range_a: f64 = 4.4727134, [0.01 .. 5000], "A";
+        range_a: f64 = 4.4727134, [0.01 .. 5000], "A" => plant.measurement.range_a;
         /// Noise of each channel, rms; unset: 5 mA with the dissertation's sensors, in proportion to the range.
-        noise_a: Option<f64> = None, [0 .. 10], "A";
+        noise_a: Option<f64> = None, [0 .. 10], "A" => plant.measurement.noise_a;
         /// Step of the converter, 7 to 16 bits over the range; unset: 12 bits.
-        lsb_a: Option<f64> = None, [1e-7 .. 50], "A";
+        lsb_a: Option<f64> = None, [1e-7 .. 50], "A" => plant.measurement.lsb_a;
         /// Corner of the analog filter of Figure 16, first order; 0 for none.
-        filter_hz: f64 = 5305.0, [0 .. 1e6], "Hz";
+        filter_hz: f64 = 5305.0, [0 .. 1e6], "Hz" => plant.measurement.filter_hz;
         /// Relative error of the gain of channel a.
-        gain_error_a: f64 = 0.0, [-0.5 .. 0.5], "";
+        gain_error_a: f64 = 0.0, [-0.5 .. 0.5], "" => plant.measurement.gain_error_a;
         /// Relative error of the gain of channel b.
-        gain_error_b: f64 = 0.0, [-0.5 .. 0.5], "";
+        gain_error_b: f64 = 0.0, [-0.5 .. 0.5], "" => plant.measurement.gain_error_b;
         /// Offset of channel a.
-        offset_a: f64 = 0.0, [-5 .. 5], "A";
+        offset_a: f64 = 0.0, [-5 .. 5], "A" => plant.measurement.offset_a;
         /// Offset of channel b.
-        offset_b: f64 = 0.0, [-5 .. 5], "A";
+        offset_b: f64 = 0.0, [-5 .. 5], "A" => plant.measurement.offset_b;
         /// Share of the current of phase b that channel a reads as well.
-        cross_talk_a: f64 = 0.0, [-0.2 .. 0.2], "";
+        cross_talk_a: f64 = 0.0, [-0.2 .. 0.2], "" => plant.measurement.cross_talk_a;
         /// Share of the current of phase a that channel b reads as well.
-        cross_talk_b: f64 = 0.0, [-0.2 .. 0.2], "";
+        cross_talk_b: f64 = 0.0, [-0.2 .. 0.2], "" => plant.measurement.cross_talk_b;
         /// Further lag of channel b, first order.
-        lag_b_us: f64 = 0.0, [0 .. 1000], "us";
+        lag_b_us: f64 = 0.0, [0 .. 1000], "us" => plant.measurement.lag_b_us;
         /// Relative error at the end of the range; it grows with the square of the current.
-        cubic_error: f64 = 0.0, [-0.3 .. 0.3], "";
+        cubic_error: f64 = 0.0, [-0.3 .. 0.3], "" => plant.measurement.cubic_error;
         /// Drift of the offset of channel a from the start on.
-        drift_a: f64 = 0.0, [-1 .. 1], "A/s";
+        drift_a: f64 = 0.0, [-1 .. 1], "A/s" => plant.measurement.drift_a;
         /// Drift of the offset of channel b from the start on.
-        drift_b: f64 = 0.0, [-1 .. 1], "A/s";
+        drift_b: f64 = 0.0, [-1 .. 1], "A/s" => plant.measurement.drift_b;
         /// Whether each sample is the mean of two conversions, in both zero vectors. The drive is set to the age of the mean.
-        both_zero_vectors: bool = false, [switch], "";
+        both_zero_vectors: bool = false, [switch], "" => plant.measurement.both_zero_vectors;
         /// Relative error of the gain of the dc-link voltage.
-        dc_gain_error: f64 = 0.0, [-0.5 .. 0.5], "";
+        dc_gain_error: f64 = 0.0, [-0.5 .. 0.5], "" => plant.measurement.dc_gain_error;
         /// Lag of the dc-link voltage, first order.
-        dc_lag_us: f64 = 0.0, [0 .. 1e5], "us";
+        dc_lag_us: f64 = 0.0, [0 .. 1e5], "us" => plant.measurement.dc_lag_us;
         /// Noise of the dc-link voltage, rms.
-        dc_noise_v: f64 = 0.0, [0 .. 100], "V";
+        dc_noise_v: f64 = 0.0, [0 .. 100], "V" => plant.measurement.dc_noise_v;
         /// End of the range of the dc link; unset: 450 V at 311 V, more in proportion to a higher dc link.
         dc_link_range_v: Option<f64> = None, [10 .. 2000], "V";
         /// Temperature of the heat sink.
@@ -316,20 +325,20 @@ keys! {
     /// What a shaft may have besides inertia, friction and load.
     "shaft." shaft: ShaftConfig {
         /// Static friction: the torque to break away, and that against the motion.
-        static_nm: f64 = 0.0, [0 .. 1000], "Nm";
+        static_nm: f64 = 0.0, [0 .. 1000], "Nm" => plant.mechanics.static_torque;
         /// Amplitude of a load torque that varies once a turn.
-        once_nm: f64 = 0.0, [0 .. 1000], "Nm";
+        once_nm: f64 = 0.0, [0 .. 1000], "Nm" => plant.mechanics.once_torque;
         /// Stops on both sides, this far from where the shaft begins; 0: it turns freely.
         stops_turns: f64 = 0.0, [0 .. 1000], "turns";
         /// Stiffness of a stop.
-        stop_stiffness: f64 = 100.0, [0 .. 1e9], "Nm/rad";
+        stop_stiffness: f64 = 100.0, [0 .. 1e9], "Nm/rad" => plant.mechanics.stop_stiffness;
         /// Inertia behind an elastic coupling, where the load acts; 0 for a rigid shaft. motor.inertia is then that before
         /// it.
-        load_inertia: f64 = 0.0, [0 .. 1000], "kg m2";
+        load_inertia: f64 = 0.0, [0 .. 1000], "kg m2" => plant.mechanics.load_inertia;
         /// Stiffness of the coupling; a resonance of at most 500 Hz.
-        stiffness: f64 = 100.0, [0.001 .. 1e9], "Nm/rad";
+        stiffness: f64 = 100.0, [0.001 .. 1e9], "Nm/rad" => plant.mechanics.stiffness;
         /// Damping of the coupling.
-        damping: f64 = 0.0, [0 .. 1000], "Nm s/rad";
+        damping: f64 = 0.0, [0 .. 1000], "Nm s/rad" => plant.mechanics.damping;
     }
     /// References, for experiments that do not bring their own.
     "reference." reference: ReferenceConfig {

@@ -14,20 +14,8 @@ use crate::error::Error;
 static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
 
 /// What a file of one's own must say, because no rule gives it and nothing of another motor may stand in for it.
-const NEEDED: [&str; 12] = [
-    "nameplate.power_w",
-    "nameplate.voltage_v",
-    "nameplate.current_a",
-    "nameplate.frequency_hz",
-    "nameplate.speed_rpm",
-    "motor.r_s",
-    "motor.r_r",
-    "motor.l_ls",
-    "motor.l_lr",
-    "motor.l_m",
-    "motor.pole_pairs",
-    "inverter.dc_link_v",
-];
+const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
+    motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
 /// Where numbers of a motor come from.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -118,7 +106,7 @@ impl Motor {
     pub fn apply(&self, config: &mut Config) -> Result<(), Error> {
         let (settings, name) = (self.settings(), &self.name);
         let missing: Vec<_> =
-            NEEDED.into_iter().filter(|key| self.is_own() && !self.says(key)).collect();
+            NEEDED.split(' ').filter(|key| self.is_own() && !self.says(key)).collect();
         if !missing.is_empty() {
             let missing = missing.join(", ");
             return Err(Error::Refused(format!("motor {name}: these are missing: {missing}")));
@@ -149,20 +137,13 @@ impl Motor {
         let range_a = four_digits(config.amperes(base.measurement.range_a));
         let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
         let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
+        let word = |word: &str| Value::Word(word.to_owned());
         let all = [
-            (
-                "current_plant",
-                Value::Word("motor".to_owned()),
-                "by rule: as a commissioned drive has it",
-            ),
+            ("current_plant", word("motor"), "by rule: as a commissioned drive has it"),
             ("measurement.range_a", range_a, "by rule: 1.24 times the rated current, peak"),
             ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
             ("prepare.learn", Value::Switch(true), "by rule: the drive has not learned this motor"),
-            (
-                flux,
-                Value::Word("high".to_owned()),
-                "by rule: rated flux, or what the current allows",
-            ),
+            (flux, word("high"), "by rule: rated flux, or what the current allows"),
         ];
         all.into_iter().filter(|(key, ..)| self.is_own() && !self.says(key)).collect()
     }

@@ -145,37 +145,22 @@ impl<T: Field> Field for Option<T> {
     }
 }
 
-/// An enumeration whose variants are written as words.
-macro_rules! words {
-    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $word:literal,)+ }) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-        pub enum $name { $($(#[$variant_doc])* #[serde(rename = $word)] $variant,)+ }
-
-        impl $name {
-            /// How the variants are written.
-            pub const WORDS: &'static [&'static str] = &[$($word,)+];
-
-            /// How it is written.
-            pub const fn word(self) -> &'static str {
-                match self { $(Self::$variant => $word,)+ }
-            }
-        }
-
-        impl crate::config::value::Field for $name {
-            fn to_value(&self) -> crate::config::value::Value {
-                crate::config::value::Value::Word(self.word().to_owned())
-            }
-            fn from_value(
-                value: &crate::config::value::Value,
-                _: &crate::config::value::Allowed,
-            ) -> Result<Self, &'static str> {
-                match value {
-                    $(crate::config::value::Value::Word(word) if word == $word => Ok(Self::$variant),)+
-                    _ => Err("not one of the words"),
-                }
-            }
-        }
-    };
+/// A value of the configuration that the plant has, too.
+pub trait CopyTo<T> {
+    /// Copies it; what is not set leaves the place as it is.
+    fn copy_to(self, place: &mut T);
 }
-pub(crate) use words;
+
+impl<T> CopyTo<T> for T {
+    fn copy_to(self, place: &mut T) {
+        *place = self;
+    }
+}
+
+impl<T> CopyTo<T> for Option<T> {
+    fn copy_to(self, place: &mut T) {
+        if let Some(value) = self {
+            *place = value;
+        }
+    }
+}

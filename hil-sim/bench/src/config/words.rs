@@ -1,10 +1,13 @@
 //! The words that keys of the bench may have as values.
 
-use super::value::words;
+use drive_settings::value::Words;
+use drive_settings::words;
+
+use super::value::{Allowed, Field, Value};
 
 words! {
     /// Load on the shaft.
-    LoadMode {
+    pub enum LoadMode {
         /// Shaft blocked.
         Locked = "locked",
         /// Turns freely against `load.torque_nm`.
@@ -16,7 +19,7 @@ words! {
 
 words! {
     /// Model of the motor: model A with its assumed saliency, or a family of iron from which saliency emerges.
-    PlantModel {
+    pub enum PlantModel {
         /// Model A.
         A = "a",
         /// Energy model, linear iron.
@@ -44,7 +47,7 @@ words! {
 
 words! {
     /// Flux at which the numbers of a family hold.
-    FluxLevel {
+    pub enum FluxLevel {
         /// That of a direct current of 0.7 A with the dissertation's motor, in proportion to the rated current.
         Low = "low",
         /// The smaller of the rated flux and that of 0.55 times the peak of the rated current.
@@ -54,7 +57,7 @@ words! {
 
 words! {
     /// Which runs the battery consists of.
-    BatteryRuns {
+    pub enum BatteryRuns {
         /// The twelve kinds.
         Kinds = "kinds",
         /// Load steps of battery.load_share.
@@ -72,7 +75,7 @@ words! {
 
 words! {
     /// What the drive is asked for in runs over the whole speed range.
-    RangeKind {
+    pub enum RangeKind {
         /// Constant torque at constant speed.
         Constant = "constant",
         /// Steps of the torque between its limits at constant speed.
@@ -102,7 +105,7 @@ words! {
 
 words! {
     /// A phase that is interrupted between inverter and motor.
-    OpenPhase {
+    pub enum OpenPhase {
         /// None.
         None = "none",
         /// Phase a.
@@ -113,3 +116,20 @@ words! {
         C = "c",
     }
 }
+
+macro_rules! fields {
+    ($($type:ident)+) => {$(
+        impl Field for $type {
+            fn to_value(&self) -> Value {
+                Value::Word(self.word().to_owned())
+            }
+
+            fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
+                let is = |word: &&str| matches!(value, Value::Word(given) if given == word);
+                let place = Self::WORDS.iter().position(is);
+                place.map(Self::at).ok_or("not one of the words")
+            }
+        }
+    )+};
+}
+fields!(LoadMode PlantModel FluxLevel BatteryRuns RangeKind OpenPhase);

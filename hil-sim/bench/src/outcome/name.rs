@@ -15,16 +15,21 @@ pub fn of_curve(panel: &str, series: &str) -> String {
     joined(&[quantity, series, unit])
 }
 
+#[rustfmt::skip] // one a line would fill a page
+const UNITS: [(&str, &str); 19] = [
+    ("_deg", "°"), ("_pct", "%"), ("_nm", "Nm"), ("_ma", "mA"), ("_ua", "µA"), ("_a", "A"), ("_v", "V"), ("_ms", "ms"),
+    ("_us", "µs"), ("_s", "s"), ("_rpm", "rpm"), ("_hz", "Hz"), ("_wb", "Wb"), ("_ohm", "Ω"), ("_milli", "10⁻³"),
+    ("_db", "dB"), ("_w", "W"), ("_h", "H"), ("_c", "°C"),
+];
+
+/// The name without the unit at its end, and the unit as it is shown; none where it ends in no unit.
+pub fn split_unit(name: &str) -> Option<(&str, &'static str)> {
+    UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)))
+}
+
 /// A name in words: `angle_error_rms_deg` becomes `angle error rms (°)`.
 pub fn words(name: &str) -> String {
-    #[rustfmt::skip] // one a line would fill a page
-    const UNITS: [(&str, &str); 18] = [
-        ("_deg", "°"), ("_pct", "%"), ("_nm", "Nm"), ("_ma", "mA"), ("_ua", "µA"), ("_a", "A"), ("_v", "V"), ("_ms", "ms"),
-        ("_us", "µs"), ("_s", "s"), ("_rpm", "rpm"), ("_hz", "Hz"), ("_wb", "Wb"), ("_ohm", "Ω"), ("_milli", "10⁻³"),
-        ("_db", "dB"), ("_w", "W"), ("_h", "H"),
-    ];
-    let unit = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, unit)));
-    match unit.filter(|(quantity, _)| !quantity.ends_with("_per")) {
+    match split_unit(name).filter(|(quantity, _)| !quantity.ends_with("_per")) {
         Some((quantity, unit)) => format!("{} ({unit})", quantity.replace('_', " ")),
         None => name.replace('_', " "),
     }

@@ -3,6 +3,7 @@
 use serde::ser::{Serialize, Serializer};
 
 use super::Step;
+use crate::columns;
 
 /// A table.
 #[derive(Clone, Debug, Default, serde::Serialize)]
@@ -67,19 +68,20 @@ impl Table {
         self
     }
 
+    /// Whether a column has numbers.
+    pub fn is_numeric(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row.get(column).is_some_and(Cell::is_number))
+    }
+
     /// The standard table of the levels of a torque experiment.
     pub fn of_steps(steps: &[Step]) -> Self {
-        let heads = ["iq reference (A)", "iq (A)", "torque (Nm)", "mean angle error (°)"];
-        let mut table = Self::new("Levels", &heads);
-        for step in steps {
-            table.row([
-                Cell::fixed(step.iq_ref_a, 3),
-                of_level(step.iq_a, 3),
-                of_level(step.torque_nm, 3),
-                of_level(step.angle_error_mean_deg, 2),
-            ]);
-        }
-        table
+        let columns = columns![|_, step: &Step|
+            "iq reference (A)" => Cell::fixed(step.iq_ref_a, 3);
+            "iq (A)" => of_level(step.iq_a, 3);
+            "torque (Nm)" => of_level(step.torque_nm, 3);
+            "mean angle error (°)" => of_level(step.angle_error_mean_deg, 2);
+        ];
+        Self::of("Levels", &columns, steps.iter().enumerate())
     }
 }
 

@@ -25,6 +25,15 @@ const R: IronSettings =
 const G: IronSettings = IronSettings { teeth_gap: 1.0, ..R };
 const M6: IronSettings = IronSettings { saturation: 1.3, exponent: 6, ..LINEAR };
 const M4: IronSettings = IronSettings { exponent: 4, ..M6 };
+const F: IronSettings = IronSettings {
+    saturation: 1.1,
+    exponent: 6,
+    leakage_saturation: 0.05,
+    rotor_leakage_saturation: 0.10,
+    skin_ratio: 3.5,
+    skin_leakage: 0.005,
+    ..G
+};
 
 /// All families.
 #[rustfmt::skip] // one a line
@@ -38,18 +47,5 @@ pub const FAMILIES: [Family; 10] = [
     Family { name: "m6", about: "main flux saturated by 1.3 at nominal flux, n = 6", iron: M6 },
     Family { name: "m4b", about: "as m4; stator leakage saturates too", iron: IronSettings { leakage_saturation: LEAKAGE, ..M4 } },
     Family { name: "m6b", about: "as m6; stator leakage saturates too", iron: IronSettings { leakage_saturation: LEAKAGE, ..M6 } },
-    Family {
-        name: "f",
-        about: "teeth on the air-gap flux, main flux saturated by 1.1, n = 6, both leakages saturate, skin effect",
-        iron: IronSettings {
-            saturation: 1.1,
-            exponent: 6,
-            // These four bring the map of q at 2 A close to that of the study the family comes from.
-            leakage_saturation: 0.05,
-            rotor_leakage_saturation: 0.10,
-            skin_ratio: 3.5,
-            skin_leakage: 0.005,
-            ..G
-        },
-    },
+    Family { name: "f", about: "teeth on the air-gap flux, main flux saturated by 1.1, n = 6, both leakages saturate, skin effect", iron: F },
 ];

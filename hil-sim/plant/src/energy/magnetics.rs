@@ -129,10 +129,8 @@ impl Leakage {
     #[inline]
     fn current(&self, x: Complex) -> (Complex, Curvature) {
         if self.saturation == 0.0 {
-            return (
-                x * self.inverse,
-                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
-            );
+            let straight = Curvature { direct: self.inverse, ..Curvature::default() };
+            return (x * self.inverse, straight);
         }
         let squared = square(x);
         let length = squared.sqrt();
@@ -158,10 +156,8 @@ impl MainFlux {
     #[inline]
     fn current(&self, m: Complex) -> (Complex, Curvature) {
         if self.inverse_knee == 0.0 {
-            return (
-                m * self.inverse,
-                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
-            );
+            let straight = Curvature { direct: self.inverse, ..Curvature::default() };
+            return (m * self.inverse, straight);
         }
         let knee_squared = self.inverse_knee * self.inverse_knee;
         let y = square(m) * knee_squared;

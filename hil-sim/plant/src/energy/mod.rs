@@ -68,7 +68,7 @@ impl EnergyMachine {
     /// [`PlantError::OutOfRange`].
     pub fn new(m: &MachineSettings, iron: &IronSettings) -> Result<Self, PlantError> {
         m.check()?;
-        iron.check(m)?;
+        iron.check_in(m)?;
         let pole_pairs = f64::from(m.pole_pairs);
         let (ls, lr) = (m.lls + m.lm, m.llr + m.lm);
         let relative = (ls - m.lm * m.lm / lr) / (m.lls * m.lls);

@@ -2,15 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Accepted, Command, Drive, State};
+use drive_core::Accepted;
 
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
-use crate::config::{Config, open_phase};
-use crate::error::Error;
-use crate::experiments::LOST_DEG;
-use crate::plant::{Complex, Load, Plant, PlantSettings};
-use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
-use crate::stats::Stats;
+use crate::config::open_phase;
+use crate::plant::{Complex, Plant, PlantSettings};
+use crate::prelude::*;
 
 /// An error beyond this, degrees, is wrong, unless the run says otherwise.
 const WRONG_DEG: f64 = 30.0;
@@ -79,9 +76,8 @@ pub struct Bench {
     /// The record of the run, where one is wanted.
     pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
-    wrong: Lasting,
-    lost: Lasting,
-    flux_off: Lasting,
+    /// How long the angle is wrong and lost, and the flux off.
+    lasting: [Lasting; 3],
     /// Whether angle or flux was off at any time since the first reference, and whether one is now.
     was_off: bool,
     is_off: bool,
@@ -116,9 +112,7 @@ impl Bench {
             wrong_deg: WRONG_DEG,
             trace: None,
             counts: vec![0; LARGEST_CLASS + 1],
-            wrong: Lasting::default(),
-            lost: Lasting::default(),
-            flux_off: Lasting::default(),
+            lasting: Default::default(),
             was_off: false,
             is_off: false,
             turned: false,
@@ -194,7 +188,7 @@ impl Bench {
     pub fn turn_flux(&mut self, degrees: f64) {
         self.rig.plant.turn_rotor_flux(degrees.to_radians());
         (self.turned, self.counted_from) = (true, None);
-        (self.wrong, self.lost, self.flux_off) = Default::default();
+        self.lasting = Default::default();
     }
 
     /// Runs for some seconds, or until the drive no longer regulates; says whether it still does.
@@ -213,9 +207,8 @@ impl Bench {
             self.error_deg = error;
             let (wrong, flux_off) =
                 (error.abs() > self.wrong_deg, share < FLUX_OFF.0 || share > FLUX_OFF.1);
-            self.wrong.push(t, wrong);
-            self.lost.push(t, error.abs() > LOST_DEG);
-            self.flux_off.push(t, flux_off);
+            let states = [wrong, error.abs() > LOST_DEG, flux_off];
+            self.lasting.iter_mut().zip(states).for_each(|(lasting, is)| lasting.push(t, is));
             self.is_off = wrong || flux_off;
             if !self.turned {
                 self.trial.largest_deg = self.trial.largest_deg.max(error.abs());
@@ -237,9 +230,7 @@ impl Bench {
             trial.trip = Some(fault.code());
             trial.sound_stop = !self.was_off;
         }
-        trial.wrong_s = self.wrong.longest;
-        trial.lost_s = self.lost.longest;
-        trial.flux_off_s = self.flux_off.longest;
+        [trial.wrong_s, trial.lost_s, trial.flux_off_s] = self.lasting.map(|state| state.longest);
         trial.stuck = still && self.is_off && trial.is_silent();
         let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);
         trial.histogram = classes.collect();

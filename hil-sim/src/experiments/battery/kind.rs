@@ -1,12 +1,10 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
-use drive_core::{Accepted, Command, Drive, Mode};
-use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
+use drive_core::Accepted;
 
 use super::disturbed::Asymmetry;
-use crate::config::{BatteryRuns, Config, PlantModel};
-use crate::error::Error;
+use crate::config::BatteryRuns;
+use crate::prelude::*;
 
 /// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,29 +57,6 @@ pub const KINDS: [Kind; 12] = [
     Kind::Load,
 ];
 
-/// The other lists of kinds, likewise.
-const FORCED: [Kind; 3] = [Kind::Forced(0), Kind::Forced(60), Kind::Forced(300)];
-const RESTLESS: [Kind; 6] = [
-    Kind::Restless { hz: 100, forced: false },
-    Kind::Restless { hz: 600, forced: false },
-    Kind::Restless { hz: 6000, forced: false },
-    Kind::Restless { hz: 100, forced: true },
-    Kind::Restless { hz: 600, forced: true },
-    Kind::Restless { hz: 6000, forced: true },
-];
-/// The last two need a motor of iron.
-const DRAGGED: [Kind; 9] = [
-    Kind::Dragged(Asymmetry::None),
-    Kind::Dragged(Asymmetry::GainA(10)),
-    Kind::Dragged(Asymmetry::GainA(-10)),
-    Kind::Dragged(Asymmetry::GainB(10)),
-    Kind::Dragged(Asymmetry::GainB(-10)),
-    Kind::Dragged(Asymmetry::CrossTalk(5)),
-    Kind::Dragged(Asymmetry::CrossTalk(-5)),
-    Kind::Dragged(Asymmetry::StatorFixed(6)),
-    Kind::Dragged(Asymmetry::StatorFixed(-6)),
-];
-
 /// The kinds that a configuration asks for, and how many runs there are unless it says.
 pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     match config.battery.runs {
@@ -90,12 +65,21 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
             (vec![Kind::LoadStep((1e3 * config.battery.load_share).round() as u16)], 32)
         }
         BatteryRuns::Hold => (vec![Kind::Hold], 64),
-        BatteryRuns::Forced => (FORCED.to_vec(), 90 * FORCED.len()),
-        BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
+        BatteryRuns::Forced => ([0, 60, 300].map(Kind::Forced).to_vec(), 90 * 3),
+        BatteryRuns::Restless => {
+            let of = |forced| [100, 600, 6000].map(|hz| Kind::Restless { hz, forced });
+            ([false, true].map(of).concat(), 16 * 6)
+        }
         BatteryRuns::Dragged => {
-            // Model A has no saliency that is fixed to the stator.
-            let ends = if config.model.plant == PlantModel::A { 7 } else { DRAGGED.len() };
-            (DRAGGED[..ends].to_vec(), 24 * ends)
+            let (a, b) = ([10, -10].map(Asymmetry::GainA), [10, -10].map(Asymmetry::GainB));
+            let mut all = [a, b, [5, -5].map(Asymmetry::CrossTalk)].concat();
+            all.insert(0, Asymmetry::None);
+            if config.model.plant != PlantModel::A {
+                // Model A has no saliency that is fixed to the stator.
+                all.extend([6, -6].map(Asymmetry::StatorFixed));
+            }
+            let runs = 24 * all.len();
+            (all.into_iter().map(Kind::Dragged).collect(), runs)
         }
     }
 }
@@ -248,7 +232,7 @@ impl Kind {
 
     /// The parts of a run, drawn at random.
     pub fn parts(self, random: &mut impl Rng) -> Vec<Part> {
-        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+        let sign = sign(random);
         match self {
             Self::Constant(_) => {
                 vec![Part::constant(sign * random.random_range(LEAST_A..=MOST_A), 3.0)]
@@ -256,11 +240,10 @@ impl Kind {
             Self::Hold => {
                 vec![Part::constant(sign * random.random_range(0.75..=1.0) * MOST_A, 6.0)]
             }
-            Self::Steps => std::iter::repeat_with(|| {
-                Part::constant(random.random_range(-MOST_A..=MOST_A), LEVEL_S)
-            })
-            .take(6)
-            .collect(),
+            Self::Steps => {
+                let mut i_q = || random.random_range(-MOST_A..=MOST_A);
+                (0..6).map(|_| Part::constant(i_q(), LEVEL_S)).collect()
+            }
             Self::Reversals => (0..4)
                 .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, 1.0))
                 .collect(),
@@ -274,13 +257,11 @@ impl Kind {
             }
             Self::Load | Self::LoadStep(_) => {
                 let rpm = LOAD_RPM[random.random_range(0..LOAD_RPM.len())];
-                Part::loaded(
-                    rpm,
-                    match self {
-                        Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
-                        _ => LoadTorque::Nm(sign * LOAD_NM),
-                    },
-                )
+                let load = match self {
+                    Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
+                    _ => LoadTorque::Nm(sign * LOAD_NM),
+                };
+                Part::loaded(rpm, load)
             }
             Self::Forced(_) => {
                 let i_q = sign * random.random_range(0.0..=MOST_A);
@@ -321,8 +302,7 @@ impl Kind {
 
 /// A turn of the flux, degrees, of either sign.
 fn turn(random: &mut impl Rng) -> f64 {
-    let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-    sign * random.random_range(TURN_DEG.0..=TURN_DEG.1)
+    sign(random) * random.random_range(TURN_DEG.0..=TURN_DEG.1)
 }
 
 /// The torque current that a drive which is off would take when it is asked for this one, A peak.
@@ -340,9 +320,6 @@ pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
     use crate::config::Value;
 
@@ -358,7 +335,7 @@ mod tests {
         config.battery.load_share = 0.62;
         let (kinds, runs) = chosen(&config);
         assert_eq!((kinds.as_slice(), runs), (&[Kind::LoadStep(620)][..], 32));
-        let parts = kinds[0].parts(&mut Xoshiro256PlusPlus::seed_from_u64(1));
+        let parts = kinds[0].parts(&mut seeded(1));
         let loads: Vec<f64> =
             parts.iter().map(|part| part.load.newton_metres(&config).abs()).collect();
         assert_eq!((loads[0], loads[2]), (0.0, 0.0));
@@ -384,9 +361,11 @@ mod tests {
     /// turned once.
     #[test]
     fn restless_commands_never_rest() {
-        for kind in RESTLESS {
+        let mut config = Config::default();
+        config.battery.runs = BatteryRuns::Restless;
+        for kind in chosen(&config).0 {
             let Kind::Restless { hz, forced } = kind else { continue };
-            let parts = kind.parts(&mut Xoshiro256PlusPlus::seed_from_u64(3));
+            let parts = kind.parts(&mut seeded(3));
             assert_eq!(parts.len(), 5 * usize::from(hz));
             let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
             assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");

@@ -2,16 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Drive, Mode, State};
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::bench::Bench;
 use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, torque_nm};
 use super::trial::{Refused, Trial};
-use crate::config::{Config, plant_settings};
-use crate::error::Error;
-use crate::plant::{Load, PlantSettings};
+use crate::plant::PlantSettings;
+use crate::prelude::*;
 
 /// Time after the first reference that the statistics of the error leave out, s: the angle settles.
 const SETTLING_S: f64 = 0.5;
@@ -55,7 +50,7 @@ pub fn trial(
     kind: Kind,
     seed: u64,
 ) -> Result<Trial, Error> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut random = seeded(seed);
     let parts = kind.parts(&mut random);
     let nominal = nominal_limit_a(config);
     let (load, mode) = match kind.shaft() {
@@ -209,7 +204,7 @@ mod tests {
         let (mut into, mut out_of, mut rates) = (0, 0, Vec::new());
         for seed in 0..12 {
             let kind = Kind::Dragged(Asymmetry::None);
-            let mut parts = kind.parts(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+            let mut parts = kind.parts(&mut seeded(seed));
             let dragged = parts.iter().rev().find(|part| part.shaft_rpm.is_some()).unwrap();
             let (rpm, sign) = (dragged.shaft_rpm.unwrap(), dragged.reference.0.signum());
             rates.push((rpm.1 - rpm.0).abs() / dragged.seconds);

@@ -3,10 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::kind::Kind;
-use super::trial::{CLASSES_PER_DEG, Trial};
-use crate::columns;
-use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
-use crate::stats::Stats;
+use super::trial::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
+use crate::prelude::*;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference on. Lost: beyond 45° at \
@@ -16,177 +14,160 @@ pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the
     of two at all times before. Limited: the drive allows less torque current than the nominal limit. After the flux was \
     turned at once, wrong and flux off count from there, and the error no more.";
 
-/// The verdict.
-#[derive(Clone, Debug, Default)]
-pub struct Summary {
-    /// Angle error over all samples of all runs, degrees.
-    pub error: Stats,
-    /// The magnitude that 99 % of all samples stay below, to 0.1°; not a number without samples.
-    pub p99_deg: f64,
-    /// Runs.
-    pub runs: usize,
-    /// Lost runs.
-    pub lost: usize,
-    /// Runs wrong for long, and the longest time, s.
-    pub wrong: (usize, f64),
-    /// Runs beyond 45° for long, and the longest time, s.
-    pub lost_for_long: (usize, f64),
-    /// Runs with the flux off for long, and the longest time, s.
-    pub flux_off: (usize, f64),
-    /// Runs wrong or with the flux off for long, and those of them that were so to the end.
-    pub silent: usize,
-    /// See `silent`.
-    pub stuck: usize,
-    /// Runs stopped, by number of the fault.
-    pub trips: BTreeMap<u8, usize>,
-    /// Runs stopped although angle and flux were sound.
-    pub sound_stops: usize,
-    /// Runs with a drive that has learned a lower limit of the torque current.
-    pub limited: usize,
-    /// The least limit, in relation to the nominal one.
-    pub limit_share: Option<f64>,
-    /// Error of the torque of runs at constant torque, in relation to that at the nominal limit.
-    pub torque_error: Stats,
-    /// Starts refused, by number of the fault.
-    pub refused: BTreeMap<u8, usize>,
-}
+/// A time of a run, s, and the number of a fault.
+type Seconds = fn(&Trial) -> f64;
+type Number = fn(&Trial) -> Option<u8>;
 
-impl Summary {
+/// States that should not last: in the metrics, in the table, and how long they did, s.
+const LASTING: [(&str, &str, Seconds); 3] = [
+    ("wrong", "wrong (longest)", |trial| trial.wrong_s),
+    ("beyond_45_deg", "beyond 45° (longest)", |trial| trial.lost_s),
+    ("flux_off", "flux off (longest)", |trial| trial.flux_off_s),
+];
+/// Ends by a fault: all of them and each in the metrics, in the table, and the number of the fault.
+const ENDS: [(&str, &str, &str, Number); 2] = [
+    ("trips", "trips_by_fault", "trips, fault: runs", |trial| trial.trip),
+    ("refused_starts", "refused_by_fault", "refused, fault: runs", Trial::refused_by),
+];
+
+/// Runs that are judged together.
+pub struct Summary<'a>(Vec<&'a Trial>);
+
+impl<'a> Summary<'a> {
     /// That of these runs.
-    pub fn of<'a>(trials: impl IntoIterator<Item = &'a Trial>) -> Self {
-        let mut all = Self::default();
+    pub fn of(trials: impl IntoIterator<Item = &'a Trial>) -> Self {
+        Self(trials.into_iter().collect())
+    }
+
+    /// How many runs are so.
+    pub fn count(&self, is: impl Fn(&Trial) -> bool) -> usize {
+        self.0.iter().filter(|trial| is(trial)).count()
+    }
+
+    /// Angle error over all samples of all runs, degrees.
+    pub fn error(&self) -> Stats {
+        let mut error = Stats::default();
+        self.0.iter().for_each(|trial| error.add(&trial.error));
+        error
+    }
+
+    /// The magnitude that 99 % of all samples stay below, to 0.1°; not a number without samples.
+    pub fn p99_deg(&self) -> f64 {
         let mut histogram: BTreeMap<u32, u64> = BTreeMap::new();
-        for trial in trials {
-            all.runs += 1;
-            all.error.add(&trial.error);
-            all.lost += usize::from(trial.is_lost());
-            all.wrong.0 += usize::from(trial.is_wrong());
-            all.wrong.1 = all.wrong.1.max(trial.wrong_s);
-            all.lost_for_long.0 += usize::from(trial.is_lost_for_long());
-            all.lost_for_long.1 = all.lost_for_long.1.max(trial.lost_s);
-            all.flux_off.0 += usize::from(trial.is_flux_off());
-            all.flux_off.1 = all.flux_off.1.max(trial.flux_off_s);
-            all.silent += usize::from(trial.is_silent());
-            all.stuck += usize::from(trial.stuck);
-            all.sound_stops += usize::from(trial.sound_stop);
-            all.limited += usize::from(trial.is_limited());
-            all.limit_share = trial.limit_share.into_iter().chain(all.limit_share).reduce(f64::min);
-            trial.torque_error.into_iter().for_each(|error| all.torque_error.push(error));
-            trial.trip.into_iter().for_each(|fault| *all.trips.entry(fault).or_default() += 1);
-            trial
-                .refused_by()
-                .into_iter()
-                .for_each(|fault| *all.refused.entry(fault).or_default() += 1);
-            for &(class, count) in &trial.histogram {
-                *histogram.entry(class).or_default() += u64::from(count);
-            }
+        for &(class, count) in self.0.iter().flat_map(|trial| &trial.histogram) {
+            *histogram.entry(class).or_default() += u64::from(count);
         }
-        all.p99_deg = quantile(&histogram, 0.99);
-        all
+        let (all, mut below) = (histogram.values().sum::<u64>(), 0);
+        let reaches = |(_, count): &(&u32, &u64)| {
+            below += **count;
+            below as f64 >= 0.99 * all as f64
+        };
+        let class = histogram.iter().find(reaches);
+        class.map_or(f64::NAN, |(class, _)| f64::from(class + 1) / CLASSES_PER_DEG)
+    }
+
+    /// The least limit of the torque current that a drive has learned, in relation to the nominal one.
+    pub fn limit_share(&self) -> Option<f64> {
+        self.0.iter().filter_map(|trial| trial.limit_share).reduce(f64::min)
+    }
+
+    /// Number of runs by number of the fault.
+    fn by_fault(&self, of: Number) -> BTreeMap<u8, usize> {
+        let mut faults = BTreeMap::new();
+        for fault in self.0.iter().filter_map(|trial| of(trial)) {
+            *faults.entry(fault).or_default() += 1;
+        }
+        faults
+    }
+
+    /// How many runs were so for long, and the longest time, s.
+    fn lasting(&self, of: Seconds) -> (usize, f64) {
+        let longest = self.0.iter().map(|trial| of(trial)).fold(0.0, f64::max);
+        (self.count(|trial| of(trial) > UNNOTICED_S), longest)
     }
 
     /// As metrics.
     pub fn metrics(&self, metrics: &mut Metrics) {
-        metrics.set("angle_error_rms_deg", self.error.rms());
-        metrics.set("angle_error_p99_deg", self.p99_deg);
-        metrics.set("angle_error_max_deg", self.error.largest());
-        metrics.set("lost_runs", self.lost as f64);
-        metrics.set("wrong_runs", self.wrong.0 as f64);
-        metrics.set("wrong_longest_s", self.wrong.1);
-        metrics.set("beyond_45_deg_runs", self.lost_for_long.0 as f64);
-        metrics.set("beyond_45_deg_longest_s", self.lost_for_long.1);
-        metrics.set("flux_off_runs", self.flux_off.0 as f64);
-        metrics.set("flux_off_longest_s", self.flux_off.1);
-        metrics.set("silent_runs", self.silent as f64);
-        metrics.set("stuck_runs", self.stuck as f64);
-        metrics.set("sound_runs_stopped", self.sound_stops as f64);
-        metrics.set("trips", self.trips.values().sum::<usize>() as f64);
-        for (fault, count) in &self.trips {
-            metrics.set(format!("trips_by_fault_{fault}"), *count as f64);
+        let mut set = |name: &str, value: f64| metrics.set(name, value);
+        let error = self.error();
+        set("angle_error_rms_deg", error.rms());
+        set("angle_error_p99_deg", self.p99_deg());
+        set("angle_error_max_deg", error.largest());
+        set("lost_runs", self.count(Trial::is_lost) as f64);
+        for (name, _, of) in LASTING {
+            let (runs, longest) = self.lasting(of);
+            set(&format!("{name}_runs"), runs as f64);
+            set(&format!("{name}_longest_s"), longest);
         }
-        metrics.set("refused_starts", self.refused.values().sum::<usize>() as f64);
-        for (fault, count) in &self.refused {
-            metrics.set(format!("refused_by_fault_{fault}"), *count as f64);
+        set("silent_runs", self.count(Trial::is_silent) as f64);
+        set("stuck_runs", self.count(|trial| trial.stuck) as f64);
+        set("sound_runs_stopped", self.count(|trial| trial.sound_stop) as f64);
+        for (all, each, _, of) in ENDS {
+            let faults = self.by_fault(of);
+            set(all, faults.values().sum::<usize>() as f64);
+            for (fault, count) in faults {
+                set(&format!("{each}_{fault}"), count as f64);
+            }
         }
-        metrics.set("limited_runs", self.limited as f64);
-        if let Some(share) = self.limit_share {
-            metrics.set("limit_pct", 100.0 * share);
+        set("limited_runs", self.count(Trial::is_limited) as f64);
+        if let Some(share) = self.limit_share() {
+            set("limit_pct", 100.0 * share);
         }
-        if self.torque_error.count() > 0 {
-            let error = &self.torque_error;
-            metrics.set("torque_error_mean_pct", 100.0 * error.mean());
-            metrics.set("torque_error_deviation_pct", 100.0 * error.deviation());
-            metrics.set("torque_error_max_pct", 100.0 * error.largest());
+        let torque = Stats::of(self.0.iter().filter_map(|trial| trial.torque_error));
+        if torque.count() > 0 {
+            set("torque_error_mean_pct", 100.0 * torque.mean());
+            set("torque_error_deviation_pct", 100.0 * torque.deviation());
+            set("torque_error_max_pct", 100.0 * torque.largest());
         }
-        metrics.set("runs", self.runs as f64);
+        set("runs", self.0.len() as f64);
     }
 
     /// As cells of a row, with the heads of their columns.
     pub fn cells(&self) -> Vec<(&'static str, Cell)> {
-        let regulated = self.error.count() > 0;
-        let degrees = |value| Cell::or_dash(regulated.then(|| Cell::fixed(value, 2)));
-        vec![
-            ("runs", Cell::from(self.runs.to_string())),
-            ("rms (°)", degrees(self.error.rms())),
-            ("99 % (°)", degrees(self.p99_deg)),
-            ("largest (°)", degrees(self.error.largest())),
-            ("lost", Cell::from(self.lost.to_string())),
-            ("wrong (longest)", Cell::from(lasting(self.wrong))),
-            ("beyond 45° (longest)", Cell::from(lasting(self.lost_for_long))),
-            ("flux off (longest)", Cell::from(lasting(self.flux_off))),
-            ("stuck", Cell::from(self.stuck.to_string())),
-            ("trips, fault: runs", Cell::from(by_fault(&self.trips))),
-            ("sound", Cell::from(self.sound_stops.to_string())),
-            ("refused, fault: runs", Cell::from(by_fault(&self.refused))),
-            ("limited", Cell::from(self.limited.to_string())),
-        ]
+        let error = self.error();
+        let degrees = |value| Cell::fixed_or_dash((error.count() > 0).then_some(value), 2);
+        let count = |is: fn(&Trial) -> bool| Cell::from(self.count(is).to_string());
+        let lasting = LASTING.map(|(_, head, of)| match self.lasting(of) {
+            (0, _) => (head, Cell::from("0")),
+            (runs, longest) => (head, Cell::from(format!("{runs} ({longest:.2} s)"))),
+        });
+        let [trips, refused] = ENDS.map(|(_, _, head, of)| {
+            let faults = self.by_fault(of);
+            let each: Vec<_> = faults.iter().map(|(f, n)| format!("{f}: {n}")).collect();
+            (head, Cell::from(if each.is_empty() { "0".to_owned() } else { each.join(", ") }))
+        });
+        let mut cells = vec![
+            ("runs", Cell::from(self.0.len().to_string())),
+            ("rms (°)", degrees(error.rms())),
+            ("99 % (°)", degrees(self.p99_deg())),
+            ("largest (°)", degrees(error.largest())),
+            ("lost", count(Trial::is_lost)),
+        ];
+        cells.extend(lasting);
+        cells.extend([("stuck", count(|trial| trial.stuck)), trips]);
+        cells.extend([("sound", count(|trial| trial.sound_stop)), refused]);
+        cells.push(("limited", count(Trial::is_limited)));
+        cells
     }
 }
 
-fn lasting((runs, longest): (usize, f64)) -> String {
-    if runs == 0 { "0".to_owned() } else { format!("{runs} ({longest:.2} s)") }
-}
-
-fn by_fault(faults: &BTreeMap<u8, usize>) -> String {
-    match faults.is_empty() {
-        true => "0".to_owned(),
-        false => faults.iter().map(|(f, n)| format!("{f}: {n}")).collect::<Vec<_>>().join(", "),
-    }
-}
-
-/// The upper end of the class below which this share of all values is.
-fn quantile(histogram: &BTreeMap<u32, u64>, share: f64) -> f64 {
-    let all: u64 = histogram.values().sum();
-    let mut below = 0;
-    for (&class, count) in histogram {
-        below += count;
-        if below as f64 >= share * all as f64 {
-            return f64::from(class + 1) / CLASSES_PER_DEG;
-        }
-    }
-    f64::NAN
-}
-
-/// The runs of each kind.
+/// The runs of each kind, and all.
 pub fn by_kind(trials: &[Trial]) -> Table {
-    let mut table = Table::new("By kind", &[]);
     let mut kinds: Vec<Option<Kind>> = Vec::new();
     for trial in trials {
         if !kinds.contains(&trial.kind) {
             kinds.push(trial.kind);
         }
     }
-    for kind in kinds {
-        let cells = Summary::of(trials.iter().filter(|trial| trial.kind == kind)).cells();
-        table.record(
-            [("kind", Cell::from(kind.map(Kind::name).unwrap_or_default()))]
-                .into_iter()
-                .chain(cells),
-        );
-    }
-    let all = Summary::of(trials).cells();
-    table.record([("kind", Cell::from("all"))].into_iter().chain(all));
-    table
+    let row = |name, summary: Summary<'_>| {
+        [("kind", Cell::from(name))].into_iter().chain(summary.cells())
+    };
+    let of_kind = |kind: Option<Kind>| {
+        let some = Summary::of(trials.iter().filter(|trial| trial.kind == kind));
+        row(kind.map(Kind::name).unwrap_or_default(), some)
+    };
+    let all = row("all".to_owned(), Summary::of(trials));
+    Table::new("By kind", &[]).records(kinds.into_iter().map(of_kind).chain([all]))
 }
 
 /// The silent runs, each with its disturbances in words.
@@ -248,10 +229,10 @@ mod tests {
             errors.iter().partition(|e| ((*e * 10.0) as u32).is_multiple_of(2));
         let trials = [sound(&even), sound(&odd), Trial::unlearned(2, 25)];
         let summary = Summary::of(&trials);
-        assert!((summary.p99_deg - 99.0).abs() < 1e-9, "{}", summary.p99_deg);
-        assert!((summary.error.rms() - Stats::of(errors).rms()).abs() < 1e-9);
-        assert_eq!((summary.runs, summary.lost), (3, 2));
-        assert_eq!(summary.refused, BTreeMap::from([(25, 1)]));
-        assert!(Summary::of(&trials[2..]).p99_deg.is_nan());
+        assert!((summary.p99_deg() - 99.0).abs() < 1e-9, "{}", summary.p99_deg());
+        assert!((summary.error().rms() - Stats::of(errors).rms()).abs() < 1e-9);
+        assert_eq!((summary.count(|_| true), summary.count(Trial::is_lost)), (3, 2));
+        assert_eq!(summary.by_fault(Trial::refused_by), BTreeMap::from([(25, 1)]));
+        assert!(Summary::of(&trials[2..]).p99_deg().is_nan());
     }
 }

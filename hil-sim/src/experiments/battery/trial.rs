@@ -2,12 +2,8 @@
 
 use std::fmt;
 
-use drive_core::Fault;
-use serde::{Deserialize, Serialize};
-
 use super::kind::Kind;
-use crate::experiments::LOST_DEG;
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// A state that lasts longer, s, should have been noticed.
 pub const UNNOTICED_S: f64 = 0.5;
@@ -111,11 +107,6 @@ impl Trial {
         self.wrong_s > UNNOTICED_S
     }
 
-    /// Whether the angle was lost for so long.
-    pub fn is_lost_for_long(&self) -> bool {
-        self.lost_s > UNNOTICED_S
-    }
-
     /// Whether the flux was off for so long.
     pub fn is_flux_off(&self) -> bool {
         self.flux_off_s > UNNOTICED_S
@@ -134,9 +125,8 @@ impl Trial {
     /// The reason why the run is none that a drive should have, after its kind and seed.
     pub fn failure(&self) -> Option<String> {
         let fault = |code: u8| {
-            let fault = Fault::ALL.iter().find(|fault| fault.code() == code);
-            let text = fault.map_or(String::new(), |fault| format!(": {fault}"));
-            format!("fault {code}{text}")
+            let fault = Fault::ALL.iter().copied().find(|fault| fault.code() == code);
+            fault.map_or_else(|| format!("fault {code}"), fault_text)
         };
         let stops = self.trip.filter(|_| !self.kind.is_some_and(Kind::turns_flux));
         let reasons = [

@@ -1,20 +1,13 @@
 //! Defects of motor, wiring, sensors and board: are they refused, by name?
 
 use drive_commission::{Commissioning, Meaning, Refusal, Step};
-use drive_core::{Fault, Sample, State};
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
+use drive_core::Sample;
 
-use super::super::statistics::{Study, seed_of, whole};
-use super::super::{BENCH, Context, DRIVE, Experiment};
 use super::session::{Abort, Session, unaware};
-use crate::config::{Config, FluxLevel, LoadMode, OpenPhase, PlantModel};
-use crate::error::Error;
+use crate::config::{FluxLevel, OpenPhase};
 use crate::experiments::drawn_machine::drawn;
-use crate::outcome::{Cell, Outcome, Table};
 use crate::plant::{Channel, CurrentFault};
-use crate::rig::Rig;
+use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
@@ -167,7 +160,7 @@ impl Study for Refusals {
         let mut rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
         (defect.on_bench)(&mut rig);
         let abort = defect.abort.map_or(Abort::default(), |step| {
-            let after = Xoshiro256PlusPlus::seed_from_u64(seed).random_range(1..abort_within(step));
+            let after = seeded(seed).random_range(1..abort_within(step));
             Abort { step: Some(step), after }
         });
         let commissioning = Commissioning::new(&settings);
@@ -184,33 +177,29 @@ impl Study for Refusals {
     }
 
     fn outcome(&self, _: &Context<'_>, records: Vec<Record>) -> Result<Outcome, Error> {
+        let most = |of: fn(&Record) -> f64, all: &[Record]| all.iter().map(of).fold(0.0, f64::max);
+        let count = |is: fn(&Record) -> bool, all: &[Record]| {
+            all.iter().filter(|record| is(record)).count() as f64
+        };
+        let answer = |all: &[Record]| {
+            let other = all.iter().rfind(|record| !record.named).or(all.last());
+            other.map_or(String::new(), |record| record.answer.clone())
+        };
+        let columns = columns![|n, all: &&[Record]|
+            "defect" => Cell::from(DEFECTS[n].name);
+            "machines" => Cell::fixed(all.len() as f64, 0);
+            "named" => Cell::fixed(count(|r| r.named, all), 0);
+            "unchanged" => Cell::fixed(count(|r| r.unchanged, all), 0);
+            "within (s)" => Cell::fixed(most(|r| r.seconds, all), 1);
+            "largest (A)" => Cell::fixed(most(|r| r.largest_a, all), 2);
+            "last other answer, or an answer" => Cell::from(answer(all));
+        ];
+        let parts: Vec<&[Record]> = records.chunks(self.runs).collect();
         let mut outcome = Outcome::default();
-        let mut table = Table::new("Refusals", &[]);
-        let (mut named, mut unchanged) = (0, 0);
-        for (defect, records) in DEFECTS.iter().zip(records.chunks(self.runs)) {
-            let count = |of: fn(&Record) -> bool| records.iter().filter(|&r| of(r)).count();
-            let (by_name, kept) = (count(|r| r.named), count(|r| r.unchanged));
-            named += by_name;
-            unchanged += kept;
-            let most = |of: fn(&Record) -> f64| records.iter().map(of).fold(0.0, f64::max);
-            let other = records.iter().rfind(|r| !r.named).or(records.last());
-            table.record([
-                ("defect", Cell::from(defect.name)),
-                ("machines", Cell::fixed(records.len() as f64, 0)),
-                ("named", Cell::fixed(by_name as f64, 0)),
-                ("unchanged", Cell::fixed(kept as f64, 0)),
-                ("within (s)", Cell::fixed(most(|r| r.seconds), 1)),
-                ("largest (A)", Cell::fixed(most(|r| r.largest_a), 2)),
-                (
-                    "last other answer, or an answer",
-                    Cell::from(other.map_or(String::new(), |r| r.answer.clone())),
-                ),
-            ]);
-        }
         outcome.metrics.set("sessions", records.len() as f64);
-        outcome.metrics.set("named", named as f64);
-        outcome.metrics.set("unchanged", unchanged as f64);
-        outcome.tables.push(table);
+        outcome.metrics.set("named", count(|r| r.named, &records));
+        outcome.metrics.set("unchanged", count(|r| r.unchanged, &records));
+        outcome.tables.push(Table::of("Refusals", &columns, parts.iter().enumerate()));
         Ok(outcome)
     }
 }

@@ -3,14 +3,11 @@
 use std::f64::consts::TAU;
 
 use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{AlphaBeta, Command, Excitation, Mode, Motor, Sample, State, Stop};
+use drive_core::{AlphaBeta, Excitation, Motor, Sample, Stop};
 use drive_settings::Settings;
 
-use crate::config::Config;
-use crate::error::Error;
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
-use crate::rig::{RATE_HZ, Rig};
-use crate::stats::Stats;
+use crate::prelude::*;
 
 /// Control periods from one poll of the main loop to the next.
 const POLL: u32 = 6;
@@ -76,6 +73,7 @@ impl Session {
         let from = rig.plant.mechanical_angle();
         let mut carrier_on = AlphaBeta::ZERO;
         let mut leakage = [Stats::default(); 2];
+        let order = |rig: &mut Rig, command| rig.command(&command).map(|_| ());
         for period in 0..(LONGEST_S * RATE_HZ) as u32 {
             let mut sample = rig.plant.sample();
             sensors(&mut sample);
@@ -94,7 +92,7 @@ impl Session {
             if abort.step == Some(commissioning.step()) && rig.drive.state() != State::Off {
                 in_step += 1;
                 if in_step == abort.after {
-                    rig.command(&Command::Stop(Stop::Coast))?;
+                    order(&mut rig, Command::Stop(Stop::Coast))?;
                 }
             }
             if commissioning.step() == Step::Leakage && carrier_on != AlphaBeta::ZERO {
@@ -112,17 +110,11 @@ impl Session {
                     if let Excitation::Current { carrier, .. } = excitation {
                         carrier_on = carrier;
                     }
-                    rig.command(&Command::Excite(excitation))?;
+                    order(&mut rig, Command::Excite(excitation))?;
                 }
-                Next::Stop => {
-                    rig.command(&Command::Stop(Stop::Coast))?;
-                }
-                Next::Start => {
-                    rig.command(&Command::Start(Mode::Torque))?;
-                }
-                Next::Torque(i_q) => {
-                    rig.command(&Command::Torque(i_q))?;
-                }
+                Next::Stop => order(&mut rig, Command::Stop(Stop::Coast))?,
+                Next::Start => order(&mut rig, Command::Start(Mode::Torque))?,
+                Next::Torque(i_q) => order(&mut rig, Command::Torque(i_q))?,
                 Next::Design => commissioning.design(),
                 Next::Report(report) => reports.push((rig.time() - began, report)),
                 Next::Done => {

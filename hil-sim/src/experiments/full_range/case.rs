@@ -1,30 +1,14 @@
 //! What is run: each kind in the regions of the speed that it is for.
 
-use rand::{Rng, RngExt};
-
 use crate::config::RangeKind;
 use crate::experiments::battery::Shaft;
+use crate::prelude::*;
 
 /// Ends of the regions, rpm on four poles. The injection alone gives the angle up to 450 rpm and the motor's own voltage from
 /// 600 rpm on, the carrier is off above 750 rpm, and the field is weakened in the last.
 const REGIONS_RPM: [f64; 9] = [0.0, 150.0, 350.0, 550.0, 750.0, 1200.0, 1800.0, 2700.0, 3600.0];
 /// Speed of the kinds that have but one, rpm.
 pub const ONE_RPM: f64 = 1800.0;
-
-const KINDS: [RangeKind; 12] = [
-    RangeKind::Constant,
-    RangeKind::Reversals,
-    RangeKind::LoadSteps,
-    RangeKind::Ramps,
-    RangeKind::HotRamps,
-    RangeKind::WrongParameters,
-    RangeKind::TurnedFlux,
-    RangeKind::TurningStart,
-    RangeKind::ResidualStart,
-    RangeKind::Braking,
-    RangeKind::Outage,
-    RangeKind::Sag,
-];
 
 /// A kind in a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +22,8 @@ pub struct Case {
 impl Case {
     /// All of one kind, or of all kinds.
     pub fn all(only: Option<RangeKind>) -> Vec<Self> {
-        let kinds = KINDS.into_iter().filter(|kind| only.is_none_or(|only| only == *kind));
+        let kinds = RangeKind::VALUES.iter().copied();
+        let kinds = kinds.filter(|kind| only.is_none_or(|only| only == *kind));
         let of = |kind| Self::regions(kind).into_iter().map(move |region| Self { kind, region });
         kinds.flat_map(of).collect()
     }
@@ -46,9 +31,7 @@ impl Case {
     fn regions(kind: RangeKind) -> Vec<(f64, f64)> {
         let all = REGIONS_RPM.windows(2).map(|ends| (ends[0], ends[1]));
         match kind {
-            RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage => {
-                vec![(0.0, ONE_RPM)]
-            }
+            one if has_one_speed(one) => vec![(0.0, ONE_RPM)],
             RangeKind::Sag => all.filter(|region| region.0 >= 1200.0).collect(),
             _ => all.collect(),
         }
@@ -67,28 +50,18 @@ impl Case {
 
     /// The shaft at a speed, rpm on four poles.
     pub fn shaft(&self, rpm: f64) -> Shaft {
-        match self.kind {
-            RangeKind::LoadSteps
-            | RangeKind::Ramps
-            | RangeKind::HotRamps
-            | RangeKind::Braking
-            | RangeKind::Outage => Shaft::Free,
-            _ => Shaft::Held(rpm),
-        }
+        let free = self.kind == RangeKind::LoadSteps || has_one_speed(self.kind);
+        if free { Shaft::Free } else { Shaft::Held(rpm) }
     }
 
     /// A speed in the region, of either sign, rpm on four poles; that of the kinds that have but one.
     pub fn speed(&self, random: &mut impl Rng) -> f64 {
         let speed = random.random_range(self.region.0..=self.region.1);
-        let one = matches!(
-            self.kind,
-            RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage
-        );
-        sign(random) * if one { ONE_RPM } else { speed }
+        sign(random) * if has_one_speed(self.kind) { ONE_RPM } else { speed }
     }
 }
 
-/// 1 or -1.
-pub fn sign(random: &mut impl Rng) -> f64 {
-    if random.random::<bool>() { 1.0 } else { -1.0 }
+/// Whether the runs of a kind have but one speed, which the drive regulates.
+fn has_one_speed(kind: RangeKind) -> bool {
+    matches!(kind, RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage)
 }

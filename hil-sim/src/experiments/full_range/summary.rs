@@ -1,12 +1,9 @@
 //! The verdict over the runs, per kind and region.
 
-use drive_core::Fault;
-
 use super::case::Case;
 use crate::config::RangeKind;
-use crate::experiments::battery::{Moment, Refused, Trial, UNNOTICED_S};
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::stats::Stats;
+use crate::experiments::battery::{Moment, Refused, Trial};
+use crate::prelude::*;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: true minus estimated, over all samples that count: at constant torque and in reversals from 0.5 s \
@@ -21,86 +18,76 @@ fn is_lost(case: &Case, run: &Trial) -> bool {
     run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
 }
 
-/// The verdict on some runs.
-struct Verdict {
-    runs: usize,
-    lost: usize,
-    refused: usize,
-    stopped: usize,
-    silent: usize,
-    error: Stats,
-    peak_a: f64,
-    dc_link_v: (f64, f64),
-    took_s: Option<f64>,
+fn is_refused(_: &Case, run: &Trial) -> bool {
+    run.refused.is_some()
 }
 
-impl Verdict {
-    fn of(done: &[&(Case, usize, Trial)]) -> Self {
-        let count = |is: &dyn Fn(&Case, &Trial) -> bool| {
-            done.iter().filter(|(case, _, run)| is(case, run)).count()
-        };
-        let started = || done.iter().map(|(_, _, run)| run).filter(|run| run.refused.is_none());
-        let mut error = Stats::default();
-        started().for_each(|run| error.add(&run.error));
-        Self {
-            runs: done.len(),
-            lost: count(&|case, run| is_lost(case, run)),
-            refused: count(&|_, run| run.refused.is_some()),
-            stopped: count(&|_, run| run.trip.is_some()),
-            silent: count(&|_, run| run.wrong_s > UNNOTICED_S),
-            error,
-            // Not a number where none has started.
-            peak_a: started().map(|run| run.peak_a).fold(f64::NAN, f64::max),
-            dc_link_v: started().fold((f64::NAN, f64::NAN), |(least, most), run| {
-                (least.min(run.dc_link_v.0), most.max(run.dc_link_v.1))
-            }),
-            took_s: started().filter_map(|run| run.took_s).reduce(f64::max),
-        }
-    }
+fn is_silent(_: &Case, run: &Trial) -> bool {
+    run.is_wrong()
 }
 
-impl Verdict {
-    /// Largest error; not a number without samples.
-    fn largest_deg(&self) -> f64 {
-        if self.error.count() > 0 { self.error.largest() } else { f64::NAN }
-    }
+/// A run with its case and number.
+pub type Done = (Case, usize, Trial);
+
+/// Of how many runs it is so.
+fn count(done: &[&Done], is: impl Fn(&Case, &Trial) -> bool) -> f64 {
+    done.iter().filter(|(case, _, run)| is(case, run)).count() as f64
 }
 
-/// Metrics, table and failures of all runs, each with its case and number.
-pub fn of(cases: &[Case], done: &[(Case, usize, Trial)], outcome: &mut Outcome) {
+/// The verdict on some runs: names in the metrics, heads of the columns, numbers, and decimals where they are no counts.
+fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize>)> {
+    let started = || done.iter().map(|(_, _, run)| run).filter(|run| run.refused.is_none());
+    let mut error = Stats::default();
+    started().for_each(|run| error.add(&run.error));
+    // Not a number where none has started.
+    let largest = |of: fn(&Trial) -> f64| started().map(of).fold(f64::NAN, f64::max);
+    let least_v = started().map(|run| run.dc_link_v.0).fold(f64::NAN, f64::min);
+    let largest_deg = if error.count() > 0 { error.largest() } else { f64::NAN };
+    let took_s = started().filter_map(|run| run.took_s).reduce(f64::max);
+    vec![
+        ("runs", "runs", done.len() as f64, None),
+        ("lost_runs", "lost", count(done, is_lost), None),
+        ("refused_runs", "refused", count(done, is_refused), None),
+        ("stopped_runs", "stopped", count(done, |_, run| run.trip.is_some()), None),
+        ("silent_runs", "silent", count(done, is_silent), None),
+        ("angle_error_rms_deg", "rms (°)", error.rms(), Some(2)),
+        ("angle_error_max_deg", "largest (°)", largest_deg, Some(2)),
+        ("current_peak_a", "current (A)", largest(|run| run.peak_a), Some(2)),
+        ("dc_link_max_v", "most (V)", largest(|run| run.dc_link_v.1), Some(0)),
+        ("dc_link_min_v", "dc link, least (V)", least_v, Some(0)),
+        ("took_s", "took (s)", took_s.unwrap_or(f64::NAN), Some(2)),
+    ]
+}
+
+/// Metrics, table and failures of all runs.
+pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
     let mut table = Table::new("By kind and region", &[]);
     for case in cases {
         let some: Vec<_> = done.iter().filter(|(of, _, _)| of == case).collect();
         if some.is_empty() {
             continue;
         }
-        let (verdict, name) = (Verdict::of(&some), case.name());
-        let m = &mut outcome.metrics;
-        let mut set = |what: &str, value: f64| m.set(format!("{name}_{what}"), value);
-        set("runs", verdict.runs as f64);
-        set("lost_runs", verdict.lost as f64);
-        set("refused_runs", verdict.refused as f64);
-        set("stopped_runs", verdict.stopped as f64);
-        set("silent_runs", verdict.silent as f64);
-        set("angle_error_rms_deg", verdict.error.rms());
-        set("angle_error_max_deg", verdict.largest_deg());
-        set("current_peak_a", verdict.peak_a);
-        set("dc_link_max_v", verdict.dc_link_v.1);
-        set("dc_link_min_v", verdict.dc_link_v.0);
-        if let Some(longest) = verdict.took_s {
-            set("took_s", longest);
+        let mut verdict = verdict(&some);
+        for (name, _, value, _) in &verdict {
+            if *name != "took_s" || value.is_finite() {
+                outcome.metrics.set(format!("{}_{name}", case.name()), *value);
+            }
         }
-        table.record([("kind", Cell::from(case.words()))].into_iter().chain(cells(&verdict)));
+        // In the table the least voltage stands before the most.
+        verdict.swap(8, 9);
+        let cell = |value: f64, decimals: Option<usize>| match decimals {
+            None => Cell::from(value.to_string()),
+            Some(decimals) => Cell::fixed_or_dash(value.is_finite().then_some(value), decimals),
+        };
+        let cells = verdict.into_iter().map(|(_, head, value, digits)| (head, cell(value, digits)));
+        table.record([("kind", Cell::from(case.words()))].into_iter().chain(cells));
     }
-    let all = Verdict::of(&done.iter().collect::<Vec<_>>());
-    for (name, count) in [
-        ("runs", all.runs),
-        ("lost_runs", all.lost),
-        ("refused_runs", all.refused),
-        ("silent_runs", all.silent),
-    ] {
-        outcome.metrics.set(name, count as f64);
-    }
+    let all: Vec<_> = done.iter().collect();
+    let m = &mut outcome.metrics;
+    m.set("runs", all.len() as f64);
+    m.set("lost_runs", count(&all, is_lost));
+    m.set("refused_runs", count(&all, is_refused));
+    m.set("silent_runs", count(&all, is_silent));
     outcome.tables.push(table);
     outcome.faults.extend(done.iter().filter_map(|(case, number, run)| {
         let reason = failure(case, run)?;
@@ -108,24 +95,6 @@ pub fn of(cases: &[Case], done: &[(Case, usize, Trial)], outcome: &mut Outcome) 
         let drawn = format!("{rpm:.0} rpm, {i_q:.2} A, seed {seed}");
         Some(format!("run {number}, {}: {drawn}: {reason}", case.words()))
     }));
-}
-
-fn cells(verdict: &Verdict) -> Vec<(&'static str, Cell)> {
-    let number = |value: f64, n| Cell::or_dash(value.is_finite().then(|| Cell::fixed(value, n)));
-    let count = |count: usize| Cell::from(count.to_string());
-    vec![
-        ("runs", count(verdict.runs)),
-        ("lost", count(verdict.lost)),
-        ("refused", count(verdict.refused)),
-        ("stopped", count(verdict.stopped)),
-        ("silent", count(verdict.silent)),
-        ("rms (°)", number(verdict.error.rms(), 2)),
-        ("largest (°)", number(verdict.largest_deg(), 2)),
-        ("current (A)", number(verdict.peak_a, 2)),
-        ("dc link, least (V)", number(verdict.dc_link_v.0, 0)),
-        ("most (V)", number(verdict.dc_link_v.1, 0)),
-        ("took (s)", number(verdict.took_s.unwrap_or(f64::NAN), 2)),
-    ]
 }
 
 /// Speed of the shaft beyond which a start refuses to follow it, rpm on four poles.
@@ -145,7 +114,7 @@ fn failure(case: &Case, run: &Trial) -> Option<String> {
         return (!too_fast(case, run)).then(|| format!("not started: {why}"));
     }
     let reasons = [
-        (run.wrong_s > UNNOTICED_S).then(|| format!("beyond 45° for {:.2} s", run.wrong_s)),
+        run.is_wrong().then(|| format!("beyond 45° for {:.2} s", run.wrong_s)),
         is_lost(case, run).then(|| match run.trip {
             Some(fault) => format!("fault {fault}, largest error {:.0}°", run.largest_deg),
             None => format!("largest error {:.0}°", run.largest_deg),

@@ -2,19 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Drive, Mode, State, Stop};
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use drive_core::Stop;
 
-use super::case::{Case, sign};
-use crate::config::{Config, RangeKind, plant_settings};
-use crate::error::Error;
-use crate::experiments::LOST_DEG;
+use super::case::Case;
+use crate::config::RangeKind;
 use crate::experiments::battery::{
     Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
     nominal_limit_a,
 };
-use crate::plant::Load;
+use crate::prelude::*;
 
 /// Least and largest constant torque current, in relation to the current limit.
 const TORQUE: (f64, f64) = (1.0 / 7.0, 6.0 / 7.0);
@@ -109,7 +105,7 @@ impl<'a> Run<'a> {
         traced: bool,
     ) -> Result<Self, Error> {
         let plant = plant_settings(config);
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut random = seeded(seed);
         let rpm = case.speed(&mut random);
         let per_a = config.amperes(1.0);
         let most = nominal_limit_a(config) / per_a;

@@ -2,17 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Fault, Mode, State};
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
-
-use crate::config::{Config, LoadMode};
-use crate::error::Error;
 use crate::experiments::statistics::fault_code;
 use crate::experiments::steady::{OperatingPoint, at_speed};
-use crate::plant::Load;
-use crate::rig::{Point, Rig};
+use crate::prelude::*;
 
 /// An error below this, degrees, counts as locked.
 pub const LOCKED_DEG: f64 = 15.0;
@@ -28,8 +20,8 @@ pub fn fault(rig: &Rig) -> Option<Fault> {
 
 /// A random operating point: speeds within ±`bound` rpm.
 pub fn case(seed: u64, bound: f64) -> OperatingPoint {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+    let mut random = seeded(seed);
+    let sign = sign(&mut random);
     // Every fifth at the least current, where the torque that a wrong angle makes is least.
     let least = random.random_range(0..5) == 0;
     let length = if least { IQ_A.0 } else { random.random_range(IQ_A.0..=IQ_A.1) };
@@ -80,7 +72,7 @@ impl Trial {
 /// # Errors
 /// As [`at_speed`], or when the drive stops before that moment.
 pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Trial, Error> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(case.seed ^ 0x5eed);
+    let mut random = seeded(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
     rig.run(0.8 + random.random_range(0.0..0.2), |_| {});
     if let Some(fault) = fault(&rig) {
@@ -206,7 +198,7 @@ pub const OVER_SPEED_S: f64 = 0.5;
 /// # Errors
 /// As [`at_speed`].
 pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x0ff);
+    let mut random = seeded(seed ^ 0x0ff);
     let mut case = case(seed, limit);
     case.rpm = 0.7 * limit.copysign(case.rpm);
     let rpm_per_s = 10.0_f64.powf(random.random_range(1.7..3.3));

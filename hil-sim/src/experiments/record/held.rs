@@ -2,12 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::config::Config;
-use crate::error::Error;
-use crate::experiments::LOST_DEG;
-use crate::plant::{Load, Plant};
-use crate::rig::{Rig, wrapped_degrees};
-use crate::stats::Stats;
+use crate::plant::Plant;
+use crate::prelude::*;
 
 /// Pace of the dynamometer, s, and of the lines of the figures.
 const PACE_S: f64 = 0.001;

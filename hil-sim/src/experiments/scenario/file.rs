@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use drive_core::Stop;
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
 use crate::columns::Columns;
-use crate::config::{Config, Value, flattened};
-use crate::error::{Error, unknown};
+use crate::config::{Value, flattened};
+use crate::error::unknown;
+use crate::prelude::*;
 
 /// A value from the beginning to the end of a part, straight between them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -184,7 +184,7 @@ impl Scenario {
     /// # Errors
     /// [`Error::Data`] with the line.
     pub fn read(path: &Path, config: &Config) -> Result<Self, Error> {
-        let failed = |e: std::io::Error| data(path, None, e.to_string());
+        let failed = |e: std::io::Error| Error::data(path, None, e.to_string());
         Self::of_toml(path, &std::fs::read_to_string(path).map_err(failed)?, config)
     }
 
@@ -194,7 +194,7 @@ impl Scenario {
     /// [`Error::Data`] with the line.
     pub fn of_toml(path: &Path, text: &str, config: &Config) -> Result<Self, Error> {
         let at = |offset: usize, problem: String| {
-            data(path, Some(1 + text[..offset].matches('\n').count() as u64), problem)
+            Error::data(path, Some(1 + text[..offset].matches('\n').count() as u64), problem)
         };
         let mut text: Text = toml::from_str(text)
             .map_err(|e| at(e.span().unwrap_or_default().start, e.message().to_owned()))?;
@@ -227,7 +227,7 @@ impl Scenario {
             }
         }
         let reference = scenario.reference.ok_or_else(|| {
-            data(path, None, format!("no [[part]] gives a reference: {}", references()))
+            Error::data(path, None, format!("no [[part]] gives a reference: {}", references()))
         })?;
         Ok(Self { text: scenario.text.completed(reference.column)?, ..scenario })
     }
@@ -350,8 +350,4 @@ impl Scenario {
 /// The names of the references.
 fn references() -> String {
     REFERENCES.each_ref().map(|reference| reference.column).join(", ")
-}
-
-fn data(path: &Path, line: Option<u64>, problem: String) -> Error {
-    Error::Data { path: path.to_owned(), line, problem }
 }

@@ -2,18 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::Accepted;
 use drive_core::carrier::{CARRIER_SAMPLES, DemodulatorKind};
-use drive_core::{Accepted, Command, Mode};
 
 use super::file::{Metric, Over, Statistic};
 use super::quantity::{Named, QUANTITIES, Quantity, Seen};
 use super::{Part, Reference, Scenario, Shaft};
-use crate::config::Config;
-use crate::error::Error;
-use crate::experiments::Context;
-use crate::outcome::{Figure, Metrics, Panel, Series, Step};
-use crate::rig::{Point, RATE_HZ, Rig};
-use crate::stats::Stats;
+use crate::outcome::Step;
+use crate::prelude::*;
 
 /// Time between two references, s: they change at the pace of a host, not of the control.
 const PACE_S: f64 = CARRIER_SAMPLES as f64 / RATE_HZ;

@@ -1,10 +1,7 @@
 //! Angle error at standstill over the amplitude of the carrier.
 
-use super::assumptions;
 use super::steady::{OperatingPoint, steady_run};
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::error::Error;
-use crate::outcome::{Cell, Outcome, Table};
+use crate::prelude::*;
 
 /// Not a figure of the source.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -1,10 +1,7 @@
 //! A step of the torque, and the figures of it.
 
-use drive_core::Command;
+use crate::prelude::*;
 use drive_core::carrier::CARRIER_SAMPLES;
-
-use crate::error::Error;
-use crate::rig::{RATE_HZ, Rig};
 
 /// Time that is recorded after the step, s, and the part at its end that gives the final value.
 const RECORDED_S: f64 = 0.06;
