@@ -134,7 +134,7 @@ pub fn flip(board: &mut Board, rng: &mut dyn Rng, region: Region) -> String {
     let offset = rng.random_range(0..region.size);
     let address = region.address + offset;
     let bit = rng.random_range(0..8);
-    let byte = board.byte(address).unwrap_or(0) ^ 1 << bit;
-    board.cpu().write(address, &[byte]);
+    let byte = board.cpu.byte(address).unwrap_or(0) ^ 1 << bit;
+    board.cpu.write(address, &[byte]);
     format!("bit {bit} of {address:#010x}, {offset:#x} from the beginning")
 }

@@ -77,8 +77,8 @@ impl Target {
     fn new(board: &Board, config: &Config, settings: Settings, encoder_rpm: f64) -> Result<Self> {
         let Addresses { coefficients, state, control, .. } = board.addresses();
         let between = |first: &str, end: &str| {
-            let address = board.image().symbol(first)?.address;
-            anyhow::Ok(Region { address, size: board.image().symbol(end)?.address - address })
+            let address = board.image.symbol(first)?.address;
+            anyhow::Ok(Region { address, size: board.image.symbol(end)?.address - address })
         };
         let code = between("__sccm", "__eccm")?;
         let data = between("__sdata", "__euninit")?;
@@ -246,7 +246,7 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
         "settings outside the part that can be written"
     );
     let mut chip = board.chip().clone();
-    let defaults = FirmwareSettings::of(chip.gates.stage().board());
+    let defaults = FirmwareSettings::of(chip.gates.stage.board());
     match Saved::load(Bank(&mut chip), &defaults).1 {
         Loaded::Settings(settings) => Some(settings),
         _ => None,
