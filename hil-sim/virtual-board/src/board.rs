@@ -43,8 +43,10 @@ const IDLE_LIMIT: u32 = 100_000;
 
 /// The board.
 pub struct Board {
-    cpu: Cpu,
-    image: Image,
+    /// The core.
+    pub cpu: Cpu,
+    /// The image.
+    pub image: Image,
     log: Option<Log>,
     lines: Vec<String>,
     since_log: u32,
@@ -88,7 +90,7 @@ impl Board {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
         let mut cpu =
             Cpu::new(Chip::default(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
-        for segment in image.segments() {
+        for segment in &image.segments {
             let end = segment.address + segment.bytes.len() as u32;
             let inside = segment.address >= memory::FLASH && end <= memory::STORED;
             ensure!(inside, "a segment at {:#x} is not in the flash of the code", segment.address);
@@ -140,27 +142,6 @@ impl Board {
         Ok(board)
     }
 
-    /// The core.
-    pub fn cpu(&mut self) -> &mut Cpu {
-        &mut self.cpu
-    }
-
-    /// A word of memory.
-    pub fn word(&self, address: u32) -> Option<u32> {
-        self.cpu.word(address)
-    }
-
-    /// A byte of memory.
-    pub fn byte(&self, address: u32) -> Option<u8> {
-        let mut byte = [0];
-        self.read(address, &mut byte).then_some(byte[0])
-    }
-
-    /// Reads memory; `false` where there is none.
-    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
-        self.cpu.read(address, bytes)
-    }
-
     /// Addresses of the firmware's data; all zero of an image without the table.
     pub fn addresses(&self) -> Addresses {
         self.addresses.unwrap_or_default()
@@ -179,7 +160,7 @@ impl Board {
     /// Telemetry of the drive after its last control interrupt with the outputs on.
     pub fn telemetry(&self) -> Telemetry {
         let mut bytes = [0; size_of::<Telemetry>()];
-        self.read(self.addresses().telemetry, &mut bytes);
+        self.cpu.read(self.addresses().telemetry, &mut bytes);
         // SAFETY: 32-bit integers and floating-point numbers, of which every value is valid, and laid out as on the chip.
         unsafe { bytes.as_ptr().cast::<Telemetry>().read_unaligned() }
     }
@@ -187,11 +168,6 @@ impl Board {
     /// The chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()
-    }
-
-    /// The image.
-    pub fn image(&self) -> &Image {
-        &self.image
     }
 
     /// The last sample.

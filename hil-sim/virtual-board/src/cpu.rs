@@ -304,6 +304,12 @@ impl Cpu {
         self.uc.mem_read(u64::from(address), bytes).is_ok()
     }
 
+    /// A byte of memory.
+    pub fn byte(&self, address: u32) -> Option<u8> {
+        let mut byte = [0];
+        self.read(address, &mut byte).then_some(byte[0])
+    }
+
     /// A word of memory.
     pub fn word(&self, address: u32) -> Option<u32> {
         let mut bytes = [0; 4];

@@ -38,8 +38,10 @@ struct Symbol {
 
 /// An image.
 pub struct Image {
-    bytes: Vec<u8>,
-    segments: Vec<Segment>,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Contents of the flash.
+    pub segments: Vec<Segment>,
     symbols: Vec<Symbol>,
     lines: addr2line::Context<Slice>,
 }
@@ -118,16 +120,6 @@ impl Image {
         };
         let lines = addr2line::Context::from_dwarf(gimli::Dwarf::load(section)?)?;
         Ok(Self { segments, symbols, lines, bytes })
-    }
-
-    /// The file.
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Contents of the flash.
-    pub fn segments(&self) -> &[Segment] {
-        &self.segments
     }
 
     /// Address and size of the symbol with exactly this name, demangled and without angle brackets.

@@ -26,7 +26,7 @@ impl Log {
         let Ok(Region { address: control_block, .. }) = image.symbol("_SEGGER_RTT") else {
             return Ok(None);
         };
-        let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
+        let table = Table::parse(&image.bytes).map_err(|e| anyhow!("{e}"))?;
         let table = table.context("the image has no defmt log")?;
         Ok(Some(Self { table, control_block, bytes: Vec::new() }))
     }

@@ -67,11 +67,17 @@ pub type Plain = (u32, u32, u32);
 /// bits that can be written. The names become constants.
 macro_rules! registers {
     ($($name:tt = $offset:expr, $reset:expr, $mask:expr;)*) => {
-        $(const $name: u32 = $offset;)*
+        $(pub(crate) const $name: u32 = $offset;)*
         const KNOWN: &[$crate::periph::Plain] = &[$(($offset, $reset, $mask)),*];
     };
 }
 use registers;
+
+/// Bits of a register, each by its number.
+macro_rules! bits {
+    ($($seen:vis $name:ident = $number:literal),*) => { $($seen const $name: u32 = 1 << $number;)* };
+}
+use bits;
 
 /// Registers without behaviour.
 #[derive(Clone, Debug)]

@@ -50,34 +50,36 @@ impl SysTick {
     }
 }
 
-/// The registers.
-#[derive(Clone, Debug)]
-pub struct Scs {
-    pending: [bool; EXCEPTIONS],
-    enabled: [bool; EXCEPTIONS],
-    line: [bool; EXCEPTIONS],
-    priority: [u8; EXCEPTIONS],
-    /// Exceptions being served, innermost last.
-    pub active: Vec<u16>,
-    any_pending: bool,
-    vtor: u32,
-    grouping: u32,
-    /// Reasons of faults.
-    pub cfsr: u32,
-    /// Reasons of hard faults.
-    pub hfsr: u32,
-    /// Address of a bus fault.
-    pub bfar: u32,
-    plain: Store,
-    /// Memory protection.
-    pub mpu: Mpu,
-    demcr: u32,
-    dwt_control: u32,
-    /// The cycle counter is this less than time.
-    cycles_from: u64,
-    cycles_held: u32,
-    /// SysTick.
-    pub systick: SysTick,
+defaults! {
+    /// The registers; by default after a reset, on the internal oscillator.
+    #[derive(Clone, Debug)]
+    pub struct Scs {
+        pending: [bool; EXCEPTIONS] = [false; EXCEPTIONS],
+        enabled: [bool; EXCEPTIONS] = std::array::from_fn(|n| n < 16),
+        line: [bool; EXCEPTIONS] = [false; EXCEPTIONS],
+        priority: [u8; EXCEPTIONS] = [0; EXCEPTIONS],
+        /// Exceptions being served, innermost last.
+        pub active: Vec<u16>,
+        any_pending: bool,
+        vtor: u32 = 0x0800_0000,
+        grouping: u32,
+        /// Reasons of faults.
+        pub cfsr: u32,
+        /// Reasons of hard faults.
+        pub hfsr: u32,
+        /// Address of a bus fault.
+        pub bfar: u32,
+        plain: Store = Store::new(PLAIN),
+        /// Memory protection.
+        pub mpu: Mpu,
+        demcr: u32,
+        dwt_control: u32,
+        /// The cycle counter is this less than time.
+        cycles_from: u64,
+        cycles_held: u32,
+        /// SysTick.
+        pub systick: SysTick = SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
+    }
 }
 
 /// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
@@ -91,32 +93,6 @@ const PLAIN: &[Plain] = &[
     (0xe000_ef38, 0, u32::MAX),
     (0xe000_ef34, 0xc000_0000, u32::MAX),
 ];
-
-/// After a reset, on the internal oscillator.
-impl Default for Scs {
-    fn default() -> Self {
-        Self {
-            pending: [false; EXCEPTIONS],
-            enabled: std::array::from_fn(|n| n < 16),
-            line: [false; EXCEPTIONS],
-            priority: [0; EXCEPTIONS],
-            active: Vec::new(),
-            any_pending: false,
-            vtor: 0x0800_0000,
-            grouping: 0,
-            cfsr: 0,
-            hfsr: 0,
-            bfar: 0,
-            plain: Store::new(PLAIN),
-            mpu: Mpu::default(),
-            demcr: 0,
-            dwt_control: 0,
-            cycles_from: 0,
-            cycles_held: 0,
-            systick: SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
-        }
-    }
-}
 
 impl Scs {
     /// The vector of an exception.

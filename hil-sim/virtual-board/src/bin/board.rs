@@ -59,9 +59,9 @@ fn run(mut options: Options) -> Result<()> {
     let flash = options.flash.as_deref().map(|path| FlashFile::open(path, &mut board.chip().flash));
     let flash = flash.transpose()?;
 
-    let port = pty.path().display();
+    let port = pty.path.display();
     say(&format!("console: {port}"));
-    say(&format!("bus: {}", bus.path().display()));
+    say(&format!("bus: {}", bus.path.display()));
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
@@ -124,7 +124,7 @@ fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
 
 /// Writes the page, its plots and the JSON object; where the page is.
 fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBuf> {
-    let board = session.board();
+    let board = &session.board;
     let mut outcome =
         page::outcome(config, board.time(), board.resets.len(), &session.record, &session.lines);
     if session.behind_s > 0.0 {

@@ -49,8 +49,8 @@ impl Board {
     /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
         let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
-        let mailbox = self.word(orders);
-        mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
+        let mailbox = self.cpu.word(orders);
+        mailbox.and_then(|mailbox| self.cpu.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }
 
     pub(super) fn begin_control(&mut self) {
@@ -74,7 +74,7 @@ impl Board {
         }
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both convert the third current second.
-        let in_line = chip.gates.stage().sensors == Sensors::InLine;
+        let in_line = chip.gates.stage.sensors == Sensors::InLine;
         let (current_c, slow) = if in_line { (0, 1) } else { (one[1], 2) };
         let sample = Sample {
             current_a: one[0] + upper_a,

@@ -72,7 +72,7 @@ impl Board {
         self.reset(Reset::Pin);
         self.hang();
         self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)?;
-        for segment in image.segments() {
+        for segment in &image.segments {
             self.cpu.write(segment.address, &segment.bytes);
         }
         self.reset(Reset::Pin);

@@ -65,29 +65,22 @@ impl Chip {
             let value = self.read_word(address & !3);
             value.map(|value| value >> (8 * (address & 3)))
         };
-        match value {
-            Some(value) if size >= 4 => value,
-            Some(value) => value & ((1 << (8 * size)) - 1),
-            None => self.is_unknown(address, None),
-        }
+        value.map_or_else(|| self.is_unknown(address, None), |value| value & mask(size))
     }
 
     /// Writes a register, `size` bytes.
     pub fn write(&mut self, address: u32, size: u8, value: u32) {
         self.begin_access();
-        let done = if let Some((word, bit)) = bit_band(address) {
-            self.peek(word).and_then(|old| {
-                let new = old & !(1 << bit) | (value & 1) << bit;
-                self.write_word(word, new)
-            })
-        } else if size < 4 {
-            let shift = 8 * (address & 3);
-            let mask = ((1_u32 << (8 * size)) - 1) << shift;
-            let word = address & !3;
+        let done = if bit_band(address).is_none() && size >= 4 {
+            self.write_word(address, value)
+        } else {
+            let place = (address & !3, 8 * (address & 3));
+            let (word, shift, mask) = bit_band(address)
+                .map_or((place.0, place.1, mask(size) << place.1), |(word, bit)| {
+                    (word, bit, 1 << bit)
+                });
             self.peek(word)
                 .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
-        } else {
-            self.write_word(address, value)
         };
         if COMPARES.contains(&address) {
             self.compared = (self.blocks.len(), self.accesses);
@@ -240,7 +233,7 @@ impl Chip {
             USART3 if offset == uart::TDR => self.check_bus_pins(),
             RCC | FLASH_REGISTERS => {
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
-                self.scs.systick.cycle = self.rcc.ticks_per_cycle();
+                self.scs.systick.cycle = self.rcc.ticks_per_cycle;
                 self.check_clocks();
             }
             PWR => {
@@ -256,16 +249,11 @@ impl Chip {
 
     fn follow(&mut self, effect: Effect) -> Option<()> {
         match effect {
-            Effect::None => {}
-            Effect::Look => {
-                self.update_lines();
-                self.attention = true;
-            }
-            Effect::Reset => {
-                self.reset = Some(Reset::Software);
-                self.attention = true;
-            }
+            Effect::None => return Some(()),
+            Effect::Look => self.update_lines(),
+            Effect::Reset => self.reset = Some(Reset::Software),
         }
+        self.attention = true;
         Some(())
     }
 }
@@ -278,6 +266,11 @@ fn moves_gates(address: u32) -> bool {
         GPIO_A | GPIO_B => true,
         _ => false,
     }
+}
+
+/// The bits of an access of some bytes.
+fn mask(size: u8) -> u32 {
+    u32::MAX >> 32_u8.saturating_sub(8 * size)
 }
 
 fn port(address: u32) -> usize {

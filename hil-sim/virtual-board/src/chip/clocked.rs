@@ -52,7 +52,7 @@ impl Chip {
             return false;
         };
         let Some(on) = on.filter(|_| !self.rules.coarse) else { return true };
-        let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle();
+        let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle;
         // This access itself is counted.
         let accesses = self.accesses.saturating_sub(on.accesses + 1);
         self.rules.require(

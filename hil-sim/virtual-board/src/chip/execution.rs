@@ -102,7 +102,7 @@ impl Chip {
     /// Instructions from the flash are about to be executed.
     #[inline]
     pub fn instructions(&mut self, count: u64) {
-        self.now += self.rcc.ticks_per_cycle() * count * self.flash_cycles;
+        self.now += self.rcc.ticks_per_cycle * count * self.flash_cycles;
         self.instructions += count;
         self.last_block = None;
     }

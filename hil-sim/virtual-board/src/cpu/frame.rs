@@ -74,11 +74,7 @@ impl Cpu {
         self.uc.reg_write(R::CONTROL, control).ok();
         let basic: [u64; 7] = std::array::from_fn(|k| word(4 * k));
         self.uc.reg_write_batch(&BASIC[..6], &basic[..6], 6).ok();
-        let sp = sp
-            .wrapping_add(size as u32)
-            .wrapping_add(xpsr >> 9 & 1)
-            .wrapping_add(3 * (xpsr >> 9 & 1));
-        self.set(R::SP, sp);
+        self.set(R::SP, sp.wrapping_add(size as u32).wrapping_add(4 * (xpsr >> 9 & 1)));
         self.set(R::PC, basic[6] as u32);
         true
     }

@@ -70,7 +70,8 @@ pub struct Inputs {
 
 /// A board that is talked to.
 pub struct Session {
-    board: Board,
+    /// The board.
+    pub board: Board,
     pty: Pty,
     bus: Pty,
     inputs: Inputs,
@@ -108,11 +109,6 @@ impl Session {
             record: Record::default(),
             behind_s: 0.0,
         }
-    }
-
-    /// The board.
-    pub fn board(&self) -> &Board {
-        &self.board
     }
 
     /// Goes on until something ends it; every line is shown when it comes.

@@ -3,7 +3,7 @@
 
 mod converter;
 
-use super::{Effect, NEVER, Store, registers};
+use super::{Effect, NEVER, Store, bits, registers};
 use crate::rules::{Rule, Rules};
 use converter::{Converter, EOC, JEOC, JEOS, Sequence};
 

@@ -9,34 +9,21 @@ pub const LSI_HZ: f64 = 32_000.0;
 /// Clocks until a value written has arrived, at most.
 const ARRIVES: u64 = 6;
 
-/// The watchdog.
-#[derive(Clone, Debug)]
-pub struct Iwdg {
-    prescaler: u32,
-    reload: u32,
-    window: u32,
-    unlocked: bool,
-    /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
-    pub quick: bool,
-    /// Ticks per cycle of its clock.
-    pub clock: u64,
-    /// Until when the last values of prescaler, reload and window are on their way.
-    busy_until: [u64; 3],
-    expires: u64,
-}
-
-impl Default for Iwdg {
-    fn default() -> Self {
-        Self {
-            prescaler: 0,
-            reload: 0xfff,
-            window: 0xfff,
-            unlocked: false,
-            quick: false,
-            clock: (TICKS_PER_S as f64 / LSI_HZ) as u64,
-            busy_until: [0; 3],
-            expires: NEVER,
-        }
+defaults! {
+    /// The watchdog.
+    #[derive(Clone, Debug)]
+    pub struct Iwdg {
+        prescaler: u32,
+        reload: u32 = 0xfff,
+        window: u32 = 0xfff,
+        unlocked: bool,
+        /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
+        pub quick: bool,
+        /// Ticks per cycle of its clock.
+        pub clock: u64 = (TICKS_PER_S as f64 / LSI_HZ) as u64,
+        /// Until when the last values of prescaler, reload and window are on their way.
+        busy_until: [u64; 3],
+        expires: u64 = NEVER,
     }
 }
 

@@ -8,7 +8,7 @@ mod outputs;
 
 pub use outputs::{Output, Wave};
 
-use super::{Effect, NEVER, Store, registers};
+use super::{Effect, NEVER, Store, bits, registers};
 use crate::rules::{Rule, Rules};
 
 registers! {
@@ -38,12 +38,9 @@ registers! {
     _ = 0x64, 1, 0x7_3fff;
 }
 
-const UIF: u32 = 1;
-const BIF: u32 = 1 << 7;
-const SBIF: u32 = 1 << 13;
-const MOE: u32 = 1 << 15;
-const BKE: u32 = 1 << 12;
-const BKP: u32 = 1 << 13;
+// SR, BDTR.
+bits! { UIF = 0, BIF = 7, SBIF = 13 }
+bits! { OSSI = 10, OSSR = 11, BKE = 12, BKP = 13, MOE = 15 }
 
 /// An event and its time.
 #[derive(Clone, Copy, Debug)]
@@ -56,54 +53,34 @@ pub enum Event {
     Valley(u64),
 }
 
-/// The timer.
-#[derive(Clone, Debug)]
-pub struct Tim1 {
-    store: Store,
-    /// Counter at rest.
-    held: u32,
-    /// When the counter was last at 0, on its way up.
-    from: u64,
-    top: u32,
-    active: [u32; 4],
-    repetitions: u32,
-    status: u32,
-    /// Next end of the count, and whether it is the top.
-    next_end: u64,
-    at_top_next: bool,
-    /// When each trigger output rises next.
-    trigger_at: [u64; 2],
-    /// Level of the break pin; `None` is not sure.
-    fault_pin: Option<bool>,
-    /// Outputs of the comparators.
-    comparators: [bool; 7],
-    /// LOCK of the first write to BDTR.
-    first_lock: Option<u32>,
-    /// A debugger has stopped the counter, at this time.
-    frozen: Option<u64>,
-    /// Updates to be left out: compare values are not taken over, no flag is set.
-    pub drop_update: u32,
-}
-
-impl Default for Tim1 {
-    fn default() -> Self {
-        Self {
-            store: Store::new(KNOWN),
-            held: 0,
-            from: 0,
-            top: 0xffff,
-            active: [0; 4],
-            repetitions: 0,
-            status: 0,
-            next_end: NEVER,
-            at_top_next: true,
-            trigger_at: [NEVER; 2],
-            fault_pin: Some(true),
-            comparators: [false; 7],
-            first_lock: None,
-            frozen: None,
-            drop_update: 0,
-        }
+defaults! {
+    /// The timer.
+    #[derive(Clone, Debug)]
+    pub struct Tim1 {
+        store: Store = Store::new(KNOWN),
+        /// Counter at rest.
+        held: u32,
+        /// When the counter was last at 0, on its way up.
+        from: u64,
+        top: u32 = 0xffff,
+        active: [u32; 4],
+        repetitions: u32,
+        status: u32,
+        /// Next end of the count, and whether it is the top.
+        next_end: u64 = NEVER,
+        at_top_next: bool = true,
+        /// When each trigger output rises next.
+        trigger_at: [u64; 2] = [NEVER; 2],
+        /// Level of the break pin; `None` is not sure.
+        fault_pin: Option<bool> = Some(true),
+        /// Outputs of the comparators.
+        comparators: [bool; 7],
+        /// LOCK of the first write to BDTR.
+        first_lock: Option<u32>,
+        /// A debugger has stopped the counter, at this time.
+        frozen: Option<u64>,
+        /// Updates to be left out: compare values are not taken over, no flag is set.
+        pub drop_update: u32,
     }
 }
 
