@@ -9,8 +9,7 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use drive_core::{Hardware, State};
-use hil_sim::Config;
-use hil_sim::config::LoadMode;
+use hil_sim::{Config, config::LoadMode};
 use virtual_board::{Image, Options, Pair, Period};
 
 /// A typed line, the state that is waited for, and the periods that follow.

@@ -3,8 +3,7 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::image::Image;
-use crate::memory::Region;
+use crate::{image::Image, memory::Region};
 
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";

@@ -23,16 +23,11 @@ use motor::Connection;
 pub use motor::Disturbance;
 pub use options::Options;
 
-use crate::addresses::Addresses;
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::cpu::Cpu;
-use crate::image::Image;
-use crate::log::Log;
-use crate::memory;
-use crate::periph::Reset;
-use crate::periph::iwdg::LSI_HZ;
-use crate::power_stage::watch::GateWatch;
-use crate::rules::Violation;
+use crate::{
+    addresses::Addresses, cpu::Cpu, image::Image, log::Log, memory, periph::Reset,
+    periph::iwdg::LSI_HZ, power_stage::watch::GateWatch, rules::Violation,
+};
 use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
@@ -192,7 +187,7 @@ impl Board {
         self.chip().reset(cause);
         self.resets.push((now, cause));
         if cause == Reset::Power {
-            for (base, size) in [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)] {
+            for (base, size) in memory::VOLATILE {
                 // Neither the old contents nor zeros.
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }

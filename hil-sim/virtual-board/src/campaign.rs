@@ -21,11 +21,8 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::board::Board;
-use crate::chip::TICKS_PER_PERIOD;
-use crate::image::Image;
-use crate::periph::Reset;
 use crate::power_stage::{PowerStage, REFERENCE};
+use crate::{board::Board, chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
 use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;

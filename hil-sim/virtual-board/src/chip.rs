@@ -11,30 +11,22 @@ mod nets;
 pub mod pins;
 mod supply;
 
-pub use bus::Unknown;
-pub use clocked::clock_of;
+pub use bus::{Unknown, clock_of};
 pub use execution::Watched;
 
-use crate::cost::Block;
-use crate::periph::adc::Adc;
-use crate::periph::analog::Comparators;
-use crate::periph::dac::Dacs;
-use crate::periph::encoder::EncoderTimer;
-use crate::periph::flash::Flash;
-use crate::periph::gpio::Gpio;
-use crate::periph::iwdg::Iwdg;
-use crate::periph::pwr::Pwr;
-use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
-use crate::periph::tim8::Tim8;
-use crate::periph::time_base::TimeBase;
 use crate::periph::uart::{self, Uart};
-use crate::periph::wwdg::Wwdg;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::{
+    cost::Block, periph::adc::Adc, periph::analog::Comparators, periph::dac::Dacs,
+    periph::encoder::EncoderTimer, periph::flash::Flash, periph::gpio::Gpio, periph::iwdg::Iwdg,
+    periph::pwr::Pwr, periph::rcc::Rcc, periph::tim8::Tim8, periph::time_base::TimeBase,
+    periph::wwdg::Wwdg,
+};
 use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 use nets::DcLinkNet;
 

@@ -9,16 +9,13 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
-use hil_sim::Config;
-use hil_sim::config::LoadMode;
+use hil_sim::{Config, config::LoadMode};
 use induction_drive::board::LONGEST_INTERRUPT_CYCLES;
 
 use crate::board::{Board, LongestPath, Options, Period};
 use crate::chip::{TICKS_PER_PERIOD, Watched};
 use crate::cost::{self, BUS, TAKEN, instructions};
-use crate::image::Image;
-use crate::memory;
-use crate::pair::Pair;
+use crate::{image::Image, memory, pair::Pair};
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
 const BLOCKS: [(&str, &str); 12] = [

@@ -8,8 +8,7 @@ use anyhow::{Context, Result, bail};
 use gimli::{EndianArcSlice, RunTimeEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-use crate::memory::Region;
-use crate::power_stage::REFERENCE;
+use crate::{memory::Region, power_stage::REFERENCE};
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 

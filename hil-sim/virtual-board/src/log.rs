@@ -3,9 +3,8 @@
 use anyhow::{Context, Result, anyhow};
 use defmt_decoder::{DecodeError, Table};
 
-use crate::cpu::Cpu;
-use crate::image::Image;
 use crate::memory::{self, Region};
+use crate::{cpu::Cpu, image::Image};
 
 /// Up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;

@@ -9,10 +9,9 @@ use std::sync::mpsc::{Receiver, channel};
 
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
-use hil_sim::board::Options;
-use hil_sim::outcome::Origin;
 use hil_sim::report::{self, Section};
 use hil_sim::{Config, Error};
+use hil_sim::{board::Options, outcome::Origin};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use virtual_board::interactive::flash_file::FlashFile;
 use virtual_board::interactive::page;

@@ -3,9 +3,8 @@
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
-use crate::addresses::Addresses;
 use crate::cost::{self, Block};
-use crate::power_stage::Sensors;
+use crate::{addresses::Addresses, power_stage::Sensors};
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]

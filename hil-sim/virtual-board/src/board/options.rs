@@ -2,9 +2,8 @@
 
 use anyhow::{Result, anyhow};
 use drive_core::Line;
-use drive_settings::entry::Entry;
-use drive_settings::value::Value;
 use drive_settings::{SETTINGS, Settings};
+use drive_settings::{entry::Entry, value::Value};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 

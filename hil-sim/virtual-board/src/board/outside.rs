@@ -4,8 +4,7 @@ use anyhow::Result;
 
 use super::Board;
 use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
-use crate::image::Image;
-use crate::periph::Reset;
+use crate::{image::Image, periph::Reset};
 
 impl Board {
     /// Puts a line, without its end, on the wire to the console.

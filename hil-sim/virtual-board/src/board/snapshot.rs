@@ -3,11 +3,8 @@
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
-use super::Board;
-use super::motor::Connection;
-use crate::chip::Chip;
-use crate::cpu::CoreState;
-use crate::periph::Reset;
+use super::{Board, motor::Connection};
+use crate::{chip::Chip, cpu::CoreState, periph::Reset};
 
 /// Everything that changes on a board.
 pub struct Snapshot {

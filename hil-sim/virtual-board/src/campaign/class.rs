@@ -7,11 +7,7 @@ use super::faults::{
     bad_code, current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor,
 };
 use super::scene::{Source, Target};
-use crate::board::Board;
-use crate::chip::TICKS_PER_S;
-use crate::cpu::Register;
-use crate::memory::Region;
-use crate::periph::iwdg::LSI_HZ;
+use crate::{board::Board, chip::TICKS_PER_S, cpu::Register, memory::Region, periph::iwdg::LSI_HZ};
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 
@@ -145,7 +141,7 @@ const CLASSES: &[Class] = &[
         slow_sensor(board, rng, |s| &mut s.heat_sink)
     }),
     regulating("not-a-number in the drive's state", NOT_A_NUMBER, |board, target, rng| {
-        let Region { address: base, size } = target.state;
+        let Region { address: base, size } = target.addresses.state;
         // A word that holds a plausible number; angles and counts are another class.
         for _ in 0..1000 {
             let address = base + 4 * rng.random_range(0..size / 4);
@@ -196,19 +192,19 @@ const CLASSES: &[Class] = &[
     })
     .ends(),
     regulating("bit flip in the coefficients", CHECK, |board, target, rng| {
-        flip(board, rng, target.coefficients)
+        flip(board, rng, target.addresses.coefficients)
     }),
     regulating("bit flip in a register", REGISTERS, |board, _, rng| flip_register(board, rng))
         .ends(),
     regulating("bit flip in the drive's state", LOCK, |board, target, rng| {
-        flip(board, rng, target.state)
+        flip(board, rng, target.addresses.state)
     })
     .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in the control's code", CHECK, |board, target, rng| {
         flip(board, rng, target.code)
     }),
     regulating("bit flip anywhere in the control's data", LOCK, |board, target, rng| {
-        flip(board, rng, target.control)
+        flip(board, rng, target.addresses.control)
     })
     .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in RAM, stack included", LOCK, |board, target, rng| {

@@ -4,9 +4,8 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::periph::Reset;
+use crate::{board::Board, periph::Reset};
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;

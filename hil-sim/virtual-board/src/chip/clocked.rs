@@ -1,11 +1,6 @@
 //! The clocks of the peripherals, and the rules between clock tree, supply and flash.
 
-use super::Chip;
-use super::bus::{
-    ADC1, DAC1, DAC3, FLASH_REGISTERS, GPIO_FIRST, GPIO_LAST, LPUART1, PWR, SYSCFG, TIM1, TIM2,
-    TIM5, TIM8, USART3, WWDG,
-};
-use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR};
+use super::{Chip, bus::clock_of};
 use crate::rules::Rule;
 
 /// Cycles from the store that switches a clock on to the first store that arrives: two whole cycles lie between.
@@ -16,31 +11,6 @@ const BUS_CYCLES: u64 = 2;
 const STEP_HZ: u64 = 80_000_000;
 /// That while, ticks: a microsecond.
 const STEP_TICKS: u64 = 170;
-
-/// Name, enable register and bit of the clock behind an address; `None` has none of its own.
-pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
-    const PORTS: [&str; 7] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
-    Some(match address & !0x3ff {
-        TIM1 => ("TIM1", APB2ENR, 11),
-        ADC1 => ("ADC12", AHB2ENR, 13),
-        TIM8 => ("TIM8", APB2ENR, 13),
-        TIM2 => ("TIM2", APB1ENR1, 0),
-        TIM5 => ("TIM5", APB1ENR1, 3),
-        WWDG => ("WWDG", APB1ENR1, 11),
-        GPIO_FIRST..=GPIO_LAST => {
-            let port = (address - GPIO_FIRST) >> 10;
-            (PORTS[port as usize], AHB2ENR, port)
-        }
-        PWR => ("PWR", APB1ENR1, 28),
-        LPUART1 => ("LPUART1", APB1ENR2, 0),
-        USART3 => ("USART3", APB1ENR1, 18),
-        SYSCFG => ("SYSCFG", APB2ENR, 0),
-        DAC1 => ("DAC1", AHB2ENR, 16),
-        DAC3 => ("DAC3", AHB2ENR, 18),
-        FLASH_REGISTERS => ("FLASH", AHB1ENR, 8),
-        _ => return None,
-    })
-}
 
 impl Chip {
     /// Whether an access reaches its peripheral.

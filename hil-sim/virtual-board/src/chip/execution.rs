@@ -2,9 +2,7 @@
 
 use super::Chip;
 use crate::cost::{self, Block};
-use crate::memory::Region;
-use crate::periph::plain;
-use crate::scs;
+use crate::{memory::Region, periph::plain, scs};
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
 #[derive(Clone, Debug)]

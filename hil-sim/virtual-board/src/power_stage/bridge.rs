@@ -5,9 +5,8 @@ use thiserror::Error;
 
 use super::PowerStage;
 use super::driver::{Driver, Request};
-use crate::periph::gpio::Gpio;
 use crate::periph::tim1::{Tim1, Wave};
-use crate::time::TICKS_PER_S;
+use crate::{periph::gpio::Gpio, time::TICKS_PER_S};
 
 /// Names of the switches of a leg.
 const SIDES: [&str; 2] = ["high", "low"];
