@@ -29,9 +29,7 @@ pub fn test() -> Result<()> {
     for (features, examples) in [("stm32g474", PLAIN), ("stm32g474,defmt", LOGGED)] {
         let mut build = cargo(&target, &hal, &folder);
         build.args(["--features", features]);
-        for example in examples {
-            build.args(["--example", example]);
-        }
+        build.args(examples.iter().flat_map(|example| ["--example", example]));
         run::step("examples of stm32g4xx-hal", &mut build)?;
         for example in examples {
             let from = folder.join(TARGET).join("release/examples").join(example);
@@ -46,9 +44,8 @@ pub fn test() -> Result<()> {
         let from = folder.join(TARGET).join("release").join(&name);
         fs::copy(from, programs.join(format!("embassy-{name}")))?;
     }
-    let mut test = board::cargo("test --release --test image foreign --")?;
-    test.args(["--ignored", "--nocapture"]).env(FOLDER, programs);
-    run::step("programs of others on the virtual board", &mut test)
+    let mut test = board::ignored_test("foreign")?;
+    run::step("programs of others on the virtual board", test.env(FOLDER, programs))
 }
 
 /// A cargo command that builds a workspace for the microcontroller.
