@@ -166,46 +166,34 @@ defaults! {
     }
 }
 
+/// Takes over fields that a reset does not change.
+macro_rules! keep {
+    ($new:ident, $old:ident: $($field:ident $(. $part:ident)?)*) => {
+        $($new.$field $(.$part)? = $old.$field $(.$part)?;)*
+    };
+}
+
 impl Chip {
     /// After a reset: registers at their values, flash contents and the world outside as before.
     pub fn reset(&mut self, cause: Reset) {
-        let old = std::mem::take(self);
-        self.now = old.now;
-        self.accesses = old.accesses;
-        self.instructions = old.instructions;
-        self.keep_blocks = old.keep_blocks;
-        self.watched = old.watched;
-        self.forgiving = old.forgiving;
-        self.rules = old.rules;
-        self.flash_cycles = old.flash_cycles;
-        self.pwr.supply_v = old.pwr.supply_v;
-        (self.analog, self.dc_link) = (old.analog, old.dc_link);
-        self.comparator_offset = old.comparator_offset;
-        (self.fault_pull_ohm, self.fault_low) = (old.fault_pull_ohm, old.fault_low);
-        self.damage = old.damage;
-        (self.clock_error, self.reference_error) = (old.clock_error, old.reference_error);
-        (self.tim5, self.iwdg.clock) = (old.tim5.after_reset(), old.iwdg.clock);
-        self.adc.own_reference = old.adc.own_reference;
+        let mut old = std::mem::take(self);
+        old.rcc.flags = match cause {
+            Reset::Power => Rcc::new(cause).flags,
+            _ => Rcc::new(cause).flags | old.rcc.flags,
+        };
+        keep! { self, old:
+            now accesses instructions keep_blocks watched forgiving rules flash_cycles
+            analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
+            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers tim1.drop_update tim2.position
+            rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates
+        }
         // Only power-on resets the debug support.
         if cause != Reset::Power {
-            self.debug = old.debug;
-            self.halt = old.halt;
+            keep! { self, old: debug halt }
         }
-        self.rcc = Rcc::new(cause);
-        if cause != Reset::Power {
-            self.rcc.flags |= old.rcc.flags;
-        }
-        self.rcc.crystal_lives = old.rcc.crystal_lives;
-        self.rcc.pll_locks = old.rcc.pll_locks;
+        self.tim5 = old.tim5.after_reset();
         self.flash = old.flash.after_reset();
         self.follow_fault_pin();
-        self.tim1.drop_update = old.tim1.drop_update;
-        self.tim2.position = old.tim2.position;
-        self.adc.inputs = old.adc.inputs;
-        self.adc.lose_triggers = old.adc.lose_triggers;
-        self.lpuart.line = old.lpuart.line;
-        self.usart3.line = old.usart3.line;
-        self.gates = old.gates;
         self.look_at_gates();
     }
 

@@ -82,7 +82,7 @@ impl Board {
             return Ok(());
         }
         // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
-        if chip.scs.waits() {
+        if chip.scs.wakes() {
             chip.deadline = chip.now + 1;
         }
         if let Some(at) = self.preempt_at {

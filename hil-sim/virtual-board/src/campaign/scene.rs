@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, bail, ensure};
 use drive_core::State;
 use drive_settings::Settings;
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
@@ -233,9 +233,8 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     );
     let mut chip = board.chip().clone();
     let defaults = FirmwareSettings::of(chip.gates.stage.board());
-    match Saved::load(Bank(&mut chip), &defaults).1 {
-        Loaded::Settings(settings) => Some(settings),
-        _ => None,
-    }
-    .context("no whole settings in the flash")
+    let Loaded::Settings(settings) = Saved::load(Bank(&mut chip), &defaults).1 else {
+        bail!("no whole settings in the flash");
+    };
+    Ok(settings)
 }
