@@ -26,7 +26,7 @@ pub fn test(target: &Target) -> Result<()> {
         image::build_for(target, board)?;
     }
     // Last: the others leave their image at its path.
-    let elf = image::build_with(target)?;
+    let elf = image::build_for(target, image::REFERENCE)?;
     let mut command = cargo("test --release --tests --no-fail-fast")?;
     command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
     times::test("the images on the virtual board", command)

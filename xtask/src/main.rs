@@ -189,7 +189,7 @@ fn test() -> Result<()> {
         let lints = ["--package", "induction-drive", "--no-deps", "--", "-D", "warnings"];
         run::step("lints of the firmware", target.cargo("clippy")?.args(lints))
     });
-    let elf = steps.with(target, "firmware", image::build_with);
+    let elf = steps.with(target, "firmware", |target| image::build_for(target, image::REFERENCE));
     let elf = elf.as_deref();
     steps.with(elf, "size", size::report);
 

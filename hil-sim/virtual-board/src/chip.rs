@@ -177,19 +177,18 @@ impl Chip {
     /// After a reset: registers at their values, flash contents and the world outside as before.
     pub fn reset(&mut self, cause: Reset) {
         let mut old = std::mem::take(self);
-        old.rcc.flags = match cause {
-            Reset::Power => Rcc::new(cause).flags,
-            _ => Rcc::new(cause).flags | old.rcc.flags,
-        };
+        // Only power-on clears the flags of resets and resets the debug support.
+        if cause == Reset::Power {
+            old.rcc.flags = 0;
+        } else {
+            keep! { self, old: debug halt }
+        }
+        old.rcc.flags |= Rcc::new(cause).flags;
         keep! { self, old:
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
             analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
             pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers tim1.drop_update tim2.position
             rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates
-        }
-        // Only power-on resets the debug support.
-        if cause != Reset::Power {
-            keep! { self, old: debug halt }
         }
         self.tim5 = old.tim5.after_reset();
         self.flash = old.flash.after_reset();

@@ -39,13 +39,8 @@ pub enum Reset {
 /// As the firmware's log names it.
 impl fmt::Display for Reset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Power => "reset by power-on",
-            Self::Pin => "reset by reset pin",
-            Self::Software => "reset by software",
-            Self::Watchdog => "reset by watchdog",
-            Self::Window => "reset by window watchdog",
-        })
+        let causes = ["power-on", "reset pin", "software", "watchdog", "window watchdog"];
+        write!(f, "reset by {}", causes[*self as usize])
     }
 }
 

@@ -1,6 +1,6 @@
 //! The bus: reads and writes of registers, each to the model that has it.
 
-use std::fmt;
+use thiserror::Error;
 
 use super::{Chip, OWN_REFERENCE_CODE, pins};
 use crate::memory;
@@ -54,7 +54,8 @@ pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
 }
 
 /// An access that the model does not know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("unknown register {address:#010x} {}", written.map_or("read".into(), |value| format!("written with {value:#x}")))]
 pub struct Unknown {
     /// Where.
     pub address: u32,
@@ -62,16 +63,6 @@ pub struct Unknown {
     pub written: Option<u32>,
     /// Last known place of the core: the instruction, in CCM the block.
     pub at: u32,
-}
-
-impl fmt::Display for Unknown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "unknown register {:#010x} ", self.address)?;
-        match self.written {
-            Some(value) => write!(f, "written with {value:#x}"),
-            None => f.write_str("read"),
-        }
-    }
 }
 
 impl Chip {

@@ -5,7 +5,7 @@ use crate::cost::{self, Block};
 use crate::{memory::Region, periph::plain, scs};
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Watched {
     /// Where it lies in the flash.
     pub function: Region,
@@ -22,13 +22,7 @@ pub struct Watched {
 impl Watched {
     /// Counts the calls of a function in the flash.
     pub fn new(function: Region) -> Self {
-        Self {
-            function,
-            calls: Vec::new(),
-            longest: Vec::new(),
-            present: Vec::new(),
-            returns_to: 0,
-        }
+        Self { function, ..Self::default() }
     }
 
     /// Whether the block at this address belongs to a call.

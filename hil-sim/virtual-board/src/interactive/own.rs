@@ -16,14 +16,11 @@ pub enum Own {
 }
 
 /// Names and meanings.
+#[rustfmt::skip]
 const COMMANDS: [(&str, Own, &str); 4] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
-    (
-        "!unplug",
-        Own::Unplug,
-        "unplugs the controller and plugs it in again: RAM is lost, flash stays",
-    ),
+    ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
 
