@@ -43,15 +43,10 @@ pub struct Board {
     /// The image.
     pub image: Image,
     log: Option<Log>,
-    lines: Vec<String>,
-    since_log: u32,
+    progress: Progress,
     /// The motor with everything around it.
     pub plant: Plant,
     connection: Connection,
-    sleeping: bool,
-    hung: bool,
-    entered: Option<RunningInterrupt>,
-    periods: VecDeque<Period>,
     addresses: Option<Addresses>,
     /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
@@ -67,10 +62,23 @@ pub struct Board {
     pub longest: LongestPath,
     /// The longest way to the compare values.
     pub longest_to_compares: LongestPath,
-    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
-    pended: Option<u64>,
     /// Longest from there to its first instruction, ticks.
     pub latest_start: u64,
+}
+
+/// What passes while a board runs.
+#[derive(Default)]
+struct Progress {
+    sleeping: bool,
+    hung: bool,
+    entered: Option<RunningInterrupt>,
+    /// Control interrupts and lines of the log that were not asked for yet.
+    periods: VecDeque<Period>,
+    lines: Vec<String>,
+    /// Periods since the log was fetched.
+    since_log: u32,
+    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    pended: Option<u64>,
     /// The core is stopped before the n-th instruction in the flash from here on, if set, and
     /// [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
@@ -97,14 +105,9 @@ impl Board {
             cpu,
             image,
             log,
-            lines: Vec::new(),
-            since_log: 0,
+            progress: Progress::default(),
             plant,
             connection: Connection::new(&options),
-            sleeping: false,
-            hung: false,
-            entered: None,
-            periods: VecDeque::new(),
             addresses,
             disturb: None,
             poison: None,
@@ -113,9 +116,7 @@ impl Board {
             resets: Vec::new(),
             longest: LongestPath::default(),
             longest_to_compares: LongestPath::default(),
-            pended: None,
             latest_start: 0,
-            preempt_at: None,
         };
         let chip = board.chip();
         chip.set_clocks(0.0, LSI_HZ);
@@ -177,7 +178,7 @@ impl Board {
 
     /// The oldest control interrupt that has ended and was not asked for yet.
     pub fn next_period(&mut self) -> Option<Period> {
-        self.periods.pop_front()
+        self.progress.periods.pop_front()
     }
 
     /// Resets the chip; RAM, flash and the motor stay, unless power was lost.
@@ -192,9 +193,9 @@ impl Board {
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }
         }
-        self.sleeping = false;
-        self.hung = false;
-        self.entered = None;
+        self.progress.sleeping = false;
+        self.progress.hung = false;
+        self.progress.entered = None;
         self.follow_outputs();
         self.cpu.reset(memory::FLASH);
     }
@@ -206,9 +207,9 @@ impl Board {
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(TICKS_PER_PERIOD)?;
-            self.since_log += 1;
-            if self.since_log >= PERIODS_PER_LOG {
-                self.since_log = 0;
+            self.progress.since_log += 1;
+            if self.progress.since_log >= PERIODS_PER_LOG {
+                self.progress.since_log = 0;
                 self.drain_log()?;
             }
         }
@@ -229,8 +230,8 @@ impl Board {
                 bail!("no time passes");
             }
             self.events()?;
-            if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
-                self.preempt_at = None;
+            if self.progress.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
+                self.progress.preempt_at = None;
                 return Ok(());
             }
             let chip = self.cpu.chip();

@@ -123,9 +123,7 @@ fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
 
 /// Writes the page, its plots and the JSON object; where the page is.
 fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBuf> {
-    let board = &session.board;
-    let mut outcome =
-        page::outcome(config, board.time(), board.resets.len(), &session.record, &session.lines);
+    let mut outcome = page::outcome(config, session);
     if session.behind_s > 0.0 {
         let behind = format!("The board fell behind the clock by {:.1} s.", session.behind_s);
         outcome.remarks.insert(0, behind);

@@ -85,14 +85,15 @@ impl Board {
             hardware,
         };
         let (began, accesses) = (chip.now, chip.accesses);
-        if let Some(at) = self.pended.take() {
+        if let Some(at) = self.progress.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
-        self.entered = Some(RunningInterrupt { began, sample, ended, had_order, accesses });
+        self.progress.entered =
+            Some(RunningInterrupt { began, sample, ended, had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {
-        let Some(entered) = self.entered.take() else { return };
+        let Some(entered) = self.progress.entered.take() else { return };
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
         chip.in_control = false;
@@ -122,7 +123,7 @@ impl Board {
                 cycles,
                 to_compares,
             };
-            self.periods.push_back(period);
+            self.progress.periods.push_back(period);
         }
     }
 }

@@ -19,7 +19,7 @@ impl Board {
     }
 
     fn enter(&mut self, exception: u16) -> Result<()> {
-        self.sleeping = false;
+        self.progress.sleeping = false;
         if exception == CONTROL_INTERRUPT {
             self.begin_control();
             self.remember();
@@ -28,8 +28,8 @@ impl Board {
         let handler = self.cpu.word(vector).context("no vector")?;
         self.cpu.chip_mut().scs.begin(exception);
         let stacked = self.cpu.enter(exception, handler & !1);
-        if exception == CONTROL_INTERRUPT {
-            self.spoil();
+        if exception == CONTROL_INTERRUPT && self.poison.is_some() {
+            self.cpu.spoil_float();
         }
         if !stacked && exception != scs::HARD_FAULT {
             // The stack is at its end: the frame is lost, and the fault is taken instead.
@@ -46,7 +46,7 @@ impl Board {
             ensure!(chip.forgiving, "lock-up: a fault in a fault handler at {}", place());
             // Locked up, until a reset.
             chip.lock_up();
-            self.hung = true;
+            self.progress.hung = true;
             return Ok(());
         }
         chip.scs.cfsr |= cfsr;
@@ -66,14 +66,14 @@ impl Board {
             chip.now = chip.now.max(chip.deadline.min(chip.stalled_until));
             return Ok(());
         }
-        if self.hung || self.sleeping || chip.is_halted() || chip.browned_out() {
-            if self.sleeping && !chip.is_halted() && chip.scs.wakes() {
-                self.sleeping = false;
+        if self.progress.hung || self.progress.sleeping || chip.is_halted() || chip.browned_out() {
+            if self.progress.sleeping && !chip.is_halted() && chip.scs.wakes() {
+                self.progress.sleeping = false;
                 return Ok(());
             }
             let before = chip.now;
             chip.now = chip.now.max(chip.deadline);
-            if self.sleeping && !chip.is_halted() {
+            if self.progress.sleeping && !chip.is_halted() {
                 chip.sleep(chip.now - before);
             }
             return Ok(());
@@ -85,13 +85,13 @@ impl Board {
         if chip.scs.wakes() {
             chip.deadline = chip.now + 1;
         }
-        if let Some(at) = self.preempt_at {
+        if let Some(at) = self.progress.preempt_at {
             chip.deadline =
                 chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
         }
         match self.cpu.run() {
             Stop::Asked => {}
-            Stop::Wait => self.sleeping = true,
+            Stop::Wait => self.progress.sleeping = true,
             Stop::Return(exc_return) => self.leave(exc_return)?,
             Stop::Access(address) if memory::is_reserved(address) || self.cpu.chip().forgiving => {
                 self.hard_fault(1 << 9, Some(address))?;

@@ -44,12 +44,12 @@ impl Board {
     /// The log cannot be decoded.
     pub fn take_log(&mut self) -> Result<Vec<String>> {
         self.drain_log()?;
-        Ok(std::mem::take(&mut self.lines))
+        Ok(std::mem::take(&mut self.progress.lines))
     }
 
     pub(super) fn drain_log(&mut self) -> Result<()> {
         if let Some(log) = &mut self.log {
-            self.lines.extend(log.take(&mut self.cpu)?);
+            self.progress.lines.extend(log.take(&mut self.cpu)?);
         }
         Ok(())
     }
@@ -92,7 +92,7 @@ impl Board {
 
     /// The core executes nothing any more, until a reset.
     pub fn hang(&mut self) {
-        self.hung = true;
+        self.progress.hung = true;
     }
 
     /// The core executes nothing for some ticks, as if the bus were taken.
@@ -111,14 +111,14 @@ impl Board {
 
     /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
     pub fn stop_after(&mut self, instructions: u64) {
-        self.preempt_at = Some(self.cpu.chip().instructions + instructions);
+        self.progress.preempt_at = Some(self.cpu.chip().instructions + instructions);
     }
 
     /// Makes an exception pending: it preempts by its priority and the masks.
     pub fn pend(&mut self, exception: u16) {
         // A control interrupt that runs already delays only itself.
-        if exception == CONTROL_INTERRUPT && self.entered.is_none() {
-            self.pended = Some(self.cpu.chip().now);
+        if exception == CONTROL_INTERRUPT && self.progress.entered.is_none() {
+            self.progress.pended = Some(self.cpu.chip().now);
         }
         self.chip().scs.pend(exception);
     }

@@ -49,13 +49,6 @@ impl Board {
         }
     }
 
-    /// Poisons the floating-point registers as it begins.
-    pub(super) fn spoil(&mut self) {
-        if self.poison.is_some() {
-            self.cpu.spoil_float();
-        }
-    }
-
     /// Compares the state after a control interrupt with that before it.
     ///
     /// # Errors

@@ -160,9 +160,7 @@ impl Flash {
     /// Whether the operation that begins now is the one in which the power goes.
     fn power_goes(&mut self) -> bool {
         self.operations += 1;
-        if self.power_loss_at == Some(self.operations) {
-            self.power_lost = true;
-        }
+        self.power_lost |= self.power_loss_at == Some(self.operations);
         self.power_lost
     }
 
@@ -196,11 +194,8 @@ impl Flash {
             return;
         }
         place.copy_from_slice(&(old & new).to_le_bytes());
-        self.torn[at / 8] = false;
         self.changing = at / 8..at / 8 + 1;
-        if self.power_goes() {
-            self.torn[at / 8] = true;
-        }
+        self.torn[at / 8] = self.power_goes();
         self.busy_until = now + PROGRAM;
         self.status |= EOP;
     }

@@ -64,20 +64,15 @@ impl Iwdg {
     /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
         let now = rules.now;
-        match (offset, value) {
-            (0x00, 0x5555) => self.unlocked = true,
-            (0x00, 0xaaaa) => {
-                self.unlocked = false;
-                if self.expires != NEVER {
+        match offset {
+            0x00 => {
+                self.unlocked = value == 0x5555;
+                let runs = self.expires != NEVER;
+                if value == 0xcccc || value == 0xaaaa && runs {
                     self.expires = now + self.period();
                 }
             }
-            (0x00, 0xcccc) => {
-                self.unlocked = false;
-                self.expires = now + self.period();
-            }
-            (0x00, _) => self.unlocked = false,
-            (0x04 | 0x08 | 0x10, _) if self.unlocked => {
+            0x04 | 0x08 | 0x10 if self.unlocked => {
                 let which = [0x04, 0x08, 0x10].iter().position(|known| *known == offset)?;
                 let name = ["PR", "RLR", "WINR"][which];
                 let idle = now >= self.busy_until[which];
@@ -92,7 +87,7 @@ impl Iwdg {
                 let clock = if self.quick { self.clock } else { before.max(self.count()) };
                 self.busy_until[which] = now + ARRIVES * clock;
             }
-            (0x04 | 0x08 | 0x10, _) => {}
+            0x04 | 0x08 | 0x10 => {}
             _ => return None,
         }
         Some(Effect::Look)

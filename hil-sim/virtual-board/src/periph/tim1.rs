@@ -3,7 +3,6 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising edges of OC4REF on the way
 //! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters.
 
-mod halt;
 mod outputs;
 
 pub use outputs::{Output, Wave};
@@ -97,6 +96,21 @@ impl Tim1 {
         let now = self.frozen.unwrap_or(now);
         let phase = ((now.saturating_sub(self.from)) % u64::from(2 * self.top)) as u32;
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
+    }
+
+    /// A debugger halts the core: the counter stops, and the outputs go off as if MOE was reset (RM0440, TIM1, debug mode).
+    pub fn freeze(&mut self, now: u64) {
+        self.frozen.get_or_insert(now);
+    }
+
+    /// The counter goes on.
+    pub fn thaw(&mut self, now: u64) {
+        let Some(since) = self.frozen.take() else { return };
+        let stood = now - since;
+        self.from += stood;
+        for at in self.trigger_at.iter_mut().chain([&mut self.next_end]) {
+            *at = at.saturating_add(stood);
+        }
     }
 
     /// Lets an update come at the next end of the count, whatever the repetition counter says.
@@ -193,9 +207,7 @@ impl Tim1 {
             return;
         }
         self.top = self.store.get(ARR).max(1);
-        for channel in 0..4 {
-            self.active[channel] = self.store.get(CCR1 + 4 * channel as u32);
-        }
+        self.active = std::array::from_fn(|channel| self.store.get(CCR1 + 4 * channel as u32));
         self.repetitions = self.store.get(RCR);
         if flag {
             self.status |= UIF;
@@ -209,10 +221,7 @@ impl Tim1 {
 
     /// A fault inside the chip: clock, supply, memory, lock-up.
     pub fn system_break(&mut self) {
-        if self.store.get(BDTR) & BKE != 0 {
-            self.status |= SBIF;
-            self.clear_moe();
-        }
+        self.pull_break(SBIF);
     }
 
     /// Outputs of the comparators, from now on.
@@ -236,21 +245,17 @@ impl Tim1 {
         // BKCMP1E is bit 1, BKCMP1P bit 10; comparators 5 to 7 have no polarity.
         let comparator =
             (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
-        if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
-            self.latch_break();
+        if (pin || comparator) == (bdtr & BKP != 0) {
+            self.pull_break(BIF);
         }
     }
 
-    fn latch_break(&mut self) {
-        if self.store.get(BDTR) & BKE != 0 {
-            self.status |= BIF;
-            self.clear_moe();
-        }
-    }
-
-    fn clear_moe(&mut self) {
+    fn pull_break(&mut self, flag: u32) {
         let bdtr = self.store.get(BDTR);
-        self.store.write(BDTR, bdtr & !MOE);
+        if bdtr & BKE != 0 {
+            self.status |= flag;
+            self.store.write(BDTR, bdtr & !MOE);
+        }
     }
 
     /// Reads a register.
@@ -283,7 +288,7 @@ impl Tim1 {
                     }
                 }
                 if value & 1 << 7 != 0 {
-                    self.latch_break();
+                    self.pull_break(BIF);
                 }
                 return Some(Effect::Look);
             }
@@ -346,14 +351,9 @@ impl Tim1 {
     }
 
     fn locked(&self, old: u32, new: u32) -> u32 {
-        let mut kept = 0;
-        if self.lock() >= 1 {
-            // Dead time, break enable, polarity and filters, automatic output.
-            kept |= 0x0fff_f0ff & !MOE;
-        }
-        if self.lock() >= 2 {
-            kept |= 0x0c00;
-        }
+        // Dead time, break enable, polarity and filters, automatic output; then OSSR and OSSI.
+        let first = 0x0fff_f0ff & !MOE;
+        let kept = [0, first, first | OSSR | OSSI, first | OSSR | OSSI][self.lock() as usize];
         old & kept | new & !kept
     }
 }

@@ -245,18 +245,11 @@ impl Converter {
         })
     }
 
-    /// Writes a register, with `clock` ticks per converter clock if there is one.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        clock: Option<u64>,
-        rules: &mut Named,
-    ) -> Option<()> {
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Named) -> Option<()> {
         match offset {
             ISR => self.status &= !value,
-            CR => self.order(value, now, clock, rules),
+            CR => self.order(value, rules),
             JSQR => {
                 let queue = self.store.get(CFGR) & JQDIS == 0;
                 let free = queue || self.control & JADSTART == 0;
@@ -269,7 +262,8 @@ impl Converter {
         Some(())
     }
 
-    fn order(&mut self, value: u32, now: u64, clock: Option<u64>, rules: &mut Named) {
+    fn order(&mut self, value: u32, rules: &mut Named) {
+        let (now, clock) = (rules.rules.now, rules.clock);
         let config = DEEPPWD | VREGEN | ADCALDIF;
         let before = self.control;
         self.control = self.control & !config | value & config;
