@@ -80,7 +80,7 @@ pub fn for_target() -> Result<Target> {
     }
     println!("\nThe toolchain in use has no {TARGET}, so Debian's compiler builds for it.");
     let there =
-        || run::succeeds(run::command("dpkg").arg("--status").args(DEBIAN_PACKAGES.split(' ')));
+        || run::said(run::command("dpkg").arg("--status").args(DEBIAN_PACKAGES.split(' '))).is_ok();
     provide(&format!("a compiler for {TARGET}"), there, &rustup, DEBIAN_PACKAGES)?;
     Ok(Target::Debian)
 }
@@ -88,7 +88,7 @@ pub fn for_target() -> Result<Target> {
 /// Finds or gets `cargo fmt` and `cargo clippy` for the toolchain in use.
 pub fn ensure_format_and_lints() -> Result<()> {
     let tools = ["fmt --version", "clippy --version"];
-    let there = || tools.iter().all(|words| run::succeeds(&mut run::cargo(words)));
+    let there = || tools.iter().all(|words| run::said(&mut run::cargo(words)).is_ok());
     let rustup = "rustup component add rustfmt clippy";
     provide("cargo fmt or cargo clippy", there, rustup, "rustfmt-web rust-web-clippy")
 }
@@ -129,7 +129,7 @@ fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -
 
 /// Whether a program is there.
 fn answers(program: &str) -> bool {
-    run::succeeds(run::command(program).arg("--version"))
+    run::said(run::command(program).arg("--version")).is_ok()
 }
 
 fn rustup_may_install() -> bool {

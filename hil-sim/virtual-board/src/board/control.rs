@@ -115,14 +115,8 @@ impl Board {
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
-            let period = Period {
-                began: entered.began,
-                sample: entered.sample,
-                compare,
-                took_order,
-                cycles,
-                to_compares,
-            };
+            let RunningInterrupt { began, sample, .. } = entered;
+            let period = Period { began, sample, compare, took_order, cycles, to_compares };
             self.progress.periods.push_back(period);
         }
     }

@@ -41,7 +41,7 @@ impl Chip {
     pub(super) fn check_clocks(&mut self) {
         let (system, bus) = (self.rcc.system_hz(), self.rcc.bus_hz());
         let range = self.pwr.range();
-        let limit = range.limit_hz();
+        let limit = range.clocks_hz().0;
         self.rules.require(system <= limit, Rule::VoltageRange, || {
             format!("a system clock of {system} Hz in {range:?}, at most {limit}")
         });

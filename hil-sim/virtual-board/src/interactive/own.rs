@@ -32,13 +32,10 @@ impl Own {
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
-        match known {
-            Some((_, own, _)) => Ok(Some(*own)),
-            None => {
-                let names = COMMANDS.map(|(name, ..)| name).join(", ");
-                Err(format!("`{line}`: no such command of the board; there are {names}"))
-            }
-        }
+        known.map(|(_, own, _)| Some(*own)).ok_or_else(|| {
+            let names = COMMANDS.map(|(name, ..)| name).join(", ");
+            format!("`{line}`: no such command of the board; there are {names}")
+        })
     }
 
     /// A line about each command.

@@ -33,17 +33,12 @@ pub enum Range {
 
 impl Range {
     /// Largest system clock, and bus clock for each wait state of the flash and one more, Hz.
-    fn clocks_hz(self) -> (u64, u64) {
+    pub fn clocks_hz(self) -> (u64, u64) {
         match self {
             Self::Boost => (170_000_000, 34_000_000),
             Self::Normal => (150_000_000, 30_000_000),
             Self::Low => (26_000_000, 12_000_000),
         }
-    }
-
-    /// Largest system clock, Hz.
-    pub fn limit_hz(self) -> u64 {
-        self.clocks_hz().0
     }
 
     /// Wait states of the flash that a bus clock in Hz needs.

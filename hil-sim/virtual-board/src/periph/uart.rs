@@ -253,9 +253,7 @@ impl Uart {
                 self.shift(now);
             }
             TDR => {}
-            _ => {
-                self.store.write(offset, value)?;
-            }
+            _ => return self.store.write(offset, value).map(|_| Effect::Look),
         }
         Some(Effect::Look)
     }
