@@ -69,11 +69,10 @@ impl Chip {
     /// Reads a register, `size` bytes.
     pub fn read(&mut self, address: u32, size: u8) -> u32 {
         self.begin_access();
-        let value = if let Some(word) = bit_band(address) {
-            self.peek(word.0).map(|value| value >> word.1 & 1)
+        let value = if let Some((word, bit)) = bit_band(address) {
+            self.peek(word).map(|value| value >> bit & 1)
         } else {
-            let value = self.read_word(address & !3);
-            value.map(|value| value >> (8 * (address & 3)))
+            self.read_word(address & !3).map(|value| value >> (8 * (address & 3)))
         };
         value.map_or_else(|| self.is_unknown(address, None), |value| value & mask(size))
     }
@@ -81,16 +80,14 @@ impl Chip {
     /// Writes a register, `size` bytes.
     pub fn write(&mut self, address: u32, size: u8, value: u32) {
         self.begin_access();
-        let done = if bit_band(address).is_none() && size >= 4 {
+        let alias = bit_band(address);
+        let done = if alias.is_none() && size >= 4 {
             self.write_word(address, value)
         } else {
-            let place = (address & !3, 8 * (address & 3));
-            let (word, shift, mask) = bit_band(address)
-                .map_or((place.0, place.1, mask(size) << place.1), |(word, bit)| {
-                    (word, bit, 1 << bit)
-                });
-            self.peek(word)
-                .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
+            let (word, shift) = alias.unwrap_or((address & !3, 8 * (address & 3)));
+            let mask = if alias.is_some() { 1 } else { mask(size) } << shift;
+            let old = self.peek(word);
+            old.and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
         };
         if COMPARES.contains(&address) {
             self.compared = (self.blocks.len(), self.accesses);
