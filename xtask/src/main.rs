@@ -148,9 +148,8 @@ fn run(task: Task) -> Result<()> {
 fn quick() -> Result<()> {
     let mut steps = run::Steps::default();
     before_tests(&mut steps);
-    steps.run("unit tests", || {
-        times::test("unit tests", run::cargo("test --workspace --lib --bins --no-fail-fast"))
-    });
+    let unit = run::cargo("test --workspace --lib --bins --no-fail-fast");
+    steps.run("unit tests", || times::test("unit tests", unit));
     steps.run("procedures", || times::test("procedures", run::cargo("test --test procedures")));
     steps.end()
 }
