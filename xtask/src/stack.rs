@@ -232,9 +232,7 @@ fn depth(
     if function.name.contains(PANIC) && !path.is_empty() {
         return Ok(0);
     }
-    if path.contains(&at) {
-        bail!("{} calls itself", function.name);
-    }
+    ensure!(!path.contains(&at), "{} calls itself", function.name);
     path.push(at);
     let veneer = function.name.split_once(VENEER);
     let target = veneer.and_then(|(_, name)| functions.iter().find(|(_, f)| f.name == name));

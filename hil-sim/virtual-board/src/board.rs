@@ -226,9 +226,7 @@ impl Board {
         while self.cpu.chip().now < end {
             idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
             at = self.cpu.chip().now;
-            if idle > IDLE_LIMIT {
-                bail!("no time passes");
-            }
+            ensure!(idle <= IDLE_LIMIT, "no time passes");
             self.events()?;
             if self.progress.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
                 self.progress.preempt_at = None;

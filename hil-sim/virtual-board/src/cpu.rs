@@ -91,12 +91,10 @@ impl Cpu {
                             let address = (base + offset) as u32;
                             u64::from(uc.get_data_mut().read(address, size as u8))
                         }),
-                        Some(
-                            move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
-                                let address = (base + offset) as u32;
-                                uc.get_data_mut().write(address, size as u8, value as u32);
-                            },
-                        ),
+                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, v: u64| {
+                            let address = (base + offset) as u32;
+                            uc.get_data_mut().write(address, size as u8, v as u32);
+                        }),
                     )?;
                 }
             }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use gimli::{EndianArcSlice, RunTimeEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
@@ -204,9 +204,7 @@ fn segments(bytes: &[u8]) -> Result<Vec<Segment>> {
     use object::read::elf::{FileHeader, ProgramHeader};
     let header = FileHeader32::<object::Endianness>::parse(bytes)?;
     let endian = header.endian()?;
-    if header.e_machine(endian) != EM_ARM {
-        bail!("not for an Arm processor");
-    }
+    ensure!(header.e_machine(endian) == EM_ARM, "not for an Arm processor");
     let mut segments = Vec::new();
     for program in header.program_headers(endian, bytes)? {
         let data = program.data(endian, bytes).unwrap_or_default();
