@@ -14,19 +14,18 @@ mod supply;
 pub use bus::{Unknown, clock_of};
 pub use execution::Watched;
 
+use crate::cost::Block;
 use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
+use crate::periph::{
+    adc::Adc, analog::Comparators, dac::Dacs, encoder::EncoderTimer, flash::Flash, gpio::Gpio,
+    iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
+};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::{
-    cost::Block, periph::adc::Adc, periph::analog::Comparators, periph::dac::Dacs,
-    periph::encoder::EncoderTimer, periph::flash::Flash, periph::gpio::Gpio, periph::iwdg::Iwdg,
-    periph::pwr::Pwr, periph::rcc::Rcc, periph::tim8::Tim8, periph::time_base::TimeBase,
-    periph::wwdg::Wwdg,
-};
 use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 use nets::DcLinkNet;
 
