@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use anyhow::Result;
+use clap::Args;
 
 use crate::toolchain::Target;
 use crate::{budget, image, run, times, toolchain};
@@ -15,6 +16,9 @@ pub const ELF: &str = "INDUCTION_DRIVE_ELF";
 /// Environment variable by which they find the images of the other boards: a folder with one folder a board.
 const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 
+/// Faults of a whole campaign; `cargo xtask test` injects a twentieth.
+pub const CAMPAIGN: u32 = 2000;
+
 /// Builds the images of all boards and runs the tests of the virtual board with them.
 pub fn test(target: &Target) -> Result<()> {
     toolchain::ensure_c_compiler()?;
@@ -22,7 +26,7 @@ pub fn test(target: &Target) -> Result<()> {
         image::build_for(target, board)?;
     }
     // Last: the others leave their image at its path.
-    let elf = image::build_with(target)?;
+    let elf = image::build_for(target, image::REFERENCE)?;
     let mut command = cargo("test --release --tests --no-fail-fast")?;
     command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
     times::test("the images on the virtual board", command)
@@ -47,36 +51,42 @@ pub fn cycles(elf: &Path) -> Result<()> {
 }
 
 /// Injects faults into this image; fails if the outputs stay on with wrong control beyond a bound.
-pub fn campaign(elf: &Path, board: &str, faults: &Faults, class: &str) -> Result<()> {
+pub fn campaign(elf: &Path, board: &str, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    run::step("campaign of faults", faults.command(elf, board)?.args(["--class", class]))
+    let Faults { count, seed, class, rpm } = faults;
+    let mut command = program("campaign", elf)?;
+    command.args([&count.to_string(), &seed.to_string(), "--board", board]);
+    command.args(rpm.map(|rpm| format!("--rpm={rpm}"))).args(["--class", class]);
+    run::step("campaign of faults", &mut command)
 }
 
 /// Faults of a campaign.
+#[derive(Args)]
 pub struct Faults {
-    /// Their number.
+    /// Number of faults
+    #[arg(default_value_t = CAMPAIGN)]
     pub count: u32,
-    /// Seed of the first.
+    /// Seed of the first fault
+    #[arg(default_value_t = 1)]
     pub seed: u32,
-    /// Speed of the shaft, rpm on four poles; none is the usual scene at low speed.
+    /// Only classes of faults whose name contains this
+    #[arg(default_value = "")]
+    pub class: String,
+    /// Speed of the shaft, rpm: 850 to 3500; the usual scene is at rest and at low speed
+    #[arg(long)]
     pub rpm: Option<u32>,
 }
 
-impl Faults {
-    /// The command that injects them into the image of a board.
-    pub fn command(&self, elf: &Path, board: &str) -> Result<Command> {
-        let mut command = program("campaign", elf)?;
-        command.args([self.count.to_string(), self.seed.to_string()]).args(["--board", board]);
-        command.args(self.rpm.map(|rpm| format!("--rpm={rpm}")));
-        Ok(command)
-    }
-}
-
 /// A task of the virtual board as a program.
-pub fn program(task: &str, elf: &Path) -> Result<Command> {
+fn program(task: &str, elf: &Path) -> Result<Command> {
     let mut command = cargo("run --release --")?;
     command.arg(task).arg(elf);
     Ok(command)
+}
+
+/// An ignored test with images, run by its name.
+pub fn ignored_test(name: &str) -> Result<Command> {
+    cargo(&format!("test --release --test image {name} -- --ignored --nocapture"))
 }
 
 /// A cargo command in the workspace of the virtual board. Its build results are beside those of the main one.

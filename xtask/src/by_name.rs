@@ -28,9 +28,9 @@ pub fn pages() -> Result<()> {
     }
     let elf = image::build()?;
     // One after the other: the virtual board keeps pace with the clock.
-    let test = "test --release --package drive-live --test page -- --ignored --nocapture";
-    let mut test = run::cargo(test);
-    test.arg("--test-threads=1");
+    let options = "--ignored --nocapture --test-threads=1";
+    let mut test =
+        run::cargo(&format!("test --release --package drive-live --test page -- {options}"));
     run::step("pages in Chromium", test.env("PAGES", &folder).env("LIVE_ELF", elf))?;
     println!("\npictures: {}", folder.display());
     Ok(())
@@ -39,8 +39,7 @@ pub fn pages() -> Result<()> {
 /// Compares the registers of a real board with those of the virtual board that has this image.
 pub fn bench_dump(elf: &Path, name: &str) -> Result<()> {
     run::probe_rs()?;
-    let mut test =
-        board::cargo("test --release --test image every_register -- --ignored --nocapture")?;
+    let mut test = board::ignored_test("every_register")?;
     test.env(board::ELF, elf).env("BOARD", name).env("CHIP", image::CHIP);
     run::step("registers of the board", &mut test)
 }
@@ -48,7 +47,5 @@ pub fn bench_dump(elf: &Path, name: &str) -> Result<()> {
 /// Runs the clients of the field bus, those that are installed, with this image.
 pub fn bus(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    let mut test =
-        board::cargo("test --release --test image bus_clients -- --ignored --nocapture")?;
-    run::step("clients of the bus", test.env(board::ELF, elf))
+    run::step("clients of the bus", board::ignored_test("bus_clients")?.env(board::ELF, elf))
 }

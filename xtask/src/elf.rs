@@ -38,8 +38,7 @@ pub fn instructions(elf: &ElfFile32, section: &str) -> Result<Vec<Instruction>> 
     for symbol in elf.symbols() {
         // `$t` begins code, `$d` data (ABI for the Arm architecture).
         match symbol.name()?.get(..2) {
-            Some("$t") => marks.insert(address(&symbol), true),
-            Some("$d") => marks.insert(address(&symbol), false),
+            Some(mark @ ("$t" | "$d")) => marks.insert(address(&symbol), mark == "$t"),
             _ => None,
         };
     }

@@ -25,17 +25,16 @@ pub fn test() -> Result<()> {
     let target = toolchain::for_target()?;
     let folder = run::folder("foreign")?;
     let programs = run::folder("foreign/programs")?;
+    let built = folder.join(TARGET).join("release");
     let hal = copy_of_hal(&folder)?;
     for (features, examples) in [("stm32g474", PLAIN), ("stm32g474,defmt", LOGGED)] {
         let mut build = cargo(&target, &hal, &folder);
         build.args(["--features", features]);
-        for example in examples {
-            build.args(["--example", example]);
-        }
+        build.args(examples.iter().flat_map(|example| ["--example", example]));
         run::step("examples of stm32g4xx-hal", &mut build)?;
         for example in examples {
-            let from = folder.join(TARGET).join("release/examples").join(example);
-            fs::copy(from, programs.join(format!("hal-{example}")))?;
+            let to = programs.join(format!("hal-{example}"));
+            fs::copy(built.join("examples").join(example), to)?;
         }
     }
     let embassy = run::root().join(EMBASSY);
@@ -43,12 +42,10 @@ pub fn test() -> Result<()> {
     for source in fs::read_dir(embassy.join("src/bin"))? {
         let source = source?.path();
         let name = source.file_stem().context("no name")?.to_string_lossy().into_owned();
-        let from = folder.join(TARGET).join("release").join(&name);
-        fs::copy(from, programs.join(format!("embassy-{name}")))?;
+        fs::copy(built.join(&name), programs.join(format!("embassy-{name}")))?;
     }
-    let mut test = board::cargo("test --release --test image foreign --")?;
-    test.args(["--ignored", "--nocapture"]).env(FOLDER, programs);
-    run::step("programs of others on the virtual board", &mut test)
+    let mut test = board::ignored_test("foreign")?;
+    run::step("programs of others on the virtual board", test.env(FOLDER, programs))
 }
 
 /// A cargo command that builds a workspace for the microcontroller.
@@ -64,9 +61,8 @@ fn cargo(target: &Target, workspace: &Path, folder: &Path) -> Command {
 fn copy_of_hal(folder: &Path) -> Result<PathBuf> {
     let metadata = run::output("cargo", &["metadata", "--format-version", "1"])?;
     // The path of its manifest, without a parser for the whole.
-    let source = metadata
-        .split('"')
-        .find(|text| text.ends_with("Cargo.toml") && text.contains("/stm32g4xx-hal-"));
+    let is_it = |text: &&str| text.ends_with("Cargo.toml") && text.contains("/stm32g4xx-hal-");
+    let source = metadata.split('"').find(is_it);
     let source = Path::new(source.context("no stm32g4xx-hal")?).parent().context("no folder")?;
     let copy = folder.join("stm32g4xx-hal");
     if copy.exists() {

@@ -29,12 +29,7 @@ pub fn boards() -> Result<Vec<String>> {
 
 /// Builds and checks the image of the reference board; returns its path.
 pub fn build() -> Result<PathBuf> {
-    build_with(&toolchain::for_target()?)
-}
-
-/// The same with this compiler.
-pub fn build_with(target: &Target) -> Result<PathBuf> {
-    build_for(target, REFERENCE)
+    build_for(&toolchain::for_target()?, REFERENCE)
 }
 
 /// Builds and checks the image of a board. The path of the last image built is always the same; images of other boards

@@ -28,16 +28,13 @@ pub fn report() -> Result<()> {
         add(&mut rows[room], counts(path, &sources::read(path)?));
         Ok(())
     };
-    for path in sources::files("rs")? {
-        tally(&path, count)?;
-    }
+    sources::files("rs")?.iter().try_for_each(|path| tally(path, count))?;
+    let ours = |path: &&PathBuf| {
+        !path.ends_with("Cargo.toml") && !path.to_string_lossy().ends_with(".min.js")
+    };
     for (ending, _) in OTHERS {
-        let ours = |path: &PathBuf| {
-            !path.ends_with("Cargo.toml") && !path.to_string_lossy().ends_with(".min.js")
-        };
-        for path in sources::files(ending)?.iter().filter(|path| ours(path)) {
-            tally(path, count_other)?;
-        }
+        let files = sources::files(ending)?;
+        files.iter().filter(ours).try_for_each(|path| tally(path, count_other))?;
     }
     let mut all = Counts::default();
     rows.iter().for_each(|counts| add(&mut all, *counts));

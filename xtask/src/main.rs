@@ -55,18 +55,9 @@ enum Task {
     Bus,
     /// Injects faults into the image on the virtual board
     Campaign {
-        /// Number of faults
-        #[arg(default_value_t = CAMPAIGN)]
-        count: u32,
-        /// Seed of the first fault
-        #[arg(default_value_t = 1)]
-        seed: u32,
-        /// Only classes of faults whose name contains this
-        #[arg(default_value = "")]
-        class: String,
-        /// Speed of the shaft, rpm: 850 to 3500; the usual scene is at rest and at low speed
-        #[arg(long)]
-        rpm: Option<u32>,
+        /// The faults
+        #[command(flatten)]
+        faults: board::Faults,
         /// The board
         #[command(flatten)]
         which: Which,
@@ -119,9 +110,6 @@ impl Which {
     }
 }
 
-/// Faults of a whole campaign; `test` injects a twentieth.
-const CAMPAIGN: u32 = 2000;
-
 fn main() -> ExitCode {
     match run(Task::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -143,10 +131,7 @@ fn run(task: Task) -> Result<()> {
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Bus => by_name::bus(&image::build()?),
-        Task::Campaign { count, seed, class, rpm, which } => {
-            let faults = board::Faults { count, seed, rpm };
-            board::campaign(&which.image()?, &which.board, &faults, &class)
-        }
+        Task::Campaign { faults, which } => board::campaign(&which.image()?, &which.board, &faults),
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report(&image::build()?),
         Task::Lines => lines::report(),
@@ -163,9 +148,8 @@ fn run(task: Task) -> Result<()> {
 fn quick() -> Result<()> {
     let mut steps = run::Steps::default();
     before_tests(&mut steps);
-    steps.run("unit tests", || {
-        times::test("unit tests", run::cargo("test --workspace --lib --bins --no-fail-fast"))
-    });
+    let unit = run::cargo("test --workspace --lib --bins --no-fail-fast");
+    steps.run("unit tests", || times::test("unit tests", unit));
     steps.run("procedures", || times::test("procedures", run::cargo("test --test procedures")));
     steps.end()
 }
@@ -183,22 +167,15 @@ fn before_tests(steps: &mut run::Steps) {
 fn test() -> Result<()> {
     let mut steps = run::Steps::default();
     before_tests(&mut steps);
-    let host = || run::cargo("test --workspace --no-fail-fast");
-    steps.run("host tests", || {
-        let mut tests = host();
-        tests.arg("--tests");
-        times::test("host tests", tests)
-    });
-    let mut examples = host();
-    examples.arg("--doc");
-    steps.command("examples in documentation", examples);
+    let host = |what| run::cargo(&format!("test --workspace --no-fail-fast {what}"));
+    steps.run("host tests", || times::test("host tests", host("--tests")));
+    steps.command("examples in documentation", host("--doc"));
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
 
-    let mut commands =
-        run::cargo("test --workspace --test simulator commands_of_the_documents -- --ignored");
-    commands.arg("--nocapture");
+    let commands = "commands_of_the_documents -- --ignored --nocapture";
+    let commands = run::cargo(&format!("test --workspace --test simulator {commands}"));
     steps.command("commands of the documents", commands);
 
     let target = steps.run("compiler for the controller", toolchain::for_target);
@@ -211,15 +188,16 @@ fn test() -> Result<()> {
         let lints = ["--package", "induction-drive", "--no-deps", "--", "-D", "warnings"];
         run::step("lints of the firmware", target.cargo("clippy")?.args(lints))
     });
-    let elf = steps.with(target, "firmware", image::build_with);
+    let elf = steps.with(target, "firmware", |target| image::build_for(target, image::REFERENCE));
     let elf = elf.as_deref();
     steps.with(elf, "size", size::report);
 
     let compiler = steps.run("compiler for the emulator", toolchain::ensure_c_compiler);
     steps.with(compiler, "format, lints, documentation of the virtual board", |()| board::check());
     steps.with(elf, "campaign of faults", |elf| {
-        let faults = board::Faults { count: CAMPAIGN / 20, seed: 1, rpm: None };
-        board::campaign(elf, image::REFERENCE, &faults, "")
+        let (count, class) = (board::CAMPAIGN / 20, String::new());
+        let faults = board::Faults { count, seed: 1, class, rpm: None };
+        board::campaign(elf, image::REFERENCE, &faults)
     });
     steps.with(target.filter(|_| elf.is_some()), "the image on the virtual board", board::test);
     steps.with(elf, "cycles of the control interrupt", board::cycles);

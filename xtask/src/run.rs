@@ -135,24 +135,16 @@ pub fn limit<T: Display + PartialOrd>(what: &str, used: T, limit: T, unit: &str)
     Ok(())
 }
 
-/// Whether a command runs and succeeds; its output is not shown.
-pub fn succeeds(command: &mut Command) -> bool {
-    said(command).is_ok()
-}
-
 /// The output of a command, without white space around it.
 ///
 /// # Errors
 /// It does not run, or it fails: all that it said.
 pub fn said(command: &mut Command) -> Result<String> {
     let output = command.output().with_context(|| format!("cannot run: {command:?}"))?;
+    let decoded = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
     let (text, errors) = (decoded(&output.stdout), decoded(&output.stderr));
     ensure!(output.status.success(), "{}: {text}{errors}\n    {command:?}", output.status);
     Ok(text)
-}
-
-fn decoded(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).trim().to_owned()
 }
 
 /// The same of a program with these arguments.

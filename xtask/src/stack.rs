@@ -135,9 +135,7 @@ fn functions(image: &[u8]) -> Result<Functions> {
 }
 
 fn is_entry(name: &str) -> bool {
-    name == MAIN
-        || INTERRUPTS.iter().any(|names| names.contains(&name))
-        || BY_PROCESSOR.contains(&name)
+    name == MAIN || INTERRUPTS.concat().contains(&name) || BY_PROCESSOR.contains(&name)
 }
 
 /// Adds the effect of an instruction to a function that begins at `begin`.
@@ -191,11 +189,7 @@ fn expanded(immediate: u32) -> u32 {
 fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
     let start = find(functions, name)?;
     let called: Vec<u32> = functions.values().flat_map(|f| f.calls.iter().copied()).collect();
-    let by_pointer: Vec<u32> = functions
-        .iter()
-        .filter(|(at, function)| !called.contains(at) && !is_entry(&function.name))
-        .map(|(at, _)| *at)
-        .collect();
+    let by_pointer = |at| !called.contains(&at) && !is_entry(&functions[&at].name);
     // How deep a call through a register may get, with none inside it, one, and so on.
     let deepest = |through: Through, which: &dyn Fn(u32) -> bool| {
         let mut known = BTreeMap::new();
@@ -205,7 +199,7 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
     let mut through = Through::default();
     through.output = deepest(through, &|at| is_named(&functions[&at], &OUTPUTS))?;
     for _ in 0..NESTED {
-        through.any = deepest(through, &|at| by_pointer.contains(&at))?;
+        through.any = deepest(through, &by_pointer)?;
     }
     depth(functions, start, through, &mut BTreeMap::new(), &mut Vec::new())
 }
@@ -238,9 +232,7 @@ fn depth(
     if function.name.contains(PANIC) && !path.is_empty() {
         return Ok(0);
     }
-    if path.contains(&at) {
-        bail!("{} calls itself", function.name);
-    }
+    ensure!(!path.contains(&at), "{} calls itself", function.name);
     path.push(at);
     let veneer = function.name.split_once(VENEER);
     let target = veneer.and_then(|(_, name)| functions.iter().find(|(_, f)| f.name == name));

@@ -80,7 +80,7 @@ pub fn for_target() -> Result<Target> {
     }
     println!("\nThe toolchain in use has no {TARGET}, so Debian's compiler builds for it.");
     let there =
-        || run::succeeds(run::command("dpkg").arg("--status").args(DEBIAN_PACKAGES.split(' ')));
+        || run::said(run::command("dpkg").arg("--status").args(DEBIAN_PACKAGES.split(' '))).is_ok();
     provide(&format!("a compiler for {TARGET}"), there, &rustup, DEBIAN_PACKAGES)?;
     Ok(Target::Debian)
 }
@@ -88,23 +88,21 @@ pub fn for_target() -> Result<Target> {
 /// Finds or gets `cargo fmt` and `cargo clippy` for the toolchain in use.
 pub fn ensure_format_and_lints() -> Result<()> {
     let tools = ["fmt --version", "clippy --version"];
-    let there = || tools.iter().all(|words| run::succeeds(&mut run::cargo(words)));
+    let there = || tools.iter().all(|words| run::said(&mut run::cargo(words)).is_ok());
     let rustup = "rustup component add rustfmt clippy";
     provide("cargo fmt or cargo clippy", there, rustup, "rustfmt-web rust-web-clippy")
 }
 
 /// Finds or gets a C compiler, for the emulator of the virtual board.
 pub fn ensure_c_compiler() -> Result<()> {
-    let tools = ["cmake", "cc", "make", "pkg-config"];
-    let there = || tools.iter().all(|tool| run::succeeds(run::command(tool).arg("--version")));
     let packages = "cmake gcc libc6-dev make pkg-config";
+    let there = || ["cmake", "cc", "make", "pkg-config"].into_iter().all(answers);
     provide("cmake, make, pkg-config or a C compiler", there, "", packages)
 }
 
 /// Finds or gets Chromium, for pictures of pages.
 pub fn ensure_chromium() -> Result<()> {
-    let there = || run::succeeds(run::command("chromium").arg("--version"));
-    provide("chromium", there, "", "chromium")
+    provide("chromium", || answers("chromium"), "", "chromium")
 }
 
 /// Installs something that is not there, by a command of rustup or as packages of Debian.
@@ -129,9 +127,13 @@ fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -
     Ok(())
 }
 
+/// Whether a program is there.
+fn answers(program: &str) -> bool {
+    run::said(run::command(program).arg("--version")).is_ok()
+}
+
 fn rustup_may_install() -> bool {
-    std::env::var("RUSTUP_AUTO_INSTALL").as_deref() != Ok("0")
-        && run::succeeds(run::command("rustup").arg("--version"))
+    std::env::var("RUSTUP_AUTO_INSTALL").as_deref() != Ok("0") && answers("rustup")
 }
 
 /// Whether the toolchain in use has the core library of the target.

@@ -1,10 +1,9 @@
 //! The addresses that the firmware publishes in one table: its symbol is all that the virtual board knows of the
 //! firmware's data. `src/task/control/addresses.rs` writes the table and documents it.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 
-use crate::image::Image;
-use crate::memory::Region;
+use crate::{image::Image, memory::Region};
 
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";
@@ -38,9 +37,8 @@ impl Addresses {
             return Ok(None);
         }
         let words = image.contents(SYMBOL)?;
-        if words.first() != Some(&VERSION) {
-            bail!("{SYMBOL} has version {:?}, not {VERSION}", words.first());
-        }
+        let version = words.first();
+        ensure!(version == Some(&VERSION), "{SYMBOL} has version {version:?}, not {VERSION}");
         let table: [u32; 10] = words.try_into().ok().context("a table of another size")?;
         let region = |at: usize| Region { address: table[at], size: table[at + 1] };
         Ok(Some(Self {

@@ -23,16 +23,11 @@ use motor::Connection;
 pub use motor::Disturbance;
 pub use options::Options;
 
-use crate::addresses::Addresses;
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::cpu::Cpu;
-use crate::image::Image;
-use crate::log::Log;
-use crate::memory;
-use crate::periph::Reset;
-use crate::periph::iwdg::LSI_HZ;
-use crate::power_stage::watch::GateWatch;
-use crate::rules::Violation;
+use crate::{
+    addresses::Addresses, cpu::Cpu, image::Image, log::Log, memory, periph::Reset,
+    periph::iwdg::LSI_HZ, power_stage::watch::GateWatch, rules::Violation,
+};
 use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
@@ -43,18 +38,15 @@ const IDLE_LIMIT: u32 = 100_000;
 
 /// The board.
 pub struct Board {
-    cpu: Cpu,
-    image: Image,
+    /// The core.
+    pub cpu: Cpu,
+    /// The image.
+    pub image: Image,
     log: Option<Log>,
-    lines: Vec<String>,
-    since_log: u32,
+    progress: Progress,
     /// The motor with everything around it.
     pub plant: Plant,
     connection: Connection,
-    sleeping: bool,
-    hung: bool,
-    entered: Option<RunningInterrupt>,
-    periods: VecDeque<Period>,
     addresses: Option<Addresses>,
     /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
@@ -70,10 +62,23 @@ pub struct Board {
     pub longest: LongestPath,
     /// The longest way to the compare values.
     pub longest_to_compares: LongestPath,
-    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
-    pended: Option<u64>,
     /// Longest from there to its first instruction, ticks.
     pub latest_start: u64,
+}
+
+/// What passes while a board runs.
+#[derive(Default)]
+struct Progress {
+    sleeping: bool,
+    hung: bool,
+    entered: Option<RunningInterrupt>,
+    /// Control interrupts and lines of the log that were not asked for yet.
+    periods: VecDeque<Period>,
+    lines: Vec<String>,
+    /// Periods since the log was fetched.
+    since_log: u32,
+    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    pended: Option<u64>,
     /// The core is stopped before the n-th instruction in the flash from here on, if set, and
     /// [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
@@ -88,7 +93,7 @@ impl Board {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
         let mut cpu =
             Cpu::new(Chip::default(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
-        for segment in image.segments() {
+        for segment in &image.segments {
             let end = segment.address + segment.bytes.len() as u32;
             let inside = segment.address >= memory::FLASH && end <= memory::STORED;
             ensure!(inside, "a segment at {:#x} is not in the flash of the code", segment.address);
@@ -100,14 +105,9 @@ impl Board {
             cpu,
             image,
             log,
-            lines: Vec::new(),
-            since_log: 0,
+            progress: Progress::default(),
             plant,
             connection: Connection::new(&options),
-            sleeping: false,
-            hung: false,
-            entered: None,
-            periods: VecDeque::new(),
             addresses,
             disturb: None,
             poison: None,
@@ -116,9 +116,7 @@ impl Board {
             resets: Vec::new(),
             longest: LongestPath::default(),
             longest_to_compares: LongestPath::default(),
-            pended: None,
             latest_start: 0,
-            preempt_at: None,
         };
         let chip = board.chip();
         chip.set_clocks(0.0, LSI_HZ);
@@ -140,27 +138,6 @@ impl Board {
         Ok(board)
     }
 
-    /// The core.
-    pub fn cpu(&mut self) -> &mut Cpu {
-        &mut self.cpu
-    }
-
-    /// A word of memory.
-    pub fn word(&self, address: u32) -> Option<u32> {
-        self.cpu.word(address)
-    }
-
-    /// A byte of memory.
-    pub fn byte(&self, address: u32) -> Option<u8> {
-        let mut byte = [0];
-        self.read(address, &mut byte).then_some(byte[0])
-    }
-
-    /// Reads memory; `false` where there is none.
-    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
-        self.cpu.read(address, bytes)
-    }
-
     /// Addresses of the firmware's data; all zero of an image without the table.
     pub fn addresses(&self) -> Addresses {
         self.addresses.unwrap_or_default()
@@ -179,7 +156,7 @@ impl Board {
     /// Telemetry of the drive after its last control interrupt with the outputs on.
     pub fn telemetry(&self) -> Telemetry {
         let mut bytes = [0; size_of::<Telemetry>()];
-        self.read(self.addresses().telemetry, &mut bytes);
+        self.cpu.read(self.addresses().telemetry, &mut bytes);
         // SAFETY: 32-bit integers and floating-point numbers, of which every value is valid, and laid out as on the chip.
         unsafe { bytes.as_ptr().cast::<Telemetry>().read_unaligned() }
     }
@@ -187,11 +164,6 @@ impl Board {
     /// The chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()
-    }
-
-    /// The image.
-    pub fn image(&self) -> &Image {
-        &self.image
     }
 
     /// The last sample.
@@ -206,7 +178,7 @@ impl Board {
 
     /// The oldest control interrupt that has ended and was not asked for yet.
     pub fn next_period(&mut self) -> Option<Period> {
-        self.periods.pop_front()
+        self.progress.periods.pop_front()
     }
 
     /// Resets the chip; RAM, flash and the motor stay, unless power was lost.
@@ -216,14 +188,14 @@ impl Board {
         self.chip().reset(cause);
         self.resets.push((now, cause));
         if cause == Reset::Power {
-            for (base, size) in [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)] {
+            for (base, size) in memory::VOLATILE {
                 // Neither the old contents nor zeros.
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }
         }
-        self.sleeping = false;
-        self.hung = false;
-        self.entered = None;
+        self.progress.sleeping = false;
+        self.progress.hung = false;
+        self.progress.entered = None;
         self.follow_outputs();
         self.cpu.reset(memory::FLASH);
     }
@@ -235,9 +207,9 @@ impl Board {
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(TICKS_PER_PERIOD)?;
-            self.since_log += 1;
-            if self.since_log >= PERIODS_PER_LOG {
-                self.since_log = 0;
+            self.progress.since_log += 1;
+            if self.progress.since_log >= PERIODS_PER_LOG {
+                self.progress.since_log = 0;
                 self.drain_log()?;
             }
         }
@@ -254,12 +226,10 @@ impl Board {
         while self.cpu.chip().now < end {
             idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
             at = self.cpu.chip().now;
-            if idle > IDLE_LIMIT {
-                bail!("no time passes");
-            }
+            ensure!(idle <= IDLE_LIMIT, "no time passes");
             self.events()?;
-            if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
-                self.preempt_at = None;
+            if self.progress.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
+                self.progress.preempt_at = None;
                 return Ok(());
             }
             let chip = self.cpu.chip();

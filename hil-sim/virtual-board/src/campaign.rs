@@ -14,7 +14,6 @@ mod judge;
 mod scene;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::ops::RangeInclusive;
 use std::sync::Mutex;
 
@@ -22,11 +21,8 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::board::Board;
-use crate::chip::TICKS_PER_PERIOD;
-use crate::image::Image;
-use crate::periph::Reset;
 use crate::power_stage::{PowerStage, REFERENCE};
+use crate::{board::Board, chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
 use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;
@@ -42,16 +38,8 @@ const SAVE: u64 = 1200;
 /// Speeds of a campaign at speed, rpm on four poles: the carrier is off from some 800 rpm on, and a drive turns up to 3600.
 const SPEEDS_RPM: RangeInclusive<f64> = 850.0..=3500.0;
 
-/// Results of a class.
-#[derive(Clone, Debug, Default)]
-struct Tally {
-    runs: u32,
-    off: u32,
-    worst_off_ms: f64,
-    worst_wrong_ms: f64,
-    peak_a: f64,
-    failures: Vec<(u64, String)>,
-}
+/// Seeds and ends of the runs of each class, by its place.
+type Runs = BTreeMap<usize, Vec<(u64, Result<Outcome>)>>;
 
 /// Changes a board before each fault, given its class and nothing, and after it, given its description too.
 pub type Without = fn(&mut Board, &str, &str);
@@ -97,7 +85,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
         SPEEDS_RPM.end()
     );
     let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
-    let tallies: Mutex<BTreeMap<usize, Tally>> = Mutex::default();
+    let runs: Mutex<Runs> = Mutex::default();
     let work = || -> Result<()> {
         let mut scene = Scene::new(open()?, stage, rpm)?;
         scene.board.forgive();
@@ -116,8 +104,8 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             if let Err(why) = &outcome {
                 eprintln!("{}, seed {}: {why:#}", all[which].name, seed);
             }
-            let mut tallies = tallies.lock().map_err(|_| anyhow!("another worker has failed"))?;
-            add(tallies.entry(which).or_default(), &all[which], seed, outcome);
+            let mut runs = runs.lock().map_err(|_| anyhow!("another worker has failed"))?;
+            runs.entry(which).or_default().push((seed, outcome));
         }
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
@@ -127,32 +115,22 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             .into_iter()
             .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
     })?;
-    let tallies = tallies.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
-    let table = table(&all, &tallies);
-    let failed: usize = tallies.values().map(|f| f.failures.len()).sum();
-    if failed > 0 {
-        bail!("{failed} of {count} failed\n{table}");
-    }
+    let runs = runs.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
+    let (table, failed) = table(&all, &runs);
+    ensure!(failed == 0, "{failed} of {count} failed\n{table}");
     Ok(table)
 }
 
-fn add(tally: &mut Tally, class: &Class, seed: u64, outcome: Result<Outcome>) {
-    tally.runs += 1;
-    let outcome = match outcome {
-        Ok(outcome) => outcome,
-        Err(why) => return tally.failures.push((seed, format!("{why:#}"))),
-    };
-    if let Some(ms) = outcome.off_ms {
-        tally.off += 1;
-        tally.worst_off_ms = tally.worst_off_ms.max(ms);
-    }
-    tally.worst_wrong_ms = tally.worst_wrong_ms.max(outcome.wrong_ms);
-    tally.peak_a = tally.peak_a.max(outcome.peak_a);
+/// Why a run has failed, if it has.
+fn failure(class: &Class, end: &Result<Outcome>) -> Option<String> {
     // Over-current is judged in every class.
     let bound = if class.bound.0.is_finite() { class.bound.0 } else { 0.0 };
-    if outcome.wrong_ms > bound {
-        let why = format!("wrong for {:.2} ms: {outcome:?}", outcome.wrong_ms);
-        tally.failures.push((seed, why));
+    match end {
+        Err(why) => Some(format!("{why:#}")),
+        Ok(end) if end.wrong_ms > bound => {
+            Some(format!("wrong for {:.2} ms: {end:?}", end.wrong_ms))
+        }
+        Ok(_) => None,
     }
 }
 
@@ -286,42 +264,36 @@ fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     Ok(Outcome { off_ms: Some(0.0), ..Outcome::default() })
 }
 
-fn table(all: &[Class], tallies: &BTreeMap<usize, Tally>) -> String {
+/// The table, and how many runs have failed.
+fn table(all: &[Class], runs: &Runs) -> (String, usize) {
     let mut text = String::from(
         "| class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
-    for (which, f) in tallies {
-        let class = &all[*which];
-        let _ = writeln!(
-            text,
-            "| {} | {:.3} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {} |",
-            class.name,
-            class.bound.0,
-            f.runs,
-            f.off,
-            f.runs - f.off - f.failures.len().min((f.runs - f.off) as usize) as u32,
-            f.worst_off_ms,
-            f.worst_wrong_ms,
-            f.peak_a,
-            f.failures.len(),
+    let mut failures = Vec::new();
+    for (which, ends) in runs {
+        let (class, before) = (&all[*which], failures.len());
+        failures.extend(ends.iter().filter_map(|(seed, end)| {
+            Some(format!("{}, seed {seed}: {}\n", class.name, failure(class, end)?))
+        }));
+        let (runs, failed) = (ends.len(), failures.len() - before);
+        let ended: Vec<_> = ends.iter().filter_map(|(_, end)| end.as_ref().ok()).collect();
+        let most = |of: fn(&Outcome) -> f64| ended.iter().map(|end| of(end)).fold(0.0, f64::max);
+        let off = ended.iter().filter(|end| end.off_ms.is_some()).count();
+        let carried_on = runs - off - failed.min(runs - off);
+        let (name, bound) = (class.name, class.bound.0);
+        let latest_off = most(|end| end.off_ms.unwrap_or(0.0));
+        let (wrong, peak) = (most(|end| end.wrong_ms), most(|end| end.peak_a));
+        text += &format!(
+            "| {name} | {bound:.3} | {runs} | {off} | {carried_on} | {latest_off:.3} | {wrong:.2} | {peak:.2} | {failed} |\n"
         );
     }
-    for (which, f) in tallies.iter().filter(|(_, f)| !f.failures.is_empty()) {
-        for (seed, why) in &f.failures {
-            let _ = writeln!(text, "{}, seed {seed}: {why}", all[*which].name);
-        }
-    }
-    text
+    (text + &failures.concat(), failures.len())
 }
 
 /// The bounds and their reasons, at speed or not.
 pub fn bounds(at_speed: bool) -> String {
-    Class::all(at_speed).iter().fold(
-        String::from("class | bound, ms | reason\n---|---|---\n"),
-        |mut text, c| {
-            let _ = writeln!(text, "{} | {:.3} | {}", c.name, c.bound.0, c.bound.1);
-            text
-        },
-    )
+    let row = |c: &Class| format!("{} | {:.3} | {}\n", c.name, c.bound.0, c.bound.1);
+    let rows: String = Class::all(at_speed).iter().map(row).collect();
+    format!("class | bound, ms | reason\n---|---|---\n{rows}")
 }

@@ -11,26 +11,17 @@ mod nets;
 pub mod pins;
 mod supply;
 
-pub use bus::Unknown;
-pub use clocked::clock_of;
+pub use bus::{Unknown, clock_of};
 pub use execution::Watched;
 
 use crate::cost::Block;
-use crate::periph::adc::Adc;
-use crate::periph::analog::Comparators;
-use crate::periph::dac::Dacs;
-use crate::periph::encoder::EncoderTimer;
-use crate::periph::flash::Flash;
-use crate::periph::gpio::Gpio;
-use crate::periph::iwdg::Iwdg;
-use crate::periph::pwr::Pwr;
-use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
-use crate::periph::tim8::Tim8;
-use crate::periph::time_base::TimeBase;
 use crate::periph::uart::{self, Uart};
-use crate::periph::wwdg::Wwdg;
 use crate::periph::{NEVER, Reset, Store, plain};
+use crate::periph::{
+    adc::Adc, analog::Comparators, dac::Dacs, encoder::EncoderTimer, flash::Flash, gpio::Gpio,
+    iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
+};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
@@ -64,217 +55,143 @@ pub enum Damage {
     Break,
 }
 
-/// The chip but for its core and memories.
-#[derive(Clone, Debug)]
-pub struct Chip {
-    /// Time, ticks.
-    pub now: u64,
-    /// Time up to which the core may run.
-    pub deadline: u64,
-    /// The core has just been let go.
-    pub first: bool,
-    /// Something to be done before the core goes on.
-    pub attention: bool,
-    /// The first access that the model does not know.
-    pub unknown: Option<Unknown>,
-    /// The core executes nothing before this.
-    pub stalled_until: u64,
-    /// A reset that is due.
-    pub reset: Option<Reset>,
-    /// Where the core was last seen.
-    pub at: u32,
-    /// Accesses to registers since power-on.
-    pub accesses: u64,
-    /// Instructions of the flash since power-on.
-    pub instructions: u64,
-    /// Blocks executed in CCM since they were taken, while asked for.
-    pub blocks: Vec<Block>,
-    /// Whether blocks are kept.
-    pub keep_blocks: bool,
-    /// Blocks and accesses up to the compare value of a leg that was written last.
-    pub compared: (usize, u64),
-    /// A function of the main loop whose calls are counted, if there is one.
-    pub watched: Option<Watched>,
-    /// Whether registers that are not known read as 0.
-    pub forgiving: bool,
-    /// Rules of the chip that the program has broken.
-    pub rules: Rules,
-    /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
-    /// states, prefetch and caches is expected to take.
-    pub flash_cycles: u64,
-    /// The control interrupt runs, and its cycles are counted.
-    pub in_control: bool,
-    /// The emulated core is running, and its access that the memory protection denied.
-    pub(crate) core_runs: bool,
-    pub(crate) guard_hit: Option<u32>,
-    /// A debugger has halted the core.
-    pub(crate) halt: Option<Halt>,
-    /// Damage to the over-voltage protection.
-    pub damage: Option<Damage>,
-    /// Error of the core clock, as a share, and of the reference of the converters.
-    clock_error: f64,
-    pub(crate) reference_error: f64,
-    /// Outputs came back with the core, and are looked at then.
-    pub(crate) back_on: Option<u64>,
-    /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
-    system_hz: u64,
-    bus_hz: u64,
-    system_rose: u64,
-    /// Codes at the pins of current a, current b, dc link.
-    analog: [u16; 3],
-    pub(crate) dc_link: DcLinkNet,
-    /// Codes that an input must be above the level of a comparator: offset of this part, and zero error of its DAC.
-    pub comparator_offset: u16,
-    /// Resistor from the fault input to the supply, ohm, and whether the power stage pulls the input low.
-    pub(crate) fault_pull_ohm: f64,
-    pub(crate) fault_low: bool,
-    last_block: Option<(u32, u32)>,
-    /// Core-private registers.
-    pub scs: Scs,
-    /// Clocks.
-    pub rcc: Rcc,
-    /// Supply.
-    pub pwr: Pwr,
-    /// Flash.
-    pub flash: Flash,
-    /// Ports A to G.
-    pub gpio: [Gpio; 7],
-    /// System configuration.
-    pub syscfg: Store,
-    /// Interrupts of pins and comparators.
-    pub exti: Store,
-    /// Timer of the power stage.
-    pub tim1: Tim1,
-    /// Timer of the brake chopper.
-    pub tim8: Tim8,
-    /// Timer of the encoder.
-    pub tim2: EncoderTimer,
-    /// Time base.
-    pub tim5: TimeBase,
-    /// Converters.
-    pub adc: Adc,
-    /// Comparators.
-    pub comp: Comparators,
-    /// Reference voltages of the comparators.
-    pub dac: Dacs,
-    /// Console.
-    pub lpuart: Uart,
-    /// Field bus.
-    pub usart3: Uart,
-    /// Watchdog.
-    pub iwdg: Iwdg,
-    /// Window watchdog.
-    pub wwdg: Wwdg,
-    /// Debug support.
-    pub debug: Store,
-    /// The power stage at the pins of the gates.
-    pub gates: GateWatch,
+defaults! {
+    /// The chip but for its core and memories; by default after power-on, with its flash erased.
+    #[derive(Clone, Debug)]
+    pub struct Chip {
+        /// Time, ticks.
+        pub now: u64,
+        /// Time up to which the core may run.
+        pub deadline: u64,
+        /// The core has just been let go.
+        pub first: bool,
+        /// Something to be done before the core goes on.
+        pub attention: bool,
+        /// The first access that the model does not know.
+        pub unknown: Option<Unknown>,
+        /// The core executes nothing before this.
+        pub stalled_until: u64,
+        /// A reset that is due.
+        pub reset: Option<Reset>,
+        /// Where the core was last seen.
+        pub at: u32,
+        /// Accesses to registers since power-on.
+        pub accesses: u64,
+        /// Instructions of the flash since power-on.
+        pub instructions: u64,
+        /// Blocks executed in CCM since they were taken, while asked for.
+        pub blocks: Vec<Block>,
+        /// Whether blocks are kept.
+        pub keep_blocks: bool,
+        /// Blocks and accesses up to the compare value of a leg that was written last.
+        pub compared: (usize, u64),
+        /// A function of the main loop whose calls are counted, if there is one.
+        pub watched: Option<Watched>,
+        /// Whether registers that are not known read as 0.
+        pub forgiving: bool,
+        /// Rules of the chip that the program has broken.
+        pub rules: Rules,
+        /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
+        /// states, prefetch and caches is expected to take.
+        pub flash_cycles: u64 = 1,
+        /// The control interrupt runs, and its cycles are counted.
+        pub in_control: bool,
+        /// The emulated core is running, and its access that the memory protection denied.
+        pub(crate) core_runs: bool,
+        pub(crate) guard_hit: Option<u32>,
+        /// A debugger has halted the core.
+        pub(crate) halt: Option<Halt>,
+        /// Damage to the over-voltage protection.
+        pub damage: Option<Damage>,
+        /// Error of the core clock, as a share, and of the reference of the converters.
+        clock_error: f64,
+        pub(crate) reference_error: f64,
+        /// Outputs came back with the core, and are looked at then.
+        pub(crate) back_on: Option<u64>,
+        /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
+        system_hz: u64 = 16_000_000,
+        bus_hz: u64 = 16_000_000,
+        system_rose: u64,
+        /// Codes at the pins of current a, current b, dc link.
+        analog: [u16; 3],
+        pub(crate) dc_link: DcLinkNet = DcLinkNet::new(power_stage::REFERENCE.dc_link_pin),
+        /// Codes that an input must be above the level of a comparator: offset of this part, and zero error of its DAC.
+        pub comparator_offset: u16,
+        /// Resistor from the fault input to the supply, ohm, and whether the power stage pulls the input low.
+        pub(crate) fault_pull_ohm: f64 = power_stage::REFERENCE.fault_pull_ohm,
+        pub(crate) fault_low: bool,
+        last_block: Option<(u32, u32)>,
+        /// Core-private registers.
+        pub scs: Scs,
+        /// Clocks.
+        pub rcc: Rcc,
+        /// Supply.
+        pub pwr: Pwr,
+        /// Flash.
+        pub flash: Flash,
+        /// Ports A to G.
+        pub gpio: [Gpio; 7] = std::array::from_fn(Gpio::new),
+        /// System configuration.
+        pub syscfg: Store = Store::new(plain::SYSCFG),
+        /// Interrupts of pins and comparators.
+        pub exti: Store = Store::new(plain::EXTI),
+        /// Timer of the power stage.
+        pub tim1: Tim1,
+        /// Timer of the brake chopper.
+        pub tim8: Tim8 = Tim8::at_reset(),
+        /// Timer of the encoder.
+        pub tim2: EncoderTimer,
+        /// Time base.
+        pub tim5: TimeBase,
+        /// Converters.
+        pub adc: Adc,
+        /// Comparators.
+        pub comp: Comparators,
+        /// Reference voltages of the comparators.
+        pub dac: Dacs,
+        /// Console.
+        pub lpuart: Uart,
+        /// Field bus.
+        pub usart3: Uart = Uart::new(&uart::USART3),
+        /// Watchdog.
+        pub iwdg: Iwdg,
+        /// Window watchdog.
+        pub wwdg: Wwdg,
+        /// Debug support.
+        pub debug: Store = Store::new(plain::DEBUG),
+        /// The power stage at the pins of the gates.
+        pub gates: GateWatch =
+            GateWatch::new(&power_stage::REFERENCE, &[0, 1, 2, 3, 4, 5, 6].map(Gpio::new), &Tim1::default()),
+    }
 }
 
-/// A chip after power-on, whose flash is erased.
-impl Default for Chip {
-    fn default() -> Self {
-        let (gpio, tim1) = (std::array::from_fn(Gpio::new), Tim1::default());
-        let gates = GateWatch::new(&power_stage::REFERENCE, &gpio, &tim1);
-        Self {
-            now: 0,
-            deadline: 0,
-            first: false,
-            attention: false,
-            unknown: None,
-            stalled_until: 0,
-            reset: None,
-            at: 0,
-            accesses: 0,
-            instructions: 0,
-            blocks: Vec::new(),
-            keep_blocks: false,
-            compared: (0, 0),
-            watched: None,
-            forgiving: false,
-            rules: Rules::default(),
-            core_runs: false,
-            guard_hit: None,
-            flash_cycles: 1,
-            in_control: false,
-            halt: None,
-            damage: None,
-            clock_error: 0.0,
-            reference_error: 0.0,
-            back_on: None,
-            system_hz: 16_000_000,
-            bus_hz: 16_000_000,
-            system_rose: 0,
-            analog: [0; 3],
-            comparator_offset: 0,
-            dc_link: DcLinkNet::new(power_stage::REFERENCE.dc_link_pin),
-            fault_pull_ohm: power_stage::REFERENCE.fault_pull_ohm,
-            fault_low: false,
-            last_block: None,
-            scs: Scs::default(),
-            rcc: Rcc::new(Reset::Power),
-            pwr: Pwr::default(),
-            flash: Flash::default(),
-            gpio,
-            syscfg: Store::new(plain::SYSCFG),
-            exti: Store::new(plain::EXTI),
-            tim1,
-            tim8: Tim8::at_reset(),
-            tim2: EncoderTimer::at_reset(),
-            tim5: TimeBase::default(),
-            adc: Adc::default(),
-            comp: Comparators::default(),
-            dac: Dacs::default(),
-            lpuart: Uart::new(&uart::LPUART1),
-            usart3: Uart::new(&uart::USART3),
-            iwdg: Iwdg::default(),
-            wwdg: Wwdg::default(),
-            debug: Store::new(plain::DEBUG),
-            gates,
-        }
-    }
+/// Takes over fields that a reset does not change.
+macro_rules! keep {
+    ($new:ident, $old:ident: $($field:ident $(. $part:ident)?)*) => {
+        $($new.$field $(.$part)? = $old.$field $(.$part)?;)*
+    };
 }
 
 impl Chip {
     /// After a reset: registers at their values, flash contents and the world outside as before.
     pub fn reset(&mut self, cause: Reset) {
-        let old = std::mem::take(self);
-        self.now = old.now;
-        self.accesses = old.accesses;
-        self.instructions = old.instructions;
-        self.keep_blocks = old.keep_blocks;
-        self.watched = old.watched;
-        self.forgiving = old.forgiving;
-        self.rules = old.rules;
-        self.flash_cycles = old.flash_cycles;
-        self.pwr.supply_v = old.pwr.supply_v;
-        (self.analog, self.dc_link) = (old.analog, old.dc_link);
-        self.comparator_offset = old.comparator_offset;
-        (self.fault_pull_ohm, self.fault_low) = (old.fault_pull_ohm, old.fault_low);
-        self.damage = old.damage;
-        (self.clock_error, self.reference_error) = (old.clock_error, old.reference_error);
-        (self.tim5, self.iwdg.clock) = (old.tim5.after_reset(), old.iwdg.clock);
-        self.adc.own_reference = old.adc.own_reference;
-        // Only power-on resets the debug support.
-        if cause != Reset::Power {
-            self.debug = old.debug;
-            self.halt = old.halt;
+        let mut old = std::mem::take(self);
+        // Only power-on clears the flags of resets and resets the debug support.
+        if cause == Reset::Power {
+            old.rcc.flags = 0;
+        } else {
+            keep! { self, old: debug halt }
         }
-        self.rcc = Rcc::new(cause);
-        if cause != Reset::Power {
-            self.rcc.flags |= old.rcc.flags;
+        old.rcc.flags |= Rcc::new(cause).flags;
+        keep! { self, old:
+            now accesses instructions keep_blocks watched forgiving rules flash_cycles
+            analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
+            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers tim1.drop_update tim2.position
+            rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates
         }
-        self.rcc.crystal_lives = old.rcc.crystal_lives;
-        self.rcc.pll_locks = old.rcc.pll_locks;
+        self.tim5 = old.tim5.after_reset();
         self.flash = old.flash.after_reset();
         self.follow_fault_pin();
-        self.tim1.drop_update = old.tim1.drop_update;
-        self.tim2.position = old.tim2.position;
-        self.adc.inputs = old.adc.inputs;
-        self.adc.lose_triggers = old.adc.lose_triggers;
-        self.lpuart.line = old.lpuart.line;
-        self.usart3.line = old.usart3.line;
-        self.gates = old.gates;
         self.look_at_gates();
     }
 

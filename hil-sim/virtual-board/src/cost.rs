@@ -122,11 +122,6 @@ fn store(before: &mut Previous) -> u32 {
     1
 }
 
-fn many(registers: u32, before: &mut Previous) -> u32 {
-    *before = Previous::default();
-    1 + registers
-}
-
 fn plain(cycles: u32, before: &mut Previous) -> u32 {
     *before = Previous::default();
     cycles
@@ -135,15 +130,12 @@ fn plain(cycles: u32, before: &mut Previous) -> u32 {
 fn short(w: u16, before: &mut Previous) -> u32 {
     let low = u32::from(w & 0xff);
     match w >> 8 {
-        0x48..=0x4f => load(before),
-        0x50..=0x55 => store(before),
-        0x56..=0x5f => load(before),
+        0x48..=0x4f | 0x56..=0x5f => load(before),
         0x60..=0x9f if w & 0x0800 != 0 => load(before),
-        0x60..=0x9f => store(before),
+        0x50..=0x55 | 0x60..=0x9f => store(before),
         // PUSH, POP, with the link register or the program counter.
-        0xb4 | 0xbc => many(low.count_ones(), before),
-        0xb5 | 0xbd => many(low.count_ones() + 1, before),
-        0xc0..=0xcf => many(low.count_ones(), before),
+        0xb5 | 0xbd => plain(2 + low.count_ones(), before),
+        0xb4 | 0xbc | 0xc0..=0xcf => plain(1 + low.count_ones(), before),
         _ => plain(1, before),
     }
 }
@@ -151,13 +143,13 @@ fn short(w: u16, before: &mut Previous) -> u32 {
 fn long(w: u16, v: u16, before: &mut Previous) -> u32 {
     let is_load = w & 0x10 != 0;
     match w >> 8 {
-        0xe8 | 0xe9 if w & 0x40 == 0 => many(u32::from(v).count_ones(), before),
+        0xe8 | 0xe9 if w & 0x40 == 0 => plain(1 + u32::from(v).count_ones(), before),
         // Table branch.
         0xe8 if w & 0xfff0 == 0xe8d0 && v & 0xffe0 == 0xf000 => plain(2, before),
         // LDREX, STREX and their like.
         0xe8 if w & 0x0120 == 0 && is_load => load(before),
         0xe8 if w & 0x0120 == 0 => store(before),
-        0xe8 | 0xe9 => many(2, before),
+        0xe8 | 0xe9 => plain(3, before),
         0xec..=0xee => float(w, v, before),
         0xf8 | 0xf9 if is_load => load(before),
         0xf8 | 0xf9 => store(before),
@@ -179,7 +171,7 @@ fn float(w: u16, v: u16, before: &mut Previous) -> u32 {
             return plain(2, before);
         }
         if w & 0x0120 != 0x0100 {
-            return many(u32::from(v & 0xff), before);
+            return plain(1 + u32::from(v & 0xff), before);
         }
         // VLDR, VSTR.
         if w & 0x10 == 0 {

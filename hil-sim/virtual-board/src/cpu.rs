@@ -33,16 +33,9 @@ pub enum Stop {
     Asked,
     /// It branched to this EXC_RETURN.
     Return(u32),
-    /// An access to where nothing is, a fetch from there, or no instruction.
-    Fault(Fault),
-}
-
-/// An access that the bus refused, or a word that is no instruction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// Access to this address.
+    /// It accessed this address, where nothing is.
     Access(u32),
-    /// Access to this address, which the memory protection denies.
+    /// It accessed this address, which the memory protection denies.
     Denied(u32),
     /// No such instruction, or a fetch from where none is.
     Instruction,
@@ -70,7 +63,7 @@ pub struct Cpu {
 /// Registers and memories of a stopped core.
 pub struct CoreState {
     registers: Context,
-    memories: Vec<(u32, Vec<u8>)>,
+    memories: [(u32, Vec<u8>); 2],
 }
 
 /// Size of the pieces, bytes, that are compared before they are written: written code is translated anew.
@@ -98,12 +91,10 @@ impl Cpu {
                             let address = (base + offset) as u32;
                             u64::from(uc.get_data_mut().read(address, size as u8))
                         }),
-                        Some(
-                            move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
-                                let address = (base + offset) as u32;
-                                uc.get_data_mut().write(address, size as u8, value as u32);
-                            },
-                        ),
+                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, v: u64| {
+                            let address = (base + offset) as u32;
+                            uc.get_data_mut().write(address, size as u8, v as u32);
+                        }),
                     )?;
                 }
             }
@@ -223,14 +214,10 @@ impl Cpu {
     /// An error of the emulator.
     pub fn keep(&self) -> Result<CoreState, uc_error> {
         let registers = self.uc.context_init()?;
-        let memories = [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)]
-            .into_iter()
-            .map(|(base, size)| {
-                let mut bytes = vec![0; size as usize];
-                self.uc.mem_read(u64::from(base), &mut bytes)?;
-                Ok((base, bytes))
-            })
-            .collect::<Result<_, uc_error>>()?;
+        let mut memories = memory::VOLATILE.map(|(base, size)| (base, vec![0; size as usize]));
+        for (base, bytes) in &mut memories {
+            self.uc.mem_read(u64::from(*base), bytes)?;
+        }
         Ok(CoreState { registers, memories })
     }
 
@@ -273,19 +260,19 @@ impl Cpu {
         let pc = self.get(Register::PC);
         self.chip_mut().core_runs = false;
         if let Some(address) = self.chip_mut().guard_hit.take() {
-            return Stop::Fault(Fault::Denied(address));
+            return Stop::Denied(address);
         }
         if pc >= EXC_RETURN {
             return Stop::Return(pc | 1);
         }
         match result {
-            Ok(()) if self.trapped.get() => Stop::Fault(Fault::Instruction),
+            Ok(()) if self.trapped.get() => Stop::Instruction,
             // A jump to where no memory is, for example by a return address from the modelled page of the guard, which the
             // emulator does not report.
-            Ok(()) if self.word(pc & !3).is_none() => Stop::Fault(Fault::Instruction),
+            Ok(()) if self.word(pc & !3).is_none() => Stop::Instruction,
             Ok(()) if self.chip().wants_attention() => Stop::Asked,
             Ok(()) => Stop::Wait,
-            Err(_) => Stop::Fault(self.faulted.get().map_or(Fault::Instruction, Fault::Access)),
+            Err(_) => self.faulted.get().map_or(Stop::Instruction, Stop::Access),
         }
     }
 
@@ -302,6 +289,12 @@ impl Cpu {
     /// Reads memory, not registers; `false` where there is none.
     pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
         self.uc.mem_read(u64::from(address), bytes).is_ok()
+    }
+
+    /// A byte of memory.
+    pub fn byte(&self, address: u32) -> Option<u8> {
+        let mut byte = [0];
+        self.read(address, &mut byte).then_some(byte[0])
     }
 
     /// A word of memory.

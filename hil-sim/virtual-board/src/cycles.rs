@@ -6,20 +6,16 @@
 //! around it, inlined ones included, that is in a block.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
-use hil_sim::Config;
-use hil_sim::config::LoadMode;
+use hil_sim::{Config, config::LoadMode};
 use induction_drive::board::LONGEST_INTERRUPT_CYCLES;
 
 use crate::board::{Board, LongestPath, Options, Period};
 use crate::chip::{TICKS_PER_PERIOD, Watched};
 use crate::cost::{self, BUS, TAKEN, instructions};
-use crate::image::Image;
-use crate::memory;
-use crate::pair::Pair;
+use crate::{image::Image, memory, pair::Pair};
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
 const BLOCKS: [(&str, &str); 12] = [
@@ -228,7 +224,7 @@ fn row(
     let mut places: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
     for block in &path.blocks {
         let mut code = vec![0; block.size as usize];
-        board.read(block.address, &mut code);
+        board.cpu.read(block.address, &mut code);
         let mut list: Vec<_> = instructions(&code).collect();
         if let (true, Some(last)) = (block.taken, list.last_mut()) {
             last.cycles += TAKEN;
@@ -239,7 +235,7 @@ fn row(
         }
         for instruction in list {
             let at = block.address + instruction.offset;
-            let place = places.entry(at).or_insert_with(|| block_of(board.image(), at));
+            let place = places.entry(at).or_insert_with(|| block_of(&board.image, at));
             *row.blocks.entry(place.0).or_default() += instruction.cycles;
             *row.functions.entry(place.clone()).or_default() += instruction.cycles;
             row.instructions += 1;
@@ -292,21 +288,18 @@ pub fn table(rows: &[Row]) -> String {
         "{:<16}{:>14}{:>8}{:>8}{:>8}{:>8}",
         "line", "instructions", "cycles", "median", "whole", "share"
     );
-    blocks().for_each(|block| {
-        let _ = write!(text, "{block:>17}");
-    });
+    text.extend(blocks().map(|block| format!("{block:>17}")));
     for row in rows {
         let (i, c, m, w) = (row.instructions, row.cycles, row.median, row.whole);
         let share = 100.0 * f64::from(w) / f64::from(PERIOD);
-        let _ = write!(text, "\n{:<16}{i:>14}{c:>8}{m:>8}{w:>8}{share:>6.1} %", row.name);
-        for block in blocks() {
-            let _ = write!(text, "{:>17}", row.blocks.get(block).copied().unwrap_or(0));
-        }
+        text += &format!("\n{:<16}{i:>14}{c:>8}{m:>8}{w:>8}{share:>6.1} %", row.name);
+        let cycles = |block| row.blocks.get(block).copied().unwrap_or(0);
+        text.extend(blocks().map(|block| format!("{:>17}", cycles(block))));
     }
-    let _ = write!(text, "\n\nto the last compare value, by sample of the carrier period");
+    text += "\n\nto the last compare value, by sample of the carrier period";
     for row in rows {
         let turns = row.by_turn.map(|cycles| format!("{cycles:>6}")).concat();
-        let _ = write!(text, "\n{:<16}{turns}", row.name);
+        text += &format!("\n{:<16}{turns}", row.name);
     }
     text + "\n"
 }
@@ -315,8 +308,8 @@ pub fn table(rows: &[Row]) -> String {
 pub fn functions(row: &Row) -> String {
     let mut list: Vec<_> = row.functions.iter().collect();
     list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));
-    list.iter().fold(String::new(), |mut text, ((block, function), cycles)| {
-        let _ = writeln!(text, "{:<16}{cycles:>6} {block:<16} {function}", row.name);
-        text
-    })
+    let line = |((block, function), cycles): (&(&str, String), &u32)| {
+        format!("{:<16}{cycles:>6} {block:<16} {function}\n", row.name)
+    };
+    list.into_iter().map(line).collect()
 }

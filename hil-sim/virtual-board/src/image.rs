@@ -4,12 +4,11 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use gimli::{EndianArcSlice, RunTimeEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-use crate::memory::Region;
-use crate::power_stage::REFERENCE;
+use crate::{memory::Region, power_stage::REFERENCE};
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 
@@ -38,8 +37,10 @@ struct Symbol {
 
 /// An image.
 pub struct Image {
-    bytes: Vec<u8>,
-    segments: Vec<Segment>,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Contents of the flash.
+    pub segments: Vec<Segment>,
     symbols: Vec<Symbol>,
     lines: addr2line::Context<Slice>,
 }
@@ -118,16 +119,6 @@ impl Image {
         };
         let lines = addr2line::Context::from_dwarf(gimli::Dwarf::load(section)?)?;
         Ok(Self { segments, symbols, lines, bytes })
-    }
-
-    /// The file.
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Contents of the flash.
-    pub fn segments(&self) -> &[Segment] {
-        &self.segments
     }
 
     /// Address and size of the symbol with exactly this name, demangled and without angle brackets.
@@ -213,9 +204,7 @@ fn segments(bytes: &[u8]) -> Result<Vec<Segment>> {
     use object::read::elf::{FileHeader, ProgramHeader};
     let header = FileHeader32::<object::Endianness>::parse(bytes)?;
     let endian = header.endian()?;
-    if header.e_machine(endian) != EM_ARM {
-        bail!("not for an Arm processor");
-    }
+    ensure!(header.e_machine(endian) == EM_ARM, "not for an Arm processor");
     let mut segments = Vec::new();
     for program in header.program_headers(endian, bytes)? {
         let data = program.data(endian, bytes).unwrap_or_default();

@@ -25,6 +25,26 @@
 //! * Shunts see the mean current of the period between two tops, and after a top its slope in the zero vector; the ripple
 //!   of the other vectors is not modelled.
 
+/// A structure with the values that its fields have by default; a field without one has the default of its type.
+macro_rules! defaults {
+    (@value) => { Default::default() };
+    (@value $value:expr) => { $value };
+    ($(#[$about:meta])* $seen:vis struct $name:ident {
+        $($(#[$meaning:meta])* $from:vis $field:ident: $kind:ty $(= $value:expr)?,)*
+    }) => {
+        $(#[$about])*
+        $seen struct $name {
+            $($(#[$meaning])* $from $field: $kind,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: defaults!(@value $($value)?)),* }
+            }
+        }
+    };
+}
+
 pub mod addresses;
 pub mod board;
 pub mod campaign;

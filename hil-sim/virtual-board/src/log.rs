@@ -3,9 +3,8 @@
 use anyhow::{Context, Result, anyhow};
 use defmt_decoder::{DecodeError, Table};
 
-use crate::cpu::Cpu;
-use crate::image::Image;
 use crate::memory::{self, Region};
+use crate::{cpu::Cpu, image::Image};
 
 /// Up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;
@@ -26,7 +25,7 @@ impl Log {
         let Ok(Region { address: control_block, .. }) = image.symbol("_SEGGER_RTT") else {
             return Ok(None);
         };
-        let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
+        let table = Table::parse(&image.bytes).map_err(|e| anyhow!("{e}"))?;
         let table = table.context("the image has no defmt log")?;
         Ok(Some(Self { table, control_block, bytes: Vec::new() }))
     }

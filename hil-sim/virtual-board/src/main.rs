@@ -4,18 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::Parser;
 use virtual_board::power_stage::REFERENCE;
 use virtual_board::{Image, PowerStage, campaign, cycles, dump};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    task: Task,
-}
-
-#[derive(Subcommand)]
 enum Task {
     /// Injects faults; after each, outputs go off in time or control is correct.
     Campaign {
@@ -60,7 +54,7 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse()) {
+    match run(Task::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("FAILED: {error:#}");
@@ -69,8 +63,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: Arguments) -> Result<()> {
-    match arguments.task {
+fn run(task: Task) -> Result<()> {
+    match task {
         Task::Campaign { elf, count, seed, class, rpm, board } => {
             let stage = PowerStage::named(&board)?;
             let without = |_: &mut _, _: &_, _: &_| ();

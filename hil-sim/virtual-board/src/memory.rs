@@ -46,6 +46,8 @@ pub const CCM: u32 = 0x1000_0000;
 pub const CCM_ALIAS: u32 = RAM + RAM_SIZE;
 /// CCM SRAM, bytes.
 pub const CCM_SIZE: u32 = 32 * 1024;
+/// The memories that a loss of power empties: first address, bytes.
+pub const VOLATILE: [(u32, u32); 2] = [(RAM, RAM_SIZE), (CCM, CCM_SIZE)];
 /// The smallest piece of memory that the emulator maps, bytes.
 pub const GUARD_PAGE: u32 = 4096;
 /// Where single bits of peripheral registers appear as words.

@@ -6,8 +6,7 @@ use drive_core::State;
 use induction_drive::console::line::UNASKED;
 
 use crate::board::{Board, Options, Period};
-use crate::image::Image;
-use crate::shadow::Shadow;
+use crate::{image::Image, shadow::Shadow};
 
 /// Longest that the firmware takes from reset to its greeting, or to an answer, periods.
 const LONGEST_ANSWER: u64 = 30_000;

@@ -39,13 +39,8 @@ pub enum Reset {
 /// As the firmware's log names it.
 impl fmt::Display for Reset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Power => "reset by power-on",
-            Self::Pin => "reset by reset pin",
-            Self::Software => "reset by software",
-            Self::Watchdog => "reset by watchdog",
-            Self::Window => "reset by window watchdog",
-        })
+        let causes = ["power-on", "reset pin", "software", "watchdog", "window watchdog"];
+        write!(f, "reset by {}", causes[*self as usize])
     }
 }
 
@@ -67,11 +62,17 @@ pub type Plain = (u32, u32, u32);
 /// bits that can be written. The names become constants.
 macro_rules! registers {
     ($($name:tt = $offset:expr, $reset:expr, $mask:expr;)*) => {
-        $(const $name: u32 = $offset;)*
+        $(pub(crate) const $name: u32 = $offset;)*
         const KNOWN: &[$crate::periph::Plain] = &[$(($offset, $reset, $mask)),*];
     };
 }
 use registers;
+
+/// Bits of a register, each by its number.
+macro_rules! bits {
+    ($($seen:vis $name:ident = $number:literal),*) => { $($seen const $name: u32 = 1 << $number;)* };
+}
+use bits;
 
 /// Registers without behaviour.
 #[derive(Clone, Debug)]

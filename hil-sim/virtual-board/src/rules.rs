@@ -2,7 +2,7 @@
 //! delay or do wrong. A broken rule is recorded with its place and time, and fails the run of a
 //! [`Board`](crate::Board).
 
-use std::fmt;
+use thiserror::Error;
 
 /// The rules, each with its meaning and where it is written.
 macro_rules! rules {
@@ -67,7 +67,8 @@ rules! {
 }
 
 /// A rule that was broken.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{rule:?}: {text} ({}) at {at:#010x}, {:.3} ms", rule.source(), *now as f64 / 170e3)]
 pub struct Violation {
     /// The rule.
     pub rule: Rule,
@@ -79,14 +80,6 @@ pub struct Violation {
     pub now: u64,
     /// How often; place and time are those of the first.
     pub count: u64,
-}
-
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ms = self.now as f64 / 170e3;
-        let Self { rule, text, at, .. } = self;
-        write!(f, "{rule:?}: {text} ({}) at {at:#010x}, {ms:.3} ms", rule.source())
-    }
 }
 
 /// The violations so far.

@@ -50,34 +50,36 @@ impl SysTick {
     }
 }
 
-/// The registers.
-#[derive(Clone, Debug)]
-pub struct Scs {
-    pending: [bool; EXCEPTIONS],
-    enabled: [bool; EXCEPTIONS],
-    line: [bool; EXCEPTIONS],
-    priority: [u8; EXCEPTIONS],
-    /// Exceptions being served, innermost last.
-    pub active: Vec<u16>,
-    any_pending: bool,
-    vtor: u32,
-    grouping: u32,
-    /// Reasons of faults.
-    pub cfsr: u32,
-    /// Reasons of hard faults.
-    pub hfsr: u32,
-    /// Address of a bus fault.
-    pub bfar: u32,
-    plain: Store,
-    /// Memory protection.
-    pub mpu: Mpu,
-    demcr: u32,
-    dwt_control: u32,
-    /// The cycle counter is this less than time.
-    cycles_from: u64,
-    cycles_held: u32,
-    /// SysTick.
-    pub systick: SysTick,
+defaults! {
+    /// The registers; by default after a reset, on the internal oscillator.
+    #[derive(Clone, Debug)]
+    pub struct Scs {
+        /// A bit for each exception: pending, enabled, asked for by its peripheral.
+        pending: u128,
+        enabled: u128 = 0xffff,
+        line: u128,
+        priority: [u8; EXCEPTIONS] = [0; EXCEPTIONS],
+        /// Exceptions being served, innermost last.
+        pub active: Vec<u16>,
+        vtor: u32 = 0x0800_0000,
+        grouping: u32,
+        /// Reasons of faults.
+        pub cfsr: u32,
+        /// Reasons of hard faults.
+        pub hfsr: u32,
+        /// Address of a bus fault.
+        pub bfar: u32,
+        plain: Store = Store::new(PLAIN),
+        /// Memory protection.
+        pub mpu: Mpu,
+        demcr: u32,
+        dwt_control: u32,
+        /// The cycle counter is this less than time.
+        cycles_from: u64,
+        cycles_held: u32,
+        /// SysTick.
+        pub systick: SysTick = SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
+    }
 }
 
 /// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
@@ -92,32 +94,6 @@ const PLAIN: &[Plain] = &[
     (0xe000_ef34, 0xc000_0000, u32::MAX),
 ];
 
-/// After a reset, on the internal oscillator.
-impl Default for Scs {
-    fn default() -> Self {
-        Self {
-            pending: [false; EXCEPTIONS],
-            enabled: std::array::from_fn(|n| n < 16),
-            line: [false; EXCEPTIONS],
-            priority: [0; EXCEPTIONS],
-            active: Vec::new(),
-            any_pending: false,
-            vtor: 0x0800_0000,
-            grouping: 0,
-            cfsr: 0,
-            hfsr: 0,
-            bfar: 0,
-            plain: Store::new(PLAIN),
-            mpu: Mpu::default(),
-            demcr: 0,
-            dwt_control: 0,
-            cycles_from: 0,
-            cycles_held: 0,
-            systick: SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
-        }
-    }
-}
-
 impl Scs {
     /// The vector of an exception.
     pub fn vector(&self, exception: u16) -> u32 {
@@ -126,17 +102,13 @@ impl Scs {
 
     /// Makes an exception pending.
     pub fn pend(&mut self, exception: u16) {
-        if let Some(pending) = self.pending.get_mut(usize::from(exception)) {
-            *pending = true;
-            self.any_pending = true;
-        }
+        self.pending |= 1 << exception;
     }
 
     /// The level of a peripheral's request: pending while high and not being served.
     pub fn set_line(&mut self, irq: u16, high: bool) {
         let exception = irq + 16;
-        let n = usize::from(exception);
-        self.line[n] = high;
+        self.line = self.line & !(1 << exception) | u128::from(high) << exception;
         if high && !self.active.contains(&exception) {
             self.pend(exception);
         }
@@ -164,9 +136,6 @@ impl Scs {
 
     /// The exception that is due next with these masks.
     pub fn due(&self, primask: u32, basepri: u32) -> Option<u16> {
-        if !self.any_pending {
-            return None;
-        }
         let (best, priority) = self.best()?;
         let mut running = self.running();
         if basepri != 0 {
@@ -178,34 +147,30 @@ impl Scs {
         (self.group(priority) < running).then_some(best)
     }
 
-    /// Whether something is pending that would wake the core, whatever PRIMASK says.
+    /// Whether something enabled is pending that only a mask keeps out; it would wake the core, whatever PRIMASK says.
     pub fn wakes(&self) -> bool {
         self.best().is_some_and(|(_, priority)| self.group(priority) < self.running())
     }
 
-    /// Whether something enabled is pending that only a mask keeps out.
-    pub fn waits(&self) -> bool {
-        self.any_pending && self.wakes()
-    }
-
     fn best(&self) -> Option<(u16, i16)> {
-        (0..EXCEPTIONS)
-            .filter(|n| self.pending[*n] && self.enabled[*n])
-            .map(|n| (n as u16, self.priority_of(n as u16)))
+        let due = self.pending & self.enabled;
+        // Mostly none is.
+        (due.trailing_zeros() as u16..EXCEPTIONS as u16)
+            .filter(|n| due >> n & 1 != 0)
+            .map(|n| (n, self.priority_of(n)))
             .min_by_key(|(n, priority)| (*priority, *n))
     }
 
     /// The core takes an exception.
     pub fn begin(&mut self, exception: u16) {
-        self.pending[usize::from(exception)] = false;
+        self.pending &= !(1 << exception);
         self.active.push(exception);
-        self.any_pending = self.pending.contains(&true);
     }
 
     /// The core returns from the innermost exception.
     pub fn end(&mut self) -> Option<u16> {
         let exception = self.active.pop()?;
-        if self.line[usize::from(exception)] {
+        if self.line >> exception & 1 != 0 {
             self.pend(exception);
         }
         Some(exception)
@@ -233,10 +198,7 @@ impl Scs {
 
     /// Reads a register; `None` if it is not known.
     pub fn read(&self, address: u32, now: u64) -> Option<u32> {
-        let bits = |flags: &[bool; EXCEPTIONS]| {
-            let first = 16 + 8 * (address & 0x7f) as usize;
-            (0..32).fold(0, |word, n| word | u32::from(flags.get(first + n) == Some(&true)) << n)
-        };
+        let bits = |flags: u128| (flags >> (16 + 8 * (address & 0x7f))) as u32;
         Some(match address {
             0xe000_e010 => self.systick.control,
             0xe000_e014 => self.systick.reload,
@@ -245,22 +207,22 @@ impl Scs {
                 (left / self.systick.cycle.max(1)) as u32 & 0xff_ffff
             }
             0xe000_e01c => 0,
-            0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => bits(&self.enabled),
-            0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => bits(&self.pending),
+            0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => bits(self.enabled),
+            0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => bits(self.pending),
             0xe000_e300..0xe000_e310 => {
                 let first = 16 + 8 * (address - 0xe000_e300) as u16;
                 (0..32).fold(0, |w, n| w | u32::from(self.active.contains(&(first + n))) << n)
             }
-            0xe000_e400..0xe000_e468 => self.priorities(16 + (address - 0xe000_e400) as usize),
-            0xe000_ed18..0xe000_ed24 => self.priorities(4 + (address - 0xe000_ed18) as usize),
+            0xe000_e400..0xe000_e468 | 0xe000_ed18..0xe000_ed24 => {
+                let four = self.priority.iter().skip(first_priority(address)).take(4);
+                four.rev().fold(0, |word, one| word << 8 | u32::from(*one))
+            }
             0xe000_ed00 => 0x410f_c241,
             0xe000_ed04 => {
                 let active = self.active.last().map_or(0, |e| u32::from(*e));
                 let pending = self.best().map_or(0, |(e, _)| u32::from(e));
-                active
-                    | pending << 12
-                    | u32::from(self.pending[usize::from(PEND_SV)]) << 28
-                    | u32::from(self.pending[usize::from(SYSTICK)]) << 26
+                let is_pending = |exception: u16| (self.pending >> exception) as u32 & 1;
+                active | pending << 12 | is_pending(PEND_SV) << 28 | is_pending(SYSTICK) << 26
             }
             0xe000_ed08 => self.vtor,
             0xe000_ed0c => 0xfa05_0000 | self.grouping << 8,
@@ -276,22 +238,12 @@ impl Scs {
         })
     }
 
-    fn priorities(&self, first: usize) -> u32 {
-        (0..4).fold(0, |w, n| {
-            w | u32::from(self.priority.get(first + n).copied().unwrap_or(0)) << (8 * n)
-        })
-    }
-
     /// Writes a register; `None` if it is not known.
     pub fn write(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
         // The upper of two registers clears.
-        let set = |flags: &mut [bool; EXCEPTIONS]| {
-            let (first, to) = (16 + 8 * (address & 0x7f) as usize, address & 0x80 == 0);
-            for n in (0..32).filter(|n| value & 1 << n != 0) {
-                if let Some(flag) = flags.get_mut(first + n) {
-                    *flag = to;
-                }
-            }
+        let set = |flags: &mut u128| {
+            let bits = u128::from(value) << (16 + 8 * (address & 0x7f)) & ((1 << EXCEPTIONS) - 1);
+            *flags = if address & 0x80 == 0 { *flags | bits } else { *flags & !bits };
         };
         match address {
             0xe000_e010 => {
@@ -305,24 +257,14 @@ impl Scs {
             0xe000_e018 => self.systick.expires = now + self.systick.period(),
             0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => set(&mut self.enabled),
             0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => set(&mut self.pending),
-            0xe000_e400..0xe000_e468 => {
-                self.set_priorities(16 + (address - 0xe000_e400) as usize, value)
-            }
-            0xe000_ed18..0xe000_ed24 => {
-                self.set_priorities(4 + (address - 0xe000_ed18) as usize, value)
+            0xe000_e400..0xe000_e468 | 0xe000_ed18..0xe000_ed24 => {
+                let four = self.priority.iter_mut().skip(first_priority(address));
+                four.zip(value.to_le_bytes()).for_each(|(one, new)| *one = new);
             }
             0xe000_ed04 => {
-                for (bit, exception, to) in [
-                    (31, NMI, true),
-                    (28, PEND_SV, true),
-                    (27, PEND_SV, false),
-                    (26, SYSTICK, true),
-                    (25, SYSTICK, false),
-                ] {
-                    if value & 1 << bit != 0 {
-                        self.pending[usize::from(exception)] = to;
-                    }
-                }
+                let bit = |bit: u32, exception: u16| u128::from(value >> bit & 1) << exception;
+                self.pending |= bit(31, NMI) | bit(28, PEND_SV) | bit(26, SYSTICK);
+                self.pending &= !(bit(27, PEND_SV) | bit(25, SYSTICK));
             }
             0xe000_ed08 => self.vtor = value & !0x1ff,
             // Only with the key.
@@ -356,15 +298,12 @@ impl Scs {
             }
             _ => return self.plain.write(address, value),
         }
-        self.any_pending = self.pending.contains(&true);
         Some(Effect::Look)
     }
+}
 
-    fn set_priorities(&mut self, first: usize, value: u32) {
-        for n in 0..4 {
-            if let Some(priority) = self.priority.get_mut(first + n) {
-                *priority = (value >> (8 * n)) as u8;
-            }
-        }
-    }
+/// The exception whose priority a register holds in its lowest byte.
+fn first_priority(address: u32) -> usize {
+    let first = if address < 0xe000_ed00 { address - 0xe000_e3f0 } else { address - 0xe000_ed14 };
+    first as usize
 }

@@ -9,16 +9,12 @@ use drive_core::{Accepted, Coefficients, Command, Drive, FrontEndState, Output, 
 use drive_settings::{Settings, SettingsError};
 
 use crate::board::{Options, Period, confirmed};
-use induction_drive::commissioning::Session;
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::desk::Desk;
 use induction_drive::desk::handle::{CommandError, DriveHandle};
-use induction_drive::link::Status;
-use induction_drive::link::ring::Record;
-use induction_drive::rotor_tracking::Tracking;
-use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::bus::Commander;
-use induction_drive::store::FlashError;
+use induction_drive::{
+    commissioning::Session, desk::Desk, link::Status, link::ring::Record, rotor_tracking::Tracking,
+    settings::FirmwareSettings, settings::bus::Commander, store::FlashError,
+};
 
 /// A drive with the settings of the board, and a desk of its own.
 pub struct Shadow {

@@ -67,17 +67,17 @@ fn a_hanging_core_is_off_within_three_periods() -> Result<()> {
 fn a_hanging_main_loop_is_off_within_six_milliseconds() -> Result<()> {
     let mut board = common::regulating(2)?.board;
     // A jump to itself where the main loop sleeps, or would go on.
-    let sleep = board.image().symbol("induction_drive::chip::sleep::until_interrupt")?;
+    let sleep = board.image.symbol("induction_drive::chip::sleep::until_interrupt")?;
     let mut at = 0;
     for _ in 0..100_000 {
         board.run_ticks(100)?;
-        at = board.cpu().get(Register::PC);
+        at = board.cpu.get(Register::PC);
         if (sleep.address..sleep.address + sleep.size).contains(&at) {
             break;
         }
     }
     assert!(at >= sleep.address, "it never sleeps");
-    board.cpu().write(at, &0xe7fe_u16.to_le_bytes());
+    board.cpu.write(at, &0xe7fe_u16.to_le_bytes());
     board.run_periods(6)?;
     assert!(board.chip().tim1.outputs_on());
     board.run_periods(30)?;
@@ -151,15 +151,15 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
         let mut pair = common::regulating(6)?;
         // The last word of the code, which is padding or never executed here; the direct current, by its value.
         let address = if code {
-            pair.board.image().symbol("__eccm")?.address - 4
+            pair.board.image.symbol("__eccm")?.address - 4
         } else {
             let region = pair.board.addresses().coefficients;
             let i_d = Some(pair.shadow.settings().i_d().to_bits());
             let mut words = (region.address..region.end()).step_by(4);
-            words.find(|at| pair.board.word(*at) == i_d).context("no direct current")?
+            words.find(|at| pair.board.cpu.word(*at) == i_d).context("no direct current")?
         };
-        let word = pair.board.word(address).unwrap_or(0) ^ 1 << 20;
-        pair.board.cpu().write(address, &word.to_le_bytes());
+        let word = pair.board.cpu.word(address).unwrap_or(0) ^ 1 << 20;
+        pair.board.cpu.write(address, &word.to_le_bytes());
         let began = pair.board.time();
         while pair.board.chip().tim1.outputs_on() {
             pair.board.run_ticks(2000)?;

@@ -35,22 +35,22 @@ enum Protection {
 
 /// A function finds nothing from now on, or it is as in the image again.
 fn cut(board: &mut Board, function: &str, is_cut: bool) {
-    let address = board.image().symbol(function).expect("it is in the image").address;
-    let sound = board.image().segments().iter().find_map(|segment| {
+    let address = board.image.symbol(function).expect("it is in the image").address;
+    let sound = board.image.segments.iter().find_map(|segment| {
         let at = address.checked_sub(segment.address)? as usize;
         segment.bytes.get(at..at + FINDS_NOTHING.len())
     });
     let sound = sound.expect("code of the image").to_vec();
-    board.cpu().write(address, if is_cut { &FINDS_NOTHING } else { &sound });
+    board.cpu.write(address, if is_cut { &FINDS_NOTHING } else { &sound });
 }
 
 /// The check of registers expects of one what it holds.
 fn expect_as_it_is(board: &mut Board, address: u32) {
     let table = "induction_drive::task::check::Check::new::{closure#0}::VAR";
-    let table = board.image().symbol(table).expect("it is in the image").address;
+    let table = board.image.symbol(table).expect("it is in the image").address;
     for (n, register) in control().enumerate().filter(|(_, r)| r.address == address) {
         let value = board.chip().read(address, 4) & register.mask;
-        board.cpu().write(table + 4 * n as u32, &value.to_le_bytes());
+        board.cpu.write(table + 4 * n as u32, &value.to_le_bytes());
     }
 }
 

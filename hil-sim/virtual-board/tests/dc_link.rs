@@ -133,9 +133,9 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
     }
     // A handler that ends the run: a flipped bit in the control's code, found by the main loop.
     pair.board.go_back(&running)?;
-    let address = pair.board.image().symbol("__eccm")?.address - 4;
-    let word = pair.board.word(address).unwrap_or(0) ^ 1 << 20;
-    pair.board.cpu().write(address, &word.to_le_bytes());
+    let address = pair.board.image.symbol("__eccm")?.address - 4;
+    let word = pair.board.cpu.word(address).unwrap_or(0) ^ 1 << 20;
+    pair.board.cpu.write(address, &word.to_le_bytes());
     pair.board.run_periods(130)?;
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Software));
     assert_eq!(pair.board.chip().chopper_duty(), 0.0);

@@ -83,8 +83,8 @@ const PROGRAMS: &[Program] = &[
     Program { done: |board| is(board.chip().tim1.outputs_on()), ..runs("embassy-pwm", EMBASSY) },
     Program {
         done: |board| {
-            let samples = board.image().symbol("SAMPLES")?.address;
-            is(board.word(samples) == Some(u32::from(CODE)))
+            let samples = board.image.symbol("SAMPLES")?.address;
+            is(board.cpu.word(samples) == Some(u32::from(CODE)))
         },
         ..runs("embassy-adc", EMBASSY)
     },

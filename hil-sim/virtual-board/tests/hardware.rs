@@ -95,7 +95,7 @@ fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {
 /// The gates that ask for on, or may, of a chip that stands still.
 fn gates_on(board: &mut Board) -> Vec<String> {
     let chip = board.chip();
-    let driver = chip.gates.stage().driver;
+    let driver = chip.gates.stage.driver;
     let mut on = Vec::new();
     for (leg, name) in ["a", "b", "c"].into_iter().enumerate() {
         let requests = driver.requests(leg, &chip.gpio, &chip.tim1, true);

@@ -37,7 +37,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     pair.until_state(State::Torque)?;
     let mut board = pair.board;
     board.take_log()?;
-    board.poison = Some(Poison::new(board.image().symbol("_stack_start")?.address));
+    board.poison = Some(Poison::new(board.image.symbol("_stack_start")?.address));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let (mut periods, mut replies) = (0_u64, 0);
     while periods < LOGGED || board.poison.as_ref().is_some_and(|poison| poison.intact < INTERRUPTS)

@@ -74,16 +74,16 @@ fn after(script: &[Step]) -> Chip {
         match *step {
             Write(address, value) => {
                 chip.write(address, 4, value);
-                let cycle = chip.rcc.ticks_per_cycle();
+                let cycle = chip.rcc.ticks_per_cycle;
                 pass(&mut chip, 10 * cycle);
             }
             Next(address, value) => {
                 chip.write(address, 4, value);
-                chip.now += chip.rcc.ticks_per_cycle();
+                chip.now += chip.rcc.ticks_per_cycle;
             }
             Read(address) => {
                 chip.read(address, 4);
-                chip.now += chip.rcc.ticks_per_cycle();
+                chip.now += chip.rcc.ticks_per_cycle;
             }
             Wait(ticks) => pass(&mut chip, ticks),
             Halt => {

@@ -35,7 +35,7 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
     let mut board = greeted(41)?;
     let place = spoilt.unwrap_or(FLASH..FLASH);
     let mut sound = vec![0; (place.end - place.start) as usize];
-    board.read(place.start, &mut sound);
+    board.cpu.read(place.start, &mut sound);
     let rubbish = vec![0xde; sound.len()];
     let (mut seen, mut answered) = (Vec::new(), 0);
     let lines =
@@ -50,7 +50,7 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
             board.run_ticks(if is_spoilt { 1 } else { STEP })?;
             let interrupts = !board.chip().scs.active.is_empty();
             if interrupts != is_spoilt {
-                board.cpu().write(place.start, if interrupts { &rubbish } else { &sound });
+                board.cpu.write(place.start, if interrupts { &rubbish } else { &sound });
                 is_spoilt = interrupts;
             }
         }
@@ -139,7 +139,7 @@ const FREE: [u32; 2] = [0x0803_ff00, 0x0805_ff00];
 /// the first with a word of the second that it reads.
 fn before_the_control(board: &mut Board, reads: bool) {
     let vector = board.chip().scs.vector(CONTROL_INTERRUPT);
-    let handler = board.word(vector).unwrap();
+    let handler = board.cpu.word(vector).unwrap();
     let place = FREE[usize::from(!reads)];
     // ldr r0, [pc, #4]; ldr r0, [r0]; ldr pc, [pc, #4]; a word of the second bank; the handler. Or: ldr pc, [pc, #0]; the handler.
     let words: &[u32] = if reads {
@@ -148,8 +148,8 @@ fn before_the_control(board: &mut Board, reads: bool) {
         &[0xf000_f8df, handler]
     };
     let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-    board.cpu().write(place, &bytes);
-    board.cpu().write(vector, &(place | 1).to_le_bytes());
+    board.cpu.write(place, &bytes);
+    board.cpu.write(vector, &(place | 1).to_le_bytes());
 }
 
 /// The control interrupt with a piece of code or a word in the second bank: as good as ever until the flash is written; then

@@ -152,7 +152,7 @@ fn a_stack_in_the_guard_faults() -> Result<()> {
     board.run_periods(START)?;
     board.take_console();
     let guard = board.chip().scs.mpu.guard().context("no guard")?;
-    board.cpu().set(Register::SP, guard.end() + 16);
+    board.cpu.set(Register::SP, guard.end() + 16);
     board.run_periods(60)?;
     assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Software));
     board.run_periods(START)?;

@@ -1,9 +1,8 @@
 //! The clock of all programs: 170 MHz from the crystal of the board, as the drive's.
 #![no_std]
 
-use embassy_stm32::Config;
+use embassy_stm32::{Config, time::Hertz};
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
-use embassy_stm32::time::Hertz;
 use panic_halt as _;
 
 /// 24 MHz / 6 * 85 / 2, boosted.

@@ -9,10 +9,9 @@ use std::sync::mpsc::{Receiver, channel};
 
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
-use hil_sim::board::Options;
-use hil_sim::outcome::Origin;
 use hil_sim::report::{self, Section};
 use hil_sim::{Config, Error};
+use hil_sim::{board::Options, outcome::Origin};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use virtual_board::interactive::flash_file::FlashFile;
 use virtual_board::interactive::page;
@@ -59,9 +58,9 @@ fn run(mut options: Options) -> Result<()> {
     let flash = options.flash.as_deref().map(|path| FlashFile::open(path, &mut board.chip().flash));
     let flash = flash.transpose()?;
 
-    let port = pty.path().display();
+    let port = pty.path.display();
     say(&format!("console: {port}"));
-    say(&format!("bus: {}", bus.path().display()));
+    say(&format!("bus: {}", bus.path.display()));
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
@@ -124,9 +123,7 @@ fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
 
 /// Writes the page, its plots and the JSON object; where the page is.
 fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBuf> {
-    let board = session.board();
-    let mut outcome =
-        page::outcome(config, board.time(), board.resets.len(), &session.record, &session.lines);
+    let mut outcome = page::outcome(config, session);
     if session.behind_s > 0.0 {
         let behind = format!("The board fell behind the clock by {:.1} s.", session.behind_s);
         outcome.remarks.insert(0, behind);

@@ -1,14 +1,10 @@
 //! The flash of a board whose bench steps were done: its settings, with the confirmation, saved.
 
 use anyhow::{Context, Result};
-use induction_drive::board::settings_address;
-use induction_drive::boards;
-use induction_drive::settings::FirmwareSettings;
-use induction_drive::store::codec;
+use induction_drive::{board::settings_address, boards, settings::FirmwareSettings, store::codec};
 
 use super::Options;
-use crate::memory::STORED;
-use crate::periph::flash::Flash;
+use crate::{memory::STORED, periph::flash::Flash};
 
 /// The settings of a board, confirmed.
 ///

@@ -3,9 +3,8 @@
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
-use crate::addresses::Addresses;
 use crate::cost::{self, Block};
-use crate::power_stage::Sensors;
+use crate::{addresses::Addresses, power_stage::Sensors};
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,8 +48,8 @@ impl Board {
     /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
         let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
-        let mailbox = self.word(orders);
-        mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
+        let mailbox = self.cpu.word(orders);
+        mailbox.and_then(|mailbox| self.cpu.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }
 
     pub(super) fn begin_control(&mut self) {
@@ -74,7 +73,7 @@ impl Board {
         }
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both convert the third current second.
-        let in_line = chip.gates.stage().sensors == Sensors::InLine;
+        let in_line = chip.gates.stage.sensors == Sensors::InLine;
         let (current_c, slow) = if in_line { (0, 1) } else { (one[1], 2) };
         let sample = Sample {
             current_a: one[0] + upper_a,
@@ -86,14 +85,15 @@ impl Board {
             hardware,
         };
         let (began, accesses) = (chip.now, chip.accesses);
-        if let Some(at) = self.pended.take() {
+        if let Some(at) = self.progress.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
-        self.entered = Some(RunningInterrupt { began, sample, ended, had_order, accesses });
+        self.progress.entered =
+            Some(RunningInterrupt { began, sample, ended, had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {
-        let Some(entered) = self.entered.take() else { return };
+        let Some(entered) = self.progress.entered.take() else { return };
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
         chip.in_control = false;
@@ -115,15 +115,9 @@ impl Board {
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
-            let period = Period {
-                began: entered.began,
-                sample: entered.sample,
-                compare,
-                took_order,
-                cycles,
-                to_compares,
-            };
-            self.periods.push_back(period);
+            let RunningInterrupt { began, sample, .. } = entered;
+            let period = Period { began, sample, compare, took_order, cycles, to_compares };
+            self.progress.periods.push_back(period);
         }
     }
 }

@@ -1,12 +1,10 @@
 //! Lets the core run or sleep, and takes it into exceptions and back.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::Board;
-use crate::chip::CONTROL_INTERRUPT;
-use crate::cpu::{Fault, Register, Stop};
-use crate::memory;
-use crate::scs;
+use crate::cpu::{Register, Stop};
+use crate::{chip::CONTROL_INTERRUPT, memory, scs};
 
 impl Board {
     /// Takes the exception that is due.
@@ -21,19 +19,17 @@ impl Board {
     }
 
     fn enter(&mut self, exception: u16) -> Result<()> {
-        self.sleeping = false;
+        self.progress.sleeping = false;
         if exception == CONTROL_INTERRUPT {
             self.begin_control();
+            self.remember();
         }
         let vector = self.cpu.chip().scs.vector(exception);
         let handler = self.cpu.word(vector).context("no vector")?;
         self.cpu.chip_mut().scs.begin(exception);
-        if exception == CONTROL_INTERRUPT {
-            self.remember();
-        }
         let stacked = self.cpu.enter(exception, handler & !1);
-        if exception == CONTROL_INTERRUPT {
-            self.spoil();
+        if exception == CONTROL_INTERRUPT && self.poison.is_some() {
+            self.cpu.spoil_float();
         }
         if !stacked && exception != scs::HARD_FAULT {
             // The stack is at its end: the frame is lost, and the fault is taken instead.
@@ -45,15 +41,13 @@ impl Board {
     fn hard_fault(&mut self, cfsr: u32, address: Option<u32>) -> Result<()> {
         let pc = self.cpu.get(Register::PC);
         let chip = self.cpu.chip_mut();
-        if chip.scs.running() < 0 && chip.forgiving {
+        if chip.scs.running() < 0 {
+            let place = || self.image.location(pc);
+            ensure!(chip.forgiving, "lock-up: a fault in a fault handler at {}", place());
             // Locked up, until a reset.
             chip.lock_up();
-            self.hung = true;
+            self.progress.hung = true;
             return Ok(());
-        }
-        if chip.scs.running() < 0 {
-            let place = self.image.location(pc);
-            bail!("lock-up: a fault in a fault handler at {place}");
         }
         chip.scs.cfsr |= cfsr;
         chip.scs.hfsr |= 1 << 30;
@@ -72,14 +66,14 @@ impl Board {
             chip.now = chip.now.max(chip.deadline.min(chip.stalled_until));
             return Ok(());
         }
-        if self.hung || self.sleeping || chip.is_halted() || chip.browned_out() {
-            if self.sleeping && !chip.is_halted() && chip.scs.wakes() {
-                self.sleeping = false;
+        if self.progress.hung || self.progress.sleeping || chip.is_halted() || chip.browned_out() {
+            if self.progress.sleeping && !chip.is_halted() && chip.scs.wakes() {
+                self.progress.sleeping = false;
                 return Ok(());
             }
             let before = chip.now;
             chip.now = chip.now.max(chip.deadline);
-            if self.sleeping && !chip.is_halted() {
+            if self.progress.sleeping && !chip.is_halted() {
                 chip.sleep(chip.now - before);
             }
             return Ok(());
@@ -88,30 +82,28 @@ impl Board {
             return Ok(());
         }
         // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
-        if chip.scs.waits() {
+        if chip.scs.wakes() {
             chip.deadline = chip.now + 1;
         }
-        if let Some(at) = self.preempt_at {
+        if let Some(at) = self.progress.preempt_at {
             chip.deadline =
                 chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
         }
         match self.cpu.run() {
             Stop::Asked => {}
-            Stop::Wait => self.sleeping = true,
+            Stop::Wait => self.progress.sleeping = true,
             Stop::Return(exc_return) => self.leave(exc_return)?,
-            Stop::Fault(Fault::Access(address))
-                if memory::is_reserved(address) || self.cpu.chip().forgiving =>
-            {
+            Stop::Access(address) if memory::is_reserved(address) || self.cpu.chip().forgiving => {
                 self.hard_fault(1 << 9, Some(address))?;
             }
-            Stop::Fault(Fault::Denied(address)) => {
+            Stop::Denied(address) => {
                 // MMFAR, MMARVALID and DACCVIOL.
                 let now = self.cpu.chip().now;
                 self.cpu.chip_mut().scs.write(0xe000_ed34, address, now);
                 self.hard_fault(1 << 7 | 1 << 1, None)?;
             }
-            Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
-            Stop::Fault(Fault::Access(address)) => {
+            Stop::Instruction => self.hard_fault(1 << 16, None)?,
+            Stop::Access(address) => {
                 let place = self.image.location(self.cpu.chip().at);
                 bail!("access to {address:#010x} at {place}");
             }

@@ -145,17 +145,17 @@ impl Board {
     pub fn gates(&mut self) -> &Bridge {
         let chip = self.cpu.chip_mut();
         chip.look_at_gates();
-        chip.gates.bridge()
+        &chip.gates.bridge
     }
 
     /// Lets the motor see the outputs as they are from now on.
     pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip_mut();
         // A break switches them off without a write.
-        if chip.gates.bridge().outputs_on != chip.tim1.outputs_on() {
+        if chip.gates.bridge.outputs_on != chip.tim1.outputs_on() {
             chip.look_at_gates();
         }
-        let (now, compare) = (chip.now, chip.gates.bridge().compare());
+        let (now, compare) = (chip.now, chip.gates.bridge.compare());
         let seen = (chip.chopper_duty(), chip.relay_pin());
         if seen != self.connection.dc_link {
             self.advance_plant(now);
@@ -167,7 +167,7 @@ impl Board {
             self.advance_plant(now);
             self.connection.applied = compare;
             if let Some(reader) = &mut self.connection.shunts {
-                reader.bridge = self.cpu.chip().gates.bridge().clone();
+                reader.bridge = self.cpu.chip().gates.bridge.clone();
             }
             if !compare.enabled {
                 self.went_off = Some(now);
@@ -196,7 +196,7 @@ impl Board {
         self.advance_plant(at);
         let chip = self.cpu.chip_mut();
         chip.look_at_gates();
-        let (bridge, stage) = (chip.gates.bridge(), chip.gates.stage());
+        let (bridge, stage) = (&chip.gates.bridge, chip.gates.stage);
         let (outputs_on, dead_time) = (bridge.outputs_on, bridge.dead_time);
         let (pulses, halves) = (bridge.check_pulses(stage), chip.adc.samples_twice());
         self.connection.applied = bridge.compare();

@@ -1,8 +1,9 @@
 //! Options of a board.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use drive_core::Line;
-use drive_settings::{SETTINGS, Settings, find};
+use drive_settings::{SETTINGS, Settings};
+use drive_settings::{entry::Entry, value::Value};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
@@ -62,6 +63,12 @@ impl Options {
     /// The lines for the console that adapt the image of a board to a configuration: its motor, and on the reference board
     /// scales for its sensors at the converters of this board.
     pub fn set_lines(stage: &PowerStage, config: &Config) -> Vec<String> {
+        let needed = Self::needed(stage, config);
+        needed.into_iter().map(|(entry, value)| format!("set {} {value}", entry.name)).collect()
+    }
+
+    /// These settings with their values.
+    fn needed(stage: &PowerStage, config: &Config) -> Vec<(&'static Entry<Settings>, Value)> {
         let [image, default] = [stage.firmware_settings(), Config::default().drive];
         let mut wanted = config.drive;
         // Timer and converters are the board's.
@@ -82,7 +89,7 @@ impl Options {
             wanted.scales = image.scales;
         }
         let needed = differing.iter().filter(|entry| entry.get(&wanted) != entry.get(&image));
-        needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
+        needed.map(|entry| (*entry, entry.get(&wanted))).collect()
     }
 
     /// With the settings for a configuration saved, as if [`Options::set_lines`] were typed and saved before.
@@ -90,10 +97,7 @@ impl Options {
     /// # Errors
     /// A line that the image would refuse.
     pub fn set_up(mut self, config: &Config) -> Result<Self> {
-        for line in Self::set_lines(self.power_stage, config) {
-            let (name, value) = line.trim_start_matches("set ").split_once(' ').unwrap_or_default();
-            let entry = find(name).with_context(|| line.clone())?;
-            let value = entry.parse(value).map_err(|why| anyhow!("{line}: {why}"))?;
+        for (entry, value) in Self::needed(self.power_stage, config) {
             entry.set(&mut self.saved, value);
         }
         self.saved.check().map_err(|why| anyhow!("{why}"))?;

@@ -4,8 +4,7 @@ use anyhow::Result;
 
 use super::Board;
 use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
-use crate::image::Image;
-use crate::periph::Reset;
+use crate::{image::Image, periph::Reset};
 
 impl Board {
     /// Puts a line, without its end, on the wire to the console.
@@ -45,12 +44,12 @@ impl Board {
     /// The log cannot be decoded.
     pub fn take_log(&mut self) -> Result<Vec<String>> {
         self.drain_log()?;
-        Ok(std::mem::take(&mut self.lines))
+        Ok(std::mem::take(&mut self.progress.lines))
     }
 
     pub(super) fn drain_log(&mut self) -> Result<()> {
         if let Some(log) = &mut self.log {
-            self.lines.extend(log.take(&mut self.cpu)?);
+            self.progress.lines.extend(log.take(&mut self.cpu)?);
         }
         Ok(())
     }
@@ -72,7 +71,7 @@ impl Board {
         self.reset(Reset::Pin);
         self.hang();
         self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)?;
-        for segment in image.segments() {
+        for segment in &image.segments {
             self.cpu.write(segment.address, &segment.bytes);
         }
         self.reset(Reset::Pin);
@@ -93,7 +92,7 @@ impl Board {
 
     /// The core executes nothing any more, until a reset.
     pub fn hang(&mut self) {
-        self.hung = true;
+        self.progress.hung = true;
     }
 
     /// The core executes nothing for some ticks, as if the bus were taken.
@@ -112,14 +111,14 @@ impl Board {
 
     /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
     pub fn stop_after(&mut self, instructions: u64) {
-        self.preempt_at = Some(self.cpu.chip().instructions + instructions);
+        self.progress.preempt_at = Some(self.cpu.chip().instructions + instructions);
     }
 
     /// Makes an exception pending: it preempts by its priority and the masks.
     pub fn pend(&mut self, exception: u16) {
         // A control interrupt that runs already delays only itself.
-        if exception == CONTROL_INTERRUPT && self.entered.is_none() {
-            self.pended = Some(self.cpu.chip().now);
+        if exception == CONTROL_INTERRUPT && self.progress.entered.is_none() {
+            self.progress.pended = Some(self.cpu.chip().now);
         }
         self.chip().scs.pend(exception);
     }

@@ -4,10 +4,10 @@
 use anyhow::{Result, bail};
 
 use super::Board;
-use crate::cpu::Register;
-use crate::memory;
+use crate::{cpu::Register, memory};
 
 /// The state of the core before a control interrupt.
+#[derive(PartialEq)]
 struct Preempted {
     registers: Vec<u64>,
     sp: u32,
@@ -33,25 +33,19 @@ impl Poison {
 }
 
 impl Board {
-    fn stack_above(&self, sp: u32, top: u32) -> Vec<u8> {
+    /// The state of the core, with the stack between two addresses.
+    fn preempted(&self, sp: u32, top: u32) -> Preempted {
         let mut stack = vec![0; top.saturating_sub(sp.max(memory::RAM)) as usize];
         self.cpu.read(sp, &mut stack);
-        stack
+        Preempted { registers: self.cpu.registers(), sp, stack }
     }
 
     /// Remembers the state before a control interrupt.
     pub(super) fn remember(&mut self) {
-        let Some(mut poison) = self.poison.take() else { return };
-        let sp = self.cpu.get(Register::SP);
-        let stack = self.stack_above(sp, poison.top);
-        poison.before = Some(Preempted { registers: self.cpu.registers(), sp, stack });
-        self.poison = Some(poison);
-    }
-
-    /// Poisons the floating-point registers as it begins.
-    pub(super) fn spoil(&mut self) {
-        if self.poison.is_some() {
-            self.cpu.spoil_float();
+        let Some(top) = self.poison.as_ref().map(|poison| poison.top) else { return };
+        let before = self.preempted(self.cpu.get(Register::SP), top);
+        if let Some(poison) = &mut self.poison {
+            poison.before = Some(before);
         }
     }
 
@@ -62,12 +56,12 @@ impl Board {
     pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
         let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };
-        let after = self.cpu.registers();
-        if after != before.registers || self.stack_above(before.sp, top) != before.stack {
+        let after = self.preempted(before.sp, top);
+        if after != before {
             let at = self.image.location(self.cpu.get(Register::PC));
+            let (before, after) = (before.registers, after.registers);
             bail!(
-                "a control interrupt changed the code it preempted at {at}: {:x?} became {after:x?}",
-                before.registers
+                "a control interrupt changed the code it preempted at {at}: {before:x?} became {after:x?}"
             );
         }
         if let Some(poison) = &mut self.poison {

@@ -3,11 +3,8 @@
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
-use super::Board;
-use super::motor::Connection;
-use crate::chip::Chip;
-use crate::cpu::CoreState;
-use crate::periph::Reset;
+use super::{Board, Progress, motor::Connection};
+use crate::{chip::Chip, cpu::CoreState, periph::Reset};
 
 /// Everything that changes on a board.
 pub struct Snapshot {
@@ -33,7 +30,7 @@ impl Board {
             chip: self.cpu.chip().clone(),
             plant: self.plant.clone(),
             connection: self.connection.clone(),
-            sleeping: self.sleeping,
+            sleeping: self.progress.sleeping,
             resets: self.resets.clone(),
         })
     }
@@ -50,16 +47,11 @@ impl Board {
         self.cpu.chip_mut().rules.collecting |= forgiving;
         self.plant = to.plant.clone();
         self.connection = to.connection.clone();
-        self.sleeping = to.sleeping;
+        self.progress = Progress { sleeping: to.sleeping, ..Progress::default() };
         self.resets = to.resets.clone();
-        self.hung = false;
-        self.entered = None;
         self.disturb = None;
-        self.preempt_at = None;
         self.went_off = None;
         self.short_pulses = 0;
-        self.periods.clear();
-        self.lines.clear();
         if let Some(log) = &mut self.log {
             log.forget();
         }

@@ -7,11 +7,7 @@ use super::faults::{
     bad_code, current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor,
 };
 use super::scene::{Source, Target};
-use crate::board::Board;
-use crate::chip::TICKS_PER_S;
-use crate::cpu::Register;
-use crate::memory::Region;
-use crate::periph::iwdg::LSI_HZ;
+use crate::{board::Board, chip::TICKS_PER_S, cpu::Register, memory::Region, periph::iwdg::LSI_HZ};
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 
@@ -52,16 +48,19 @@ pub struct Class {
     pub ends: bool,
 }
 
-/// A class of faults that are injected while the drive regulates with either angle source.
+/// A class of faults, tried with either angle source.
+const fn class(name: &'static str, bound: Bound, run: Run) -> Class {
+    Class { name, bound, at_speed: Some(bound), sources: BOTH, run, ends: false }
+}
+
+/// A class of faults that are injected while the drive regulates.
 const fn regulating(name: &'static str, bound: Bound, inject: Inject) -> Class {
-    let at_speed = Some(bound);
-    Class { name, bound, at_speed, sources: BOTH, run: Run::Regulating(inject), ends: false }
+    class(name, bound, Run::Regulating(inject))
 }
 
 /// A class of faults with the drive off.
 const fn off(name: &'static str, why: &'static str, run: Run) -> Class {
-    let sources = &[Source::Sensorless];
-    Class { name, bound: (0.0, why), at_speed: None, sources, run, ends: false }
+    class(name, (0.0, why), run).with(&[Source::Sensorless]).not_at_speed()
 }
 
 impl Class {
@@ -97,9 +96,6 @@ impl Class {
 
 const BOTH: &[Source] = &[Source::Sensorless, Source::Encoder];
 const ENCODER: &[Source] = &[Source::Encoder];
-
-/// From the first lost count of 5 % of them to the fault: 210 ms measured.
-const LOST_COUNTS_MS: f64 = 300.0;
 
 /// A PWM period, and the time in which the software sees a sample and switches off, ms.
 const PERIOD_MS: f64 = 1.0 / 6.0;
@@ -144,84 +140,49 @@ const CLASSES: &[Class] = &[
     regulating("heat-sink sensor stuck, open, saturated, noisy", SAMPLE, |board, _, rng| {
         slow_sensor(board, rng, |s| &mut s.heat_sink)
     }),
-    regulating(
-        "not-a-number in the drive's state",
-        (
-            2.0 * CARRIER_MS + STEP_MS,
-            "quantities that are used once in a carrier period show in the next one",
-        ),
-        |board, target, rng| {
-            let Region { address: base, size } = target.state;
-            // A word that holds a plausible number; angles and counts are another class.
-            for _ in 0..1000 {
-                let address = base + 4 * rng.random_range(0..size / 4);
-                let value = f32::from_bits(board.word(address).unwrap_or(0)).abs();
-                if (1e-5..1e5).contains(&value) {
-                    board.cpu().write(address, &f32::NAN.to_le_bytes());
-                    return format!("word {} of the control's state", (address - base) / 4);
-                }
+    regulating("not-a-number in the drive's state", NOT_A_NUMBER, |board, target, rng| {
+        let Region { address: base, size } = target.addresses.state;
+        // A word that holds a plausible number; angles and counts are another class.
+        for _ in 0..1000 {
+            let address = base + 4 * rng.random_range(0..size / 4);
+            let value = f32::from_bits(board.cpu.word(address).unwrap_or(0)).abs();
+            if (1e-5..1e5).contains(&value) {
+                board.cpu.write(address, &f32::NAN.to_le_bytes());
+                return format!("word {} of the control's state", (address - base) / 4);
             }
-            "no such word".into()
-        },
-    ),
-    regulating(
-        "dc-link step",
-        (STEP_MS, "voltage limits: the sample after it, and the step that sees it"),
-        |board, target, rng| {
-            // On a dc link of 311 V.
-            let volts = target.relative_voltage * rng.random_range(100.0..600.0);
-            board.plant.set_dc_link(volts).ok();
-            format!("to {volts:.0} V")
-        },
-    ),
-    regulating(
-        "encoder stands still",
-        (
-            5.0,
-            "1.4 degrees of a turn that did not come: 0.8 ms at 300 rpm, 2.4 ms at 100 rpm; \
-                and the step",
-        ),
-        |board, _, _| {
-            board.plant.set_encoder_fault(EncoderFault::Stuck);
-            String::new()
-        },
-    )
+        }
+        "no such word".into()
+    }),
+    regulating("dc-link step", VOLTAGE, |board, target, rng| {
+        // On a dc link of 311 V.
+        let volts = target.relative_voltage * rng.random_range(100.0..600.0);
+        board.plant.set_dc_link(volts).ok();
+        format!("to {volts:.0} V")
+    }),
+    regulating("encoder stands still", STANDS_STILL, |board, _, _| {
+        board.plant.set_encoder_fault(EncoderFault::Stuck);
+        String::new()
+    })
     .with(ENCODER),
-    regulating(
-        "encoder loses counts of up to 6 rpm",
-        (0.0, "as a slip that is wrong by as much: control is correct throughout"),
-        |board, target, rng| losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm),
-    )
+    regulating("encoder loses counts of up to 6 rpm", SLIP, |board, target, rng| {
+        losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm)
+    })
     .with(ENCODER),
     regulating(
         "encoder loses 5 to 90 % of its counts at 900 rpm and more",
-        (
-            LOST_COUNTS_MS,
-            "the back-emf of the flux that is turned away, once it is there: with the rotor \
-                time constant",
-        ),
+        LOST_COUNTS,
         |board, _, rng| losing(board, rng.random_range(0.05..0.9)),
     )
     .with(&[Source::FastEncoder]),
-    regulating(
-        "encoder loses 2 to 90 % of its counts at 300 rpm",
-        (
-            f64::INFINITY,
-            "15 degrees leave 4.7 V unexplained of a back-emf of 6.7 V, a motor 30 % \
-                warmer 4.2 V at the right angle: only the currents are judged",
-        ),
-        |board, _, rng| losing(board, rng.random_range(0.02..0.9)),
-    )
+    regulating("encoder loses 2 to 90 % of its counts at 300 rpm", LOST_SLOWLY, |board, _, rng| {
+        losing(board, rng.random_range(0.02..0.9))
+    })
     .with(ENCODER)
     .not_at_speed(),
-    regulating(
-        "break pin",
-        (firmware_board::BREAK_REACTION_NS as f64 * 1e-6, "the timer's filter; no software"),
-        |board, _, _| {
-            board.set_fault_pin(false);
-            String::new()
-        },
-    ),
+    regulating("break pin", BREAK, |board, _, _| {
+        board.set_fault_pin(false);
+        String::new()
+    }),
     regulating("clock failure", (0.01, "the clock security system; no software"), |board, _, _| {
         board.set_crystal(false);
         String::new()
@@ -231,19 +192,19 @@ const CLASSES: &[Class] = &[
     })
     .ends(),
     regulating("bit flip in the coefficients", CHECK, |board, target, rng| {
-        flip(board, rng, target.coefficients)
+        flip(board, rng, target.addresses.coefficients)
     }),
     regulating("bit flip in a register", REGISTERS, |board, _, rng| flip_register(board, rng))
         .ends(),
     regulating("bit flip in the drive's state", LOCK, |board, target, rng| {
-        flip(board, rng, target.state)
+        flip(board, rng, target.addresses.state)
     })
     .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in the control's code", CHECK, |board, target, rng| {
         flip(board, rng, target.code)
     }),
     regulating("bit flip anywhere in the control's data", LOCK, |board, target, rng| {
-        flip(board, rng, target.control)
+        flip(board, rng, target.addresses.control)
     })
     .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in RAM, stack included", LOCK, |board, target, rng| {
@@ -255,34 +216,22 @@ const CLASSES: &[Class] = &[
         flip(board, rng, area)
     })
     .at_speed(LOCK_AT_SPEED),
-    regulating(
-        "timer update dropped",
-        (2.0 * STEP_MS, "five updates at most, each seen in its own period"),
-        |board, _, rng| {
-            let count = rng.random_range(1..6);
-            board.chip().tim1.drop_update = count;
-            format!("{count} of them")
-        },
-    ),
+    regulating("timer update dropped", UPDATES, |board, _, rng| {
+        let count = rng.random_range(1..6);
+        board.chip().tim1.drop_update = count;
+        format!("{count} of them")
+    }),
     regulating("timer update duplicated", (STEP_MS, "seen in its own period"), |board, _, _| {
         board.chip().tim1.extra_update();
         String::new()
     }),
-    regulating(
-        "conversion trigger lost",
-        (
-            WINDOW_MS,
-            "one converter: its own period; both: no interrupt, the window watchdog is not fed",
-        ),
-        |board, _, rng| {
-            let which = rng.random_range(0..3_usize);
-            // For good, or for a while: up to longer than the watchdog waits.
-            let count =
-                if rng.random_range(0..4) == 0 { u32::MAX } else { rng.random_range(1..40) };
-            board.chip().adc.lose_triggers = [[count, 0], [0, count], [count, count]][which];
-            format!("{} of them, {}", count, ["one", "two", "both"][which])
-        },
-    ),
+    regulating("conversion trigger lost", TRIGGERS, |board, _, rng| {
+        let which = rng.random_range(0..3_usize);
+        // For good, or for a while: up to longer than the watchdog waits.
+        let count = if rng.random_range(0..4) == 0 { u32::MAX } else { rng.random_range(1..40) };
+        board.chip().adc.lose_triggers = [[count, 0], [0, count], [count, count]][which];
+        format!("{} of them, {}", count, ["one", "two", "both"][which])
+    }),
     regulating("console garbage and floods", THROUGHOUT, |board, _, rng| {
         let mut bytes = vec![0; rng.random_range(1..3000)];
         let text = rng.random::<bool>();
@@ -296,19 +245,11 @@ const CLASSES: &[Class] = &[
         board.send(&bytes);
         format!("{} bytes{}", bytes.len(), if text { " of text" } else { "" })
     }),
-    regulating(
-        "interrupt overrun",
-        (
-            OVERRUN_MS + 2.0 * STEP_MS,
-            "the core stands still for up to 2 ms; then the first interrupt sees that it is \
-                late",
-        ),
-        |board, _, rng| {
-            let ms = rng.random_range(0.005..OVERRUN_MS);
-            board.stall((ms * 1e-3 * TICKS_PER_S as f64) as u64);
-            format!("{ms:.3} ms")
-        },
-    ),
+    regulating("interrupt overrun", OVERRUN, |board, _, rng| {
+        let ms = rng.random_range(0.005..OVERRUN_MS);
+        board.stall((ms * 1e-3 * TICKS_PER_S as f64) as u64);
+        format!("{ms:.3} ms")
+    }),
     regulating("LSI off its frequency", SOURCES, |board, _, rng| {
         let hz = [0.0, rng.random_range(8e3..28e3), rng.random_range(36e3..60e3)];
         set_clocks(board, 0.0, hz[rng.random_range(0..3_usize)])
@@ -337,74 +278,64 @@ const CLASSES: &[Class] = &[
         String::new()
     })
     .ends(),
-    regulating(
-        "stack overflow",
-        (2.0 * STEP_MS, "the next interrupt does not find room for its frame"),
-        |board, target, rng| {
-            let room = 8 * rng.random_range(0..13);
-            board.cpu().set(Register::SP, target.stack.address + room);
-            format!("room for {room} bytes")
-        },
-    ),
+    regulating("stack overflow", STACK, |board, target, rng| {
+        let room = 8 * rng.random_range(0..13);
+        board.cpu.set(Register::SP, target.stack.address + room);
+        format!("room for {room} bytes")
+    }),
     off("damaged page of the settings", "outputs are off; the other page holds", Run::DamagedPage),
     off(
         "power lost in an operation of save",
         "outputs are off; the old or the new set holds",
         Run::Saving,
     ),
-    Class {
-        name: "reset pin at any time",
-        bound: RESET,
-        at_speed: Some(RESET),
-        sources: BOTH,
-        run: Run::Reset,
-        ends: false,
-    },
+    class("reset pin at any time", RESET, Run::Reset),
 ];
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;
-const RESET: Bound = (0.001, "the reset of the timer; no software");
-const THROUGHOUT: Bound = (0.0, "control is correct throughout");
-const SAMPLE: Bound = (STEP_MS, "the sample after it, and the step that sees it");
-/// Noise that turns the angle.
-const NOISE: Bound = (
-    100.0,
-    "the mean over 67 ms passes the limit; noise below the limit turns the angle by less than 15 degrees",
-);
-/// A sensor across the injection axis sees no carrier, and cannot be judged: a quarter of half a turn of
-/// the flux, which is 60 ms with the shaft locked.
-const SILENT: Bound = (
-    70.0,
-    "up to 60 ms until the axis has turned to the sensor, then three carrier periods of silence",
-);
-/// At speed there is no carrier: the voltage shows it, by more than half of the back-emf at once, or in the mean.
-const SILENT_AT_SPEED: Bound = (
-    70.0,
-    "without a carrier the voltage shows it, at the latest by its mean over 50 ms in the frame of the flux",
-);
-/// From any wrong angle to the right one or to the lock monitor's fault. The longest is 180 degrees, which
-/// looks right until the flux has decayed with the rotor time constant.
-const LOCK: Bound = (
-    400.0,
-    "a wrong angle: right again, or off by the lock monitor (measured there for 90, 120 and 180 degrees)",
-);
-const LOCK_AT_SPEED: Bound = (
-    400.0,
-    "a wrong angle: right again by the observer, or off as the voltage misses the flux where it is believed to be",
-);
-/// Compared and hashed by the main loop, 64 words of 5300 a pass, a pass a control period: 14 ms for all.
-const CHECK: Bound =
-    (20.0, "the main loop has looked at all of it after 14 ms, later if the console is busy");
-const REGISTERS: Bound =
-    (5.0, "the main loop has looked at all of them after 1.9 ms, later if the console is busy");
 /// The window watchdog bites 482 us after it was fed at the latest; the truth is compared once in a period.
 const WINDOW_MS: f64 = 0.7;
-const WINDOW: Bound =
-    (WINDOW_MS, "the window watchdog, 0.48 ms after it was last fed at the latest");
-const SOURCES: Bound = (
-    1200.0,
-    "compared once a second, and once more when it is wrong; until then off by that share",
-);
 const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;
+
+/// The bounds, a row each: time, ms, and reason. The names become constants.
+macro_rules! bounds {
+    ($($(#[$about:meta])* $name:ident = $ms:expr, $why:literal;)*) => {
+        $($(#[$about])* const $name: Bound = ($ms, $why);)*
+    };
+}
+
+bounds! {
+    RESET = 0.001, "the reset of the timer; no software";
+    THROUGHOUT = 0.0, "control is correct throughout";
+    SAMPLE = STEP_MS, "the sample after it, and the step that sees it";
+    /// Noise that turns the angle.
+    NOISE = 100.0, "the mean over 67 ms passes the limit; noise below the limit turns the angle by less than 15 degrees";
+    /// A sensor across the injection axis sees no carrier, and cannot be judged: a quarter of half a turn of
+    /// the flux, which is 60 ms with the shaft locked.
+    SILENT = 70.0, "up to 60 ms until the axis has turned to the sensor, then three carrier periods of silence";
+    /// At speed there is no carrier: the voltage shows it, by more than half of the back-emf at once, or in the mean.
+    SILENT_AT_SPEED = 70.0, "without a carrier the voltage shows it, at the latest by its mean over 50 ms in the frame of the flux";
+    /// From any wrong angle to the right one or to the lock monitor's fault. The longest is 180 degrees, which
+    /// looks right until the flux has decayed with the rotor time constant.
+    LOCK = 400.0, "a wrong angle: right again, or off by the lock monitor (measured there for 90, 120 and 180 degrees)";
+    LOCK_AT_SPEED = 400.0, "a wrong angle: right again by the observer, or off as the voltage misses the flux where it is believed to be";
+    /// Compared and hashed by the main loop, 64 words of 5300 a pass, a pass a control period: 14 ms for all.
+    CHECK = 20.0, "the main loop has looked at all of it after 14 ms, later if the console is busy";
+    REGISTERS = 5.0, "the main loop has looked at all of them after 1.9 ms, later if the console is busy";
+    WINDOW = WINDOW_MS, "the window watchdog, 0.48 ms after it was last fed at the latest";
+    TRIGGERS = WINDOW_MS, "one converter: its own period; both: no interrupt, the window watchdog is not fed";
+    SOURCES = 1200.0, "compared once a second, and once more when it is wrong; until then off by that share";
+    NOT_A_NUMBER = 2.0 * CARRIER_MS + STEP_MS, "quantities that are used once in a carrier period show in the next one";
+    VOLTAGE = STEP_MS, "voltage limits: the sample after it, and the step that sees it";
+    STANDS_STILL = 5.0, "1.4 degrees of a turn that did not come: 0.8 ms at 300 rpm, 2.4 ms at 100 rpm; and the step";
+    SLIP = 0.0, "as a slip that is wrong by as much: control is correct throughout";
+    /// From the first lost count of 5 % of them to the fault: 210 ms measured.
+    LOST_COUNTS = 300.0, "the back-emf of the flux that is turned away, once it is there: with the rotor time constant";
+    LOST_SLOWLY = f64::INFINITY, "15 degrees leave 4.7 V unexplained of a back-emf of 6.7 V, a motor 30 % warmer 4.2 V at the right angle: only the currents are judged";
+    BREAK = firmware_board::BREAK_REACTION_NS as f64 * 1e-6, "the timer's filter; no software";
+    UPDATES = 2.0 * STEP_MS, "five updates at most, each seen in its own period";
+    OVERRUN = OVERRUN_MS + 2.0 * STEP_MS, "the core stands still for up to 2 ms; then the first interrupt sees that it is late";
+    STACK = 2.0 * STEP_MS, "the next interrupt does not find room for its frame";
+}

@@ -13,6 +13,9 @@ use crate::memory::{FLASH, Region, STORED};
 use drive_core::{Line, Sample};
 use drive_settings::CurrentSensors;
 
+/// A code of a sample.
+type Code = fn(&mut Sample) -> &mut u16;
+
 /// The code of the current sensor of phase 0, 1 or 2.
 pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {
     match which {
@@ -66,11 +69,7 @@ pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
 }
 
 /// The sensor of the dc link or of the heat sink sticks, opens, saturates or has noise.
-pub fn slow_sensor(
-    board: &mut Board,
-    rng: &mut dyn Rng,
-    of: fn(&mut Sample) -> &mut u16,
-) -> String {
+pub fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: Code) -> String {
     let held = *of(&mut board.sample());
     let rms = 2_f64.powf(rng.random_range(0.0..10.0));
     let mut noise = noise(rng, rms);
@@ -134,7 +133,7 @@ pub fn flip(board: &mut Board, rng: &mut dyn Rng, region: Region) -> String {
     let offset = rng.random_range(0..region.size);
     let address = region.address + offset;
     let bit = rng.random_range(0..8);
-    let byte = board.byte(address).unwrap_or(0) ^ 1 << bit;
-    board.cpu().write(address, &[byte]);
+    let byte = board.cpu.byte(address).unwrap_or(0) ^ 1 << bit;
+    board.cpu.write(address, &[byte]);
     format!("bit {bit} of {address:#010x}, {offset:#x} from the beginning")
 }

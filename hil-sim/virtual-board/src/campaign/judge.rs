@@ -4,9 +4,8 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::periph::Reset;
+use crate::{board::Board, periph::Reset};
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
@@ -71,9 +70,8 @@ pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Res
 
 /// Between the flux and where the drive believes it, degrees.
 fn angle_error(board: &Board) -> f64 {
-    let error = (board.plant.rotor_flux_angle() / TAU
-        - f64::from(board.telemetry().phi.to_turns()))
-    .rem_euclid(1.0);
+    let believed = f64::from(board.telemetry().phi.to_turns());
+    let error = (board.plant.rotor_flux_angle() / TAU - believed).rem_euclid(1.0);
     error.min(1.0 - error) * 360.0
 }
 

@@ -2,23 +2,19 @@
 
 use std::f64::consts::TAU;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, bail, ensure};
 use drive_core::State;
 use drive_settings::Settings;
-use hil_sim::Config;
-use hil_sim::experiments::full_range::for_the_range;
-use hil_sim::plant::Load;
+use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Loaded, Saved};
 
-use crate::addresses::Addresses;
-use crate::board::snapshot::Snapshot;
 use crate::board::{Board, Options};
-use crate::chip::Chip;
-use crate::image::Image;
 use crate::memory::{Region, STORED};
-use crate::pair::Pair;
-use crate::power_stage::PowerStage;
+use crate::{
+    addresses::Addresses, board::snapshot::Snapshot, chip::Chip, image::Image, pair::Pair,
+    power_stage::PowerStage,
+};
 
 /// Current on the quadrature axis before the injection of a fault, A on the dissertation's motor. At speed it also generates.
 const TORQUE_A: f64 = 1.5;
@@ -51,12 +47,8 @@ pub enum Source {
 /// The target of the faults: regions of memory in which bits flip, and the sizes of the drive's quantities.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// The drive's coefficients.
-    pub coefficients: Region,
-    /// The drive's state.
-    pub state: Region,
-    /// All data of the control interrupt, in CCM.
-    pub control: Region,
+    /// The data of the control interrupt, in CCM.
+    pub addresses: Addresses,
     /// The code of the control interrupt, in CCM.
     pub code: Region,
     /// Data in RAM, without the stack.
@@ -75,21 +67,15 @@ pub struct Target {
 
 impl Target {
     fn new(board: &Board, config: &Config, settings: Settings, encoder_rpm: f64) -> Result<Self> {
-        let Addresses { coefficients, state, control, .. } = board.addresses();
         let between = |first: &str, end: &str| {
-            let address = board.image().symbol(first)?.address;
-            anyhow::Ok(Region { address, size: board.image().symbol(end)?.address - address })
+            let address = board.image.symbol(first)?.address;
+            anyhow::Ok(Region { address, size: board.image.symbol(end)?.address - address })
         };
-        let code = between("__sccm", "__eccm")?;
-        let data = between("__sdata", "__euninit")?;
-        let stack = between("_stack_end", "_stack_start")?;
         Ok(Self {
-            coefficients,
-            state,
-            control,
-            code,
-            data,
-            stack,
+            addresses: board.addresses(),
+            code: between("__sccm", "__eccm")?,
+            data: between("__sdata", "__euninit")?,
+            stack: between("_stack_end", "_stack_start")?,
             settings,
             relative_current: config.amperes(1.0),
             relative_voltage: config.inverter.dc_link_v / Config::default().inverter.dc_link_v,
@@ -246,10 +232,9 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
         "settings outside the part that can be written"
     );
     let mut chip = board.chip().clone();
-    let defaults = FirmwareSettings::of(chip.gates.stage().board());
-    match Saved::load(Bank(&mut chip), &defaults).1 {
-        Loaded::Settings(settings) => Some(settings),
-        _ => None,
-    }
-    .context("no whole settings in the flash")
+    let defaults = FirmwareSettings::of(chip.gates.stage.board());
+    let Loaded::Settings(settings) = Saved::load(Bank(&mut chip), &defaults).1 else {
+        bail!("no whole settings in the flash");
+    };
+    Ok(settings)
 }

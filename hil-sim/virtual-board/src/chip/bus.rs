@@ -1,41 +1,61 @@
 //! The bus: reads and writes of registers, each to the model that has it.
 
-use std::fmt;
+use thiserror::Error;
 
 use super::{Chip, OWN_REFERENCE_CODE, pins};
 use crate::memory;
-use crate::periph::rcc::On;
+use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, On};
 use crate::periph::{Effect, Reset, uart};
 
-pub(super) const TIM2: u32 = 0x4000_0000;
-pub(super) const TIM5: u32 = 0x4000_0c00;
-pub(super) const WWDG: u32 = 0x4000_2c00;
+/// The peripherals whose clock can be off, a row each: name, first address, enable register and bit. The names become constants.
+macro_rules! clocked {
+    ($($name:ident = $first:literal, $register:ident, $bit:literal;)*) => {
+        $(const $name: u32 = $first;)*
+        const CLOCKED: &[(u32, (&str, u32, u32))] =
+            &[$(($name, (stringify!($name), $register, $bit))),*];
+    };
+}
+
+clocked! {
+    TIM1 = 0x4001_2c00, APB2ENR, 11;
+    ADC12 = 0x5000_0000, AHB2ENR, 13;
+    TIM8 = 0x4001_3400, APB2ENR, 13;
+    TIM2 = 0x4000_0000, APB1ENR1, 0;
+    TIM5 = 0x4000_0c00, APB1ENR1, 3;
+    WWDG = 0x4000_2c00, APB1ENR1, 11;
+    GPIOA = 0x4800_0000, AHB2ENR, 0;
+    GPIOB = 0x4800_0400, AHB2ENR, 1;
+    GPIOC = 0x4800_0800, AHB2ENR, 2;
+    GPIOD = 0x4800_0c00, AHB2ENR, 3;
+    GPIOE = 0x4800_1000, AHB2ENR, 4;
+    GPIOF = 0x4800_1400, AHB2ENR, 5;
+    GPIOG = 0x4800_1800, AHB2ENR, 6;
+    PWR = 0x4000_7000, APB1ENR1, 28;
+    LPUART1 = 0x4000_8000, APB1ENR2, 0;
+    USART3 = 0x4000_4800, APB1ENR1, 18;
+    SYSCFG = 0x4001_0000, APB2ENR, 0;
+    DAC1 = 0x5000_0800, AHB2ENR, 16;
+    DAC3 = 0x5000_1000, AHB2ENR, 18;
+    FLASH = 0x4002_2000, AHB1ENR, 8;
+}
+const EXTI: u32 = 0x4001_0400;
 const IWDG: u32 = 0x4000_3000;
-pub(super) const PWR: u32 = 0x4000_7000;
-pub(super) const USART3: u32 = 0x4000_4800;
-pub(super) const LPUART1: u32 = 0x4000_8000;
-pub(super) const SYSCFG: u32 = 0x4001_0000;
-pub(super) const TIM8: u32 = 0x4001_3400;
+const RCC: u32 = 0x4002_1000;
 /// What the factory has measured: the code of the reference inside the chip is at its address 0x1aa (datasheet, VREFINT_CAL).
 const FACTORY: u32 = 0x1fff_7400;
-const BDTR: u32 = 0x4001_2c44;
-const EXTI: u32 = 0x4001_0400;
-pub(super) const TIM1: u32 = 0x4001_2c00;
+const BDTR: u32 = TIM1 + 0x44;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
 const TIM1_SR: u32 = 0x10;
-pub(super) const RCC: u32 = 0x4002_1000;
-pub(super) const FLASH_REGISTERS: u32 = 0x4002_2000;
-pub(super) const GPIO_FIRST: u32 = 0x4800_0000;
-pub(super) const GPIO_LAST: u32 = 0x4800_1bff;
-pub(super) const ADC1: u32 = 0x5000_0000;
-pub(super) const DAC1: u32 = 0x5000_0800;
-pub(super) const DAC3: u32 = 0x5000_1000;
-const GPIO_A: u32 = GPIO_FIRST;
-const GPIO_B: u32 = GPIO_FIRST + 0x400;
+
+/// Name, enable register and bit of the clock behind an address; `None` has none of its own.
+pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
+    CLOCKED.iter().find(|(first, _)| *first == address & !0x3ff).map(|(_, clock)| *clock)
+}
 
 /// An access that the model does not know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("unknown register {address:#010x} {}", written.map_or("read".into(), |value| format!("written with {value:#x}")))]
 pub struct Unknown {
     /// Where.
     pub address: u32,
@@ -45,49 +65,29 @@ pub struct Unknown {
     pub at: u32,
 }
 
-impl fmt::Display for Unknown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "unknown register {:#010x} ", self.address)?;
-        match self.written {
-            Some(value) => write!(f, "written with {value:#x}"),
-            None => f.write_str("read"),
-        }
-    }
-}
-
 impl Chip {
     /// Reads a register, `size` bytes.
     pub fn read(&mut self, address: u32, size: u8) -> u32 {
         self.begin_access();
-        let value = if let Some(word) = bit_band(address) {
-            self.peek(word.0).map(|value| value >> word.1 & 1)
+        let value = if let Some((word, bit)) = bit_band(address) {
+            self.peek(word).map(|value| value >> bit & 1)
         } else {
-            let value = self.read_word(address & !3);
-            value.map(|value| value >> (8 * (address & 3)))
+            self.read_word(address & !3).map(|value| value >> (8 * (address & 3)))
         };
-        match value {
-            Some(value) if size >= 4 => value,
-            Some(value) => value & ((1 << (8 * size)) - 1),
-            None => self.is_unknown(address, None),
-        }
+        value.map_or_else(|| self.is_unknown(address, None), |value| value & mask(size))
     }
 
     /// Writes a register, `size` bytes.
     pub fn write(&mut self, address: u32, size: u8, value: u32) {
         self.begin_access();
-        let done = if let Some((word, bit)) = bit_band(address) {
-            self.peek(word).and_then(|old| {
-                let new = old & !(1 << bit) | (value & 1) << bit;
-                self.write_word(word, new)
-            })
-        } else if size < 4 {
-            let shift = 8 * (address & 3);
-            let mask = ((1_u32 << (8 * size)) - 1) << shift;
-            let word = address & !3;
-            self.peek(word)
-                .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
-        } else {
+        let alias = bit_band(address);
+        let done = if alias.is_none() && size >= 4 {
             self.write_word(address, value)
+        } else {
+            let (word, shift) = alias.unwrap_or((address & !3, 8 * (address & 3)));
+            let mask = if alias.is_some() { 1 } else { mask(size) } << shift;
+            let old = self.peek(word);
+            old.and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
         };
         if COMPARES.contains(&address) {
             self.compared = (self.blocks.len(), self.accesses);
@@ -148,14 +148,14 @@ impl Chip {
         let (offset, now) = (address & 0x3ff, self.now);
         match address & !0x3ff {
             TIM1 => self.tim1.read(offset, now),
-            ADC1 => self.adc.read(offset, now),
+            ADC12 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
             TIM8 => self.tim8.0.read(offset),
             TIM5 => self.tim5.read(offset, now, self.rcc.lsi_on()),
             FACTORY if offset == 0x1a8 => Some(u32::from(OWN_REFERENCE_CODE) << 16),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
-            FLASH_REGISTERS => self.flash.read(offset, now),
+            FLASH => self.flash.read(offset, now),
             port @ (LPUART1 | USART3) => {
                 let port = if port == LPUART1 { &mut self.lpuart } else { &mut self.usart3 };
                 let value = port.read(offset);
@@ -169,7 +169,7 @@ impl Chip {
                 _ => self.syscfg.read(offset),
             },
             EXTI => self.exti.read(offset),
-            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].read(offset),
+            GPIOA..=GPIOG => self.gpio[port(address)].read(offset),
             DAC1 => self.dac.read(0, offset, now),
             DAC3 => self.dac.read(1, offset, now),
             _ => None,
@@ -197,13 +197,13 @@ impl Chip {
         let rules = &mut self.rules;
         let effect = match address & !0x3ff {
             TIM1 => self.tim1.write(offset, value, rules)?,
-            ADC1 => self.adc.write(offset, value, rules)?,
+            ADC12 => self.adc.write(offset, value, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
             TIM8 => self.tim8.0.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => self.pwr.write(offset, value, locked)?,
-            FLASH_REGISTERS => self.flash.write(offset, value, rules)?,
+            FLASH => self.flash.write(offset, value, rules)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
             USART3 => self.usart3.write(offset, value, now)?,
             IWDG => self.iwdg.write(offset, value, rules)?,
@@ -213,7 +213,7 @@ impl Chip {
                 _ => self.syscfg.write(offset, value)?,
             },
             EXTI => self.exti.write(offset, value)?,
-            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].write(offset, value)?,
+            GPIOA..=GPIOG => self.gpio[port(address)].write(offset, value)?,
             DAC1 => self.dac.write(0, offset, value, rules)?,
             DAC3 => self.dac.write(1, offset, value, rules)?,
             _ => return None,
@@ -238,9 +238,9 @@ impl Chip {
                 self.require_pin(pins::SERIAL[0], "LPUART1_TDR is written");
             }
             USART3 if offset == uart::TDR => self.check_bus_pins(),
-            RCC | FLASH_REGISTERS => {
+            RCC | FLASH => {
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
-                self.scs.systick.cycle = self.rcc.ticks_per_cycle();
+                self.scs.systick.cycle = self.rcc.ticks_per_cycle;
                 self.check_clocks();
             }
             PWR => {
@@ -256,16 +256,11 @@ impl Chip {
 
     fn follow(&mut self, effect: Effect) -> Option<()> {
         match effect {
-            Effect::None => {}
-            Effect::Look => {
-                self.update_lines();
-                self.attention = true;
-            }
-            Effect::Reset => {
-                self.reset = Some(Reset::Software);
-                self.attention = true;
-            }
+            Effect::None => return Some(()),
+            Effect::Look => self.update_lines(),
+            Effect::Reset => self.reset = Some(Reset::Software),
         }
+        self.attention = true;
         Some(())
     }
 }
@@ -275,13 +270,18 @@ impl Chip {
 fn moves_gates(address: u32) -> bool {
     match address & !0x3ff {
         TIM1 => !COMPARES.contains(&address) && address & 0x3ff != TIM1_SR,
-        GPIO_A | GPIO_B => true,
+        GPIOA | GPIOB => true,
         _ => false,
     }
 }
 
+/// The bits of an access of some bytes.
+fn mask(size: u8) -> u32 {
+    u32::MAX >> 32_u8.saturating_sub(8 * size)
+}
+
 fn port(address: u32) -> usize {
-    ((address - GPIO_FIRST) >> 10) as usize
+    ((address - GPIOA) >> 10) as usize
 }
 
 /// The word and bit behind an address of the alias.

@@ -1,11 +1,6 @@
 //! The clocks of the peripherals, and the rules between clock tree, supply and flash.
 
-use super::Chip;
-use super::bus::{
-    ADC1, DAC1, DAC3, FLASH_REGISTERS, GPIO_FIRST, GPIO_LAST, LPUART1, PWR, SYSCFG, TIM1, TIM2,
-    TIM5, TIM8, USART3, WWDG,
-};
-use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR};
+use super::{Chip, bus::clock_of};
 use crate::rules::Rule;
 
 /// Cycles from the store that switches a clock on to the first store that arrives: two whole cycles lie between.
@@ -17,31 +12,6 @@ const STEP_HZ: u64 = 80_000_000;
 /// That while, ticks: a microsecond.
 const STEP_TICKS: u64 = 170;
 
-/// Name, enable register and bit of the clock behind an address; `None` has none of its own.
-pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
-    const PORTS: [&str; 7] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
-    Some(match address & !0x3ff {
-        TIM1 => ("TIM1", APB2ENR, 11),
-        ADC1 => ("ADC12", AHB2ENR, 13),
-        TIM8 => ("TIM8", APB2ENR, 13),
-        TIM2 => ("TIM2", APB1ENR1, 0),
-        TIM5 => ("TIM5", APB1ENR1, 3),
-        WWDG => ("WWDG", APB1ENR1, 11),
-        GPIO_FIRST..=GPIO_LAST => {
-            let port = (address - GPIO_FIRST) >> 10;
-            (PORTS[port as usize], AHB2ENR, port)
-        }
-        PWR => ("PWR", APB1ENR1, 28),
-        LPUART1 => ("LPUART1", APB1ENR2, 0),
-        USART3 => ("USART3", APB1ENR1, 18),
-        SYSCFG => ("SYSCFG", APB2ENR, 0),
-        DAC1 => ("DAC1", AHB2ENR, 16),
-        DAC3 => ("DAC3", AHB2ENR, 18),
-        FLASH_REGISTERS => ("FLASH", AHB1ENR, 8),
-        _ => return None,
-    })
-}
-
 impl Chip {
     /// Whether an access reaches its peripheral.
     pub(super) fn is_clocked(&mut self, address: u32) -> bool {
@@ -52,7 +22,7 @@ impl Chip {
             return false;
         };
         let Some(on) = on.filter(|_| !self.rules.coarse) else { return true };
-        let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle();
+        let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle;
         // This access itself is counted.
         let accesses = self.accesses.saturating_sub(on.accesses + 1);
         self.rules.require(
@@ -71,7 +41,7 @@ impl Chip {
     pub(super) fn check_clocks(&mut self) {
         let (system, bus) = (self.rcc.system_hz(), self.rcc.bus_hz());
         let range = self.pwr.range();
-        let limit = range.limit_hz();
+        let limit = range.clocks_hz().0;
         self.rules.require(system <= limit, Rule::VoltageRange, || {
             format!("a system clock of {system} Hz in {range:?}, at most {limit}")
         });

@@ -2,12 +2,10 @@
 
 use super::Chip;
 use crate::cost::{self, Block};
-use crate::memory::Region;
-use crate::periph::plain;
-use crate::scs;
+use crate::{memory::Region, periph::plain, scs};
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Watched {
     /// Where it lies in the flash.
     pub function: Region,
@@ -24,13 +22,7 @@ pub struct Watched {
 impl Watched {
     /// Counts the calls of a function in the flash.
     pub fn new(function: Region) -> Self {
-        Self {
-            function,
-            calls: Vec::new(),
-            longest: Vec::new(),
-            present: Vec::new(),
-            returns_to: 0,
-        }
+        Self { function, ..Self::default() }
     }
 
     /// Whether the block at this address belongs to a call.
@@ -102,7 +94,7 @@ impl Chip {
     /// Instructions from the flash are about to be executed.
     #[inline]
     pub fn instructions(&mut self, count: u64) {
-        self.now += self.rcc.ticks_per_cycle() * count * self.flash_cycles;
+        self.now += self.rcc.ticks_per_cycle * count * self.flash_cycles;
         self.instructions += count;
         self.last_block = None;
     }

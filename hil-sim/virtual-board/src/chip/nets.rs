@@ -2,11 +2,9 @@
 //! input with the break of TIM1.
 
 use super::{Chip, Damage};
-use crate::periph::NEVER;
 use crate::power_stage::driver::{self, CHIP_PULL_OHM, CHIP_V, Pull};
 use crate::power_stage::{CODES, DcLinkPin, channel};
-use crate::rules::Rule;
-use crate::time::TICKS_PER_S;
+use crate::{periph::NEVER, rules::Rule, time::TICKS_PER_S};
 
 /// The strongest of the chip's own resistors, ohm (datasheet, RPU and RPD: 25 to 55 kOhm).
 const STRONGEST_PULL_OHM: f64 = 25e3;

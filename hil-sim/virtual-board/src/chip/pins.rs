@@ -1,8 +1,7 @@
 //! The pins against their use (datasheet, tables of pins and alternate functions).
 
 use super::Chip;
-use crate::periph::gpio::Pad;
-use crate::rules::Rule;
+use crate::{periph::gpio::Pad, rules::Rule};
 
 /// A pin: its port, A is 0, and its number.
 pub type Pin = (usize, u32);

@@ -19,7 +19,8 @@ impl Cpu {
     pub fn enter(&mut self, exception: u16, handler: u32) -> bool {
         let float = self.control() & FPCA != 0;
         let before = self.get(R::SP);
-        let sp = before.wrapping_sub(if float { 0x68 } else { 0x20 }) & !7;
+        let size = if float { 0x68 } else { 0x20 };
+        let sp = before.wrapping_sub(size) & !7;
         let mut frame = [0; 0x68];
         let basic = self.uc.reg_read_batch(&BASIC, 8).unwrap_or_default();
         for (place, value) in frame.chunks_exact_mut(4).zip(&basic) {
@@ -28,18 +29,15 @@ impl Cpu {
         // The stacked status says Thumb, and whether the stack was moved for its alignment.
         let xpsr = basic.get(7).map_or(0, |x| *x as u32) & !(1 << 9) | 1 << 24 | (before & 4) << 7;
         frame[0x1c..0x20].copy_from_slice(&xpsr.to_le_bytes());
-        let size = if float {
+        if float {
             let values = self.uc.reg_read_batch(&FLOAT, 9).unwrap_or_default();
             for (place, value) in frame[0x20..0x68].chunks_exact_mut(8).zip(&values) {
                 place.copy_from_slice(&value.to_le_bytes());
             }
             self.uc.reg_write(R::CONTROL, self.control() & !FPCA).ok();
-            0x68
-        } else {
-            0x20
-        };
-        let stacked = !self.denies(sp, size as u32)
-            && self.uc.mem_write(u64::from(sp), &frame[..size]).is_ok();
+        }
+        let bytes = &frame[..size as usize];
+        let stacked = !self.denies(sp, size) && self.uc.mem_write(u64::from(sp), bytes).is_ok();
         let from_handler = xpsr & 0x1ff != 0;
         let exc_return =
             0xffff_ffe1 | if from_handler { 0 } else { 8 } | if float { 0 } else { BASIC_FRAME };
@@ -74,11 +72,7 @@ impl Cpu {
         self.uc.reg_write(R::CONTROL, control).ok();
         let basic: [u64; 7] = std::array::from_fn(|k| word(4 * k));
         self.uc.reg_write_batch(&BASIC[..6], &basic[..6], 6).ok();
-        let sp = sp
-            .wrapping_add(size as u32)
-            .wrapping_add(xpsr >> 9 & 1)
-            .wrapping_add(3 * (xpsr >> 9 & 1));
-        self.set(R::SP, sp);
+        self.set(R::SP, sp.wrapping_add(size as u32).wrapping_add(4 * (xpsr >> 9 & 1)));
         self.set(R::PC, basic[6] as u32);
         true
     }

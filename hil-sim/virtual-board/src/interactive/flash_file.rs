@@ -38,10 +38,8 @@ impl FlashFile {
                 let (contents, torn) = parse(&bytes).map_err(refused)?;
                 flash.replace_contents(contents, &torn);
                 // Found out now, not at the first `save`.
-                fs::OpenOptions::new()
-                    .write(true)
-                    .open(path)
-                    .map_err(|e| refused(e.to_string()))?;
+                let writable = fs::File::options().write(true).open(path);
+                writable.map_err(|e| refused(e.to_string()))?;
             }
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 file.write(flash).map_err(|why| refused(format!("{why:#}")))?;

@@ -16,14 +16,11 @@ pub enum Own {
 }
 
 /// Names and meanings.
+#[rustfmt::skip]
 const COMMANDS: [(&str, Own, &str); 4] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
-    (
-        "!unplug",
-        Own::Unplug,
-        "unplugs the controller and plugs it in again: RAM is lost, flash stays",
-    ),
+    ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
 
@@ -35,13 +32,10 @@ impl Own {
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
-        match known {
-            Some((_, own, _)) => Ok(Some(*own)),
-            None => {
-                let names = COMMANDS.map(|(name, ..)| name).join(", ");
-                Err(format!("`{line}`: no such command of the board; there are {names}"))
-            }
-        }
+        known.map(|(_, own, _)| Some(*own)).ok_or_else(|| {
+            let names = COMMANDS.map(|(name, ..)| name).join(", ");
+            format!("`{line}`: no such command of the board; there are {names}")
+        })
     }
 
     /// A line about each command.

@@ -4,7 +4,8 @@ use hil_sim::outcome::{Figure, Panel, Series};
 use hil_sim::{Config, Outcome};
 
 use super::record::{Quantity, Record};
-use super::transcript::{Line, Source, events, faults};
+use super::session::Session;
+use super::transcript::{Source, events, faults};
 
 /// Name of the page's files.
 pub const NAME: &str = "board";
@@ -12,19 +13,14 @@ pub const NAME: &str = "board";
 pub const ABOUT: &str = "The firmware's image on an emulated STM32G474, with the simulated motor at its \
                          pins and a pseudo-terminal at its serial port.";
 
-/// Results of a session of a simulated time, s.
-pub fn outcome(
-    config: &Config,
-    seconds: f64,
-    resets: usize,
-    record: &Record,
-    lines: &[Line],
-) -> Outcome {
+/// Results of a session.
+pub fn outcome(config: &Config, session: &Session) -> Outcome {
+    let Session { board, record, lines, .. } = session;
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;
-    m.set("simulated_s", seconds);
+    m.set("simulated_s", board.time());
     m.set("control_interrupts", record.interrupts as f64);
-    m.set("resets", resets as f64);
+    m.set("resets", board.resets.len() as f64);
     m.set("angle_error_rms_deg", record.error_rms_deg());
     m.set("angle_error_max_deg", record.largest_error_deg);
     m.set("phase_current_peak_a", record.peak_current);

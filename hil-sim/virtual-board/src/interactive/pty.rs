@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl};
@@ -20,7 +20,8 @@ pub struct Pty {
     ours: OwnedFd,
     /// Held open, so that programs come and go.
     _theirs: OwnedFd,
-    path: PathBuf,
+    /// The device file for programs.
+    pub path: PathBuf,
     waiting: VecDeque<u8>,
 }
 
@@ -44,11 +45,6 @@ impl Pty {
         let flags = fcntl_getfl(&ours).with_context(cannot)?;
         fcntl_setfl(&ours, flags | OFlags::NONBLOCK).with_context(cannot)?;
         Ok(Self { ours, _theirs: theirs, path, waiting: VecDeque::new() })
-    }
-
-    /// The device file for programs.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// The bytes written to it since the last call, at most a few thousand; never waits.

@@ -2,8 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Telemetry;
-use drive_core::carrier::CARRIER_SAMPLES;
+use drive_core::{Telemetry, carrier::CARRIER_SAMPLES};
 use hil_sim::plant::Plant;
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 

@@ -20,7 +20,7 @@ mod step;
 
 use std::path::Path;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, bail};
 use hil_sim::Error;
 
 use super::own::Own;
@@ -154,50 +154,44 @@ impl Script {
     /// A check has failed.
     pub fn due(&mut self, now: f64) -> Result<Due> {
         if let Some(why) = self.unexpected.take().filter(|_| self.strict) {
-            return Err(anyhow!(why));
+            bail!(why);
         }
         let Some(Placed { step, .. }) = self.steps.get(self.next) else { return self.end(now) };
         let passed = now - self.since;
-        let mut failed = None;
         let due = match step {
             Step::At(at, line) if now >= *at => Due::Type(line.clone()),
             Step::After(wait, line) if passed >= *wait => Due::Type(line.clone()),
             Step::For(_) if self.heard => Due::Nothing,
-            Step::For(text) if passed > PATIENCE_S => {
-                return Err(anyhow!(self.silence(text, PATIENCE_S)));
-            }
+            Step::For(text) if passed > PATIENCE_S => bail!(self.silence(text, PATIENCE_S)),
             Step::Expect(_, text) if self.answer(text).is_some() => Due::Nothing,
             Step::Expect(within, text) if passed > *within => {
-                failed = Some(self.silence(text, *within));
-                Due::Nothing
+                Due::Note(self.silence(text, *within))
             }
             Step::ExpectNot(during, text) => match self.answer(text) {
-                Some(line) => {
-                    failed = Some(self.failure(Some(self.next), &format!("said `{line}`")));
-                    Due::Nothing
-                }
+                Some(line) => Due::Note(self.failure(Some(self.next), &format!("said `{line}`"))),
                 None if passed > *during => Due::Nothing,
                 None => return Ok(Due::Nothing),
             },
             _ => return Ok(Due::Nothing),
         };
-        if let Some(why) = failed.take_if(|_| self.strict) {
-            return Err(anyhow!(why));
-        }
-        if let Due::Type(line) = &due {
-            if self.strict && Own::parse(line) == Ok(Some(Own::Quit)) {
-                self.end_with = Due::Type(line.clone());
-                self.next = self.steps.len();
-                self.since = now;
-                return Ok(Due::Nothing);
+        match &due {
+            Due::Note(why) if self.strict => bail!("{why}"),
+            Due::Type(line) => {
+                if self.strict && Own::parse(line) == Ok(Some(Own::Quit)) {
+                    self.end_with = Due::Type(line.clone());
+                    self.next = self.steps.len();
+                    self.since = now;
+                    return Ok(Due::Nothing);
+                }
+                self.typed = Some(self.next);
+                self.answers.clear();
             }
-            self.typed = Some(self.next);
-            self.answers.clear();
+            _ => {}
         }
         self.next += 1;
         self.since = now;
         self.heard = false;
-        Ok(failed.map_or(due, Due::Note))
+        Ok(due)
     }
 
     /// Behind the last step: the last answer is heard, then a strict script asks for a latched fault.
@@ -215,7 +209,7 @@ impl Script {
             return Ok(Due::Type(FAULTS.0.to_owned()));
         }
         match self.answers.iter().find(|line| line.starts_with(FAULTS.1)) {
-            Some(fault) => Err(anyhow!(self.failure(self.typed, &format!("at the end: {fault}")))),
+            Some(fault) => bail!(self.failure(self.typed, &format!("at the end: {fault}"))),
             None => Ok(self.end_with.clone()),
         }
     }

@@ -9,15 +9,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use drive_stream::{Piece, Splitter};
-use hil_sim::board::LogLevel;
-use hil_sim::rig::RATE_HZ;
+use hil_sim::{board::LogLevel, rig::RATE_HZ};
 
-use super::flash_file::FlashFile;
-use super::own::Own;
-use super::pty::Pty;
-use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
+use super::{flash_file::FlashFile, own::Own, pty::Pty, record::Record};
 use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 use crate::periph::Reset;
@@ -70,7 +66,8 @@ pub struct Inputs {
 
 /// A board that is talked to.
 pub struct Session {
-    board: Board,
+    /// The board.
+    pub board: Board,
     pty: Pty,
     bus: Pty,
     inputs: Inputs,
@@ -108,11 +105,6 @@ impl Session {
             record: Record::default(),
             behind_s: 0.0,
         }
-    }
-
-    /// The board.
-    pub fn board(&self) -> &Board {
-        &self.board
     }
 
     /// Goes on until something ends it; every line is shown when it comes.

@@ -5,7 +5,7 @@ use std::fmt;
 use hil_sim::console::answer::split_tag;
 use induction_drive::console::line::UNASKED;
 
-/// Where a line came from.
+/// Where a line came from, in the order of the marks before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Typed to the console.
@@ -31,12 +31,7 @@ pub struct Line {
 
 impl fmt::Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mark = match self.source {
-            Source::Typed => '>',
-            Source::Said => '<',
-            Source::Log => ' ',
-            Source::Board => '#',
-        };
+        let mark = ['>', '<', ' ', '#'][self.source as usize];
         write!(f, "{:9.3} {mark} {}", self.time, self.text)
     }
 }

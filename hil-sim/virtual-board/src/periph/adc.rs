@@ -3,7 +3,7 @@
 
 mod converter;
 
-use super::{Effect, NEVER, Store, registers};
+use super::{Effect, NEVER, Store, bits, registers};
 use crate::rules::{Rule, Rules};
 use converter::{Converter, EOC, JEOC, JEOS, Sequence};
 
@@ -163,14 +163,13 @@ impl Adc {
 
     /// Writes one.
     pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
-        let now = rules.now;
-        self.happen(now);
+        self.happen(rules.now);
         match offset {
             CCR => self.common = value & 0x01ff_ef1f,
             0x000..0x200 => {
                 let (n, clock) = (offset >> 8, self.clock());
                 let one = &mut self.converters[n as usize];
-                one.write(offset & 0xff, value, now, clock, &mut Named { rules, n: n + 1 })?;
+                one.write(offset & 0xff, value, &mut Named { rules, n: n + 1, clock })?;
             }
             _ => return None,
         }
@@ -178,10 +177,12 @@ impl Adc {
     }
 }
 
-/// The rules, for one converter.
+/// The rules and the clock, for one converter.
 struct Named<'a> {
     rules: &'a mut Rules,
     n: u32,
+    /// Ticks per clock of the converter; none is no clock.
+    clock: Option<u64>,
 }
 
 impl Named<'_> {

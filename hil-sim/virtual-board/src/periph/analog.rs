@@ -3,14 +3,11 @@
 //! A comparator is given its input and its reference in codes of a 12-bit converter. Its output follows after its
 //! delay, with its hysteresis below the reference.
 
-use super::{Effect, NEVER};
+use super::{Effect, NEVER, bits};
 
 /// Bits that can be written.
 const MASK: u32 = 0x80ff_8171;
-const EN: u32 = 1;
-const POL: u32 = 1 << 15;
-const VALUE: u32 = 1 << 30;
-const LOCK: u32 = 1 << 31;
+bits! { EN = 0, POL = 15, VALUE = 30, LOCK = 31 }
 /// From an input beyond the reference to the output, ticks: 31 ns (datasheet, tD, 50 mV overdrive).
 const DELAY: u64 = 5;
 /// From the enable bit to a valid output, ticks: 5 us (datasheet, tSTART).

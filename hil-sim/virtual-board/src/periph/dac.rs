@@ -22,26 +22,19 @@ const WAKE_UP: u64 = 8 * 170;
 /// From one code to another, ticks: 3 us (datasheet, tSETTLING).
 const SETTLING: u64 = 3 * 170;
 
-/// A channel.
-#[derive(Clone, Copy, Debug)]
-struct Channel {
-    ready_at: u64,
-    settled_at: u64,
-    /// The code that the output had settled to before.
-    before: u16,
-    code: u16,
-    has_data: bool,
-    seen_ready: bool,
+defaults! {
+    /// A channel; by default off.
+    #[derive(Clone, Copy, Debug)]
+    struct Channel {
+        ready_at: u64 = NEVER,
+        settled_at: u64 = NEVER,
+        /// The code that the output had settled to before.
+        before: u16,
+        code: u16,
+        has_data: bool,
+        seen_ready: bool,
+    }
 }
-
-const OFF: Channel = Channel {
-    ready_at: NEVER,
-    settled_at: NEVER,
-    before: 0,
-    code: 0,
-    has_data: false,
-    seen_ready: false,
-};
 
 impl Channel {
     fn output(&self, now: u64) -> u16 {
@@ -55,22 +48,18 @@ impl Channel {
     }
 }
 
-/// One converter.
-#[derive(Clone, Debug)]
-struct Dac {
-    store: Store,
-    channels: [Channel; 2],
+defaults! {
+    /// One converter.
+    #[derive(Clone, Debug)]
+    struct Dac {
+        store: Store = Store::new(KNOWN),
+        channels: [Channel; 2],
+    }
 }
 
 /// Both.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Dacs([Dac; 2]);
-
-impl Default for Dacs {
-    fn default() -> Self {
-        Self([0, 1].map(|_| Dac { store: Store::new(KNOWN), channels: [OFF; 2] }))
-    }
-}
 
 impl Dacs {
     /// The code that channel 1 or 2 of a converter puts out.
@@ -148,7 +137,7 @@ impl Dacs {
                 channel.ready_at = now + WAKE_UP;
                 channel.go_to(data, now, WAKE_UP);
             } else if was[n] && !on(store, n) {
-                *channel = Channel { has_data: channel.has_data, ..OFF };
+                *channel = Channel { has_data: channel.has_data, ..Channel::default() };
             }
         }
         Some(Effect::Look)

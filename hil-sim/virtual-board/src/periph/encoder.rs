@@ -18,22 +18,19 @@ registers! {
     _ = 0x2c, ALL, ALL;
 }
 
-/// The timer.
-#[derive(Clone, Debug)]
-pub struct EncoderTimer {
-    store: Store,
-    /// Where the encoder is, counts.
-    pub position: u32,
-    from: u32,
-    held: u32,
+defaults! {
+    /// The timer; by default after a reset, with the encoder at 0.
+    #[derive(Clone, Debug)]
+    pub struct EncoderTimer {
+        store: Store = Store::new(KNOWN),
+        /// Where the encoder is, counts.
+        pub position: u32,
+        from: u32,
+        held: u32,
+    }
 }
 
 impl EncoderTimer {
-    /// After a reset, with the encoder at 0.
-    pub fn at_reset() -> Self {
-        Self { store: Store::new(KNOWN), position: 0, from: 0, held: 0 }
-    }
-
     /// Whether it counts the encoder.
     pub fn counting(&self) -> bool {
         self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3

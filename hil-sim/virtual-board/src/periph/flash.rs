@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use super::{Effect, Store, registers};
+use super::{Effect, Store, bits, registers};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE, STORED};
 use crate::rules::{Rule, Rules};
 
@@ -27,79 +27,53 @@ registers! {
     _ = 0x30, 0, 0;
 }
 
-const DCEN: u32 = 1 << 10;
+// ACR, CR, SR, ECCR.
+bits! { DCEN = 10 }
+bits! { PG = 0, PER = 1, BKER = 11, STRT = 16, LOCK = 31 }
+bits! { EOP = 0, PROGERR = 3, SIZERR = 6, PGSERR = 7, BSY = 16 }
+bits! { ECCD = 31 }
 /// Option: two banks of pages of 2 KiB, or one bank of pages of 4 KiB.
 pub const DBANK: u32 = 1 << 22;
 /// Option bytes from the factory.
 const OPTIONS: u32 = 0xffef_f8aa;
 /// Supply, V, below which the chip is held in reset, by BOR_LEV (datasheet, typical, falling).
 const BROWN_OUT: [f64; 8] = [1.66, 2.0, 2.26, 2.57, 2.83, 2.83, 2.83, 2.83];
-const PG: u32 = 1;
-const PER: u32 = 1 << 1;
-const BKER: u32 = 1 << 11;
-const STRT: u32 = 1 << 16;
-const LOCK: u32 = 1 << 31;
-const EOP: u32 = 1;
-const PROGERR: u32 = 1 << 3;
-const PGSERR: u32 = 1 << 7;
-const SIZERR: u32 = 1 << 6;
-const BSY: u32 = 1 << 16;
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
-const ECCD: u32 = 1 << 31;
 
+/// Bytes of the part that can be written.
+const SIZE: usize = (FLASH + FLASH_SIZE - STORED) as usize;
 const PAGE: usize = 2048;
 /// Typical times, ticks: a double word 82 us, a page 22 ms (datasheet).
 const PROGRAM: u64 = 82 * 170;
 const ERASE: u64 = 22_000 * 170;
 
-/// The flash.
-#[derive(Clone, Debug)]
-pub struct Flash {
-    store: Store,
-    /// Option bytes, as FLASH_OPTR shows them.
-    pub options: u32,
-    status: u32,
-    eccr: u32,
-    keys: usize,
-    /// End of the last operation.
-    pub busy_until: u64,
-    /// Lower half of a double word that is being programmed.
-    half: Option<(u32, u32)>,
-    bytes: Vec<u8>,
-    /// Double words whose check code is wrong.
-    torn: Vec<bool>,
-    /// Address of a double word of the code whose check code is wrong.
-    pub bad_code: Option<u32>,
-    /// Double words of the last operation.
-    changing: Range<usize>,
-    /// Operations since the beginning: double words programmed, pages erased.
-    pub operations: u64,
-    /// The power goes in this operation, counted from 1; its double word or page is torn.
-    pub power_loss_at: Option<u64>,
-    /// The power has gone.
-    pub power_lost: bool,
-}
-
-/// Erased.
-impl Default for Flash {
-    fn default() -> Self {
-        let size = (FLASH + FLASH_SIZE - STORED) as usize;
-        Self {
-            store: Store::new(KNOWN),
-            options: OPTIONS,
-            status: 0,
-            eccr: 0,
-            keys: 0,
-            busy_until: 0,
-            half: None,
-            bytes: vec![0xff; size],
-            torn: vec![false; size / 8],
-            bad_code: None,
-            changing: 0..0,
-            operations: 0,
-            power_loss_at: None,
-            power_lost: false,
-        }
+defaults! {
+    /// The flash; by default erased.
+    #[derive(Clone, Debug)]
+    pub struct Flash {
+        store: Store = Store::new(KNOWN),
+        /// Option bytes, as FLASH_OPTR shows them.
+        pub options: u32 = OPTIONS,
+        status: u32,
+        eccr: u32,
+        keys: usize,
+        /// End of the last operation.
+        pub busy_until: u64,
+        /// Lower half of a double word that is being programmed.
+        half: Option<(u32, u32)>,
+        bytes: Vec<u8> = vec![0xff; SIZE],
+        /// Double words whose check code is wrong.
+        torn: Vec<bool> = vec![false; SIZE / 8],
+        /// Address of a double word of the code whose check code is wrong.
+        pub bad_code: Option<u32>,
+        /// Double words of the last operation.
+        changing: Range<usize> = 0..0,
+        /// Operations since the beginning: double words programmed, pages erased.
+        pub operations: u64,
+        /// The power goes in this operation, counted from 1; its double word or page is torn.
+        pub power_loss_at: Option<u64>,
+        /// The power has gone.
+        pub power_lost: bool,
     }
 }
 
@@ -186,9 +160,7 @@ impl Flash {
     /// Whether the operation that begins now is the one in which the power goes.
     fn power_goes(&mut self) -> bool {
         self.operations += 1;
-        if self.power_loss_at == Some(self.operations) {
-            self.power_lost = true;
-        }
+        self.power_lost |= self.power_loss_at == Some(self.operations);
         self.power_lost
     }
 
@@ -222,11 +194,8 @@ impl Flash {
             return;
         }
         place.copy_from_slice(&(old & new).to_le_bytes());
-        self.torn[at / 8] = false;
         self.changing = at / 8..at / 8 + 1;
-        if self.power_goes() {
-            self.torn[at / 8] = true;
-        }
+        self.torn[at / 8] = self.power_goes();
         self.busy_until = now + PROGRAM;
         self.status |= EOP;
     }

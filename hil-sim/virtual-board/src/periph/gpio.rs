@@ -38,19 +38,14 @@ impl Gpio {
     /// Port A is 0.
     pub fn new(port: usize) -> Self {
         let mut store = Store::new(KNOWN);
-        match port {
-            // The debug port's pins.
-            0 => {
-                store.write(OSPEEDR, 0x0c00_0000);
-                store.write(MODER, 0xabff_ffff);
-                store.write(PUPDR, 0x6400_0000);
-            }
-            1 => {
-                store.write(OSPEEDR, 0x0000_00c0);
-                store.write(MODER, 0xffff_febf);
-                store.write(PUPDR, 0x0000_0100);
-            }
-            _ => {}
+        // The debug port's pins.
+        let values = match port {
+            0 => [0x0c00_0000, 0xabff_ffff, 0x6400_0000],
+            1 => [0x0000_00c0, 0xffff_febf, 0x0000_0100],
+            _ => [0, ALL, 0],
+        };
+        for (register, value) in [OSPEEDR, MODER, PUPDR].into_iter().zip(values) {
+            store.write(register, value);
         }
         Self(store)
     }

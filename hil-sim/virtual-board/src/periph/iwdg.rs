@@ -9,34 +9,21 @@ pub const LSI_HZ: f64 = 32_000.0;
 /// Clocks until a value written has arrived, at most.
 const ARRIVES: u64 = 6;
 
-/// The watchdog.
-#[derive(Clone, Debug)]
-pub struct Iwdg {
-    prescaler: u32,
-    reload: u32,
-    window: u32,
-    unlocked: bool,
-    /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
-    pub quick: bool,
-    /// Ticks per cycle of its clock.
-    pub clock: u64,
-    /// Until when the last values of prescaler, reload and window are on their way.
-    busy_until: [u64; 3],
-    expires: u64,
-}
-
-impl Default for Iwdg {
-    fn default() -> Self {
-        Self {
-            prescaler: 0,
-            reload: 0xfff,
-            window: 0xfff,
-            unlocked: false,
-            quick: false,
-            clock: (TICKS_PER_S as f64 / LSI_HZ) as u64,
-            busy_until: [0; 3],
-            expires: NEVER,
-        }
+defaults! {
+    /// The watchdog.
+    #[derive(Clone, Debug)]
+    pub struct Iwdg {
+        prescaler: u32,
+        reload: u32 = 0xfff,
+        window: u32 = 0xfff,
+        unlocked: bool,
+        /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
+        pub quick: bool,
+        /// Ticks per cycle of its clock.
+        pub clock: u64 = (TICKS_PER_S as f64 / LSI_HZ) as u64,
+        /// Until when the last values of prescaler, reload and window are on their way.
+        busy_until: [u64; 3],
+        expires: u64 = NEVER,
     }
 }
 
@@ -77,20 +64,15 @@ impl Iwdg {
     /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
         let now = rules.now;
-        match (offset, value) {
-            (0x00, 0x5555) => self.unlocked = true,
-            (0x00, 0xaaaa) => {
-                self.unlocked = false;
-                if self.expires != NEVER {
+        match offset {
+            0x00 => {
+                self.unlocked = value == 0x5555;
+                let runs = self.expires != NEVER;
+                if value == 0xcccc || value == 0xaaaa && runs {
                     self.expires = now + self.period();
                 }
             }
-            (0x00, 0xcccc) => {
-                self.unlocked = false;
-                self.expires = now + self.period();
-            }
-            (0x00, _) => self.unlocked = false,
-            (0x04 | 0x08 | 0x10, _) if self.unlocked => {
+            0x04 | 0x08 | 0x10 if self.unlocked => {
                 let which = [0x04, 0x08, 0x10].iter().position(|known| *known == offset)?;
                 let name = ["PR", "RLR", "WINR"][which];
                 let idle = now >= self.busy_until[which];
@@ -105,7 +87,7 @@ impl Iwdg {
                 let clock = if self.quick { self.clock } else { before.max(self.count()) };
                 self.busy_until[which] = now + ARRIVES * clock;
             }
-            (0x04 | 0x08 | 0x10, _) => {}
+            0x04 | 0x08 | 0x10 => {}
             _ => return None,
         }
         Some(Effect::Look)

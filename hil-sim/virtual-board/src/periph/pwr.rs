@@ -1,6 +1,6 @@
 //! Supply (RM0440, section 6): voltage range, supply monitor. The regulator is always ready.
 
-use super::{Effect, Store, registers};
+use super::{Effect, Store, bits, registers};
 
 registers! {
     CR1 = 0x00, 0x200, 0x4707;
@@ -16,8 +16,7 @@ registers! {
     _ = 0x2c, 0, 0xffef;
     CR5 = 0x80, 0x100, 0x100;
 }
-const PVDE: u32 = 1;
-const PVDO: u32 = 1 << 11;
+bits! { PVDE = 0, PVDO = 11 }
 /// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last is a pin.
 const LEVELS: [f64; 7] = [2.05, 2.2, 2.36, 2.52, 2.64, 2.81, 2.9];
 
@@ -34,17 +33,12 @@ pub enum Range {
 
 impl Range {
     /// Largest system clock, and bus clock for each wait state of the flash and one more, Hz.
-    fn clocks_hz(self) -> (u64, u64) {
+    pub fn clocks_hz(self) -> (u64, u64) {
         match self {
             Self::Boost => (170_000_000, 34_000_000),
             Self::Normal => (150_000_000, 30_000_000),
             Self::Low => (26_000_000, 12_000_000),
         }
-    }
-
-    /// Largest system clock, Hz.
-    pub fn limit_hz(self) -> u64 {
-        self.clocks_hz().0
     }
 
     /// Wait states of the flash that a bus clock in Hz needs.
@@ -53,17 +47,13 @@ impl Range {
     }
 }
 
-/// The supply.
-#[derive(Clone, Debug)]
-pub struct Pwr {
-    store: Store,
-    /// Supply of the chip, V.
-    pub supply_v: f64,
-}
-
-impl Default for Pwr {
-    fn default() -> Self {
-        Self { store: Store::new(KNOWN), supply_v: 3.3 }
+defaults! {
+    /// The supply.
+    #[derive(Clone, Debug)]
+    pub struct Pwr {
+        store: Store = Store::new(KNOWN),
+        /// Supply of the chip, V.
+        pub supply_v: f64 = 3.3,
     }
 }
 

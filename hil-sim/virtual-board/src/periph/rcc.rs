@@ -1,19 +1,8 @@
 //! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, but for
 //! a crystal that is dead.
 
-use super::{Effect, NEVER, Reset, Store, registers};
+use super::{Effect, NEVER, Reset, Store, bits, registers};
 use induction_drive::board::{CLOCK_HZ, HSE_HZ, HSI_HZ};
-
-/// Clocks of the peripherals.
-pub const AHB1ENR: u32 = 0x48;
-/// See [`AHB1ENR`].
-pub const AHB2ENR: u32 = 0x4c;
-/// See [`AHB1ENR`].
-pub const APB1ENR1: u32 = 0x58;
-/// See [`AHB1ENR`].
-pub const APB1ENR2: u32 = 0x5c;
-/// See [`AHB1ENR`].
-pub const APB2ENR: u32 = 0x60;
 
 registers! {
     CR = 0x00, 0x100, 0x010d_0300;
@@ -29,12 +18,12 @@ registers! {
     _ = 0x38, 0, 0xd2fe_c13f;
     _ = 0x3c, 0, 0x103;
     _ = 0x40, 0, 0x0437_f801;
-    _ = AHB1ENR, 0x100, 0x111f;
-    _ = AHB2ENR, 0, 0x050f_607f;
+    AHB1ENR = 0x48, 0x100, 0x111f;
+    AHB2ENR = 0x4c, 0, 0x050f_607f;
     _ = 0x50, 0, 0x101;
-    _ = APB1ENR1, 0x400, 0xd2fe_cd3f;
-    _ = APB1ENR2, 0, 0x103;
-    _ = APB2ENR, 0, 0x0437_f801;
+    APB1ENR1 = 0x58, 0x400, 0xd2fe_cd3f;
+    APB1ENR2 = 0x5c, 0, 0x103;
+    APB2ENR = 0x60, 0, 0x0437_f801;
     _ = 0x68, 0x130f, 0x131f;
     _ = 0x6c, 0x050f_667f, 0x050f_667f;
     _ = 0x78, 0xd2fe_cd3f, 0xd2fe_cd3f;
@@ -47,15 +36,11 @@ registers! {
     _ = 0x9c, 0, 0x0030_0003;
 }
 
-const HSEON: u32 = 1 << 16;
-const CSSON: u32 = 1 << 19;
-const CSSF: u32 = 1 << 8;
-/// Flags of resets in CSR: software, reset pin, power, watchdogs.
-const SFT: u32 = 1 << 28;
-const PIN: u32 = 1 << 26;
-const BOR: u32 = 1 << 27;
-const IWDG: u32 = 1 << 29;
-const WWDG: u32 = 1 << 30;
+// CR, CIFR.
+bits! { HSEON = 16, CSSON = 19 }
+bits! { CSSF = 8 }
+// Flags of resets in CSR: reset pin, power, software, watchdogs.
+bits! { PIN = 26, BOR = 27, SFT = 28, IWDG = 29, WWDG = 30 }
 const FLAGS: u32 = 0xfe00_0000;
 
 /// When clocks of peripherals were switched on.
@@ -67,21 +52,24 @@ pub struct On {
     pub accesses: u64,
 }
 
-/// The clocks.
-#[derive(Clone, Debug)]
-pub struct Rcc {
-    store: Store,
-    /// Flags of resets, which stay until they are cleared.
-    pub flags: u32,
-    cifr: u32,
-    /// Whether the crystal oscillates when it is on.
-    pub crystal_lives: bool,
-    /// Whether the PLL locks when it is on.
-    pub pll_locks: bool,
-    failed: bool,
-    /// The last clocks switched on by each enable register: their bits, and when.
-    on: [(u32, On); 7],
-    ticks_per_cycle: u64,
+defaults! {
+    /// The clocks; by default after power-on.
+    #[derive(Clone, Debug)]
+    pub struct Rcc {
+        store: Store = Store::new(KNOWN),
+        /// Flags of resets, which stay until they are cleared.
+        pub flags: u32 = BOR | PIN,
+        cifr: u32,
+        /// Whether the crystal oscillates when it is on.
+        pub crystal_lives: bool = true,
+        /// Whether the PLL locks when it is on.
+        pub pll_locks: bool = true,
+        failed: bool,
+        /// The last clocks switched on by each enable register: their bits, and when.
+        on: [(u32, On); 7],
+        /// Ticks of 170 MHz per cycle of the core.
+        pub ticks_per_cycle: u64 = HSI_TICKS,
+    }
 }
 
 impl Rcc {
@@ -94,22 +82,7 @@ impl Rcc {
             Reset::Watchdog => IWDG | PIN,
             Reset::Window => WWDG | PIN,
         };
-        Self {
-            store: Store::new(KNOWN),
-            flags,
-            cifr: 0,
-            crystal_lives: true,
-            pll_locks: true,
-            failed: false,
-            on: [(0, On::default()); 7],
-            ticks_per_cycle: HSI_TICKS,
-        }
-    }
-
-    /// Ticks of 170 MHz per cycle of the core.
-    #[inline]
-    pub fn ticks_per_cycle(&self) -> u64 {
-        self.ticks_per_cycle
+        Self { flags, ..Self::default() }
     }
 
     /// The system clock, Hz.

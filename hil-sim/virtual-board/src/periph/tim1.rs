@@ -3,12 +3,11 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising edges of OC4REF on the way
 //! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters.
 
-mod halt;
 mod outputs;
 
 pub use outputs::{Output, Wave};
 
-use super::{Effect, NEVER, Store, registers};
+use super::{Effect, NEVER, Store, bits, registers};
 use crate::rules::{Rule, Rules};
 
 registers! {
@@ -38,12 +37,9 @@ registers! {
     _ = 0x64, 1, 0x7_3fff;
 }
 
-const UIF: u32 = 1;
-const BIF: u32 = 1 << 7;
-const SBIF: u32 = 1 << 13;
-const MOE: u32 = 1 << 15;
-const BKE: u32 = 1 << 12;
-const BKP: u32 = 1 << 13;
+// SR, BDTR.
+bits! { UIF = 0, BIF = 7, SBIF = 13 }
+bits! { OSSI = 10, OSSR = 11, BKE = 12, BKP = 13, MOE = 15 }
 
 /// An event and its time.
 #[derive(Clone, Copy, Debug)]
@@ -56,54 +52,34 @@ pub enum Event {
     Valley(u64),
 }
 
-/// The timer.
-#[derive(Clone, Debug)]
-pub struct Tim1 {
-    store: Store,
-    /// Counter at rest.
-    held: u32,
-    /// When the counter was last at 0, on its way up.
-    from: u64,
-    top: u32,
-    active: [u32; 4],
-    repetitions: u32,
-    status: u32,
-    /// Next end of the count, and whether it is the top.
-    next_end: u64,
-    at_top_next: bool,
-    /// When each trigger output rises next.
-    trigger_at: [u64; 2],
-    /// Level of the break pin; `None` is not sure.
-    fault_pin: Option<bool>,
-    /// Outputs of the comparators.
-    comparators: [bool; 7],
-    /// LOCK of the first write to BDTR.
-    first_lock: Option<u32>,
-    /// A debugger has stopped the counter, at this time.
-    frozen: Option<u64>,
-    /// Updates to be left out: compare values are not taken over, no flag is set.
-    pub drop_update: u32,
-}
-
-impl Default for Tim1 {
-    fn default() -> Self {
-        Self {
-            store: Store::new(KNOWN),
-            held: 0,
-            from: 0,
-            top: 0xffff,
-            active: [0; 4],
-            repetitions: 0,
-            status: 0,
-            next_end: NEVER,
-            at_top_next: true,
-            trigger_at: [NEVER; 2],
-            fault_pin: Some(true),
-            comparators: [false; 7],
-            first_lock: None,
-            frozen: None,
-            drop_update: 0,
-        }
+defaults! {
+    /// The timer.
+    #[derive(Clone, Debug)]
+    pub struct Tim1 {
+        store: Store = Store::new(KNOWN),
+        /// Counter at rest.
+        held: u32,
+        /// When the counter was last at 0, on its way up.
+        from: u64,
+        top: u32 = 0xffff,
+        active: [u32; 4],
+        repetitions: u32,
+        status: u32,
+        /// Next end of the count, and whether it is the top.
+        next_end: u64 = NEVER,
+        at_top_next: bool = true,
+        /// When each trigger output rises next.
+        trigger_at: [u64; 2] = [NEVER; 2],
+        /// Level of the break pin; `None` is not sure.
+        fault_pin: Option<bool> = Some(true),
+        /// Outputs of the comparators.
+        comparators: [bool; 7],
+        /// LOCK of the first write to BDTR.
+        first_lock: Option<u32>,
+        /// A debugger has stopped the counter, at this time.
+        frozen: Option<u64>,
+        /// Updates to be left out: compare values are not taken over, no flag is set.
+        pub drop_update: u32,
     }
 }
 
@@ -120,6 +96,21 @@ impl Tim1 {
         let now = self.frozen.unwrap_or(now);
         let phase = ((now.saturating_sub(self.from)) % u64::from(2 * self.top)) as u32;
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
+    }
+
+    /// A debugger halts the core: the counter stops, and the outputs go off as if MOE was reset (RM0440, TIM1, debug mode).
+    pub fn freeze(&mut self, now: u64) {
+        self.frozen.get_or_insert(now);
+    }
+
+    /// The counter goes on.
+    pub fn thaw(&mut self, now: u64) {
+        let Some(since) = self.frozen.take() else { return };
+        let stood = now - since;
+        self.from += stood;
+        for at in self.trigger_at.iter_mut().chain([&mut self.next_end]) {
+            *at = at.saturating_add(stood);
+        }
     }
 
     /// Lets an update come at the next end of the count, whatever the repetition counter says.
@@ -216,9 +207,7 @@ impl Tim1 {
             return;
         }
         self.top = self.store.get(ARR).max(1);
-        for channel in 0..4 {
-            self.active[channel] = self.store.get(CCR1 + 4 * channel as u32);
-        }
+        self.active = std::array::from_fn(|channel| self.store.get(CCR1 + 4 * channel as u32));
         self.repetitions = self.store.get(RCR);
         if flag {
             self.status |= UIF;
@@ -232,10 +221,7 @@ impl Tim1 {
 
     /// A fault inside the chip: clock, supply, memory, lock-up.
     pub fn system_break(&mut self) {
-        if self.store.get(BDTR) & BKE != 0 {
-            self.status |= SBIF;
-            self.clear_moe();
-        }
+        self.pull_break(SBIF);
     }
 
     /// Outputs of the comparators, from now on.
@@ -259,21 +245,17 @@ impl Tim1 {
         // BKCMP1E is bit 1, BKCMP1P bit 10; comparators 5 to 7 have no polarity.
         let comparator =
             (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
-        if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
-            self.latch_break();
+        if (pin || comparator) == (bdtr & BKP != 0) {
+            self.pull_break(BIF);
         }
     }
 
-    fn latch_break(&mut self) {
-        if self.store.get(BDTR) & BKE != 0 {
-            self.status |= BIF;
-            self.clear_moe();
-        }
-    }
-
-    fn clear_moe(&mut self) {
+    fn pull_break(&mut self, flag: u32) {
         let bdtr = self.store.get(BDTR);
-        self.store.write(BDTR, bdtr & !MOE);
+        if bdtr & BKE != 0 {
+            self.status |= flag;
+            self.store.write(BDTR, bdtr & !MOE);
+        }
     }
 
     /// Reads a register.
@@ -306,7 +288,7 @@ impl Tim1 {
                     }
                 }
                 if value & 1 << 7 != 0 {
-                    self.latch_break();
+                    self.pull_break(BIF);
                 }
                 return Some(Effect::Look);
             }
@@ -369,14 +351,9 @@ impl Tim1 {
     }
 
     fn locked(&self, old: u32, new: u32) -> u32 {
-        let mut kept = 0;
-        if self.lock() >= 1 {
-            // Dead time, break enable, polarity and filters, automatic output.
-            kept |= 0x0fff_f0ff & !MOE;
-        }
-        if self.lock() >= 2 {
-            kept |= 0x0c00;
-        }
+        // Dead time, break enable, polarity and filters, automatic output; then OSSR and OSSI.
+        let first = 0x0fff_f0ff & !MOE;
+        let kept = [0, first, first | OSSR | OSSI, first | OSSR | OSSI][self.lock() as usize];
         old & kept | new & !kept
     }
 }

@@ -1,6 +1,6 @@
 //! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, upwards. Other modes are off here.
 
-use super::{Store, registers};
+use super::{Store, bits, registers};
 
 registers! {
     CR1 = 0x00, 0, 0x1bff;
@@ -13,13 +13,13 @@ registers! {
     _ = 0x60, 1, 0x0003_ffff;
 }
 
-const CEN: u32 = 1;
-const CC1E: u32 = 1;
+// CR1, CCER, BDTR.
+bits! { CEN = 0 }
+bits! { CC1E = 0 }
+bits! { BKE = 12, MOE = 15 }
 /// OC1M and CC1S.
 const MODE: u32 = 0x1_0073;
 const PWM_1: u32 = 0x60;
-const BKE: u32 = 1 << 12;
-const MOE: u32 = 1 << 15;
 
 /// The timer.
 #[derive(Clone, Debug)]

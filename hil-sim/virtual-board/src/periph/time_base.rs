@@ -1,7 +1,7 @@
 //! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well. Channel 1
 //! captures every eighth edge of the LSI oscillator.
 
-use super::{Effect, Store, registers};
+use super::{Effect, Store, bits, registers};
 
 const ALL: u32 = u32::MAX;
 registers! {
@@ -16,36 +16,32 @@ registers! {
     CCR1 = 0x34, 0, 0;
     TISEL = 0x5c, 0, 0x0f0f_0f0f;
 }
-/// Of SR: a capture that was not read, and another one behind it.
-const CC1IF: u32 = 1 << 1;
-const CC1OF: u32 = 1 << 9;
+// Of SR: a capture that was not read, and another one behind it.
+bits! { CC1IF = 1, CC1OF = 9 }
 /// Edges of the oscillator to a capture.
 const EDGES: f64 = 8.0;
 
-/// The captures, as they come while the channel is on.
-#[derive(Clone, Copy, Debug)]
-pub struct Captures {
-    /// Ticks from one to the next.
-    ticks: f64,
-    /// A time, and the captures up to it.
-    from: (u64, f64),
-    /// Captures up to the last one that was read.
-    read: u64,
+defaults! {
+    /// The captures, as they come while the channel is on.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Captures {
+        /// Ticks from one to the next.
+        ticks: f64 = f64::INFINITY,
+        /// A time, and the captures up to it.
+        from: (u64, f64),
+        /// Captures up to the last one that was read.
+        read: u64,
+    }
 }
 
-/// The timer.
-#[derive(Clone, Debug)]
-pub struct TimeBase {
-    store: Store,
-    /// Time at which the counter was 0.
-    from: u64,
-    captures: Captures,
-}
-
-impl Default for TimeBase {
-    fn default() -> Self {
-        let captures = Captures { ticks: f64::INFINITY, from: (0, 0.0), read: 0 };
-        Self { store: Store::new(KNOWN), from: 0, captures }
+defaults! {
+    /// The timer.
+    #[derive(Clone, Debug)]
+    pub struct TimeBase {
+        store: Store = Store::new(KNOWN),
+        /// Time at which the counter was 0.
+        from: u64,
+        captures: Captures,
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER, Plain, Store, bits};
 
 const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;
@@ -50,30 +50,15 @@ pub const LPUART1: Kind = Kind { known: OF_LPUART1.split_at(10).0, least: 0x300,
 /// USART3.
 pub const USART3: Kind = Kind { known: &OF_USART3, least: 16, units: 1 };
 
-const UE: u32 = 1;
-const RE: u32 = 1 << 2;
-const TE: u32 = 1 << 3;
-const PCE: u32 = 1 << 10;
-const M0: u32 = 1 << 12;
-const RTOIE: u32 = 1 << 26;
-const FIFOEN: u32 = 1 << 29;
+// CR1; PEIE asks for PE.
+bits! { UE = 0, RE = 2, TE = 3, PEIE = 8, PCE = 10, M0 = 12, RTOIE = 26, FIFOEN = 29, TXFEIE = 30 }
+// CR2.
+bits! { RTOEN = 23 }
+// ISR; RXFF is never asked for.
+bits! { PE = 0, FE = 1, NE = 2, ORE = 3, RXNE = 5, TC = 6, TXE = 7, RTOF = 11, TXFE = 23 }
 /// Bits of CR1 that can be changed only while the port is off: FIFOEN, OVER8, M1, M0, WAKE, PCE, PS.
 const FIXED: u32 = FIFOEN | 1 << 28 | 1 << 15 | M0 | 1 << 11 | PCE | 1 << 9;
 const TWO_STOPS: u32 = 2 << 12;
-const RTOEN: u32 = 1 << 23;
-const PE: u32 = 1;
-const FE: u32 = 1 << 1;
-const NE: u32 = 1 << 2;
-const ORE: u32 = 1 << 3;
-const RXNE: u32 = 1 << 5;
-const TC: u32 = 1 << 6;
-const TXE: u32 = 1 << 7;
-const RTOF: u32 = 1 << 11;
-/// PEIE of CR1 asks for PE.
-const PEIE: u32 = 1 << 8;
-/// TXFE of ISR, and its enable in CR1; RXFF is never asked for.
-const TXFE: u32 = 1 << 23;
-const TXFEIE: u32 = 1 << 30;
 /// Bytes that a FIFO holds.
 const FIFO: usize = 8;
 
@@ -96,38 +81,29 @@ impl Line {
     }
 }
 
-/// A port.
-#[derive(Clone, Debug)]
-pub struct Uart {
-    kind: &'static Kind,
-    store: Store,
-    /// ISR but for the flags that follow from the FIFOs.
-    status: u32,
-    received: VecDeque<u8>,
-    to_send: VecDeque<u8>,
-    shifting: Option<u8>,
-    sent_at: u64,
-    arrives_at: u64,
-    silent_at: u64,
-    /// Its other end.
-    pub line: Line,
+defaults! {
+    /// A port; by default LPUART1.
+    #[derive(Clone, Debug)]
+    pub struct Uart {
+        kind: &'static Kind = &LPUART1,
+        store: Store = Store::new(LPUART1.known),
+        /// ISR but for the flags that follow from the FIFOs.
+        status: u32 = TC,
+        received: VecDeque<u8>,
+        to_send: VecDeque<u8>,
+        shifting: Option<u8>,
+        sent_at: u64 = NEVER,
+        arrives_at: u64 = NEVER,
+        silent_at: u64 = NEVER,
+        /// Its other end.
+        pub line: Line,
+    }
 }
 
 impl Uart {
     /// A port after a reset.
     pub fn new(kind: &'static Kind) -> Self {
-        Self {
-            kind,
-            store: Store::new(kind.known),
-            status: TC,
-            received: VecDeque::new(),
-            to_send: VecDeque::new(),
-            shifting: None,
-            sent_at: NEVER,
-            arrives_at: NEVER,
-            silent_at: NEVER,
-            line: Line::default(),
-        }
+        Self { kind, store: Store::new(kind.known), ..Self::default() }
     }
 
     fn on(&self, which: u32) -> bool {
@@ -277,9 +253,7 @@ impl Uart {
                 self.shift(now);
             }
             TDR => {}
-            _ => {
-                self.store.write(offset, value)?;
-            }
+            _ => return self.store.write(offset, value).map(|_| Effect::Look),
         }
         Some(Effect::Look)
     }

@@ -10,20 +10,16 @@ const COUNT: u32 = 0x7f;
 /// A counter below this resets the chip.
 const LAST: u32 = 0x40;
 
-/// The watchdog.
-#[derive(Clone, Debug)]
-pub struct Wwdg {
-    /// Counter as it was written last, with WDGA; and when.
-    control: u32,
-    written: u64,
-    config: u32,
-    /// The counter ran out, or was written outside the window.
-    bites_at: u64,
-}
-
-impl Default for Wwdg {
-    fn default() -> Self {
-        Self { control: COUNT, written: 0, config: COUNT, bites_at: NEVER }
+defaults! {
+    /// The watchdog.
+    #[derive(Clone, Debug)]
+    pub struct Wwdg {
+        /// Counter as it was written last, with WDGA; and when.
+        control: u32 = COUNT,
+        written: u64,
+        config: u32 = COUNT,
+        /// The counter ran out, or was written outside the window.
+        bites_at: u64 = NEVER,
     }
 }
 

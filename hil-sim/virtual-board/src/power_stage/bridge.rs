@@ -1,23 +1,22 @@
 //! The gates of the six switches over a PWM period, behind the drivers.
 
-use std::fmt;
-
 use drive_core::Compare;
+use thiserror::Error;
 
 use super::PowerStage;
 use super::driver::{Driver, Request};
-use crate::periph::gpio::Gpio;
 use crate::periph::tim1::{Tim1, Wave};
-use crate::time::TICKS_PER_S;
+use crate::{periph::gpio::Gpio, time::TICKS_PER_S};
 
 /// Names of the switches of a leg.
 const SIDES: [&str; 2] = ["high", "low"];
 const LEGS: [&str; 3] = ["a", "b", "c"];
 
 /// A violation at the gates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum BadGates {
     /// A switch is on, or may be, while the timer's outputs are off.
+    #[error("{} side {} {} on while the outputs are off", SIDES[*side], LEGS[*leg], if *undefined { "may be" } else { "is" })]
     OnWhileOff {
         /// Leg, 0 is a.
         leg: usize,
@@ -27,6 +26,7 @@ pub enum BadGates {
         undefined: bool,
     },
     /// The level at a driver's input is not defined while the outputs are on.
+    #[error("the input of {} side {} has no defined level", SIDES[*side], LEGS[*leg])]
     Undefined {
         /// Leg, 0 is a.
         leg: usize,
@@ -34,16 +34,19 @@ pub enum BadGates {
         side: usize,
     },
     /// Both switches of a leg are on together.
+    #[error("both switches of leg {} are on", LEGS[*leg])]
     Together {
         /// Leg, 0 is a.
         leg: usize,
     },
     /// Both inputs of a leg ask for on; the driver's interlock keeps both switches off.
+    #[error("both inputs of leg {} ask for on, and the driver blocks", LEGS[*leg])]
     Interlocked {
         /// Leg, 0 is a.
         leg: usize,
     },
     /// The switches of a leg follow each other too soon.
+    #[error("leg {} has a dead time of {:.2} us", LEGS[*leg], us(*dead_time))]
     Short {
         /// Leg, 0 is a.
         leg: usize,
@@ -51,6 +54,7 @@ pub enum BadGates {
         dead_time: u32,
     },
     /// A pin that the power stage ties to nets of others is not analog.
+    #[error("P{}{pin} is not analog", char::from(b'A' + *port as u8))]
     NotAnalog {
         /// Its port, 0 is A.
         port: usize,
@@ -58,6 +62,7 @@ pub enum BadGates {
         pin: u32,
     },
     /// A switch of a leg is on for too short a time.
+    #[error("leg {} has a pulse of {:.2} us", LEGS[*leg], us(*ticks))]
     Pulse {
         /// Leg, 0 is a.
         leg: usize,
@@ -66,32 +71,8 @@ pub enum BadGates {
     },
 }
 
-impl fmt::Display for BadGates {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let us = |ticks: u32| f64::from(ticks) * 1e6 / TICKS_PER_S as f64;
-        match *self {
-            Self::OnWhileOff { leg, side, undefined } => {
-                let is = if undefined { "may be" } else { "is" };
-                write!(f, "{} side {} {is} on while the outputs are off", SIDES[side], LEGS[leg])
-            }
-            Self::Undefined { leg, side } => {
-                write!(f, "the input of {} side {} has no defined level", SIDES[side], LEGS[leg])
-            }
-            Self::Together { leg } => write!(f, "both switches of leg {} are on", LEGS[leg]),
-            Self::Interlocked { leg } => {
-                write!(f, "both inputs of leg {} ask for on, and the driver blocks", LEGS[leg])
-            }
-            Self::Short { leg, dead_time } => {
-                write!(f, "leg {} has a dead time of {:.2} us", LEGS[leg], us(dead_time))
-            }
-            Self::NotAnalog { port, pin } => {
-                write!(f, "P{}{pin} is not analog", char::from(b'A' + port as u8))
-            }
-            Self::Pulse { leg, ticks } => {
-                write!(f, "leg {} has a pulse of {:.2} us", LEGS[leg], us(ticks))
-            }
-        }
-    }
+fn us(ticks: u32) -> f64 {
+    f64::from(ticks) * 1e6 / TICKS_PER_S as f64
 }
 
 /// A time in which neither switch of a leg changes.

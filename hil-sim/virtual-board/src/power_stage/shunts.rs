@@ -89,11 +89,7 @@ impl Amplifiers {
 
 /// The pieces that the gates have in `ticks` ticks from `phase` on, which repeats with the period: beginning after
 /// `phase`, length, and switches.
-fn cut(
-    pieces: &[Piece],
-    phase: i64,
-    ticks: u32,
-) -> impl Iterator<Item = (u32, u32, [bool; 2])> + '_ {
+fn cut(pieces: &[Piece], phase: i64, ticks: u32) -> impl Iterator<Item = (u32, u32, [bool; 2])> {
     let period: u32 = pieces.iter().map(|piece| piece.ticks).sum();
     let mut phase = phase.rem_euclid(i64::from(period.max(1))) as u32;
     let mut done = 0;

@@ -19,8 +19,10 @@ pub struct Seen {
 /// The power stage of a chip, with the present state of its gates.
 #[derive(Clone, Debug)]
 pub struct GateWatch {
-    stage: &'static PowerStage,
-    bridge: Bridge,
+    /// The power stage.
+    pub stage: &'static PowerStage,
+    /// The gates as they are.
+    pub bridge: Bridge,
     seen: Option<Seen>,
 }
 
@@ -28,16 +30,6 @@ impl GateWatch {
     /// Of a chip whose pins are released.
     pub fn new(stage: &'static PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
         Self { stage, bridge: Bridge::new(stage, gpio, tim1), seen: None }
-    }
-
-    /// The power stage.
-    pub fn stage(&self) -> &'static PowerStage {
-        self.stage
-    }
-
-    /// The gates as they are.
-    pub fn bridge(&self) -> &Bridge {
-        &self.bridge
     }
 
     /// The first violation since the last call.

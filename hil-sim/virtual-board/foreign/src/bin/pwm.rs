@@ -2,12 +2,8 @@
 #![no_std]
 #![no_main]
 
-use embassy_stm32::gpio::OutputType;
-use embassy_stm32::time::Hertz;
-use embassy_stm32::timer::Channel;
+use embassy_stm32::{gpio::OutputType, time::Hertz, timer::Channel, timer::low_level::CountingMode, timer::simple_pwm::PwmPin};
 use embassy_stm32::timer::complementary_pwm::{ComplementaryPwm, ComplementaryPwmPin};
-use embassy_stm32::timer::low_level::CountingMode;
-use embassy_stm32::timer::simple_pwm::PwmPin;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {

@@ -38,10 +38,8 @@ impl Step {
         let (word, rest) = line.split_once(' ').ok_or(forms)?;
         if word == "expect" {
             return match rest.trim().strip_prefix("not ") {
-                Some(rest) => {
-                    within(rest, NOT_EXPECTED_S).map(|(s, text)| Self::ExpectNot(s, text))
-                }
-                None => within(rest, EXPECTED_S).map(|(s, text)| Self::Expect(s, text)),
+                Some(rest) => within(rest, NOT_EXPECTED_S).map(|(s, t)| Self::ExpectNot(s, t)),
+                None => within(rest, EXPECTED_S).map(|(s, t)| Self::Expect(s, t)),
             };
         }
         let (time, typed) = rest.split_once(':').ok_or(forms)?;

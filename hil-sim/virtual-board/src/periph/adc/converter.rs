@@ -1,29 +1,17 @@
 //! One converter.
 
 use super::{
-    CFGR, CR, DR, IER, ISR, Inputs, JDR1, JSQR, KNOWN, NEVER, Named, SMPR1, SQR1, Store, TR1,
+    CFGR, CR, DR, IER, ISR, Inputs, JDR1, JSQR, KNOWN, NEVER, Named, SMPR1, SQR1, Store, TR1, bits,
 };
 use crate::rules::Rule;
 
-const ADRDY: u32 = 1;
-/// End of a regular conversion, and of an injected one.
-pub(super) const EOC: u32 = 1 << 2;
-const EOS: u32 = 1 << 3;
-pub(super) const JEOC: u32 = 1 << 5;
-/// End of an injected sequence.
-pub(super) const JEOS: u32 = 1 << 6;
-/// Analog watchdog 1.
-pub(super) const AWD1: u32 = 1 << 7;
-const ADEN: u32 = 1;
-const ADDIS: u32 = 1 << 1;
-const ADSTART: u32 = 1 << 2;
-const JADSTART: u32 = 1 << 3;
-const VREGEN: u32 = 1 << 28;
-const DEEPPWD: u32 = 1 << 29;
-const ADCALDIF: u32 = 1 << 30;
-const ADCAL: u32 = 1 << 31;
-const JQDIS: u32 = 1 << 31;
-const CONT: u32 = 1 << 13;
+// ISR: ready; ends of a regular conversion and sequence, and of injected ones; analog watchdog 1.
+bits! { pub(super) ADRDY = 0, pub(super) EOC = 2, pub(super) EOS = 3 }
+bits! { pub(super) JEOC = 5, pub(super) JEOS = 6, pub(super) AWD1 = 7 }
+// CR.
+bits! { ADEN = 0, ADDIS = 1, ADSTART = 2, JADSTART = 3, VREGEN = 28, DEEPPWD = 29, ADCALDIF = 30, ADCAL = 31 }
+// CFGR.
+bits! { CONT = 13, JQDIS = 31 }
 
 /// Sampling times, halves of a converter clock.
 const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
@@ -65,40 +53,25 @@ struct Running {
 
 const IDLE: Running = Running { rank: 0, done_at: NEVER };
 
-/// A converter.
-#[derive(Clone, Debug)]
-pub(super) struct Converter {
-    store: Store,
-    /// ISR.
-    pub status: u32,
-    control: u32,
-    running: [Running; 2],
-    /// Injected data.
-    pub data: [u16; 4],
-    /// Regular data.
-    pub regular: u16,
-    /// Since when the regulator is on.
-    regulator_from: u64,
-    /// End of the last calibration, and of the start-up.
-    calibrated_at: u64,
-    ready_at: u64,
-    ready: bool,
-}
-
-impl Default for Converter {
-    fn default() -> Self {
-        Self {
-            store: Store::new(KNOWN),
-            status: 0,
-            control: DEEPPWD,
-            running: [IDLE; 2],
-            data: [0; 4],
-            regular: 0,
-            regulator_from: NEVER,
-            calibrated_at: 0,
-            ready_at: NEVER,
-            ready: false,
-        }
+defaults! {
+    /// A converter.
+    #[derive(Clone, Debug)]
+    pub(super) struct Converter {
+        store: Store = Store::new(KNOWN),
+        /// ISR.
+        pub status: u32,
+        control: u32 = DEEPPWD,
+        running: [Running; 2] = [IDLE; 2],
+        /// Injected data.
+        pub data: [u16; 4],
+        /// Regular data.
+        pub regular: u16,
+        /// Since when the regulator is on.
+        regulator_from: u64 = NEVER,
+        /// End of the last calibration, and of the start-up.
+        calibrated_at: u64,
+        ready_at: u64 = NEVER,
+        ready: bool,
     }
 }
 
@@ -110,12 +83,9 @@ impl Converter {
 
     /// Whether a rising edge of a trigger output of TIM1 starts a sequence.
     pub fn waits_for(&self, sequence: Sequence, output: usize) -> bool {
-        let (selection, codes) = match sequence {
-            Sequence::Regular => (self.store.get(CFGR) >> 5, [9, 10]),
-            Sequence::Injected => (self.store.get(JSQR) >> 2, [0, 8]),
-        };
+        let code = [[9, 10], [0, 8]][sequence as usize][output];
         let idle = self.running[sequence as usize].done_at == NEVER;
-        self.control & sequence.started() != 0 && idle && selection & 0x7f == 1 << 5 | codes[output]
+        self.control & sequence.started() != 0 && idle && self.selection(sequence) == 1 << 5 | code
     }
 
     /// Whether a trigger at this time starts the injected sequence in the middle of a regular conversion.
@@ -129,11 +99,14 @@ impl Converter {
         self.control & ADSTART != 0 && self.is_triggered(Sequence::Regular)
     }
 
+    /// The trigger of a sequence, and in the two bits above its edges.
+    fn selection(&self, sequence: Sequence) -> u32 {
+        let (register, place) = [(CFGR, 5), (JSQR, 2)][sequence as usize];
+        self.store.get(register) >> place & 0x7f
+    }
+
     fn is_triggered(&self, sequence: Sequence) -> bool {
-        match sequence {
-            Sequence::Regular => self.store.get(CFGR) >> 10 & 3 != 0,
-            Sequence::Injected => self.store.get(JSQR) >> 7 & 3 != 0,
-        }
+        self.selection(sequence) >> 5 != 0
     }
 
     /// Starts a sequence.
@@ -182,10 +155,8 @@ impl Converter {
 
     /// The last rank of a sequence.
     fn last(&self, sequence: Sequence) -> u32 {
-        match sequence {
-            Sequence::Injected => self.store.get(JSQR) & 3,
-            Sequence::Regular => self.store.get(SQR1) & 15,
-        }
+        let (register, mask) = [(SQR1, 15), (JSQR, 3)][sequence as usize];
+        self.store.get(register) & mask
     }
 
     /// Sampling and conversion of a rank, halves of a clock.
@@ -227,18 +198,17 @@ impl Converter {
     }
 
     fn take(&mut self, sequence: Sequence, rank: u32, channel: u32, code: u16) {
-        let (data, flag) = match sequence {
-            Sequence::Injected => (&mut self.data[rank as usize & 3], JEOC),
-            Sequence::Regular => (&mut self.regular, EOC),
-        };
-        *data = code;
-        self.status |= flag;
+        match sequence {
+            Sequence::Injected => self.data[rank as usize & 3] = code,
+            Sequence::Regular => self.regular = code,
+        }
+        self.status |= [EOC, JEOC][sequence as usize];
         self.watch(sequence, channel, code);
     }
 
     /// A sequence has ended: what runs now.
     fn end(&mut self, sequence: Sequence, at: u64) -> Running {
-        self.status |= if sequence == Sequence::Regular { EOS } else { JEOS };
+        self.status |= [EOS, JEOS][sequence as usize];
         if sequence == Sequence::Regular && self.store.get(CFGR) & CONT != 0 {
             return Running { rank: 0, done_at: at + self.conversion(sequence, 0) };
         }
@@ -275,18 +245,11 @@ impl Converter {
         })
     }
 
-    /// Writes a register, with `clock` ticks per converter clock if there is one.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        clock: Option<u64>,
-        rules: &mut Named,
-    ) -> Option<()> {
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Named) -> Option<()> {
         match offset {
             ISR => self.status &= !value,
-            CR => self.order(value, now, clock, rules),
+            CR => self.order(value, rules),
             JSQR => {
                 let queue = self.store.get(CFGR) & JQDIS == 0;
                 let free = queue || self.control & JADSTART == 0;
@@ -294,14 +257,13 @@ impl Converter {
                     self.store.write(JSQR, value)?;
                 }
             }
-            _ => {
-                self.store.write(offset, value)?;
-            }
+            _ => return self.store.write(offset, value).map(drop),
         }
         Some(())
     }
 
-    fn order(&mut self, value: u32, now: u64, clock: Option<u64>, rules: &mut Named) {
+    fn order(&mut self, value: u32, rules: &mut Named) {
+        let (now, clock) = (rules.rules.now, rules.clock);
         let config = DEEPPWD | VREGEN | ADCALDIF;
         let before = self.control;
         self.control = self.control & !config | value & config;
@@ -342,21 +304,19 @@ impl Converter {
             self.ready = false;
             self.ready_at = NEVER;
         }
-        for (bit, sequence) in Sequence::ALL.map(|sequence| (sequence.started(), sequence)) {
-            if value & bit == 0 || self.control & bit != 0 {
-                continue;
-            }
-            if rules.require(self.ready, Rule::AdcEarly, "a conversion started before ADRDY") {
+        for sequence in Sequence::ALL {
+            let bit = sequence.started();
+            if value & !self.control & bit != 0
+                && rules.require(self.ready, Rule::AdcEarly, "a conversion started before ADRDY")
+            {
                 self.control |= bit;
                 if !self.is_triggered(sequence) {
                     self.begin(sequence, now, clock.unwrap_or(1));
                 }
             }
-        }
-        for sequence in Sequence::ALL {
             // ADSTP and JADSTP.
-            if value & sequence.started() << 2 != 0 {
-                self.control &= !sequence.started();
+            if value & bit << 2 != 0 {
+                self.control &= !bit;
                 self.running[sequence as usize] = IDLE;
             }
         }

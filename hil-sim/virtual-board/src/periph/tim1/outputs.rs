@@ -1,10 +1,7 @@
 //! The outputs of the three legs at the pins: OCx and OCxN (RM0440, section 28.6.11, output control bits for
 //! complementary channels with break feature).
 
-use super::{BDTR, CCER, CCMR1, CCMR2, CR1, CR2, Tim1};
-
-const OSSI: u32 = 1 << 10;
-const OSSR: u32 = 1 << 11;
+use super::{BDTR, CCER, CCMR1, CCMR2, CR1, CR2, OSSI, OSSR, Tim1};
 
 /// A level over a PWM period, which begins at the top of the counter: one of the two for a while, else the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
