@@ -106,14 +106,19 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
     let _ = writeln!(
         body,
         "<section id=\"{name}\">\n<h2>{name} <span class=\"source\">{stands_for}</span></h2>\n\
-         <p>{about}</p>\n<p class=\"command\"><code>{command}</code></p>"
+         <p>{about}</p>"
     );
+    for command in command.lines() {
+        let _ = writeln!(body, "<p class=\"command\"><code>{command}</code></p>");
+    }
     if let Some(lost) = outcome.lost() {
         let _ = writeln!(body, "<p class=\"lost\">{}</p>", prose(&lost));
     }
     if folded {
         let (plots, tables) = (outcome.figures.len(), outcome.tables.len());
-        let _ = writeln!(body, "<details><summary>{plots} plots, {tables} tables</summary>");
+        // What no command repeats is the head of others.
+        let open = if command.is_empty() { " open" } else { "" };
+        let _ = writeln!(body, "<details{open}><summary>{plots} plots, {tables} tables</summary>");
     }
     write_metrics(body, &outcome.metrics);
     if let Some(steps) = &outcome.steps {
@@ -191,7 +196,10 @@ fn write_table(body: &mut String, table: &Table) {
     for row in &table.rows {
         body.push_str("<tr>");
         for (column, cell) in row.iter().enumerate() {
-            let _ = write!(body, "<td{}>{}</td>", class(column), shown(cell));
+            // On a narrow page the cells of a row lie below each other, each with its head.
+            let head = escape(table.columns.get(column).map_or("", String::as_str));
+            let (class, cell) = (class(column), shown(cell));
+            let _ = write!(body, "<td{class} data-head=\"{head}\">{cell}</td>");
         }
         body.push_str("</tr>\n");
     }

@@ -11,9 +11,9 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 use super::envelope::envelope;
-use super::prose::signs;
+use super::prose::{escape, signs};
 use crate::error::Error;
-use crate::outcome::{Figure, Panel, Style};
+use crate::outcome::{Figure, Panel, Series, Style};
 use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legend, legend_height};
 pub use colours::style;
 use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
@@ -21,7 +21,9 @@ use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
 /// Drawing units per pixel of the page. plotters draws in whole units: finer ones keep curves smooth.
 const SCALE: i32 = 4;
 /// Width of a figure; plotters' areas are measured in drawing units.
-const WIDTH: i32 = 760 * SCALE;
+const WIDE: i32 = 760 * SCALE;
+/// That for a narrow page.
+const NARROW: i32 = 380 * SCALE;
 /// Height of a plot area; twice that where both axes have the same scale.
 const HEIGHT: i32 = 190 * SCALE;
 /// Space left of a plot area, for the labels of the vertical axis, and right of it.
@@ -44,46 +46,51 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// [`Error::Internal`] with the figure's name when plotters fails.
 pub fn svg(figure: &Figure) -> Result<String, Error> {
     let mut text = String::new();
-    let mut height = 0;
-    for part in parts(figure)? {
+    let (mut height, width) = (0, WIDE);
+    for part in parts(figure, width)? {
         text.push_str(&format!("<g transform=\"translate(0 {height})\">\n{}</g>\n", part.text));
         height += part.height;
     }
     let style = format!("<style>\n{}</style>\n", style());
-    Ok(Part { text: style + &text, height }.element())
+    Ok(Part { text: style + &text, height, width }.element("plot"))
 }
 
 /// The panels of the figure as `<svg>` elements that belong below each other, so that a printed page can end
-/// between them. [`style`] belongs into the style of the page.
+/// between them; each twice, for a wide page and for a narrow one. [`style`] belongs into the style of the page.
 ///
 /// # Errors
 /// As [`svg`].
 pub fn panels(figure: &Figure) -> Result<Vec<String>, Error> {
-    Ok(parts(figure)?.iter().map(Part::element).collect())
+    let mut all = Vec::new();
+    for (width, class) in [(WIDE, "plot wide"), (NARROW, "plot narrow")] {
+        all.extend(parts(figure, width)?.iter().map(|part| part.element(class)));
+    }
+    Ok(all)
 }
 
 /// Content of an `<svg>` element.
 struct Part {
     text: String,
     height: i32,
+    width: i32,
 }
 
 impl Part {
     /// The page decides how large the element is; the view box keeps its shape.
-    fn element(&self) -> String {
-        let Self { text, height } = self;
+    fn element(&self, class: &str) -> String {
+        let Self { text, height, width } = self;
         format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
+            "<svg class=\"{class}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
              {text}</svg>\n"
         )
     }
 }
 
-fn parts(figure: &Figure) -> Result<Vec<Part>, Error> {
-    draw(figure).map_err(|e| Error::Internal(format!("figure `{}`: {e}", figure.name)))
+fn parts(figure: &Figure, width: i32) -> Result<Vec<Part>, Error> {
+    draw(figure, width).map_err(|e| Error::Internal(format!("figure `{}`: {e}", figure.name)))
 }
 
-fn draw(figure: &Figure) -> Result<Vec<Part>, Failure> {
+fn draw(figure: &Figure, width: i32) -> Result<Vec<Part>, Failure> {
     let panels: Vec<&Panel> = figure.panels.iter().collect();
     let alike = |a: &Panel, b: &Panel| {
         (&a.x_label, a.log_x) == (&b.x_label, b.log_x) && !a.equal_axes && !b.equal_axes
@@ -93,14 +100,15 @@ fn draw(figure: &Figure) -> Result<Vec<Part>, Failure> {
     let events = if has_events { figure.events.as_slice() } else { &[] };
     let mut parts = Vec::new();
     for (k, panel) in panels.iter().enumerate() {
-        let (x, y) = ranges(panel, if shared { &panels[..] } else { &panels[k..=k] });
+        let (x, y) = ranges(panel, if shared { &panels[..] } else { &panels[k..=k] }, width);
         let frame = Frame {
+            width,
             // A legend is not repeated below one that says the same.
             legend: match legend(panel) {
                 same if shared && k > 0 && same == legend(panels[k - 1]) => Vec::new(),
                 entries => entries,
             },
-            labels: if k == 0 { labels(events, &x) } else { Vec::new() },
+            labels: if k == 0 { labels(events, &x, width) } else { Vec::new() },
             events: events.iter().map(|event| event.0).filter(|at| x.contains(at)).collect(),
             has_x_labels: !shared || k + 1 == panels.len(),
         };
@@ -111,6 +119,7 @@ fn draw(figure: &Figure) -> Result<Vec<Part>, Failure> {
 
 /// The surroundings of a plot.
 struct Frame<'a> {
+    width: i32,
     legend: Vec<Entry<'a>>,
     labels: Vec<Label<'a>>,
     events: Vec<f64>,
@@ -126,16 +135,17 @@ fn draw_part(
 ) -> Result<Part, Failure> {
     let plot = if panel.equal_axes { 2 * HEIGHT } else { HEIGHT };
     let below = if frame.has_x_labels { LABELS } else { GAP };
-    let (legend, labels) = (legend_height(&frame.legend), labels_height(&frame.labels));
+    let width = frame.width;
+    let (legend, labels) = (legend_height(&frame.legend, width), labels_height(&frame.labels));
     // The lines of the events go on to the plot.
     let above = if frame.labels.is_empty() { ABOVE } else { 0 };
     let height = legend + labels + above + plot + below;
     let mut text = String::new();
     {
-        let size = (WIDTH as u32, height as u32);
+        let size = (width as u32, height as u32);
         let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
         let (top, rest) = area.split_vertically(legend);
-        draw_legend(&top, &frame.legend)?;
+        draw_legend(&top, &frame.legend, width)?;
         let (top, rest) = rest.split_vertically(labels);
         draw_labels(&top, &frame.labels)?;
         let mut chart = ChartBuilder::on(&rest);
@@ -154,11 +164,32 @@ fn draw_part(
     }
     // Only what is inside of plotters' element.
     let inside = text.split_once(">\n").and_then(|(_, text)| text.rsplit_once("</svg>"));
-    Ok(Part { text: inside.map_or("", |(text, _)| text).to_owned(), height })
+    Ok(Part { text: titled(inside.map_or("", |(text, _)| text), panel, frame), height, width })
+}
+
+/// The drawing with the value of each mark as its title.
+fn titled(drawing: &str, panel: &Panel, frame: &Frame<'_>) -> String {
+    let marks = || panel.series.iter().filter(|series| series.style == Style::Points);
+    let keys = frame.legend.iter().filter(|entry| entry.1 == Style::Points);
+    let of = |series: &Series| -> Vec<String> {
+        let drawn = series.points.iter().filter(|point| is_drawn(panel, **point));
+        drawn.map(|(x, y)| format!("{}: {}, {}", series.name, number(x), number(y))).collect()
+    };
+    let mut titles = keys.map(|entry| entry.0.to_owned()).chain(marks().flat_map(of));
+    let mut parts = drawing.split("<circle ");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let title = escape(&titles.next().unwrap_or_default());
+        text += &format!(
+            "<circle {}",
+            part.replacen("/>", &format!("><title>{title}</title></circle>"), 1)
+        );
+    }
+    text
 }
 
 /// The ranges of the two axes of a panel; that of the horizontal one covers all panels that share it.
-fn ranges(panel: &Panel, sharing: &[&Panel]) -> (Range<f64>, Range<f64>) {
+fn ranges(panel: &Panel, sharing: &[&Panel], width: i32) -> (Range<f64>, Range<f64>) {
     let range = |panels: &[&Panel], coordinate: fn((f64, f64)) -> f64, air: f64| {
         let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
         let (low, high) = points
@@ -177,7 +208,7 @@ fn ranges(panel: &Panel, sharing: &[&Panel]) -> (Range<f64>, Range<f64>) {
     let y = panel.y_range.map_or_else(|| range(&[panel], |p| p.1, 0.04), |(low, high)| low..high);
     if panel.equal_axes {
         let half =
-            0.5 * (y.end - y.start) * f64::from(WIDTH - LEFT - RIGHT) / f64::from(2 * HEIGHT);
+            0.5 * (y.end - y.start) * f64::from(width - LEFT - RIGHT) / f64::from(2 * HEIGHT);
         let middle = 0.5 * (x.start + x.end);
         return (middle - half..middle + half, y);
     }
@@ -212,7 +243,11 @@ where
     let mut mesh = chart.configure_mesh();
     mesh.label_style(font(TEXT_PX)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
-    mesh.x_labels(10).y_labels(if panel.switch { 2 } else { 7 });
+    mesh.x_labels(if frame.width == WIDE { 10 } else { 5 }).y_labels(if panel.switch {
+        2
+    } else {
+        7
+    });
     mesh.y_desc(signs(&panel.y_label)).y_label_formatter(&number);
     mesh.axis_desc_style(font_beside(&panel.y_label));
     mesh.set_all_tick_mark_size(3 * SCALE);
@@ -242,7 +277,7 @@ where
                 chart.draw_series(part.iter().map(|p| Circle::new(*p, MARKER, pen)))?;
                 continue;
             }
-            let line = envelope(part, (WIDTH / SCALE) as usize);
+            let line = envelope(part, (frame.width / SCALE) as usize);
             match dash(series.style) {
                 None => chart.plotting_area().draw(&PathElement::new(line, pen))?,
                 Some(dash) => chart.plotting_area().draw(&dashed(line, dash, pen))?,
@@ -276,7 +311,6 @@ fn font_beside(text: &str) -> TextStyle<'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::Series;
 
     fn svg_of(panels: impl IntoIterator<Item = Panel>) -> String {
         let figure = Figure { panels: panels.into_iter().collect(), ..Figure::new("f", "", "") };
@@ -342,8 +376,9 @@ mod tests {
         let panel = || Panel::new("time (s)", "y").with(line());
         let mut figure = Figure::new("f", "", "").panel(panel()).panel(panel());
         let dashes = |figure: &Figure| {
-            let parts = panels(figure).unwrap();
-            parts.iter().map(|part| part.matches("stroke=\"#787878\"").count()).collect::<Vec<_>>()
+            let parts = parts(figure, WIDE).unwrap();
+            let parts = parts.iter().map(|part| &part.text);
+            parts.map(|part| part.matches("stroke=\"#787878\"").count()).collect::<Vec<_>>()
         };
         let without = dashes(&figure);
         let events = [(2.0, "start"), (2.1, "load on"), (99.0, "outside")];
@@ -354,7 +389,7 @@ mod tests {
         assert!(!texts.contains(&"outside"));
         assert!(dashes(&figure).iter().zip(without).all(|(with, without)| *with > without + 10));
         // Names that would hide each other are in different rows.
-        let found = labels(&figure.events, &(0.0..10.0));
+        let found = labels(&figure.events, &(0.0..10.0), WIDE);
         assert!(labels_height(&found) > labels_height(&found[..1]));
     }
 

@@ -7,7 +7,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::colours::{self, MARKER, dash, is_coloured, pen, pen_of};
-use super::{Area, Failure, LEFT, RIGHT, SCALE, TEXT_PX, WIDTH, font};
+use super::{Area, Failure, LEFT, RIGHT, SCALE, TEXT_PX, font};
 use crate::outcome::{Panel, Series, Style};
 use crate::report::prose::signs;
 
@@ -35,18 +35,18 @@ pub fn legend(panel: &Panel) -> Vec<Entry<'_>> {
 }
 
 /// Columns of a legend; generous, because the reader's fonts are not known.
-fn legend_columns(entries: &[Entry<'_>]) -> usize {
+fn legend_columns(entries: &[Entry<'_>], width: i32) -> usize {
     let longest = entries.iter().map(|entry| entry.0.chars().count()).max().unwrap_or(0) as i32;
-    ((WIDTH - LEFT - RIGHT) / ((50 + 7 * longest) * SCALE)).max(1) as usize
+    ((width - LEFT - RIGHT) / ((50 + 7 * longest) * SCALE)).max(1) as usize
 }
 
-pub fn legend_height(entries: &[Entry<'_>]) -> i32 {
-    LEGEND_ROW * entries.len().div_ceil(legend_columns(entries)) as i32
+pub fn legend_height(entries: &[Entry<'_>], width: i32) -> i32 {
+    LEGEND_ROW * entries.len().div_ceil(legend_columns(entries, width)) as i32
 }
 
 /// The legend in rows.
-pub fn draw_legend(area: &Area<'_>, entries: &[Entry<'_>]) -> Result<(), Failure> {
-    let columns = legend_columns(entries);
+pub fn draw_legend(area: &Area<'_>, entries: &[Entry<'_>], width: i32) -> Result<(), Failure> {
+    let columns = legend_columns(entries, width);
     let cells =
         area.margin(0, 0, LEFT, RIGHT).split_evenly((entries.len().div_ceil(columns), columns));
     for (cell, &(name, style, place)) in cells.iter().zip(entries) {
@@ -74,7 +74,7 @@ pub struct Label<'a> {
 }
 
 /// The events within a range of the horizontal axis, in the first row where they hide no other name.
-pub fn labels<'a>(events: &'a [(f64, String)], range: &Range<f64>) -> Vec<Label<'a>> {
+pub fn labels<'a>(events: &'a [(f64, String)], range: &Range<f64>, page: i32) -> Vec<Label<'a>> {
     let mut events: Vec<_> =
         events.iter().filter(|(x, _)| (range.start..=range.end).contains(x)).collect();
     events.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -83,9 +83,9 @@ pub fn labels<'a>(events: &'a [(f64, String)], range: &Range<f64>) -> Vec<Label<
     let mut labels = Vec::new();
     for (x, text) in events {
         let share = (x - range.start) / (range.end - range.start);
-        let x = LEFT + (share * f64::from(WIDTH - LEFT - RIGHT)) as i32;
+        let x = LEFT + (share * f64::from(page - LEFT - RIGHT)) as i32;
         let width = (7 * text.chars().count() as i32 + 8) * SCALE;
-        let ends = x + width > WIDTH;
+        let ends = x + width > page;
         let (from, to) = if ends { (x - width, x) } else { (x, x + width) };
         let row = rows.iter().position(|end| *end <= from).unwrap_or(rows.len());
         if row == rows.len() {
