@@ -94,6 +94,9 @@ enum Command {
     ///
     /// An experiment that is refused is named there and on standard error; the others run.
     Report {
+        /// Which experiments: all, after the printed values of both sources; or those values alone
+        #[arg(long, value_enum, default_value = "all")]
+        of: report::Of,
         #[command(flatten)]
         input: Input,
         /// Folder of the page
@@ -156,7 +159,7 @@ pub fn main() -> ExitCode {
             run::run(&name, file.as_deref(), &input, &part, &output)
         }
         Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
-        Some(Command::Report { input, out }) => report::report(&input, &out),
+        Some(Command::Report { of, input, out }) => report::report(of, &input, &out),
         Some(Command::IdentifyTrace { trace, input, output }) => {
             run::identify_trace(&trace, &input, &output)
         }

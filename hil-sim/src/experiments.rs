@@ -27,12 +27,12 @@ pub use sim_bench::experiment::{
 use sim_bench::{bode, steady};
 pub use sim_bench::{learning, statistics};
 use sim_lab::{
-    adc_calibration, angle_identification, dead_time, demodulators, filters, identify_continuous,
-    identify_discrete, identify_machine, identify_recursive, identify_validate, injection_map,
-    learn_reference, modulation, motor_tests, online_tracking, perturbation, pi_design,
-    plant_identification,
+    adc_calibration, angle_identification, as_printed, dead_time, demodulators, filters,
+    identify_continuous, identify_discrete, identify_machine, identify_recursive,
+    identify_validate, injection_map, learn_reference, modulation, motor_tests, online_tracking,
+    perturbation, pi_design, plant_identification, recomputed,
 };
-pub use sim_lab::{identify_trace, measured_motors, saliency, warming_rotor};
+pub use sim_lab::{identify_trace, measured_motors, saliency, source, warming_rotor};
 
 use statistics::Statistical;
 
@@ -45,6 +45,7 @@ use crate::outcome::Outcome;
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
 pub const EXPERIMENTS: &[Experiment] = &[
+    recomputed::EXPERIMENT,
     modulation::EXPERIMENT,
     filters::EXPERIMENT,
     adc_calibration::EXPERIMENT,
@@ -59,6 +60,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
+    as_printed::EXPERIMENT,
     scenario::POSITION,
     sensorless_position::EXPERIMENT,
     scenario::STEPS,
@@ -86,6 +88,30 @@ pub const EXPERIMENTS: &[Experiment] = &[
     motor_tests::EXPERIMENT,
     online_tracking::EXPERIMENT,
     measured_motors::EXPERIMENT,
+];
+
+/// The experiments that report printed values of the sources.
+pub const SOURCES: [&str; 20] = [
+    "printed-numbers",
+    "modulation",
+    "filters",
+    "adc-calibration",
+    "pi-design",
+    "plant-identification",
+    "current-step",
+    "anti-windup",
+    "dead-time",
+    "injection-map",
+    "demodulators",
+    "angle-identification",
+    "as-printed",
+    "sensorless-position",
+    "identify-discrete",
+    "identify-continuous",
+    "identify-recursive",
+    "identify-validate",
+    "identify-machine",
+    "motor-tests",
 ];
 
 /// The experiments that need an input file; they are no part of the report.

@@ -1,9 +1,9 @@
 //! The tables of the paper: what can be reproduced (T1), and which machine they were made with (T2).
 
 use hil_sim::identification::Parameters;
-use hil_sim::identification::study::{Errors, all};
+use hil_sim::identification::study::{Entry, Errors, all};
 use hil_sim::identification::trial::Noise;
-use hil_sim::outcome::{Entry, Origin};
+use hil_sim::outcome::Origin;
 use hil_sim::{Config, Outcome, experiments};
 
 const TRIALS: u64 = 60;
@@ -25,7 +25,7 @@ fn t1_tables() {
     println!("within a factor 2: {:.3}", share(&entries));
     assert!(share(&entries) >= 0.55, "{}", share(&entries));
     for e in &entries {
-        if e.model == "B" && e.h_us > 50.0 && ["tau_r", "l_s"].contains(&e.parameter) {
+        if e.model == "B" && e.case.period > 0 && ["tau_r", "l_s"].contains(&e.parameter) {
             assert!(e.within(1.6), "{e:?}");
         }
     }
@@ -131,20 +131,17 @@ fn the_json_table_has_one_row_for_every_number() {
         .to_json("identify-continuous", &Origin::new(1, &[]))
         .expect("JSON");
     let object: serde_json::Value = serde_json::from_str(&text).expect("one object");
-    let rows = object["table"].as_array().expect("rows");
-    // Twelve columns, four models, five parameters; 90 of them printed.
-    assert_eq!(rows.len(), 240);
-    assert_eq!(rows.iter().filter(|row| row["printed_pct"].is_number()).count(), 90);
-    let row = rows.iter().find(|r| {
-        r["model"] == "C" && r["signal"] == "Ss" && r["speed_rad_s"] == 61.0 && r["h_us"] == 200.0
-    });
-    let row = row.expect("a row of Table 5");
-    assert_eq!((&row["parameter"], &row["printed_pct"]), (&"r_s".into(), &9.706.into()));
-    assert!(row["ours_pct"].is_number());
+    let rows = object["compared"].as_array().expect("rows");
+    // 90 cells, and the claim about 0 to 200 rad/s.
+    assert_eq!(rows.len(), 91);
+    let row = rows.iter().find(|r| r["place"] == "Table 5, r_s" && r["quantity"] == "Ss 200 us");
+    let seeds = row.expect("a row of Table 5")["seeds"].as_array().expect("the spread").clone();
+    assert!(seeds[0].as_f64() < seeds[1].as_f64());
+    assert_eq!(object["table"][0]["title"], "Mean of both signals, speeds and all periods");
     let discrete = outcome("identify-discrete", 1);
-    assert_eq!(discrete.entries.len(), 96);
+    assert_eq!(discrete.compared.len(), 96);
     // The seed is what makes the difference.
-    let ours = |outcome: &Outcome| outcome.entries[0].ours_pct;
+    let ours = |outcome: &Outcome| outcome.compared[0].simulated;
     assert_eq!(ours(&discrete), ours(&outcome("identify-discrete", 1)));
     assert_ne!(ours(&discrete), ours(&outcome("identify-discrete", 2)));
 }

@@ -10,7 +10,6 @@ mod cli_contract;
 mod commission;
 mod common;
 mod console;
-mod dissertation_numbers;
 mod documents;
 mod full_range;
 #[path = "../../tests/common/generated.rs"]
@@ -39,6 +38,7 @@ mod same_json;
 mod scenarios;
 mod shards;
 mod shown_commands;
+mod sources;
 mod starts_after_a_run;
 mod torque_limit;
 mod torque_rise;

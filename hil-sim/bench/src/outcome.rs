@@ -19,8 +19,8 @@ pub struct Outcome {
     pub steps: Option<Vec<Step>>,
     /// Tables, in the order in which they are to be read.
     pub tables: Vec<Table>,
-    /// Printed numbers and ours, one an entry; where there are any they are the `table` of the JSON.
-    pub entries: Vec<Entry>,
+    /// Printed values of the sources, and ours.
+    pub compared: Vec<Compared>,
     /// Figures, likewise.
     pub figures: Vec<Figure>,
     /// Texts to be read as they are, line by line, with their titles.
@@ -111,34 +111,57 @@ pub struct Step {
     pub angle_error_mean_deg: f64,
 }
 
-/// The error of one estimated parameter, as printed in the source (if it is) and as found here.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Entry {
-    /// `A` to `D` or `S`.
-    pub model: &'static str,
-    /// `Sg` or `Ss`.
-    pub signal: &'static str,
-    /// Electrical rad/s.
-    pub speed_rad_s: f64,
-    /// Sampling period, µs.
-    pub h_us: f64,
-    /// `r_s`, `tau_r`, `sigma_l_s`, `l_s`, `omega_m`, or a coefficient like `f_1a`.
-    pub parameter: &'static str,
-    /// Printed error, %.
-    pub printed_pct: Option<f64>,
-    /// Our error, %.
-    pub ours_pct: f64,
+/// A printed value of a source beside ours, in the printed unit.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Compared {
+    /// `S0` or `S1`.
+    pub source: &'static str,
+    /// Where it is printed: `Eq. 3.20`, `Table 6, 1.5 A`.
+    pub place: String,
+    /// Its symbol or name.
+    pub quantity: String,
+    /// From the source's own numbers.
+    pub recomputed: Option<f64>,
+    /// From the drive, or the method of the source, on the simulated motor.
+    pub simulated: Option<f64>,
+    /// The least and the largest over seeds, of a mean over random runs.
+    pub seeds: Option<[f64; 2]>,
+    /// What the program takes for it.
+    pub used: Option<f64>,
+    /// A reason for a relative difference, and the largest of it.
+    pub but: Option<(&'static str, f64)>,
+    /// What the source does not state, where the value cannot be known for that.
+    pub unknown: Option<&'static str>,
 }
 
-impl Entry {
-    /// Ours over printed.
-    pub fn ratio(&self) -> Option<f64> {
-        self.printed_pct.map(|printed| self.ours_pct / printed)
+impl Compared {
+    /// A value of a source, with nothing beside it.
+    pub fn with(
+        source: &'static str,
+        place: impl Into<String>,
+        quantity: impl Into<String>,
+    ) -> Self {
+        Self { source, place: place.into(), quantity: quantity.into(), ..Self::default() }
     }
 
-    /// Whether ours and printed differ by no more than this factor.
-    pub fn within(&self, factor: f64) -> bool {
-        self.ratio().is_some_and(|ratio| ratio <= factor && ratio * factor >= 1.0)
+    /// With the value from the source's own numbers.
+    pub fn recomputed(self, value: f64) -> Self {
+        Self { recomputed: Some(value), ..self }
+    }
+
+    /// With what the program takes for it.
+    pub fn used(self, value: f64) -> Self {
+        Self { used: Some(value), ..self }
+    }
+
+    /// With the value from the simulated motor.
+    pub fn simulated(self, value: f64) -> Self {
+        Self { simulated: Some(value), ..self }
+    }
+
+    /// The value to be judged: the recomputed one, the simulated one, or what the program takes.
+    pub fn value(&self) -> Option<f64> {
+        self.recomputed.or(self.simulated).or(self.used)
     }
 }
 

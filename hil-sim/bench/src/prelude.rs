@@ -6,6 +6,6 @@ pub use crate::experiment::{
     BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
     assumptions,
 };
-pub use crate::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
+pub use crate::outcome::{Cell, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
 pub use crate::rig::{RATE_HZ, Rig};
 pub use crate::stats::Stats;

@@ -7,14 +7,16 @@ mod model;
 use std::f64::consts::{FRAC_2_PI, TAU};
 
 use drive_core::carrier::DemodulatorKind;
-use num_complex::Complex64;
-use sim_bench::bode::{Bode, frequencies, largest_pole, roots};
+use sim_bench::bode::{Bode, frequencies, largest_pole};
 use sim_bench::prelude::*;
+use sim_bench::steady::{OperatingPoint, steady_run_of};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
+use crate::demodulators::tracked;
 use crate::injection_map::PP;
+use crate::recomputed::beside;
 use measure::{Record, SLOW, StepResponses};
-use model::{Model, PRINTED_PII, Pii, TABLE_6};
+use model::{Model, Pii, TABLE_6_A};
 
 /// Section 3.11.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -30,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;
 /// The printed zero with the digit that seems to be lost.
-const LIKELY_PII: Pii = Pii { z_s: 0.99, ..PRINTED_PII };
+const LIKELY_Z_S: f64 = 0.99;
 /// Gain of band-pass and post-processing filter at dc.
 const LEAK: f64 = 0.0100 * PP;
 
@@ -59,25 +61,25 @@ impl IdentifiedPoint {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Demodulation, f64)> =
-        DEMODULATIONS.iter().flat_map(|s| TABLE_6.iter().map(move |row| (s, row.0))).collect();
+        DEMODULATIONS.iter().flat_map(|s| TABLE_6_A.iter().map(move |&iq| (s, iq))).collect();
     let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {
         let rig = || measure::oriented(context.config, demodulation.demodulator, iq, context.seed);
         let (record, steps) = (measure::sequence(rig()?)?, measure::steps(rig()?)?);
         Ok(IdentifiedPoint { models: Model::identify(&record)?, record, steps })
     })?;
-    let all = || DEMODULATIONS.iter().zip(points.chunks(TABLE_6.len()));
+    let all = || DEMODULATIONS.iter().zip(points.chunks(TABLE_6_A.len()));
 
     let mut outcome = Outcome::default();
     for (demodulation, points) in all() {
-        outcome.tables.push(identified(demodulation, points));
         metrics(&mut outcome, demodulation, points);
     }
     outcome.tables.extend(all().map(|(s, points)| gains(s, points, context.config)));
-    outcome.tables.push(controllers(all()));
+    compared(&points, &mut outcome);
+    let table = closed_loops(context, &points, &mut outcome)?;
+    outcome.tables.push(table);
     outcome.figures.extend(all().map(|(s, points)| fit_figure(s, &points[DESIGN_ROW])));
     outcome.figures.extend(all().map(|(s, points)| bode_figure(s, points)));
     outcome.figures.extend(all().map(|(s, points)| step_figure(s, points)));
-    outcome.figures.push(poles_figure(&points));
     outcome.remarks = remarks(&points);
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
@@ -85,51 +87,15 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[IdentifiedPoint]) {
     let m = &mut outcome.metrics;
-    for ((iq, ..), p) in TABLE_6.iter().zip(points) {
+    for (iq, p) in TABLE_6_A.iter().zip(points) {
         let name = |what: &str| format!("{}_{what}_iq_{iq}a", demodulation.name);
         m.set(name("fit_pct"), p.models[1].fit(&p.record).1);
         m.set(name("static_gain_milli"), p.models[1].static_gain() * 1e3);
         m.set(name("held_gain_milli"), p.held_gain() * 1e3);
         m.set(name("slow_gain_milli"), p.slow_gain() * 1e3);
     }
-}
-
-fn complex(pole: Complex64) -> String {
-    format!("{:.4} {} j{:.4}", pole.re, if pole.im < 0.0 { '-' } else { '+' }, pole.im.abs())
-}
-
-fn poles_text(model: &Model) -> String {
-    match model.poles() {
-        [p, _] if p.im != 0.0 => format!("{:.4} ± j{:.4}", p.re, p.im.abs()),
-        [p, q] => format!("{}, {}", complex(p), complex(q)),
-    }
-}
-
-fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table {
-    let gain = format!("static gain ({} / rad)", demodulation.unit());
-    let title = format!("Eq. 3.43 for {}, beside Table 6", demodulation.name);
-    let rows = points.iter().enumerate().map(|(row, p)| {
-        let [equation, model] = &p.models;
-        let printed = Model::printed(row);
-        [
-            ("iq (A)", Cell::fixed(TABLE_6[row].0, 1)),
-            ("k_φ × 10⁵", Cell::fixed(model.k * 1e5, 3)),
-            ("printed", Cell::fixed(printed.k * 1e5, 3)),
-            ("ratio", Cell::fixed(model.k / printed.k, 2)),
-            ("poles", Cell::from(poles_text(model))),
-            ("printed poles", Cell::from(poles_text(&printed))),
-            (&gain, Cell::fixed(model.static_gain() * 1e3, 1)),
-            ("printed (mA/rad)", Cell::fixed(printed.static_gain() * 1e3, 1)),
-            ("ratio of gains", Cell::fixed(model.static_gain() / printed.static_gain(), 2)),
-            ("fit (%)", Cell::fixed(model.fit(&p.record).1, 1)),
-            ("fit of equation error (%)", Cell::fixed(equation.fit(&p.record).1, 1)),
-        ]
-    });
-    Table::new(title, &[]).records(rows).note(
-        "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
-         least squares of Appendix A fits, which with noise on the output shifts poles and gain. Fit: \
-         100 % less rms error over rms signal, of the simulated output.",
-    )
+    let design = &points[DESIGN_ROW];
+    m.set(format!("{}_held_over_slow", demodulation.name), design.held_gain() / design.slow_gain());
 }
 
 /// The gains of the axis alone and of axis and current together, measured and predicted.
@@ -157,7 +123,7 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
     let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
     let inductance = config.motor.l_ls + config.motor.l_lr; // near sigma L_s
     let carrier = f64::from(config.drive.carrier_v()) / (TAU * 600.0 * inductance);
-    for ((iq, ..), p) in TABLE_6.iter().zip(points) {
+    for (iq, p) in TABLE_6_A.iter().zip(points) {
         let length = id.hypot(*iq);
         let cos_2_gamma = (id * id - iq * iq) / (length * length);
         let flux_part = 2.0 * s.a_psi.abs();
@@ -185,48 +151,6 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
     table
 }
 
-/// The controllers on the identified plants.
-fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedPoint])>) -> Table {
-    let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &[]).note(
-        "Largest magnitude of the poles of (z − 1)² (z − p₁)(z − p₂) + k_s k_φ (z − z_s); above 1 the loop \
-         is unstable. Design: the fastest with its zero at a quarter of the crossover and a sensitivity peak of 2 at \
-         most, on the plant at 1.5 A, as in the source; the printed k_s is in rad/A and says nothing for the synchronous signal.",
-    );
-    let printed: Vec<Model> = (0..TABLE_6.len()).map(Model::printed).collect();
-    let mut rows = |name: &str, plants: &[Model], in_amperes: bool| {
-        let design = plants[DESIGN_ROW].design();
-        for ((iq, ..), plant) in TABLE_6.iter().zip(plants) {
-            let with = |pii: Pii| largest_pole(&plant.closed_loop(pii));
-            let as_printed = |pii| Cell::fixed_or_dash(in_amperes.then(|| with(pii)), 5);
-            let here = design.filter(|_| *iq == TABLE_6[DESIGN_ROW].0);
-            let poles = here.map(|(pii, _)| roots(&plant.closed_loop(pii))).map(|poles| {
-                let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
-                upper.collect::<Vec<_>>().join(", ")
-            });
-            table.record([
-                ("plant", Cell::from(name)),
-                ("iq (A)", Cell::fixed(*iq, 1)),
-                ("largest pole, printed k_s, z_s = 0.90", as_printed(PRINTED_PII)),
-                ("printed k_s, z_s = 0.99", as_printed(LIKELY_PII)),
-                ("designed for 1.5 A", Cell::fixed_or_dash(design.map(|(pii, _)| with(pii)), 5)),
-                (
-                    "k_s (rad per signal)",
-                    Cell::or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
-                ),
-                ("z_s", Cell::fixed_or_dash(here.map(|(pii, _)| pii.z_s), 4)),
-                ("crossover (Hz)", Cell::fixed_or_dash(here.map(|(_, w)| w * RATE_HZ / TAU), 1)),
-                ("poles of the design", Cell::or_dash(poles.map(Cell::from))),
-            ]);
-        }
-    };
-    rows("Table 6", &printed, true);
-    for (demodulation, points) in all {
-        let plants: Vec<Model> = points.iter().map(|p| p.models[1]).collect();
-        rows(demodulation.name, &plants, demodulation.demodulator != DemodulatorKind::Synchronous);
-    }
-    table
-}
-
 fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
     let shown = (0.5 * RATE_HZ) as usize;
     let line = |y: &[f64]| {
@@ -250,13 +174,13 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
     // In thousandths, as the signals are printed.
     let scaled = |m: Model| Model { k: m.k * 1e3, ..m };
-    let models: Vec<(String, Model)> = TABLE_6
+    let models: Vec<(String, Model)> = TABLE_6_A
         .iter()
         .zip(points)
-        .map(|((iq, ..), p)| (format!("{iq} A"), scaled(p.models[1])))
+        .map(|(iq, p)| (format!("{iq} A"), scaled(p.models[1])))
         .chain(
-            (demodulation.demodulator != DemodulatorKind::Synchronous)
-                .then(|| ("Table 6, 1.5 A".into(), scaled(Model::printed(DESIGN_ROW)))),
+            (0..TABLE_6_A.len())
+                .map(|row| (format!("Table 6, {} A", TABLE_6_A[row]), scaled(Model::printed(row)))),
         )
         .collect();
     let (gain, phase) =
@@ -269,7 +193,7 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
 fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
     let panel = |of: &str, pick: fn(&IdentifiedPoint) -> &Vec<f64>| {
         let y = format!("{of} ({} / rad)", demodulation.unit());
-        TABLE_6.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, ((iq, ..), p)| {
+        TABLE_6_A.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, (iq, p)| {
             // Over a carrier period: the rest is ripple.
             let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
             let line = pick(p)
@@ -286,22 +210,94 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         .panel(panel("with the current", |p| &p.steps.with_current))
 }
 
-fn poles_figure(points: &[IdentifiedPoint]) -> Figure {
-    let turns = (0..=60).map(|n| 0.004 * f64::from(n - 30));
-    let arc = turns.map(|x| (x.cos(), x.sin())).collect();
-    let mut panel = Panel::new("real part", "imaginary part").equal_axes();
-    let mut add = |name: &str, plant: Model, pii: Option<Pii>| {
-        let poles = pii.map(|pii| roots(&plant.closed_loop(pii)));
-        let points = poles.iter().flatten().map(|p| (p.re, p.im)).collect();
-        panel.series.push(Series::points(name, points));
-    };
-    add("Table 6, printed controller", Model::printed(DESIGN_ROW), Some(PRINTED_PII));
-    for (demodulation, points) in DEMODULATIONS.iter().zip(points.chunks(TABLE_6.len())) {
-        let plant = points[DESIGN_ROW].models[1];
-        add(&format!("{}, designed", demodulation.name), plant, plant.design().map(|d| d.0));
+/// Table 6 and Eq. 3.44: what the printed chain gives on the simulated motor, and a design for the printed plant.
+fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
+    let unknown = Some("the saliency of its motor and the amplitude of the sequence");
+    for (iq, point) in TABLE_6_A.iter().zip(points) {
+        let model = point.models[1];
+        let [pole, _] = model.poles();
+        for (quantity, value) in [("k_phi", 1e5 * model.k), ("Re p", pole.re), ("Im p", pole.im)] {
+            let ours = beside(&format!("Table 6, {iq:.1} A"), quantity);
+            outcome.compared.push(Compared { unknown, ..ours }.simulated(value));
+        }
     }
-    panel.series.push(Series::limit("unit circle", arc));
-    Figure::new("poles", "Poles of the closed loop at iq = 1.5 A", "Eq. 3.44").panel(panel)
+    let plant = Model::printed(DESIGN_ROW);
+    let largest = |pii: Pii| largest_pole(&plant.closed_loop(pii));
+    let stable = Stats::of((0..TABLE_6_A.len()).map(|row| {
+        largest_pole(&Model::printed(row).closed_loop(Pii { z_s: LIKELY_Z_S, ..Pii::printed() }))
+    }));
+    outcome.metrics.set("table_6_printed_pii_largest_pole", largest(Pii::printed()));
+    outcome.metrics.set("table_6_z_s_099_largest_pole", stable.largest());
+    if let Some((design, _)) = plant.design() {
+        outcome.compared.push(beside("Eq. 3.44", "k_s").recomputed(design.k_s));
+        outcome.compared.push(beside("Eq. 3.44", "z_s").recomputed(design.z_s));
+    }
+    let fit = fits(points.get(..TABLE_6_A.len()).unwrap_or_default());
+    outcome.metrics.set("literal_fit_least_pct", fit.0);
+    outcome.metrics.set("literal_fit_most_pct", fit.1);
+    let claims = [
+        (
+            "Eq. 3.43",
+            "two poles and no zero predict the current difference satisfactorily",
+            fit.0 > 80.0,
+        ),
+        (
+            "section 3.11",
+            "the controller PII is adjusted for the function identified at 1.5 A",
+            largest(Pii::printed()) < 1.0,
+        ),
+    ];
+    outcome.compared.extend(
+        claims.map(|(place, claim, holds)| beside(place, claim).simulated(f64::from(holds))),
+    );
+}
+
+/// Controllers in the closed loop: over the steps of Figure 38, and at constant speed.
+fn closed_loops(
+    context: &Context<'_>,
+    points: &[IdentifiedPoint],
+    outcome: &mut Outcome,
+) -> Result<Table, Error> {
+    let design = |model: &Model| model.design().map(|(pii, _)| pii);
+    let (literal, rectified) = (DESIGN_ROW, TABLE_6_A.len() + DESIGN_ROW);
+    let likely = Pii { z_s: LIKELY_Z_S, ..Pii::printed() };
+    let cases = [
+        ("rectified", "its own plant", "designed", RECTIFIED, design(&points[rectified].models[1])),
+        ("rectified", "printed", "printed", RECTIFIED, Some(Pii::printed())),
+        ("rectified", "z_s = 0.99", "z_s_099", RECTIFIED, Some(likely)),
+        ("rectified", "Table 6", "table_6", RECTIFIED, design(&Model::printed(DESIGN_ROW))),
+        ("literal", "its own plant", "literal", LITERAL, design(&points[literal].models[1])),
+    ];
+    let runs = context.in_parallel("closed loops", &cases, |_, (.., demodulation, pii)| {
+        let pii = pii.ok_or_else(|| Error::Refused("no controller fits the plant".to_owned()))?;
+        let config = demodulation.config(context.config);
+        let mut drive = config.drive;
+        (drive.injection.printed.k_s, drive.injection.printed.z_s) =
+            (pii.k_s as f32, pii.z_s as f32);
+        let at = |rpm| {
+            let case = OperatingPoint { rpm, iq: TABLE_6_A[DESIGN_ROW], seed: context.seed };
+            steady_run_of(&drive, &config, case, 1.0)
+        };
+        Ok((tracked::steps(&drive, &config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
+    })?;
+    let mut table = Table::new("Controllers in the closed loop, constant reference of 10 mA", &[]);
+    for ((name, from, key, ..), (steps, turning, pii)) in cases.iter().zip(&runs) {
+        let shown =
+            |lost: bool, value: f64| if lost { "lost".into() } else { Cell::fixed(value, 1) };
+        outcome.metrics.set(format!("pii_{key}_steps_lost"), f64::from(steps.lost));
+        outcome.metrics.set(format!("pii_{key}_steps_rms_deg"), steps.stats.rms());
+        table.record([
+            ("chain", Cell::from(*name)),
+            ("designed for", Cell::from(*from)),
+            ("k_s (rad/A)", Cell::significant(pii.k_s, 3)),
+            ("z_s", Cell::fixed(pii.z_s, 4)),
+            ("Figure 38, rms (°)", shown(steps.lost, steps.stats.rms())),
+            ("largest (°)", shown(steps.lost, steps.stats.largest())),
+            ("0 rpm, rms (°)", shown(turning[0].lost, turning[0].error.rms())),
+            ("150 rpm, rms (°)", shown(turning[1].lost, turning[1].error.rms())),
+        ]);
+    }
+    Ok(table)
 }
 
 /// Smallest and largest fit of Eq. 3.43, %.
@@ -321,7 +317,7 @@ fn distance(points: &[IdentifiedPoint]) -> f64 {
 }
 
 fn remarks(points: &[IdentifiedPoint]) -> Vec<String> {
-    let mut all = points.chunks(TABLE_6.len());
+    let mut all = points.chunks(TABLE_6_A.len());
     let literal = all.next().unwrap_or_default();
     let [first, second] = [literal, all.next().unwrap_or_default()].map(fits);
     vec![

@@ -2,7 +2,7 @@
 
 pub(super) mod demodulation;
 mod signal;
-mod tracked;
+pub(super) mod tracked;
 
 use rayon::prelude::*;
 use sim_bench::prelude::*;
@@ -73,7 +73,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let all = || DEMODULATIONS.iter().zip(&found);
-    outcome.tables.push(summary(all()));
     outcome.tables.push(seen_table(all()));
     outcome.tables.push(tracked_table(&found));
     outcome.figures.extend(all().map(|(demodulation, f)| map_figure(demodulation, f)));
@@ -96,6 +95,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             }
         }
     }
+    let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
+    let promising = Compared::with("S1", "section 5.2", "detection of the envelope is promising");
+    outcome.compared.push(promising.simulated(f64::from(envelope)));
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
@@ -154,39 +156,6 @@ fn findings(
 
 fn degrees(radians: f64) -> f64 {
     radians.to_degrees().abs()
-}
-
-/// One line for each.
-fn summary<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
-    let mut table = Table::new("Summary", &["demodulation", "in one line"]);
-    for (demodulation, f) in all {
-        let (seen, share) = (f.at_one_ampere().0, f.isotropic_share());
-        let sees = match f.delay {
-            None => "blind: the same signal on a motor without saliency".to_owned(),
-            Some(delay) => format!(
-                "sees the saliency ({:.0} % of the signal without one), noise {:.1}°, delay {delay:.1} \
-                 samples",
-                100.0 * share,
-                degrees(seen.noise / seen.slope)
-            ),
-        };
-        let closed = |t: &Option<ClosedLoop>| match t {
-            None => "-".to_owned(),
-            Some(t) if t.steps.lost => "lost".to_owned(),
-            Some(t) => format!("{:.1}°", t.steps.stats.rms()),
-        };
-        let [constant, learned, retuned] = &f.tracked;
-        table.row([
-            Cell::from(demodulation.name),
-            Cell::from(format!(
-                "{sees}; torque steps, constant / learned / learned and retuned: {} / {} / {} rms",
-                closed(constant),
-                closed(learned),
-                closed(retuned)
-            )),
-        ]);
-    }
-    table
 }
 
 fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {

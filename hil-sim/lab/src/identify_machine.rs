@@ -2,8 +2,9 @@
 
 use sim_bench::prelude::*;
 
-use crate::identification::Parameters;
 use crate::identification::ratios::{self, Ratio};
+use crate::identification::{Parameters, claims};
+use crate::source;
 
 /// Numbers that do not depend on the noise.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -52,6 +53,15 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]
     });
     outcome.tables.push(Table::new("Machines", &[]).records(machines));
+    let px = Parameters::PX;
+    outcome.metrics.set("px_r_s_over_sigma_l_s", px.r_s / px.sigma_l_s);
+    outcome.metrics.set("px_tau_r_s", px.tau_r);
+    for (table, name) in [("Table 6", "tau_r_60_hz"), ("Table 7", "tau_r_10_hz")] {
+        let [ours, rbv] =
+            ["Sg", "rbv"].map(|row| source::number("S0", &format!("{table}, {row}"), "tau_r"));
+        outcome.metrics.set(format!("{name}_below_rbv_pct"), 100.0 * (1.0 - ours / rbv));
+    }
+    claims::add(&mut outcome.compared, &mut outcome.metrics);
     outcome.remark(
         "The simulated tables were not made with the machine of Table 6 (rbv). PX is inferred from \
          the tables; the paper does not name it. Errors in % do not depend on the level of voltage \

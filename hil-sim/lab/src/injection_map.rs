@@ -4,6 +4,8 @@ use drive_core::Command;
 use drive_core::carrier::DemodulatorKind;
 use sim_bench::prelude::*;
 
+use crate::recomputed::printed;
+
 /// Gain of the post-processing filter at dc.
 pub(super) const PP: f64 = 0.944_061;
 
@@ -74,7 +76,11 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
-        let panel = panel("Δi (mA)", &IQ_A, family);
+        let level = printed("Figure 19", "current difference at which the curves meet, about");
+        let ends = |level: f64| vec![(-180.0, level), (180.0, level)];
+        let panel = panel("Δi (mA)", &IQ_A, family)
+            .with(Series::limit("printed at ±90°", ends(level)))
+            .with(Series::limit("", ends(-level)));
         outcome.figures.push(Figure::new(variant.name, variant.title, "Figure 19").panel(panel));
         for (iq, curve) in [(IQ_A[2], &family[2]), (IQ_A[4], &family[4])] {
             let name = format!("{}_at_90_deg_iq_{iq}a_ma", variant.name);
@@ -87,6 +93,47 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let same =
         Stats::of(isotropic.iter().flatten().zip(silent.iter().flatten()).map(|(a, b)| a.1 - b.1));
     outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
+    // The curves of the printed chain meet at ±90° and are zero at the arc tangent, on a motor without saliency.
+    let id = f64::from(context.config.drive.i_d());
+    let at_90 =
+        |degrees: f64| Stats::of(isotropic[1..].iter().map(|curve| at(curve, degrees).abs()));
+    let meet = [-90.0, 90.0].map(|degrees| at_90(degrees).mean());
+    let off = IQ_A
+        .iter()
+        .zip(isotropic)
+        .map(|(iq, curve)| (zero(curve).abs() - (iq / id).atan().to_degrees()).abs());
+    let largest_off = off.fold(0.0, f64::max);
+    outcome.metrics.set("zero_off_the_arc_tangent_deg", largest_off);
+    let spread = |degrees| {
+        isotropic[1..]
+            .iter()
+            .map(|curve| (at(curve, degrees).abs() / meet[0] - 1.0).abs())
+            .fold(0.0, f64::max)
+    };
+    let meets = |degrees: f64| if spread(degrees) < 0.05 { degrees } else { f64::NAN };
+    let holds = "the zero of the current difference lies at the arc tangent of i_q,ref/i_d,ref";
+    // LPF as printed makes the currents larger than their references by as much as PP takes away.
+    let leak = meet[1] / PP;
+    for (quantity, value) in [
+        (
+            "angle of the zero of the current difference without quadrature current",
+            zero(&isotropic[0]),
+        ),
+        ("angle at which the curves meet, positive", meets(90.0)),
+        ("angle at which the curves meet, negative", meets(-90.0)),
+        ("current difference at which the curves meet, about", leak),
+        (holds, f64::from(largest_off < 2.0)),
+    ] {
+        outcome.compared.push(Compared::with("S1", "Figure 19", quantity).simulated(value));
+    }
+    let rectified = &curves[3 * IQ_A.len()..4 * IQ_A.len()];
+    let errors =
+        rectified[2..].iter().map(|curve| (at(curve, 90.0) / at(&rectified[2], 90.0) - 1.0).abs());
+    let constant = errors.fold(0.0, f64::max);
+    outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
+    let constant = Compared::with("S1", "section 3.3", "at the reference of convergence the quadrature current does not affect the current difference")
+        .simulated(f64::from(constant < 0.2));
+    outcome.compared.push(constant);
     outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
          zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \

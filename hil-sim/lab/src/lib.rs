@@ -4,6 +4,7 @@
 
 pub mod adc_calibration;
 pub mod angle_identification;
+pub mod as_printed;
 pub mod dead_time;
 pub mod demodulators;
 pub mod filters;
@@ -24,5 +25,7 @@ pub mod online_tracking;
 pub mod perturbation;
 pub mod pi_design;
 pub mod plant_identification;
+pub mod recomputed;
 pub mod saliency;
+pub mod source;
 pub mod warming_rotor;

@@ -20,22 +20,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// A row of Table 2: name, states of the legs, phase voltages in thirds, line voltages; all over the
-/// dc link.
-type Row = (&'static str, [u8; 3], [i8; 3], [i8; 3]);
-
-/// Table 2 as printed.
-const TABLE_2: [Row; 8] = [
-    ("O_000", [0, 0, 0], [0, 0, 0], [0, 0, 0]),
-    ("U_0", [1, 0, 0], [2, -1, -1], [1, 0, -1]),
-    ("U_60", [1, 1, 0], [1, 1, -2], [0, 1, -1]),
-    ("U_120", [0, 1, 0], [-1, 2, -1], [-1, 1, 0]),
-    ("U_180", [0, 1, 1], [-2, 1, 1], [-1, 0, 1]),
-    ("U_240", [0, 0, 1], [-1, -1, 2], [0, -1, 1]),
-    ("U_300", [1, 0, 1], [1, -2, 1], [1, -1, 0]),
-    ("O_111", [1, 1, 1], [0, 0, 0], [0, 0, 0]),
-];
-
 /// The modulator of the drive on this dc link.
 struct Inverter {
     modulator: Modulator,
@@ -74,41 +58,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     outcome.figures.push(vectors(&inverter));
     outcome.figures.push(sequence(&inverter));
-    let table = table_2(&mut outcome);
-    outcome.tables.push(table);
     let table = accuracy(&inverter, &mut outcome);
     outcome.tables.push(table);
     carrier::add(context, &mut outcome);
     Ok(outcome)
-}
-
-/// Phase and line voltages of the eight states, computed from the states of the legs.
-fn table_2(outcome: &mut Outcome) -> Table {
-    let mut table = Table::new("Table 2, voltages over the dc link", &[]);
-    let mut differences = 0;
-    for (name, legs, phases, lines) in TABLE_2 {
-        let [a, b, c] = legs.map(|leg| leg as i8);
-        let computed = [2 * a - b - c, 2 * b - a - c, 2 * c - a - b];
-        let line = [a - b, b - c, c - a];
-        let agrees = computed == phases && line == lines;
-        differences += u32::from(!agrees);
-        let (alpha, beta) = clarke([a, b, c].map(f64::from));
-        let length = alpha.hypot(beta);
-        let angle = beta.atan2(alpha).to_degrees().rem_euclid(360.0);
-        let join =
-            |values: [i8; 3]| values.map(|v| v.to_string()).join(" ").replace('-', "\u{2212}");
-        table.record([
-            ("vector", Cell::from(name)),
-            ("a b c", Cell::from(join([a, b, c]))),
-            ("va vb vc (thirds)", Cell::from(join(computed))),
-            ("vab vbc vca", Cell::from(join(line))),
-            ("angle (°)", if length > 0.0 { Cell::fixed(angle, 0) } else { Cell::from("-") }),
-            ("length", Cell::fixed(length, 4)),
-            ("as printed", Cell::from(if agrees { "yes" } else { "no" })),
-        ]);
-    }
-    outcome.metrics.set("table_2_differences", f64::from(differences));
-    table
 }
 
 /// Figure 4, and where the modulator puts voltages that are too long.
@@ -226,10 +179,9 @@ mod tests {
     use sim_bench::config::Config;
 
     #[test]
-    fn table_2_and_the_sequence_agree_with_the_modulator() {
+    fn the_modulator_gives_the_voltage_asked_for() {
         let outcome = EXPERIMENT.outcome(&Config::default(), 1).unwrap();
         let metric = |name: &str| outcome.metrics.get(name).unwrap();
-        assert_eq!(metric("table_2_differences"), 0.0);
         assert!(metric("voltage_error_max_v") < 0.05);
         assert!(metric("on_time_difference_max_us") < 0.03);
         assert!((metric("sideband_over_signal") - 0.5).abs() < 1e-6);

@@ -1,10 +1,8 @@
 //! The design of the current controllers in the w plane, and its margins with everything that is
 //! really in the loop.
 
-mod differences;
-
 use drive_core::FirstOrder;
-use drive_core::filter::LPF;
+use drive_core::filter::{BPF, LPF};
 use drive_settings::tuning::{
     CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
@@ -12,6 +10,8 @@ use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use sim_bench::outcome::Style;
 use sim_bench::prelude::*;
+
+use crate::recomputed::{PERIOD_S, beside, plant, printed};
 
 /// Figures 23 to 25, section 3.8.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -24,37 +24,24 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-const PERIOD_S: f64 = 1.0 / RATE;
-
-/// An identified plant (A/V) and the printed controller for it.
-struct Identified {
-    name: &'static str,
-    key: &'static str,
-    plant: FirstOrder,
-    /// Crossover (fictitious, Hz), z_c, k_c.
-    printed: Option<[f64; 3]>,
-}
-
-#[rustfmt::skip] // a plant a line
-const IDENTIFIED: [Identified; 3] = [
-    Identified { name: "Eq. 3.34", key: "motor", plant: FirstOrder { k: 0.0040532, p: 0.93916 }, printed: Some([204.5, 0.94786, 52.48]) },
-    Identified { name: "Eq. 3.41, d axis", key: "d", plant: FirstOrder { k: 0.002837, p: 0.9511 }, printed: None },
-    Identified { name: "Eq. 3.42, q axis", key: "q", plant: FirstOrder { k: 0.003721, p: 0.9503 }, printed: None },
+/// The identified plants: where they are printed, the name in the tables and the one of the metrics.
+const PLANTS: [(&str, &str, &str); 3] = [
+    ("Eq. 3.34", "Eq. 3.34", "motor"),
+    ("Eq. 3.41", "Eq. 3.41, d axis", "d"),
+    ("Eq. 3.42", "Eq. 3.42, q axis", "q"),
 ];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let motor = context.config.drive.motor.into();
     let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
-    let rules = IDENTIFIED.map(|i| rule_3_8(i.plant, PERIOD_S).map(|rule| (i, rule)));
-    let rules = rules.into_iter().collect::<Result<Vec<_>, _>>().map_err(Error::refused)?;
-    outcome.figures.push(w_plane(IDENTIFIED[0].plant, rules[0].1));
-    outcome.tables.push(rule_table(&rules));
+    let mut rules = Vec::new();
     let mut designs = Vec::new();
-    for (identified, rule) in &rules {
-        let design =
-            design_current_loop(identified.plant, physical, PERIOD_S).map_err(Error::refused)?;
-        for (name, value) in [
+    for (place, name, key) in PLANTS {
+        let identified = plant(place);
+        let rule = rule_3_8(identified, PERIOD_S).map_err(Error::refused)?;
+        let design = design_current_loop(identified, physical, PERIOD_S).map_err(Error::refused)?;
+        for (metric, value) in [
             ("kc_v_per_a", rule.k_c),
             ("zc", rule.z_c),
             ("crossover_fictitious_hz", hz(rule.v)),
@@ -64,19 +51,32 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("phase_margin_deg", design.margins.phase_margin_deg),
             ("ms", design.margins.ms),
         ] {
-            outcome.metrics.set(format!("{}_{name}", identified.key), value);
+            outcome.metrics.set(format!("{key}_{metric}"), value);
         }
-        designs.push((identified.name, design));
+        rules.push((name, identified, rule));
+        designs.push((name, design));
     }
+    outcome.figures.push(w_plane(rules[0].1, rules[0].2));
     outcome.tables.push(margin_table(&designs));
     outcome.figures.push(real_loop(&designs[1].1, physical));
-    outcome.tables.push(differences::table(&motor, physical));
+    // Section 2.5: the crossover of the rule beside the lower edge of BPF.
+    let edges = crate::filters::edges_hz(&BPF, -0.6);
+    outcome.metrics.set("bpf_lower_edge_hz", edges[0]);
+    outcome.metrics.set("bpf_upper_edge_hz", edges[1]);
+    let rule = rules[0].2;
+    let gain = -20.0 * rule.k_c.log10();
+    let at = "gain with the zero at the crossover";
+    outcome.compared.push(beside("Figure 24", "crossover, fictitious").recomputed(hz(rule.v)));
+    outcome.compared.push(beside("Figure 25", at).recomputed(gain));
+    let below = "the closed current loop crosses over below the lower edge of the pass band of BPF";
+    let holds = hz(rule.v) < edges[0];
+    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(f64::from(holds)));
     outcome.remarks.push(format!(
         "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
          its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 hold a slip \
          of a factor {:.2}. The gain k_FTD survives it because the factor cancels.",
         -physical.p.ln() * RATE / std::f64::consts::TAU,
-        physical.k / (1.0 - physical.p) / 0.01973,
+        physical.k / (1.0 - physical.p) / printed("Eq. 3.20", "k_FT"),
     ));
     Ok(outcome)
 }
@@ -101,38 +101,22 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
     let at = |low, high| {
         Series::limit("crossover by the rule", vec![(hz(rule.v), low), (hz(rule.v), high)])
     };
+    let marks = |marks: [(&str, &str); 2], hz: f64| {
+        let values = marks.map(|(place, quantity)| (hz, printed(place, quantity)));
+        Series::points("printed", values.to_vec())
+    };
+    let hz = printed("Figure 24", "crossover, fictitious");
+    let gains = marks([("Figure 25", "gain with the zero at the crossover"); 2], hz);
+    let phases = marks(
+        [
+            ("section 3.8", "phase desired at the crossover"),
+            ("section 3.8", "phase of the plant with integrator at the crossover"),
+        ],
+        hz,
+    );
     Figure::new("w-plane", "Identified plant of Eq. 3.34 in the w plane", "Figures 23, 24, 25")
-        .panel(gain.y_range(-100.0, 20.0).with(at(-100.0, 20.0)))
-        .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)))
-}
-
-fn rule_table(rules: &[(Identified, RuleDesign)]) -> Table {
-    let heads = ["plant", "", "crossover v (Hz)", "zc = pf", "kc (V/A)", "phase of L at v (°)"];
-    let mut table = Table::new("Rule of section 3.8", &heads);
-    for (Identified { name, plant, printed, .. }, rule) in rules {
-        let phase = |v_hz: f64, z_c: f64| {
-            let w = 2.0 * (v_hz * std::f64::consts::PI * PERIOD_S).atan();
-            (pi_response(1.0, z_c, w) * plant.response(w)).arg().to_degrees()
-        };
-        let mut row = |how: &str, [v, z_c, k_c]: [f64; 3], decimals: [usize; 2]| {
-            table.row([
-                Cell::from(*name),
-                Cell::from(how),
-                Cell::fixed(v, 2),
-                Cell::fixed(z_c, decimals[0]),
-                Cell::fixed(k_c, decimals[1]),
-                Cell::fixed(phase(v, z_c), 1),
-            ]);
-        };
-        row("computed", [hz(rule.v), rule.z_c, rule.k_c], [6, 3]);
-        if let Some(printed) = *printed {
-            row("printed", printed, [5, 2]);
-        }
-    }
-    table.note(
-        "The printed values were read off a graph; the source prints no controllers for 3.41 and \
-         3.42. Eq. 3.38 prints the zero with the wrong sign of w, which would put it at 1.055.",
-    )
+        .panel(gain.y_range(-100.0, 20.0).with(at(-100.0, 20.0)).with(gains))
+        .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)).with(phases))
 }
 
 fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
@@ -208,10 +192,10 @@ mod tests {
     #[test]
     fn controllers_of_section_3_8() {
         let expected = [(53.000, 0.947726), (66.527, 0.953803), (51.215, 0.953374)];
-        for (identified, (k_c, z_c)) in IDENTIFIED.iter().zip(expected) {
-            let rule = rule_3_8(identified.plant, PERIOD_S).unwrap();
-            assert!((rule.k_c / k_c - 1.0).abs() < 1e-4, "{}: {}", identified.name, rule.k_c);
-            assert!((rule.z_c / z_c - 1.0).abs() < 1e-4, "{}: {}", identified.name, rule.z_c);
+        for ((place, ..), (k_c, z_c)) in PLANTS.iter().zip(expected) {
+            let rule = rule_3_8(plant(place), PERIOD_S).unwrap();
+            assert!((rule.k_c / k_c - 1.0).abs() < 1e-4, "{place}: {}", rule.k_c);
+            assert!((rule.z_c / z_c - 1.0).abs() < 1e-4, "{place}: {}", rule.z_c);
         }
     }
 }

@@ -8,11 +8,12 @@ use rayon::prelude::*;
 use super::run::Run;
 use super::{say, used};
 use crate::error::Error;
-use crate::experiments::{Context, EXPERIMENTS, Experiment};
+use crate::experiments::source::evidence::Evidence;
+use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
 use crate::input::Input;
 use crate::outcome::{Origin, Outcome};
 use crate::progress::Bar;
-use crate::report;
+use crate::report::{self, Section};
 
 /// Shows which experiments are running.
 struct Running<'a> {
@@ -38,17 +39,28 @@ impl Running<'_> {
     }
 }
 
-/// Runs all experiments into one page. One that is refused or lost is named in the page and on standard error.
+/// What a page is about.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Of {
+    /// Both sources, then all experiments
+    All,
+    /// The printed values of both sources beside ours
+    Sources,
+}
+
+/// Runs all experiments, or those that repeat the sources, into one page. One that is refused or lost is named in the page and
+/// on standard error.
 ///
 /// # Errors
 /// As [`Input::config`] and [`used::check`]; [`Error::Write`]; [`Error::Incomplete`] after the page is written.
-pub fn report(input: &Input, out: &Path) -> Result<(), Error> {
-    report_of(EXPERIMENTS, input, out)
+pub fn report(of: Of, input: &Input, out: &Path) -> Result<(), Error> {
+    let is_chosen = |one: &&Experiment| of == Of::All || experiments::SOURCES.contains(&one.name);
+    report_of(&EXPERIMENTS.iter().filter(is_chosen).collect::<Vec<_>>(), of, input, out)
 }
 
-fn report_of(experiments: &[Experiment], input: &Input, out: &Path) -> Result<(), Error> {
+fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
-    used::check("report", &experiments.iter().collect::<Vec<_>>(), input)?;
+    used::check("report", experiments, input)?;
     let context = Context {
         config: &config,
         seed: input.seed,
@@ -68,11 +80,36 @@ fn report_of(experiments: &[Experiment], input: &Input, out: &Path) -> Result<()
         .map(|experiment| Run { experiment, input, config: &config, command: run(experiment) })
         .collect();
 
-    let sections: Vec<_> =
-        runs.iter().zip(&outcomes).map(|(run, outcome)| run.section(outcome)).collect();
+    let mut evidence = Evidence::default();
+    for (run, outcome) in runs.iter().zip(&outcomes) {
+        evidence.add(run.experiment.name, outcome);
+    }
+    let chapters = evidence.chapters();
+    let command = |run: &String| input.command(&format!("run {run}"), &config);
+    let commands =
+        chapters.iter().map(|chapter| chapter.runs.iter().map(command).collect::<Vec<_>>());
+    let commands: Vec<_> = commands.map(|commands| commands.join("\n")).collect();
+    let mut sections: Vec<_> = chapters
+        .iter()
+        .zip(commands)
+        .map(|(chapter, command)| Section {
+            name: &chapter.name,
+            stands_for: chapter.source,
+            about: &chapter.about,
+            command,
+            outcome: &chapter.outcome,
+        })
+        .collect();
+    if of == Of::All {
+        sections.extend(runs.iter().zip(&outcomes).map(|(run, outcome)| run.section(outcome)));
+    }
     let origin = Origin::new(input.seed, &config.changes());
-    let path = out.join("report.html");
-    let page = report::page("Induction drive: all experiments", &origin, &sections)?;
+    let (file, title) = match of {
+        Of::All => ("report.html", "Induction drive: sources and experiments"),
+        Of::Sources => ("sources.html", "Induction drive: what both sources print, beside ours"),
+    };
+    let path = out.join(file);
+    let page = report::page(title, &origin, &sections)?;
     report::write_whole(&path, &page)?;
     say(&format!("Report: {}\n", path.display()))?;
 
@@ -115,7 +152,8 @@ mod tests {
             }),
         ];
         let folder = std::env::temp_dir().join(format!("hil-sim-report-{}", std::process::id()));
-        let error = report_of(&experiments, &Input::default(), &folder).unwrap_err();
+        let experiments: Vec<_> = experiments.iter().collect();
+        let error = report_of(&experiments, Of::All, &Input::default(), &folder).unwrap_err();
         assert_eq!(error.to_string(), "2 of 3 experiments failed: refused, lost");
         assert_eq!(error.exit_code(), 1);
         let page = std::fs::read_to_string(folder.join("report.html")).unwrap();

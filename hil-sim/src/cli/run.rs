@@ -8,6 +8,7 @@ use super::part::Part;
 use super::{say, used};
 use crate::config::Config;
 use crate::error::Error;
+use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
 use crate::outcome::{self, Origin, Outcome};
@@ -66,6 +67,13 @@ impl Run<'_> {
     /// Writes the files of an outcome and prints its results; returns the JSON object if that is wanted.
     pub fn write(&self, outcome: &Outcome, output: &Output) -> Result<String, Error> {
         let name = self.experiment.name;
+        let mut whole = outcome.clone();
+        if !outcome.compared.is_empty() {
+            let mut evidence = Evidence::default();
+            evidence.add(name, outcome);
+            whole.tables.insert(0, evidence.table(&outcome.compared));
+        }
+        let outcome = &whole;
         let origin = Origin::new(self.input.seed, &self.config.changes());
         let folder = output.out.clone().or_else(|| (!output.json).then(|| OUT.into()));
         let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));

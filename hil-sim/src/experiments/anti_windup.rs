@@ -5,7 +5,7 @@ use drive_core::current::{Pi, PiState};
 use super::bode::largest_pole;
 use super::{Context, Experiment};
 use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::outcome::{Cell, Compared, Figure, Outcome, Panel, Series, Table};
 
 /// Figure 40, Eq. B.1 to B.3.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -52,6 +52,17 @@ fn literal() -> Controller {
     Box::new(move |e| {
         std::mem::swap(&mut u, &mut next);
         next = u + K_C * (e - Z_C * before);
+        before = e;
+        u
+    })
+}
+
+/// Eq. B.3 as printed: Eq. B.1 with its index, and the limited output in it.
+fn literal_limited() -> Controller {
+    let (mut u, mut next, mut before) = (0.0_f64, 0.0_f64, 0.0);
+    Box::new(move |e| {
+        std::mem::swap(&mut u, &mut next);
+        next = u.clamp(-LIMIT, LIMIT) + K_C * (e - Z_C * before);
         before = e;
         u
     })
@@ -104,11 +115,12 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ("without anti-windup", "plain", without as fn() -> Controller, immediate),
         ("with anti-windup", "anti_windup", with, immediate),
         ("Eq. B.1 with its printed index", "printed_index", literal, delayed),
+        ("Eq. B.3 with its printed index", "printed_anti_windup", literal_limited, delayed),
     ];
     let mut figure = Figure::new(
         "step",
-        "Unit step of an integrator: without anti-windup (top), with it (middle), and with the \
-         index of Eq. B.1 as printed (bottom)",
+        "Unit step of an integrator: without anti-windup, with it, and with the index as printed: \
+         Eq. B.1, and Eq. B.3",
         "Figure 40",
     );
     for (name, key, controller, pole) in cases {
@@ -142,6 +154,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
          the plain system is saturated most of the time, and that anti-windup cures it.",
     ));
     outcome.figures.push(figure);
+    compared(&mut outcome);
     outcome.remarks.push(format!(
         "Eq. B.1 and B.3 print u[k+1] on the left. Accepted literally that is one more delay, and the \
          example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
@@ -149,6 +162,23 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
          uses that."
     ));
     Ok(outcome)
+}
+
+/// What appendix B says of Figure 40.
+fn compared(outcome: &mut Outcome) {
+    let plain = Response::of(without(), LIMIT);
+    let late = Response::of(literal_limited(), LIMIT).y.split_off(SAMPLES - 40);
+    let swing = highest(&late) - late.iter().copied().fold(f64::INFINITY, f64::min);
+    outcome.metrics.set("printed_anti_windup_swing", swing);
+    for (quantity, value) in [
+        ("calculated effort when the output reaches the reference, almost", plain.u_at_crossing()),
+        (
+            "without anti-windup the system is saturated most of the time",
+            f64::from(plain.saturated() > 0.5),
+        ),
+    ] {
+        outcome.compared.push(Compared::with("S1", "Figure 40", quantity).recomputed(value));
+    }
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 
 use drive_core::FirstOrder;
 
-use super::bode::roots;
+use super::bode::largest_pole;
 use super::{Context, Experiment};
 use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::outcome::{Compared, Figure, Outcome, Panel, Series};
+use sim_lab::recomputed::{plant, printed};
 
 /// Figures 26 and 27, Eq. 3.34, 3.39, 3.40.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -18,29 +19,30 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Eq. 3.34, A/V.
-const PLANT: FirstOrder = FirstOrder { k: 0.0040532, p: 0.93916 };
-/// Eq. 3.39.
-const K_C: f64 = 52.48;
-/// Eq. 3.39, and the pole of the reference filter (3.40).
-const Z_C: f64 = 0.94786;
 const SAMPLES: usize = 240;
 const PERIOD_MS: f64 = 1.0 / 6.0;
 
 /// Unit step: controller, plant without any other delay, reference filter or none.
 fn step(plant: FirstOrder, filtered: bool) -> Vec<f64> {
+    let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
     let (mut y, mut u, mut before, mut reference) = (0.0, 0.0, 0.0, 0.0);
     let mut response = Vec::with_capacity(SAMPLES);
     for _ in 0..SAMPLES {
         response.push(y);
         let r = if filtered { reference } else { 1.0 };
-        reference = Z_C * reference + (1.0 - Z_C);
+        reference = z_c * reference + (1.0 - z_c);
         let e = r - y;
-        u += K_C * (e - Z_C * before);
+        u += k_c * (e - z_c * before);
         before = e;
         y = plant.p * y + plant.k * u;
     }
     response
+}
+
+/// The plant of Eq. 3.34, and with the pole of Figure 27.
+fn plants() -> (FirstOrder, FirstOrder) {
+    let plant = plant("Eq. 3.34");
+    (plant, FirstOrder { p: 1.03 * plant.p, ..plant })
 }
 
 fn overshoot(response: &[f64]) -> f64 {
@@ -54,24 +56,18 @@ fn settling(response: &[f64]) -> usize {
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Unit step, C(z) = 52.48 (z − 0.94786)/(z − 1)", &[]);
-    let larger = FirstOrder { p: 1.03 * PLANT.p, ..PLANT };
-    let plants = [("Eq. 3.34", "nominal", PLANT), ("pole × 1.03", "larger_pole", larger)];
-    let mut figure = Figure::new(
+    let (nominal, larger) = plants();
+    let z_c = printed("Eq. 3.38", "z_c");
+        let mut figure = Figure::new(
         "step",
         "Current after a unit step: plant of Eq. 3.34 (top) and with its pole 3 % larger (bottom)",
         "Figures 26, 27",
     );
-    for (name, key, plant) in plants {
+    for (key, plant) in [("nominal", nominal), ("larger_pole", larger)] {
         // (z - 1)(z - p) + k_c k (z - z_c)
-        let gain = K_C * plant.k;
-        let mut poles = roots(&[gain - 1.0 - plant.p, plant.p - gain * Z_C]);
-        poles.sort_by(|p, q| q.re.total_cmp(&p.re));
-        let [p, q] = [poles[0], poles[1]];
-        let poles = match p.im.abs() {
-            0.0 => format!("{:.4}, {:.4}", p.re, q.re),
-            im => format!("{:.4} ± j{im:.4}", p.re),
-        };
+        let gain = printed("section 3.8", "k_c") * plant.k;
+        let pole = largest_pole(&[gain - 1.0 - plant.p, plant.p - gain * z_c]);
+        outcome.metrics.set(format!("{key}_largest_pole"), pole);
         let end = PERIOD_MS * (SAMPLES - 1) as f64;
         let mut panel = Panel::new("time (ms)", "current (A)");
         for (label, filter_key, filtered) in
@@ -79,14 +75,6 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         {
             let response = step(plant, filtered);
             let samples = settling(&response);
-            table.record([
-                ("plant", Cell::from(name)),
-                ("reference filter", Cell::from(if filtered { "Eq. 3.40" } else { "none" })),
-                ("overshoot (%)", Cell::fixed(100.0 * overshoot(&response), 2)),
-                ("within 2 % (samples)", Cell::fixed(samples as f64, 0)),
-                ("within 2 % (ms)", Cell::fixed(samples as f64 * PERIOD_MS, 1)),
-                ("closed-loop poles", Cell::from(poles.as_str())),
-            ]);
             let prefix = format!("{key}_{filter_key}");
             outcome
                 .metrics
@@ -98,8 +86,21 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         figure =
             figure.panel(panel.with(Series::reference("reference", vec![(0.0, 1.0), (end, 1.0)])));
     }
-    outcome.tables.push(table);
     outcome.figures.push(figure);
+    let [plain, filtered] = [false, true].map(|filtered| step(larger, filtered));
+    let longer = settling(&step(nominal, true)) > settling(&step(nominal, false));
+    for (quantity, holds) in [
+        (
+            "without reference filter the response to a step overshoots with the altered plant",
+            overshoot(&plain) > 0.01,
+        ),
+        ("the reference filter removes the overshoot", overshoot(&filtered) < 0.001),
+        ("the reference filter makes the settling time longer", longer),
+    ] {
+        outcome
+            .compared
+            .push(Compared::with("S1", "Figure 27", quantity).recomputed(f64::from(holds)));
+    }
     outcome.remark(
         "The identified plant has no delay and no current filter in it; with those the same rule \
          leaves less margin (see pi-design).",
@@ -113,11 +114,11 @@ mod tests {
 
     #[test]
     fn figures_26_and_27() {
-        let plain = step(PLANT, false);
+        let (nominal, larger) = plants();
+        let plain = step(nominal, false);
         assert_eq!((overshoot(&plain), settling(&plain)), (0.0, 25));
-        let filtered = step(PLANT, true);
+        let filtered = step(nominal, true);
         assert_eq!((overshoot(&filtered), settling(&filtered)), (0.0, 82));
-        let larger = FirstOrder { p: 1.03 * PLANT.p, ..PLANT };
         assert!((overshoot(&step(larger, false)) - 0.0427).abs() < 1e-4);
         assert_eq!(overshoot(&step(larger, true)), 0.0);
     }

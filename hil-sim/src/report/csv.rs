@@ -19,8 +19,8 @@ pub fn csv(outcome: &Outcome) -> Result<Vec<(String, String)>, Error> {
     if let Some(steps) = &outcome.steps {
         files.push(("levels.csv".to_owned(), written(steps)?));
     }
-    if !outcome.entries.is_empty() {
-        files.push(("entries.csv".to_owned(), written(&outcome.entries)?));
+    if !outcome.compared.is_empty() {
+        files.push(("compared.csv".to_owned(), written(&outcome.compared)?));
     }
     for (table, number) in outcome.tables.iter().zip(1..) {
         files.push((format!("table-{number}.csv"), of_table(table)?));

@@ -3,10 +3,10 @@
 use serde::Serialize;
 use serde::ser::Serializer;
 
-use super::{Entry, Figure, Metrics, Origin, Outcome, Step, Table};
+use super::{Compared, Figure, Metrics, Origin, Outcome, Step, Table};
 
 /// Version of the form: it grows when a name changes its meaning or goes away.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// The one JSON object of an experiment.
 #[derive(Serialize)]
@@ -24,8 +24,10 @@ struct Json<'a> {
     events: Vec<(String, &'a [(f64, String)])>,
     #[serde(skip_serializing_if = "Option::is_none")]
     steps: &'a Option<Vec<Step>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    table: Option<Rows<'a>>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    table: &'a [Table],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    compared: &'a [Compared],
     remarks: &'a [String],
     faults: &'a [String],
 }
@@ -45,14 +47,6 @@ struct Points<'a> {
     y_label: &'a str,
     x: Vec<f64>,
     y: Vec<f64>,
-}
-
-/// Content of `table` in JSON.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Rows<'a> {
-    Tables(&'a [Table]),
-    Entries(&'a [Entry]),
 }
 
 impl Origin {
@@ -78,7 +72,7 @@ fn series(figure: &Figure) -> impl Iterator<Item = (String, Points<'_>)> {
 impl Outcome {
     /// The one JSON object: `schema_version`, `version` of the program, `experiment`, `seed`, `settings` (those
     /// that were changed), `metrics`, `series` (`FIGURE/CURVE`), `remarks`, `faults`, and where there are any
-    /// `events`, `steps` and `table`. A number that is not finite becomes `null`.
+    /// `events`, `steps`, `table` and `compared`. A number that is not finite becomes `null`.
     ///
     /// # Errors
     /// As [`serde_json::to_string`].
@@ -94,11 +88,8 @@ impl Outcome {
             series: self.figures.iter().flat_map(series).collect(),
             events: with_events.map(|figure| (figure.name.clone(), &*figure.events)).collect(),
             steps: &self.steps,
-            table: match (self.entries.as_slice(), self.tables.as_slice()) {
-                ([], []) => None,
-                ([], tables) => Some(Rows::Tables(tables)),
-                (entries, _) => Some(Rows::Entries(entries)),
-            },
+            table: &self.tables,
+            compared: &self.compared,
             remarks: &self.remarks,
             faults: &self.faults,
         })
@@ -156,7 +147,7 @@ mod tests {
         let text = Outcome::default().to_json("filters", &Origin::new(1, &[])).unwrap();
         let version = env!("CARGO_PKG_VERSION");
         let expected = format!(
-            r#"{{"schema_version":2,"version":"{version}","experiment":"filters","seed":1,"settings":{{}},"metrics":{{}},"series":{{}},"remarks":[],"faults":[]}}"#
+            r#"{{"schema_version":3,"version":"{version}","experiment":"filters","seed":1,"settings":{{}},"metrics":{{}},"series":{{}},"remarks":[],"faults":[]}}"#
         );
         assert_eq!(text, expected);
         let both: serde_json::Value = serde_json::from_str(&group(&[text.clone(), text])).unwrap();

@@ -6,6 +6,7 @@ use sim_bench::prelude::*;
 
 use super::measure::Record;
 use crate::identification::arx::{Orders, fit};
+use crate::source;
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
 #[derive(Clone, Copy, Debug)]
@@ -25,18 +26,16 @@ pub struct Pii {
     pub z_s: f64,
 }
 
-/// As used in section 3.11.
-pub const PRINTED_PII: Pii = Pii { k_s: 0.132_546, z_s: 0.90 };
+impl Pii {
+    /// As used in section 3.11.
+    pub fn printed() -> Self {
+        let [k_s, z_s] = ["k_s", "z_s"].map(|gain| source::number("S1", "Eq. 3.44", gain));
+        Self { k_s, z_s }
+    }
+}
 
-/// Table 6: i_q in A, k_phi, real and imaginary part of the poles.
-pub const TABLE_6: [(f64, f64, f64, f64); 6] = [
-    (0.5, 1.6145e-5, 0.98668, 0.06684),
-    (1.0, 4.6610e-5, 0.97357, 0.06383),
-    (1.5, 5.9470e-5, 0.97433, 0.06527),
-    (2.0, 7.3862e-5, 0.97451, 0.06250),
-    (2.5, 8.0544e-5, 0.97572, 0.05969),
-    (3.0, 9.5797e-5, 0.97686, 0.06461),
-];
+/// Torque currents of Table 6, A.
+pub const TABLE_6_A: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 
 /// Iterations in which the data are filtered by the denominator found last.
 const ITERATIONS: usize = 40;
@@ -44,8 +43,9 @@ const ITERATIONS: usize = 40;
 impl Model {
     /// A row of Table 6.
     pub fn printed(row: usize) -> Self {
-        let (_, k, re, im) = TABLE_6[row];
-        Self { k, a: [-2.0 * re, re * re + im * im] }
+        let place = format!("Table 6, {:.1} A", TABLE_6_A[row]);
+        let [k, re, im] = ["k_phi", "Re p", "Im p"].map(|of| source::number("S1", &place, of));
+        Self { k: 1e-5 * k, a: [-2.0 * re, re * re + im * im] }
     }
 
     /// Least squares of Eq. 3.43 as in Appendix A, which minimises the equation error; and the iteration
@@ -194,7 +194,7 @@ mod tests {
         // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
         let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
         for (row, expected) in expected.into_iter().enumerate() {
-            let found = largest_pole(&Model::printed(row).closed_loop(PRINTED_PII));
+            let found = largest_pole(&Model::printed(row).closed_loop(Pii::printed()));
             assert!((found - expected).abs() < 2e-5, "{row}: {found}");
         }
     }

@@ -12,7 +12,7 @@ pub struct ComparedFilter {
     /// Its name in the source.
     pub name: &'static str,
     /// Numerator and denominator by Tables 7 and 8.
-    printed: [Vec<f64>; 2],
+    pub printed: [Vec<f64>; 2],
     response: fn(f64) -> Complex64,
     /// A filter of sections at rest, as the drive runs it.
     at_rest: fn() -> Box<dyn FnMut(f32) -> f32>,
@@ -79,10 +79,9 @@ fn running<const SECTIONS: usize>(sections: Sos<SECTIONS>) -> Box<dyn FnMut(f32)
 /// The three filters.
 #[rustfmt::skip] // a filter a line
 pub fn filters() -> [ComparedFilter; 3] {
-    let printed = |filter: &[&[f64]; 2]| filter.map(<[f64]>::to_vec);
     [
-        ComparedFilter { name: "LPF", printed: printed(&direct::LPF), response: |w| LPF_AS_PRINTED.response(w), at_rest: || running(LPF_AS_PRINTED) },
-        ComparedFilter { name: "BPF", printed: printed(&direct::BPF), response: |w| BPF.response(w), at_rest: || running(BPF) },
-        ComparedFilter { name: "PP", printed: printed(&direct::PP), response: |w| PP.response(w), at_rest: || running(PP) },
+        ComparedFilter { name: "LPF", printed: direct::printed("Table 7", "LPF"), response: |w| LPF_AS_PRINTED.response(w), at_rest: || running(LPF_AS_PRINTED) },
+        ComparedFilter { name: "BPF", printed: direct::printed("Table 8", "BPF"), response: |w| BPF.response(w), at_rest: || running(BPF) },
+        ComparedFilter { name: "PP", printed: direct::printed("Table 8", "PP"), response: |w| PP.response(w), at_rest: || running(PP) },
     ]
 }

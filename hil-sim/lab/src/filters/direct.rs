@@ -1,62 +1,28 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
-#![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
 use num_complex::Complex64;
 
-/// Table 7: numerator, denominator.
-#[rustfmt::skip] // a table
-pub const LPF: [&[f64]; 2] = [
-    &[
-        0.738615833587383, -4.971982137583815, 15.501482170609810,
-        -28.984106346506920, 35.439076902595630, -28.984106346506920,
-        15.501482170609810, -4.971982137583815, 0.738615833587383,
-    ],
-    &[
-        1.0, -6.311293551201974, 18.463310785092791,
-        -32.436104849347807, 37.322148071647149, -28.775658178634401,
-        14.536417936493200, -4.413169859261352, 0.621866049065974,
-    ],
-];
+use crate::source;
 
-/// Table 8: numerator, denominator.
-#[rustfmt::skip] // a table
-pub const BPF: [&[f64]; 2] = [
-    &[
-        0.02218769906303914, -0.02791079414758331, 0.01263993354917355,
-        -0.02791079414758331, 0.02218769906303914,
-    ],
-    &[
-        1.0, -2.99899648142248898, 3.95706806169825098,
-        -2.58302254497039918, 0.74432231301657747,
-    ],
-];
-
-/// Table 8: numerator, denominator.
-#[rustfmt::skip] // a table
-pub const PP: [&[f64]; 2] = [
-    &[
-        0.00107990678715093, -0.00373680819442586, 0.00535736614345009,
-        -0.00373680819442586, 0.00107990678715093,
-    ],
-    &[
-        1.0, -3.86437365668928701, 5.61267070060141027,
-        -3.63099960015131895, 0.88274870085761437,
-    ],
-];
+/// A filter of Table 7 or 8: numerator, denominator.
+pub fn printed(table: &str, filter: &str) -> [Vec<f64>; 2] {
+    ["b", "a"].map(|part| source::column("S1", table, &format!("{part} ({filter})")))
+}
 
 /// Each coefficient rounded to `f32`.
 pub fn rounded(filter: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     filter.each_ref().map(|part| part.iter().map(|&c| f64::from(c as f32)).collect())
 }
 
+/// A polynomial in z⁻¹ at rad/sample.
+pub fn value(part: &[f64], omega_t: f64) -> Complex64 {
+    let delay = Complex64::cis(-omega_t);
+    part.iter().rev().fold(Complex64::ZERO, |sum, &c| sum * delay + c)
+}
+
 /// Frequency response, Eq. C.2.
 pub fn response(filter: &[Vec<f64>; 2], omega_t: f64) -> Complex64 {
-    let delay = Complex64::cis(-omega_t);
-    let value = |part: &[f64]| {
-        let zero = Complex64::new(0.0, 0.0);
-        part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex64::new(c, 0.0))
-    };
-    value(&filter[0]) / value(&filter[1])
+    value(&filter[0], omega_t) / value(&filter[1], omega_t)
 }
 
 /// The reference: the filter in `f64`, direct form I.

@@ -16,6 +16,7 @@
 pub mod arx;
 pub mod batch;
 pub mod bench_tests;
+pub mod claims;
 pub mod model;
 pub mod models;
 pub mod output_error;

@@ -1,68 +1,45 @@
-//! Tables 1 to 5 as printed: mean absolute errors in % (Eq. 45), columns S_g at 50, 100 and 200 µs,
-//! then S_s.
+//! Tables 1 to 5 as printed: mean absolute errors in % (Eq. 45).
 
 use super::Signal;
+use crate::source;
 
 /// Sampling periods of all tables, s.
 pub const PERIODS: [f64; 3] = [50e-6, 100e-6, 200e-6];
 /// Speeds of Tables 1 to 3 (60 Hz) and of Tables 4 and 5 (10 Hz), electrical rad/s.
 pub const SPEEDS: [f64; 2] = [375.0, 61.0];
 
-/// Table 1, Model A at 375 rad/s; rows as `CurrentVoltage::NAMES`.
-pub const TABLE_1: [[f64; 6]; 8] = [
-    [0.0145, 0.0408, 0.1100, 0.0089, 0.0168, 0.0368],
-    [3.1132, 8.4459, 4.7585, 0.5208, 1.3484, 3.1313],
-    [0.0294, 0.0821, 0.2294, 0.0178, 0.0349, 0.0753],
-    [3.1030, 8.5159, 4.7662, 0.5606, 1.3933, 3.1987],
-    [0.8666, 1.4108, 1.4808, 0.5834, 0.4061, 0.4283],
-    [10609.0, 1329.7, 806.79, 9632.9, 1634.1, 253.05],
-    [0.8685, 1.4069, 1.4377, 0.5832, 0.4130, 0.4305],
-    [19.967, 5.2865, 7.8214, 17.895, 5.9875, 1.9111],
-];
+/// Place and quantity of an error in the list: of the five parameters by a model at one of [`SPEEDS`], one of [`PERIODS`].
+/// The tables have Model A at both speeds, B at the first, C at both.
+pub fn place(
+    model: &str,
+    speed: f64,
+    signal: Signal,
+    period: usize,
+    parameter: &str,
+) -> [String; 2] {
+    let table = match (model, speed == SPEEDS[0], signal) {
+        ("A", true, _) => "Table 1".to_owned(),
+        ("A", false, _) => "Table 4".to_owned(),
+        (_, true, Signal::SixStep) => format!("Table 2, {model}"),
+        (_, true, Signal::Schroeder) => format!("Table 3, {model}"),
+        _ => "Table 5".to_owned(),
+    };
+    let micros = 1e6 * PERIODS[period];
+    [format!("{table}, {parameter}"), format!("{} {micros:.0} us", signal.name())]
+}
 
-/// Table 4, Model A at 61 rad/s.
-pub const TABLE_4: [[f64; 6]; 8] = [
-    [0.0411, 0.1349, 0.2732, 0.0221, 0.0640, 0.1570],
-    [9.4696, 13.928, 15.313, 9.9563, 5.0793, 8.9232],
-    [0.0842, 0.2825, 0.5968, 0.0452, 0.1341, 0.3446],
-    [9.4762, 13.619, 14.722, 9.9194, 4.9925, 8.8881],
-    [4.3312, 6.9534, 7.3833, 2.2957, 3.5233, 4.6808],
-    [217650.0, 41659.0, 8044.2, 100460.0, 24393.0, 12043.0],
-    [4.3214, 6.9238, 7.3366, 2.2932, 3.5143, 4.6641],
-    [405.69, 158.29, 53.292, 186.43, 88.913, 86.544],
-];
-
-/// Model B at 375 rad/s: the columns B of Tables 2 and 3; rows as `Parameters::NAMES`.
-pub const TABLES_2_3_B: [[f64; 6]; 5] = [
-    [34.484, 10.967, 3.9959, 16.933, 11.921, 3.7801],
-    [21.361, 29.963, 47.560, 20.622, 31.714, 48.613],
-    [1.6816, 2.9828, 4.5464, 1.2353, 1.9340, 3.4407],
-    [18.524, 30.248, 46.178, 19.150, 30.837, 45.798],
-    [0.4262, 0.6868, 0.6854, 0.6512, 0.2016, 0.2729],
-];
-
-/// Model C at 375 rad/s: the columns C of Tables 2 and 3.
-pub const TABLES_2_3_C: [[f64; 6]; 5] = [
-    [34.134, 10.596, 4.2346, 16.704, 11.534, 5.1237],
-    [9.8831, 3.4669, 1.5453, 3.2620, 1.9505, 3.5681],
-    [0.9470, 1.5478, 1.7228, 0.5048, 0.4871, 0.5675],
-    [2.7114, 2.3822, 6.4528, 3.0591, 3.4921, 6.6478],
-    [0.4262, 0.6868, 0.6854, 0.6512, 0.2016, 0.2729],
-];
-
-/// Table 5, Model C at 61 rad/s.
-pub const TABLE_5: [[f64; 6]; 5] = [
-    [57.250, 77.036, 45.438, 18.559, 20.457, 9.7060],
-    [34.141, 31.974, 14.394, 5.6815, 4.8827, 3.1271],
-    [4.6793, 7.7161, 8.3994, 2.4114, 3.8107, 5.2166],
-    [3.2595, 2.9827, 6.3871, 2.1665, 3.8043, 6.5263],
-    [9.6547, 16.437, 15.326, 4.9160, 7.0777, 8.6050],
-];
-
-/// Column of a signal and the `period`-th period in these tables.
-pub const fn column(signal: Signal, period: usize) -> usize {
-    match signal {
-        Signal::SixStep => period,
-        Signal::Schroeder => 3 + period,
-    }
+/// The printed error, %.
+pub fn error(
+    model: &str,
+    speed: f64,
+    signal: Signal,
+    period: usize,
+    parameter: &str,
+) -> Option<f64> {
+    let printed = match model {
+        "A" | "C" => true,
+        _ => model == "B" && speed == SPEEDS[0],
+    };
+    let [place, quantity] = place(model, speed, signal, period, parameter);
+    printed.then(|| source::number("S0", &place, &quantity))
 }

@@ -2,8 +2,8 @@
 //! the noise, beside the same numbers of two machines.
 
 use super::models::model_b;
-use super::printed::{PERIODS, TABLE_1, TABLE_4, TABLES_2_3_B, TABLES_2_3_C};
-use super::{CurrentVoltage, FirstOrderTheta, Parameters};
+use super::printed::{self, PERIODS, SPEEDS};
+use super::{CurrentVoltage, FirstOrderTheta, Parameters, Signal};
 
 /// A number that does not depend on the noise, as printed and for two machines.
 #[derive(Clone, Copy, Debug)]
@@ -28,22 +28,29 @@ fn coefficients(machine: Parameters, h: f64) -> CurrentVoltage {
 /// ratio |h_0b / h_1b|. Geometric mean of the four columns of Tables 1 and 4 that share a period; the
 /// ratio does not depend on the speed.
 fn gains(period: usize) -> f64 {
-    let column = |table: &[[f64; 6]; 8], k: usize| table[5][k] / table[7][k];
-    let all = [&TABLE_1, &TABLE_4].map(|t| column(t, period) * column(t, period + 3));
-    (all[0] * all[1]).powf(0.25)
+    let at = |speed, signal, k| printed::error("A", speed, signal, period, k).unwrap_or(f64::NAN);
+    let of =
+        |speed| Signal::ALL.map(|signal| at(speed, signal, "h_1b") / at(speed, signal, "h_0b"));
+    SPEEDS.map(of).iter().flatten().product::<f64>().powf(0.25)
+}
+
+/// Printed errors by a model at 375 rad/s, with both signals.
+fn fast(model: &str, period: usize, parameter: &str) -> [f64; 2] {
+    let at = |signal| printed::error(model, SPEEDS[0], signal, period, parameter);
+    Signal::ALL.map(|signal| at(signal).unwrap_or(f64::NAN))
 }
 
 /// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and use the same h_1a: their errors differ by
 /// (1 - f_11) / 2. Mean of both signals, where B is biased upwards.
 fn inductances(period: usize) -> f64 {
-    let b_minus_c = |k: usize| TABLES_2_3_B[2][k] - TABLES_2_3_C[2][k];
+    let [b, c] = ["B", "C"].map(|model| fast(model, period, "sigma_l_s"));
     // The larger: absolute values in the tables can only shrink the difference.
-    0.01 * b_minus_c(period).max(b_minus_c(period + 3))
+    0.01 * (b[0] - c[0]).max(b[1] - c[1])
 }
 
 /// The error of tau_r by Model B is almost all bias. Mean of both signals.
 fn time_constants(period: usize) -> f64 {
-    0.005 * (TABLES_2_3_B[1][period] + TABLES_2_3_B[1][period + 3])
+    0.005 * fast("B", period, "tau_r").iter().sum::<f64>()
 }
 
 /// All nine.

@@ -11,6 +11,8 @@ use rustfft::num_complex::Complex;
 use sim_bench::bode::{RATE, omega_t};
 use sim_bench::prelude::*;
 
+use crate::recomputed::beside;
+
 /// Samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
 const SAMPLES: usize = RATE as usize;
 const CARRIER_HZ: f64 = 600.0;
@@ -34,7 +36,12 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     let middle = (BAND.start() + BAND.end()) / 2;
     let at = |spectrum: &[(f64, f64)], hz: f64| spectrum[hz as usize].1;
     let middle = f64::from(middle);
-    outcome.metrics.set("sideband_over_signal", at(&p, CARRIER_HZ + middle) / at(&a, middle));
+    let sideband = at(&p, CARRIER_HZ + middle) / at(&a, middle);
+    outcome.metrics.set("sideband_over_signal", sideband);
+    let lower = at(&p, CARRIER_HZ - middle) / at(&a, middle);
+    let holds = f64::from((sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01);
+    let bands = "the spectrum of A reappears in two side bands about the frequency of injection";
+    outcome.compared.push(beside("Figure 11", bands).recomputed(holds));
     for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {
         for (side, hz) in
             [("lower", CARRIER_HZ - f64::from(offset)), ("upper", CARRIER_HZ + f64::from(offset))]

@@ -1,0 +1,88 @@
+//! Section 3.4: LPF before and after the rotation into the frame of the flux.
+
+use drive_core::AlphaBeta;
+use drive_core::filter::{LPF, LpfState};
+use drive_settings::tuning::motor_plant;
+use sim_bench::prelude::*;
+
+use crate::identification::Complex;
+use crate::recomputed::{PERIOD_S, printed};
+
+/// Speeds of the frame, Hz.
+const FRAME_HZ: [f64; 4] = [0.0, 5.0, 25.0, 48.0];
+const SAMPLES: usize = 6000;
+
+/// Adds the table, and what is compared.
+pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
+    let mut table =
+        Table::new("LPF before and after the rotation (section 3.4): steps of i_d and i_q", &[]);
+    let [mut settles, mut all] = [true, true];
+    for hz in FRAME_HZ {
+        let [before, after] = [false, true].map(|after| swing(hz, after));
+        let (before, after) = (before?, after?);
+        settles &= after < 0.01;
+        all &= before < 0.01;
+        let milli = |x: f64| Cell::fixed(1e3 * x, 2);
+        table.record([
+            ("frame (Hz)", Cell::fixed(hz, 0)),
+            ("rotation before the filter, swing after 0.5 s (mA)", milli(after)),
+            ("filter before the rotation (mA)", milli(before)),
+        ]);
+    }
+    outcome.tables.push(table.note(
+        "What still swings of i_d and i_q. The current loop in complex numbers: Table 5, the controller of Eq. 3.39, a period of delay, LPF on the current in \
+         the frame of the stator (filter before the rotation) or in that of the flux.",
+    ));
+    outcome.metrics.set("orders_that_settle", f64::from(u8::from(settles) + u8::from(all)));
+    for (quantity, holds) in [
+        (
+            "the order of filter and rotation matters for the viability of the method",
+            settles != all,
+        ),
+        (
+            "with the rotation before the filter LPF the currents settle at their references",
+            settles,
+        ),
+        (
+            "with the rotation before the filter LPF the direct current oscillates about its reference",
+            !settles,
+        ),
+    ] {
+        outcome
+            .compared
+            .push(Compared::with("S1", "section 3.4", quantity).simulated(f64::from(holds)));
+    }
+    Ok(())
+}
+
+/// Largest distance of the currents from their mean over the second half of a second after a step of both, A.
+fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
+    let motor = motor_plant(&drive_settings::Settings::default().motor.into(), PERIOD_S)
+        .map_err(Error::refused)?;
+    let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
+    let turn = std::f64::consts::TAU * frame_hz * PERIOD_S;
+    let reference = Complex::new(0.7, 1.0);
+    let (mut i, mut u, mut delayed, mut before) =
+        (Complex::ZERO, Complex::ZERO, Complex::ZERO, Complex::ZERO);
+    let mut filter = LpfState::default();
+    let mut late = Vec::new();
+    for n in 0..SAMPLES {
+        let angle = Complex::cis(turn * n as f64);
+        // The current of the stator; the filter is linear and the same for both axes.
+        let input = if rotated_first { i } else { i * angle };
+        let out = LPF.step(&mut filter, AlphaBeta::new(input.re as f32, input.im as f32));
+        let out = Complex::new(out.alpha.into(), out.beta.into());
+        let seen = if rotated_first { out } else { out * angle.conj() };
+        let error = reference - seen;
+        u += (error - before * z_c) * k_c;
+        before = error;
+        // In the frame, which turns on by a period until the voltage acts.
+        i = (i * motor.p + delayed * motor.k) * Complex::cis(-turn);
+        delayed = u;
+        if n >= SAMPLES / 2 {
+            late.push(i);
+        }
+    }
+    let mean = late.iter().sum::<Complex>() / late.len() as f64;
+    Ok(late.iter().map(|i| (i - mean).norm()).fold(0.0, f64::max))
+}

@@ -1,0 +1,81 @@
+//! Table 1 as runs: encoder, fundamental model and injection at rest, near it and far from it.
+
+use drive_core::{AngleSource, Command};
+use sim_bench::prelude::*;
+use sim_bench::steady::{OperatingPoint, bring_up, prepared};
+
+/// Row of the table and speed, rpm.
+const SPEEDS: [(&str, f64); 3] = [
+    ("works at omega = 0", 0.0),
+    ("works at omega near 0", 5.0),
+    ("works at omega far above 0", 1500.0),
+];
+/// Column of the table.
+const COLUMNS: [&str; 3] = ["mechanical sensor", "fundamental model", "signal injection"];
+const IQ_A: f64 = 1.5;
+
+/// Adds the table of runs, and what is compared.
+pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
+    let mut table =
+        Table::new("Table 1 as runs: angle error over a second at 1.5 A, and the carrier", &[]);
+    for column in COLUMNS {
+        // By construction.
+        let without = f64::from(column != COLUMNS[0]);
+        let place = Compared::with("S1", "Table 1, works without encoder", column);
+        outcome.compared.push(place.simulated(without));
+        for (row, rpm) in SPEEDS {
+            let found = tracked(context, column, rpm)?;
+            // The method works where the angle is right by it: by the injection while there is a carrier, else by the model.
+            let by_it = |(error, carrier): (f64, f64)| {
+                let by = if carrier > 1.0 { COLUMNS[2] } else { COLUMNS[1] };
+                error < LOST_DEG && (column == COLUMNS[0] || column == by)
+            };
+            let works = found.is_some_and(by_it);
+            let shown = |of: fn((f64, f64)) -> f64| Cell::fixed_or_dash(found.map(of), 1);
+            table.record([
+                ("angle source", Cell::from(column)),
+                ("speed (rpm)", Cell::fixed(rpm, 0)),
+                ("largest error (°)", shown(|f| f.0)),
+                ("carrier current (mA)", shown(|f| f.1)),
+                ("works", Cell::from(if works { "yes" } else { "no" })),
+            ]);
+            let unknown =
+                (column == COLUMNS[1]).then_some("how near to zero it means, and the load");
+            let place = Compared::with("S1", format!("Table 1, {row}"), column);
+            outcome.compared.push(Compared { unknown, ..place }.simulated(f64::from(works)));
+        }
+    }
+    outcome.tables.push(table.note(
+        "The fundamental model is the drive's own flux observer. Far from standstill the drive itself takes the carrier away; \
+         near it, it does not start without one.",
+    ));
+    Ok(())
+}
+
+/// Largest angle error, degrees, and carrier current, mA; nothing where the drive does not start or stops itself.
+fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64, f64)>, Error> {
+    let mut config = context.config.clone();
+    if column == COLUMNS[0] {
+        config.drive.angle_source = AngleSource::Encoder;
+    }
+    if column == COLUMNS[1] && rpm < SPEEDS[2].1 {
+        config.drive.injection.amplitude_v = Some(0.0);
+        config.drive.injection.synchronous.check = false;
+    }
+    let case = OperatingPoint { rpm, iq: IQ_A, seed: context.seed };
+    let mut rig = match prepared(&config.drive, &config, case.seed) {
+        Ok(rig) => rig,
+        Err(_) => return Ok(None),
+    };
+    if bring_up(&mut rig, rpm).is_err() || rig.drive.state().fault().is_some() {
+        return Ok(None);
+    }
+    rig.command(&Command::Torque(case.iq as f32))?;
+    rig.run(1.0, |_| {});
+    let (mut error, mut carrier) = (Stats::default(), Stats::default());
+    rig.run(1.0, |p| {
+        error.push(p.angle_error_deg);
+        carrier.push(1e3 * p.carrier);
+    });
+    Ok(rig.drive.state().fault().is_none().then_some((error.largest(), carrier.mean())))
+}

@@ -1,0 +1,118 @@
+//! What sections 5 and 7 say of Tables 1 to 5, counted in the tables themselves.
+
+use sim_bench::outcome::{Compared, Metrics};
+
+use super::models::model_c;
+use super::printed::{PERIODS, SPEEDS, error};
+use super::{CurrentVoltage, Parameters, Signal};
+
+/// A row of the tables: model, speed, parameter.
+type Row = (&'static str, f64, &'static str);
+
+fn rows(model: &'static str, speed: f64) -> Vec<Row> {
+    let names: &[&'static str] =
+        if model == "A" { &CurrentVoltage::NAMES } else { &Parameters::NAMES };
+    names.iter().map(|name| (model, speed, *name)).collect()
+}
+
+/// Printed errors of a row over the periods, %.
+fn over_h((model, speed, name): Row, signal: Signal) -> [f64; 3] {
+    [0, 1, 2].map(|period| error(model, speed, signal, period, name).unwrap_or(f64::NAN))
+}
+
+/// Errors at 50 µs but those of the rows left out: the least and the largest.
+fn at_50(rows: &[Row], signals: &[Signal], not: &[&str]) -> (f64, f64) {
+    let used = rows.iter().filter(|row| !not.contains(&row.2));
+    let all = used.flat_map(|&row| signals.iter().map(move |&signal| over_h(row, signal)[0]));
+    all.fold((f64::MAX, 0.0), |(least, most), error| (least.min(error), most.max(error)))
+}
+
+/// Adds the claims, and the numbers of what does not hold.
+pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
+    let [fast, slow] = SPEEDS;
+    let tables = [("A", fast), ("A", slow), ("B", fast), ("C", fast), ("C", slow)];
+    let [a_fast, a_slow, _, c_fast, c_slow] = tables.map(|(model, speed)| rows(model, speed));
+    let all: Vec<_> = tables.into_iter().flat_map(|(model, speed)| rows(model, speed)).collect();
+    let errors = all.iter().map(|&row| Signal::ALL.map(|signal| over_h(row, signal)));
+    let pairs = errors.clone().flat_map(|[sg, ss]| [0, 1, 2].map(|k| ss[k] < sg[k]));
+    let steps = errors.flatten().flat_map(|e| [e[1] > e[0], e[2] > e[1]]);
+    let count = |all: &mut dyn Iterator<Item = bool>| all.filter(|holds| *holds).count();
+    let (better, pairs) = (count(&mut pairs.clone()), pairs.count());
+    let (grow, steps) = (count(&mut steps.clone()), steps.count());
+
+    let (unseen, ss) = (["h_1b", "h_0b"], [Signal::Schroeder]);
+    let (_, discrete) = at_50(&a_fast, &Signal::ALL, &unseen);
+    let (_, continuous) = at_50(&c_fast, &Signal::ALL, &["r_s"]);
+    let (least, most) = at_50(&a_slow, &ss, &unseen);
+    let (_, c_most) = at_50(&c_slow, &ss, &["r_s"]);
+    let r_s = over_h(("C", slow, "r_s"), Signal::Schroeder)[0];
+    let h_1b = Signal::ALL.map(|signal| over_h(("A", fast, "h_1b"), signal)[0]);
+    let (these, others) = (
+        "tau_r, sigma_l_s, l_s and omega_m are below",
+        "the discrete parameters but h_1b and h_0b",
+    );
+    let procedure = |what: String| format!("with the procedure, {what}");
+    for (quantity, holds) in [
+        ("h_1b can be estimated".to_owned(), h_1b.iter().all(|error| *error < 100.0)),
+        (
+            "errors of Tables 1 to 5 are in general smaller with Ss than with Sg".to_owned(),
+            2 * better > pairs,
+        ),
+        (
+            "errors of Tables 1 to 5 grow in general with the sampling period".to_owned(),
+            2 * grow > steps,
+        ),
+        (procedure(format!("errors of {others} are below 1 % at high speed")), discrete < 1.0),
+        (procedure(format!("errors of {others} reach at most 10 % at low speed")), most < 10.0),
+        (
+            procedure(
+                "the smallest error of the discrete parameters is below 1 % at low speed"
+                    .to_owned(),
+            ),
+            least < 1.0,
+        ),
+        (procedure(format!("errors of {these} 4 % at high speed")), continuous < 4.0),
+        (procedure(format!("errors of {these} 6 % at low speed")), c_most < 6.0),
+        (procedure("the error of r_s is at most 20 % at low speed".to_owned()), r_s <= 20.0),
+    ] {
+        compared.push(Compared::with("S0", "section 5", quantity).recomputed(f64::from(holds)));
+    }
+
+    // f_1b and the speed are proportional (Eq. 42).
+    let f_1b = Signal::ALL.map(|signal| over_h(("A", fast, "f_1b"), signal));
+    let [b, c] =
+        ["B", "C"].map(|model| Signal::ALL.map(|signal| over_h((model, fast, "omega_m"), signal)));
+    let over = |x: [[f64; 3]; 2], y: [[f64; 3]; 2], of: fn(f64, f64) -> f64| {
+        x.as_flattened().iter().zip(y.as_flattened()).map(|(x, y)| of(*x, *y)).fold(0.0, f64::max)
+    };
+    let at = |model, name| over_h((model, slow, name), Signal::Schroeder)[0];
+    for (name, value) in [
+        ("pairs_better_with_ss", better as f64),
+        ("pairs", pairs as f64),
+        ("steps_of_h_that_raise", grow as f64),
+        ("steps_of_h", steps as f64),
+        ("table_4_f_1b_over_table_5_omega_m", at("A", "f_1b") / at("C", "omega_m")),
+        ("omega_m_of_b_less_c_pct", over(b, c, |b, c| (b - c).abs())),
+        ("f_1b_over_omega_m", over(f_1b, c, |f, c| f / c)),
+        ("procedure_discrete_pct", discrete),
+        ("procedure_continuous_pct", continuous),
+    ] {
+        metrics.set(name, value);
+    }
+    // Eq. 42 and Model C on the exact coefficients.
+    for (h, micros) in PERIODS.iter().zip([50, 100, 200]) {
+        let [px, rbv] = [Parameters::PX, Parameters::RBV].map(|machine| {
+            let machine = machine.at(fast);
+            let found = model_c(&machine.continuous().series(*h, 5).current_voltage().delta(), *h);
+            found
+                .array()
+                .map(|value| value.unwrap_or(f64::NAN))
+                .into_iter()
+                .zip(machine.array())
+                .map(|(found, real)| 100.0 * (1.0 - found / real))
+                .collect::<Vec<_>>()
+        });
+        metrics.set(format!("eq_42_low_by_at_{micros}_us_pct"), px[4]);
+        metrics.set(format!("model_c_tau_r_bias_of_rbv_at_{micros}_us_pct"), rbv[1].abs());
+    }
+}

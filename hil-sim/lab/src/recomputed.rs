@@ -1,0 +1,147 @@
+//! The constants of this project that are said to be those of Barroso 2017, and what follows from his numbers by no formula.
+
+use drive_core::FirstOrder;
+use drive_core::carrier::CARRIER_SAMPLES;
+use drive_settings::Settings;
+use drive_settings::tuning::rule_3_8;
+use sim_bench::bode::{RATE, fictitious, largest_pole};
+use sim_bench::plant::{InverterSettings, MachineSettings};
+use sim_bench::prelude::*;
+
+use crate::identification::bench_tests::Readings;
+use crate::source;
+
+/// Chapters 2 to 4.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "printed-numbers",
+    stands_for: "Figure 13, Eq. 4.2, Tables 3 and 5",
+    about: "The constants of the drive and of the simulated motor beside the printed ones they stand for.",
+    uses: &[],
+    not: &[],
+    run,
+};
+
+/// Control period, s.
+pub const PERIOD_S: f64 = 1.0 / RATE;
+/// The carrier, Hz.
+pub const CARRIER_HZ: f64 = RATE / CARRIER_SAMPLES as f64;
+
+/// A printed number of S1.
+pub fn printed(place: &str, quantity: &str) -> f64 {
+    source::number("S1", place, quantity)
+}
+
+/// A printed plant: gain and pole.
+pub fn plant(place: &str) -> FirstOrder {
+    FirstOrder { k: printed(place, "gain"), p: printed(place, "pole") }
+}
+
+/// Ours beside a printed value of S1.
+pub fn beside(place: &str, quantity: &str) -> Compared {
+    Compared::with("S1", place, quantity)
+}
+
+fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+    let mut outcome = Outcome::default();
+    constants(&mut outcome);
+    let bound = printed("Figure 13", "bound of the relative difference");
+    let within = |hz: &f64| 100.0 * (fictitious(*hz) / hz - 1.0) <= bound;
+    let limit = (1..30_000).map(|n| 0.1 * f64::from(n)).take_while(within).last();
+    let place = beside("Figure 13", "frequency up to which the difference stays below the bound");
+    outcome.compared.push(place.recomputed(limit.unwrap_or(f64::NAN)));
+    outcome.figures.push(figure_13());
+    position_loop(&mut outcome);
+    Ok(outcome)
+}
+
+/// What the program has as a constant of its own.
+fn constants(outcome: &mut Outcome) {
+    let (drive, config, motor) =
+        (Settings::default(), Config::default(), MachineSettings::default());
+    let (plate, tests) = (config.drive.nameplate, Readings::PRINTED);
+    // The same in the plant, on the bench and in the drive.
+    let both = |plant: f64, drive: f32| if plant as f32 == drive { plant } else { f64::NAN };
+    let three = |plant: f64, bench: f64, drive: f32| both(both(plant, bench as f32), drive);
+    let bench = config.motor;
+    let leakage = three(
+        both(motor.lls, motor.llr as f32),
+        both(bench.l_ls, bench.l_lr as f32),
+        drive.motor.l_ls,
+    );
+    let pii = drive.injection.printed;
+    #[rustfmt::skip] // a constant a line
+    let constants = [
+        ("Figure 13", "sampling frequency", RATE / 1e3),
+        ("section 3.2", "switching frequency of the inverter", RATE / 1e3),
+        ("Figure 13", "frequency at which the difference is stated", CARRIER_HZ),
+        ("section 3.10", "frequency of injection", CARRIER_HZ),
+        ("Table 3", "rated power", 1e-3 * f64::from(plate.power_w)),
+        ("Table 3", "poles", 2.0 * f64::from(drive.motor.pole_pairs)),
+        ("Table 3", "rated voltage, star", plate.voltage_v.into()),
+        ("Table 3", "rated current, star", plate.current_a.into()),
+        ("Table 3", "rated frequency", plate.frequency_hz.into()),
+        ("Table 3", "rated speed", plate.speed_rpm.into()),
+        ("Eq. 3.3", "f_c", config.measurement.filter_hz),
+        ("section 3.10", "reference of the direct current in all tests", 1e3 * f64::from(config.drive.i_d())),
+        ("Figure 28", "delay from the command to the first switch", InverterSettings::default().propagation_us),
+        ("Figure 28", "further delay to the second switch", 1e6 * f64::from(drive.inverter.dead_time_s)),
+        ("section 3.6.1", "voltage", tests.dc.0),
+        ("section 3.6.1", "current", tests.dc.1),
+        ("section 3.6.2", "frequency", tests.locked.0),
+        ("section 3.6.2", "phase voltage", tests.locked.1),
+        ("section 3.6.2", "phase current", tests.locked.2),
+        ("section 3.6.2", "theta_rb", tests.locked.3),
+        ("section 3.6.3", "phase voltage", tests.no_load.1),
+        ("section 3.6.3", "phase current", 1e3 * tests.no_load.2),
+        ("section 3.6.1", "r_s", three(motor.rs, bench.r_s, drive.motor.r_s)),
+        ("section 3.6.2", "r_r", three(motor.rr, bench.r_r, drive.motor.r_r)),
+        ("section 3.6.2", "L_l1 = L_l2", 1e3 * leakage),
+        ("section 3.6.3", "L_m", 1e3 * three(motor.lm, bench.l_m, drive.motor.l_m)),
+        ("Eq. 3.44", "k_s", pii.k_s.into()),
+        ("Eq. 3.44", "z_s", pii.z_s.into()),
+    ];
+    outcome
+        .compared
+        .extend(constants.map(|(place, quantity, used)| beside(place, quantity).used(used)));
+}
+
+/// Eq. 4.1 under Eq. 4.2: (z - 1)² (z - p) + k_c k (z - z_c).
+fn position_loop(outcome: &mut Outcome) {
+    let (plant, zero) = (plant("Eq. 4.1"), printed("Eq. 4.2", "zero"));
+    let gain = printed("Eq. 4.2", "gain") * plant.k;
+    let pole = largest_pole(&[-2.0 - plant.p, 1.0 + 2.0 * plant.p + gain, -plant.p - gain * zero]);
+    outcome.metrics.set("position_loop_largest_pole", pole);
+    // The rule of section 3.8 sees one integrator: as if the other were not there.
+    if let Ok(rule) = rule_3_8(plant, 1.0 / printed("Eq. 4.1", "f_s")) {
+        outcome.compared.push(beside("Eq. 4.2", "gain").recomputed(rule.k_c));
+        outcome.compared.push(beside("Eq. 4.2", "zero").recomputed(rule.z_c));
+    }
+    let unknown = Some("inertia, friction and the unit of the position");
+    let of = |quantity| Compared { unknown, ..beside("Eq. 4.1", quantity) };
+    outcome.compared.extend(["gain", "pole"].map(of));
+}
+
+/// Eq. 2.7 with L_m²/L_r, beside 0.7 A of direct current, Nm/A.
+pub fn torque_per_ampere() -> f64 {
+    source::value_of("S1", "torque_per_ampere").unwrap_or(f64::NAN)
+}
+
+/// Fictitious over real frequency.
+fn figure_13() -> Figure {
+    let points = |of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+        (1..=280).map(|n| 10.0 * f64::from(n)).map(|hz| (hz, of(hz))).collect()
+    };
+    let at = printed("Figure 13", "frequency up to which the difference stays below the bound");
+    let mark = |x: f64| vec![(x, 0.0), (x, 10.0)];
+    let title = "Fictitious frequency of the w plane (Eq. 2.18) over the real one";
+    let frequencies = Panel::new("real frequency (Hz)", "fictitious frequency (Hz)")
+        .with(Series::line("Eq. 2.18", points(&fictitious)))
+        .with(Series::reference("equal", points(&|hz| hz)));
+    let difference = Panel::new("real frequency (Hz)", "difference (%)")
+        .y_range(0.0, 10.0)
+        .with(Series::line("Eq. 2.18", points(&|hz| 100.0 * (fictitious(hz) / hz - 1.0))))
+        .with(Series::limit("1 %, printed at 460 Hz", vec![(0.0, 1.0), (2800.0, 1.0)]))
+        .with(Series::limit("", mark(at)))
+        .with(Series::reference("the carrier", mark(CARRIER_HZ)));
+    Figure::new("w-frequency", title, "Figure 13").panel(frequencies).panel(difference)
+}

@@ -1,0 +1,359 @@
+//! What the two sources print, and what is found wrong in them: the lists of `hil-sim/lab/source`, and the verdict on a
+//! printed value with ours beside it.
+//!
+//! S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996.
+
+pub mod errata;
+pub mod evidence;
+
+use std::collections::HashMap;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use exmex::Express;
+use serde::Deserialize;
+use sim_bench::outcome::Compared;
+
+use errata::ERRATA;
+
+/// The files, in the order of the page.
+const FILES: [&str; 2] =
+    [include_str!("../source/barroso-2017.toml"), include_str!("../source/jacobina-1996.toml")];
+
+/// What a printed value is to its source.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A rating, reading or specification that the source starts from.
+    Input,
+    /// What the source computed, designed, identified or measured.
+    Result,
+    /// A result that it read off a graph.
+    Graph,
+    /// A statement that holds or does not; its value is `yes` or `no`.
+    Claim,
+}
+
+/// A printed value.
+#[derive(Debug)]
+pub struct Printed {
+    /// `S0` or `S1`.
+    pub source: String,
+    /// Number and name of the chapter or section.
+    pub chapter: String,
+    /// Its short name.
+    id: String,
+    /// Where it stands: `Eq. 3.20`, `Table 6, 1.5 A`.
+    pub place: String,
+    /// Symbol or name.
+    pub quantity: String,
+    /// Unit as printed; may be empty.
+    pub unit: String,
+    /// The value with its digits.
+    pub value: String,
+    /// What it is to its source.
+    pub kind: Kind,
+    /// How it follows from other printed values.
+    pub formula: Option<String>,
+    /// The slip that the print has beside the number, such as its unit.
+    slip: Option<String>,
+    /// Whether an experiment or a formula took it from here.
+    taken: AtomicBool,
+}
+
+/// A source: the values of a chapter stand before its tables.
+#[derive(Deserialize)]
+struct File {
+    source: String,
+    /// Quantities of the formulas, each from those before it.
+    #[serde(default)]
+    names: Vec<[String; 2]>,
+    chapter: Vec<Chapter>,
+}
+
+#[derive(Deserialize)]
+struct Chapter {
+    /// Short name on the page.
+    id: String,
+    name: String,
+    /// Place, quantity, unit, value, kind; formula, slip.
+    #[serde(default)]
+    printed: Vec<Vec<String>>,
+    #[serde(default)]
+    table: Vec<Cells>,
+}
+
+/// A printed table; the place of a cell is that of the table and the head of the row.
+#[derive(Deserialize)]
+struct Cells {
+    place: String,
+    kind: Kind,
+    /// Quantity, unit; formula.
+    columns: Vec<Vec<String>>,
+    /// Head, then a value for each column.
+    rows: Vec<Vec<String>>,
+}
+
+fn files() -> impl Iterator<Item = File> {
+    FILES.into_iter().map(|text| toml::from_str(text).expect("the lists are part of the program"))
+}
+
+/// All printed values, in the order of the sources.
+pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
+    let mut all = Vec::new();
+    for File { source, chapter, .. } in files() {
+        for Chapter { id, name, printed, table } in chapter {
+            let mut add = |texts: [&String; 4], kind, formula: Option<String>, slip| {
+                let [place, quantity, unit, value] = texts.map(Clone::clone);
+                let (source, chapter, id) = (source.clone(), name.clone(), id.clone());
+                let taken = AtomicBool::new(false);
+                all.push(Printed {
+                    source,
+                    chapter,
+                    id,
+                    place,
+                    quantity,
+                    unit,
+                    value,
+                    kind,
+                    formula,
+                    slip,
+                    taken,
+                });
+            };
+            for row in &printed {
+                let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
+                    panic!("{name}: too few cells in {}", row.join(", "));
+                };
+                let kind = toml::Value::from(kind.as_str())
+                    .try_into()
+                    .expect("input, result, graph or claim");
+                let more = |k: usize| more.get(k).cloned();
+                add([place, quantity, unit, value], kind, more(0), more(1));
+            }
+            for Cells { place, kind, columns, rows } in &table {
+                for row in rows {
+                    let place = format!("{place}, {}", row[0]);
+                    for (column, value) in columns.iter().zip(&row[1..]) {
+                        let formula =
+                            column.get(2).map(|text| text.replace("{| ", &format!("{{{place} | ")));
+                        add([&place, &column[0], &column[1], value], *kind, formula, None);
+                    }
+                }
+            }
+        }
+    }
+    all
+});
+
+/// Source, place and quantity.
+type Key<'a> = (&'a str, &'a str, &'a str);
+
+/// Places in [`PRINTED`].
+static PLACES: LazyLock<HashMap<Key<'static>, usize>> = LazyLock::new(|| {
+    let key =
+        |(place, p): (usize, &'static Printed)| ((&*p.source, &*p.place, &*p.quantity), place);
+    PRINTED.iter().enumerate().map(key).collect()
+});
+
+/// The quantities of the formulas, by source.
+static NAMES: LazyLock<HashMap<String, HashMap<String, f64>>> = LazyLock::new(|| {
+    let of = |File { source, names, .. }: File| {
+        let mut values = HashMap::new();
+        for [name, formula] in names {
+            let value = evaluate(&source, &formula, &values);
+            values.insert(name, value.expect("the formulas are part of the program"));
+        }
+        (source, values)
+    };
+    files().map(of).collect()
+});
+
+/// The value of a formula of a source: of printed values, `{PLACE | QUANTITY}`, and of names.
+fn evaluate(source: &str, formula: &str, names: &HashMap<String, f64>) -> Option<f64> {
+    let parsed = exmex::parse::<f64>(formula).ok()?;
+    let value = |name: &String| match name.split_once(" | ") {
+        Some((place, quantity)) => {
+            place_of(source, place, quantity).and_then(|k| PRINTED[k].take())
+        }
+        None => names.get(name).copied(),
+    };
+    let values = parsed.var_names().iter().map(value).collect::<Option<Vec<_>>>()?;
+    parsed.eval(&values).ok()
+}
+
+/// The value of a formula of a source.
+pub fn value_of(source: &str, formula: &str) -> Option<f64> {
+    evaluate(source, formula, &NAMES[source])
+}
+
+/// Number of a value in [`PRINTED`].
+pub fn place_of(source: &str, place: &str, quantity: &str) -> Option<usize> {
+    PLACES.get(&(source, place, quantity)).copied()
+}
+
+/// A printed number, for an experiment that uses it.
+///
+/// # Panics
+/// When the list has none there: the lists are part of the program.
+pub fn number(source: &str, place: &str, quantity: &str) -> f64 {
+    let found = place_of(source, place, quantity).and_then(|found| PRINTED[found].take());
+    found.unwrap_or_else(|| panic!("{source} prints no number at {place}, {quantity}"))
+}
+
+/// The numbers of a column of a table, from the first row on.
+pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
+    let begins = format!("{table}, ");
+    let is_in =
+        |p: &&Printed| p.source == source && p.quantity == quantity && p.place.starts_with(&begins);
+    PRINTED.iter().filter(is_in).filter_map(Printed::take).collect()
+}
+
+impl Printed {
+    /// The value as a number: 1 and 0 for `yes` and `no`; fractions are divided out.
+    pub fn number(&self) -> Option<f64> {
+        match &*self.value {
+            "yes" => Some(1.0),
+            "no" => Some(0.0),
+            value => value.parse().ok().or_else(|| exmex::parse::<f64>(value).ok()?.eval(&[]).ok()),
+        }
+    }
+
+    fn take(&self) -> Option<f64> {
+        self.taken.store(true, Ordering::Relaxed);
+        self.number()
+    }
+
+    /// Ours by its formula.
+    fn recomputed(&self) -> Option<f64> {
+        value_of(&self.source, self.formula.as_deref()?)
+    }
+
+    /// Whether ours is the printed value within this share of a unit of its last digit.
+    fn agrees(&self, ours: f64, units: f64) -> bool {
+        let exact = self.kind == Kind::Claim || self.value.contains('/');
+        let bound = if exact { 1e-9 } else { units * self.last_digit() };
+        self.number().is_some_and(|printed| (ours - printed).abs() <= bound)
+    }
+
+    /// Whether what the program takes is the printed value: to its last digit, or to single precision where that has fewer.
+    fn is_used(&self, used: f64) -> bool {
+        self.agrees(used, 0.501)
+            || self.number().is_some_and(|printed| (used / printed - 1.0).abs() < SINGLE)
+    }
+
+    /// A unit of the last printed digit. Of a whole number it is 1, whatever its zeros.
+    fn last_digit(&self) -> f64 {
+        let (digits, exponent) = self.value.split_once('e').unwrap_or((&self.value, "0"));
+        let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        10f64.powi(exponent.parse::<i32>().unwrap_or(0) - decimals as i32)
+    }
+}
+
+/// How a printed value stands beside ours.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// Equal to the last printed digit.
+    Equal,
+    /// Equal but for this.
+    EqualBut(String),
+    /// Differs, by this row of [`ERRATA`].
+    Differs(usize),
+    /// Differs, and the source does not state this.
+    Unknown(&'static str),
+    /// A mean of random runs: ours over printed, and this over seeds.
+    Statistics {
+        /// Ours over printed.
+        factor: f64,
+        /// The least and the largest over seeds.
+        seeds: [f64; 2],
+    },
+    /// Nothing is compared, or nobody says why it differs.
+    None,
+}
+
+/// Relative precision of constants and filter sections in `f32`.
+const SINGLE: f64 = 1e-5;
+/// Share within which a value that was read off a graph counts as equal.
+const GRAPH: f64 = 0.02;
+
+/// The verdict on a printed value. An input or a reading that is taken from the list needs nothing beside it.
+pub fn verdict(place: usize, ours: &Compared) -> Verdict {
+    let printed = &PRINTED[place];
+    let taken =
+        matches!(printed.kind, Kind::Input | Kind::Graph) && printed.taken.load(Ordering::Relaxed);
+    let value = match printed.kind {
+        Kind::Input => ours.used.or(ours.value()),
+        _ => ours.value(),
+    };
+    let Some(value) = value.filter(|_| ours.used.is_none_or(|used| printed.is_used(used))) else {
+        return match (ours.unknown, ours.used) {
+            (Some(what), None) => Verdict::Unknown(what),
+            (None, None) if taken => Verdict::Equal,
+            _ => Verdict::None,
+        };
+    };
+    let ratio = printed.number().map_or(f64::NAN, |printed| value / printed);
+    let off = (ratio - 1.0).abs();
+    // Ours is rounded as well.
+    if printed.agrees(value, 0.501) {
+        return printed.slip.clone().map_or(Verdict::Equal, Verdict::EqualBut);
+    }
+    if let Some((what, _)) = ours.but.filter(|(_, share)| off < *share) {
+        return Verdict::EqualBut(what.to_owned());
+    }
+    if let Some([low, high]) = ours.seeds {
+        let printed = value / ratio;
+        return Verdict::Statistics { factor: ratio, seeds: [low / printed, high / printed] };
+    }
+    if let Some(row) = ERRATA.iter().position(|row| row.explains(place)) {
+        return Verdict::Differs(row);
+    }
+    match ours.unknown {
+        Some(what) => Verdict::Unknown(what),
+        None if printed.kind == Kind::Graph && off <= GRAPH => {
+            Verdict::EqualBut(format!("read off a graph, {:.1} %", 100.0 * off))
+        }
+        None if printed.kind != Kind::Claim && printed.agrees(value, 1.0) => {
+            Verdict::EqualBut("rounding".to_owned())
+        }
+        None => Verdict::None,
+    }
+}
+
+impl Verdict {
+    /// Heads of the counts on the first page.
+    pub const NAMES: [&str; 6] = [
+        "equal",
+        "equal but for unit or rounding",
+        "differs, follows from",
+        "differs, cannot be known",
+        "statistics",
+        "none",
+    ];
+
+    /// Place in [`Self::NAMES`].
+    pub fn number(&self) -> usize {
+        match self {
+            Self::Equal => 0,
+            Self::EqualBut(_) => 1,
+            Self::Differs(_) => 2,
+            Self::Unknown(_) => 3,
+            Self::Statistics { .. } => 4,
+            Self::None => 5,
+        }
+    }
+
+    /// In words.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Equal | Self::None => Self::NAMES[self.number()].to_owned(),
+            Self::EqualBut(what) => format!("equal but for: {what}"),
+            Self::Differs(row) => format!("differs, erratum {}", row + 1),
+            Self::Unknown(what) => format!("cannot be known: the source does not state {what}"),
+            Self::Statistics { factor, seeds: [low, high] } => {
+                format!("statistics: {factor:.2} of printed, {low:.2} to {high:.2} over seeds")
+            }
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The errata: claims and numbers of the sources that do not hold, each with the numbers that show it and the run that
+//! computes them.
+
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use super::evidence::Evidence;
+use super::{PRINTED, place_of, value_of};
+
+/// An erratum.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Erratum {
+    /// Heading of its table.
+    pub group: String,
+    /// `S0` or `S1`.
+    pub source: String,
+    /// Where it stands, for the reader.
+    pub place: String,
+    /// What is printed.
+    pub printed: String,
+    /// What holds, with `{}` for each of `numbers`.
+    holds: String,
+    /// The printed values that differ by it: place, and quantity.
+    #[serde(default)]
+    of: Vec<[String; 2]>,
+    /// What the finding rests on: ours of `PLACE | QUANTITY`, `EXPERIMENT/METRIC`, or a
+    /// formula of this source; and the number with the
+    /// digits that are shown.
+    #[serde(default)]
+    numbers: Vec<[String; 2]>,
+    /// Tests that show it, where no number does: files of the repository.
+    #[serde(default)]
+    pub tests: Vec<String>,
+}
+
+/// What gives the numbers of an erratum that needs no run.
+pub const OWN: &str = "its own numbers";
+
+#[derive(Deserialize)]
+struct File {
+    errata: Vec<Erratum>,
+}
+
+/// All errata, in the order of the page.
+pub static ERRATA: LazyLock<Vec<Erratum>> = LazyLock::new(|| {
+    let file: File = toml::from_str(include_str!("../../source/errata.toml"))
+        .expect("the errata are part of the program");
+    file.errata
+});
+
+impl Erratum {
+    /// Whether this printed value differs by it. A quantity `*` stands for all of a place, a place that ends in `*` for all that
+    /// begin so.
+    pub fn explains(&self, place: usize) -> bool {
+        let printed = &PRINTED[place];
+        self.source == printed.source
+            && self.of.iter().any(|[place, quantity]| {
+                let here = match place.strip_suffix('*') {
+                    Some(begin) => printed.place.starts_with(begin),
+                    None => printed.place == *place,
+                };
+                here && (quantity == "*" || *quantity == printed.quantity)
+            })
+    }
+
+    /// What holds, with its numbers.
+    pub fn holds(&self) -> String {
+        let mut parts = self.holds.split("{}");
+        let first = parts.next().unwrap_or_default().to_owned();
+        parts.zip(&self.numbers).fold(first, |text, (part, [_, number])| text + number + part)
+    }
+
+    /// The experiments that give its numbers and the tests, each once; [`OWN`] for what follows from the print itself.
+    pub fn runs<'a>(&'a self, evidence: &'a Evidence) -> Vec<&'a str> {
+        let of = |[name, _]: &'a [String; 2]| match (self.place_of(name), name.split_once('/')) {
+            (Some(place), _) => evidence.by(place).collect(),
+            (None, Some((experiment, _))) if evidence.metric(name).is_some() => vec![experiment],
+            _ => Vec::new(),
+        };
+        let mut runs: Vec<_> = self.numbers.iter().flat_map(of).collect();
+        runs.extend(self.tests.iter().map(String::as_str));
+        runs.sort_unstable();
+        runs.dedup();
+        if runs.is_empty() { vec![OWN] } else { runs }
+    }
+
+    fn place_of(&self, name: &str) -> Option<usize> {
+        let (place, quantity) = name.split_once(" | ")?;
+        place_of(&self.source, place, quantity)
+    }
+
+    /// Its faults: a form that is wrong, a number that no run gives, and one that is no longer what is shown.
+    pub fn faults(&self, evidence: &Evidence) -> Vec<String> {
+        let mut faults = Vec::new();
+        if self.holds.matches("{}").count() > self.numbers.len()
+            || (self.numbers.is_empty() && self.tests.is_empty())
+        {
+            faults.push(format!("{}: a number is missing", self.place));
+        }
+        for [place, quantity] in &self.of {
+            if !(0..PRINTED.len()).any(|k| {
+                let one = Self { of: vec![[place.clone(), quantity.clone()]], ..self.clone() };
+                one.explains(k)
+            }) {
+                faults.push(format!("{}: the list has no {place}, {quantity}", self.place));
+            }
+        }
+        for [name, shown] in &self.numbers {
+            let value = match self.place_of(name) {
+                Some(place) => evidence.value(place),
+                None => evidence.metric(name).or_else(|| value_of(&self.source, name)),
+            };
+            match value {
+                None => faults.push(format!("{}: no run gives {name}", self.place)),
+                Some(value) if rounded(value, shown) != *shown => {
+                    faults.push(format!("{}: {name} is {value}, shown as {shown}", self.place));
+                }
+                Some(_) => {}
+            }
+        }
+        faults
+    }
+}
+
+/// A number with as many decimals as another is shown with; yes and no for what is shown so.
+fn rounded(value: f64, like: &str) -> String {
+    if like == "yes" || like == "no" {
+        return if value == 0.0 { "no" } else { "yes" }.to_owned();
+    }
+    let digits = like.split('e').next().unwrap_or(like);
+    let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let text = if like.contains('e') {
+        format!("{value:.decimals$e}")
+    } else {
+        format!("{value:.decimals$}")
+    };
+    // A rounded zero has no sign.
+    if text.chars().all(|c| "-0.".contains(c)) { text.replace('-', "") } else { text }
+}

@@ -1,0 +1,311 @@
+//! The printed values beside ours: what the experiments report, counted, and as chapters of a page.
+
+use std::collections::HashMap;
+
+use sim_bench::outcome::{Cell, Compared, Figure, Outcome, Table};
+
+use super::errata::ERRATA;
+use super::{Kind, PRINTED, Printed, Verdict, place_of, verdict};
+
+/// What the experiments report.
+pub struct Evidence {
+    /// By place in [`PRINTED`]: the experiment, and its values.
+    compared: HashMap<usize, (String, Compared)>,
+    /// By `EXPERIMENT/METRIC`.
+    metrics: HashMap<String, f64>,
+    /// What was compared with a value that is not in the list.
+    pub astray: Vec<String>,
+    /// Figures of the sources: the experiment, and its figures.
+    figures: Vec<(String, Vec<Figure>)>,
+}
+
+/// What follows from the print itself; experiments add theirs.
+impl Default for Evidence {
+    fn default() -> Self {
+        let of = |(place, printed): (usize, &'static Printed)| {
+            let value = printed.recomputed()?;
+            let ours = Compared::with(&printed.source, &*printed.place, &*printed.quantity);
+            Some((place, (String::new(), ours.recomputed(value))))
+        };
+        let compared = PRINTED.iter().enumerate().filter_map(of).collect();
+        Self { compared, metrics: HashMap::new(), astray: Vec::new(), figures: Vec::new() }
+    }
+}
+
+impl Evidence {
+    /// Takes what an experiment reports. Where two report a place, the columns are filled in turn.
+    pub fn add(&mut self, experiment: &str, outcome: &Outcome) {
+        for (name, value) in outcome.metrics.iter() {
+            self.metrics.insert(format!("{experiment}/{name}"), value);
+        }
+        for ours in &outcome.compared {
+            let Some(place) = place_of(ours.source, &ours.place, &ours.quantity) else {
+                self.astray.push(format!(
+                    "{experiment}: {} {}, {}",
+                    ours.source, ours.place, ours.quantity
+                ));
+                continue;
+            };
+            let known = self.compared.entry(place).or_insert_with(|| (String::new(), ours.clone()));
+            let comma = if known.0.is_empty() { "" } else { ", " };
+            known.0 = format!("{}{comma}{experiment}", known.0);
+            known.1.recomputed = known.1.recomputed.or(ours.recomputed);
+            known.1.simulated = known.1.simulated.or(ours.simulated);
+            known.1.used = known.1.used.or(ours.used);
+        }
+        let shown = |figure: &&Figure| figure.source.contains("Figure");
+        let figures: Vec<_> = outcome.figures.iter().filter(shown).cloned().collect();
+        self.figures.push((experiment.to_owned(), figures));
+    }
+
+    /// The experiments that report a place; none of what follows from the print itself.
+    pub fn by(&self, place: usize) -> impl Iterator<Item = &str> {
+        self.compared
+            .get(&place)
+            .into_iter()
+            .flat_map(|(names, _)| names.split(", ").filter(|name| !name.is_empty()))
+    }
+
+    /// Our value of a place.
+    pub fn value(&self, place: usize) -> Option<f64> {
+        self.compared.get(&place)?.1.value()
+    }
+
+    /// A metric, by `EXPERIMENT/METRIC`.
+    pub fn metric(&self, name: &str) -> Option<f64> {
+        self.metrics.get(name).copied()
+    }
+
+    /// The verdict on a place.
+    pub fn verdict(&self, place: usize) -> Verdict {
+        let none = Compared::default();
+        verdict(place, self.compared.get(&place).map_or(&none, |(_, ours)| ours))
+    }
+
+    /// How many printed values of a source (and kind) have each verdict, in the order of [`Verdict::NAMES`].
+    pub fn count(&self, source: &str, kind: Option<Kind>) -> [usize; 6] {
+        let mut counts = [0; 6];
+        for (place, printed) in PRINTED.iter().enumerate() {
+            if printed.source == source && kind.is_none_or(|kind| kind == printed.kind) {
+                counts[self.verdict(place).number()] += 1;
+            }
+        }
+        counts
+    }
+
+    /// The printed values of an experiment.
+    pub fn table(&self, compared: &[Compared]) -> Table {
+        let places = compared.iter().filter_map(|c| place_of(c.source, &c.place, &c.quantity));
+        let mut places: Vec<_> = places.collect();
+        places.sort_unstable();
+        places.dedup();
+        let rows = places.iter().map(|&place| self.row(place, &PRINTED[place]));
+        Table::new("Printed values and ours", &[]).records(rows)
+    }
+
+    /// Places without a verdict, values astray, and faults of the errata.
+    pub fn faults(&self) -> Vec<String> {
+        let none = |(place, p): (usize, &Printed)| {
+            let ours =
+                self.value(place).map_or_else(|| "nothing".to_owned(), |ours| ours.to_string());
+            (self.verdict(place) == Verdict::None).then(|| {
+                format!(
+                    "{} {}, {}: {} printed, ours {ours}",
+                    p.source, p.place, p.quantity, p.value
+                )
+            })
+        };
+        let mut faults: Vec<_> = PRINTED.iter().enumerate().filter_map(none).collect();
+        faults.extend(self.astray.iter().map(|astray| format!("not in the list: {astray}")));
+        faults.extend(ERRATA.iter().flat_map(|erratum| erratum.faults(self)));
+        faults
+    }
+
+    /// Counts of the verdicts.
+    pub fn counts(&self) -> Table {
+        let mut table = Table::new("Printed values by verdict", &[]);
+        for source in ["S1", "S0"] {
+            for (what, kind) in [
+                ("all", None),
+                ("inputs", Some(Kind::Input)),
+                ("results", Some(Kind::Result)),
+                ("read off graphs", Some(Kind::Graph)),
+                ("claims", Some(Kind::Claim)),
+            ] {
+                let counts = self.count(source, kind);
+                let whole = |count: usize| Cell::fixed(count as f64, 0);
+                let mut row = vec![
+                    ("source", Cell::from(source)),
+                    ("values", what.into()),
+                    ("printed", whole(counts.iter().sum())),
+                ];
+                row.extend(Verdict::NAMES.into_iter().zip(counts.map(whole)));
+                table.record(row);
+            }
+        }
+        table
+    }
+
+    /// The first page, and the chapters of both sources with what is printed, recomputed and simulated.
+    pub fn chapters(&self) -> Vec<Chapter> {
+        let mut chapters = vec![self.first()];
+        let mut homes: HashMap<&str, usize> = HashMap::new();
+        for (place, printed) in PRINTED.iter().enumerate() {
+            if chapters.last().is_none_or(|last| !last.is_of(printed)) {
+                chapters.push(Chapter::of(printed));
+            }
+            let number = chapters.len() - 1;
+            let chapter = &mut chapters[number];
+            chapter.outcome.tables[0].record(self.row(place, printed));
+            for run in self.by(place) {
+                homes.entry(run).or_insert(number);
+                if !chapter.runs.iter().any(|known| known == run) {
+                    chapter.runs.push(run.to_owned());
+                }
+            }
+        }
+        let mut index = Table::new("Figures of the sources", &[]);
+        for chapter in &mut chapters[1..] {
+            let values = chapter.outcome.tables[0].rows.len() as f64;
+            chapter.outcome.metrics.set("printed_values", values);
+        }
+        for (experiment, figures) in &self.figures {
+            let Some(&home) = homes.get(&**experiment) else { continue };
+            for figure in figures {
+                // In the chapter where the source has it, if the list has values of it.
+                let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
+                let place = format!("Figure {number}");
+                let is_there = |p: &&Printed| p.source == chapters[home].source && p.place == place;
+                let there = PRINTED.iter().find(is_there);
+                let at = there.and_then(|p| chapters.iter().position(|chapter| chapter.is_of(p)));
+                let chapter = &mut chapters[at.unwrap_or(home)];
+                index.record([
+                    ("figure", Cell::from(&*figure.source)),
+                    ("section", chapter.name.as_str().into()),
+                    ("what it shows", figure.title.as_str().into()),
+                ]);
+                chapter.outcome.figures.push(figure.clone());
+            }
+        }
+        chapters[0].outcome.tables.push(index);
+        chapters
+    }
+
+    /// Counts, errata, and what the numbers are about.
+    fn first(&self) -> Chapter {
+        let mut outcome = Outcome::default();
+        let equal = |source| self.count(source, None)[..2].iter().sum::<usize>() as f64;
+        outcome.metrics.set("equal_of_barroso_2017", equal("S1"));
+        outcome.metrics.set("equal_of_jacobina_1996", equal("S0"));
+        outcome.tables.push(self.counts());
+        let errata = ERRATA.iter().zip(1..).map(|(erratum, number)| {
+            [
+                ("", Cell::fixed(f64::from(number), 0)),
+                ("source", erratum.source.as_str().into()),
+                ("place", erratum.place.as_str().into()),
+                ("printed", erratum.printed.as_str().into()),
+                ("what holds", erratum.holds().into()),
+                ("run", erratum.runs(self).join(", ").into()),
+            ]
+        });
+        outcome.tables.push(Table::new("Errata", &[]).records(errata));
+        let faults = self.faults();
+        if !faults.is_empty() {
+            outcome.texts.push((
+                "Without a verdict, or no longer as the errata say".into(),
+                faults.join("\n"),
+            ));
+        }
+        outcome.remark(
+            "S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996. Recomputed: from the source's own numbers. Simulated: by \
+             the drive, or the method of the source, on the simulated motor of Table 5 with an assumed saliency fixed to the \
+             flux; the motors of the sources are not known. What follows from a saliency is a statement about that motor.",
+        );
+        let drift = |name: &str| {
+            self.metric(&format!("sensorless-position/{name}")).unwrap_or(f64::NAN).abs()
+        };
+        outcome.remark(format!(
+            "Sensorless position (section 5.1 of S1): the flux is seen, not the rotor, so more is not to be had without a \
+             saliency that is fixed to the rotor. A position at rest drifts by the error of the slip: {:.0}° a minute without \
+             load, {:.0}° a minute and ampere of torque current, {:.0}° more for each percent of error of the rotor resistance; \
+             {:.0}° a minute and ampere once that is learned. Homing finds the position again.",
+            drift("drift_no_load_deg_per_min"),
+            drift("drift_deg_per_min_a"),
+            drift("drift_deg_per_min_a_per_pct_rr"),
+            drift("drift_learned_deg_per_min_a"),
+        ));
+        Chapter {
+            name: "sources".into(),
+            source: "S1, S0",
+            about: "What both sources print, counted by verdict; their errata; where their figures stand.".into(),
+            runs: Vec::new(),
+            outcome,
+        }
+    }
+
+    fn row(&self, place: usize, printed: &Printed) -> [(&'static str, Cell); 9] {
+        let ours = self.compared.get(&place).map(|(_, ours)| ours);
+        let shown = |value: Option<f64>| {
+            Cell::or_dash(value.map(|value| match (printed.kind, value) {
+                (Kind::Claim, 0.0) => "no".into(),
+                (Kind::Claim, _) => "yes".into(),
+                _ => Cell::significant(value, 6),
+            }))
+        };
+        let difference =
+            |value: f64| printed.number().map(|printed| 100.0 * (value / printed - 1.0));
+        let difference = ours.and_then(Compared::value).and_then(difference);
+        let number = printed.number().filter(|_| printed.kind != Kind::Claim);
+        [
+            ("place", Cell::from(printed.place.as_str())),
+            ("quantity", printed.quantity.as_str().into()),
+            ("unit", printed.unit.as_str().into()),
+            (
+                "printed",
+                number.map_or(printed.value.as_str().into(), |value| Cell::Number {
+                    value,
+                    text: printed.value.clone(),
+                }),
+            ),
+            ("recomputed", shown(ours.and_then(|ours| ours.recomputed))),
+            ("by", printed.formula.as_deref().map_or("-".into(), Cell::from)),
+            ("simulated", shown(ours.and_then(|ours| ours.simulated))),
+            (
+                "difference (%)",
+                Cell::fixed_or_dash(
+                    difference.filter(|d| printed.kind != Kind::Claim && d.is_finite()),
+                    2,
+                ),
+            ),
+            ("verdict", self.verdict(place).text().into()),
+        ]
+    }
+}
+
+/// A chapter of a source.
+pub struct Chapter {
+    /// Its name on the page: source and number.
+    pub name: String,
+    /// `S0` or `S1`.
+    pub source: &'static str,
+    /// Number and title.
+    pub about: String,
+    /// The experiments that give its values.
+    pub runs: Vec<String>,
+    /// Table and figures.
+    pub outcome: Outcome,
+}
+
+impl Chapter {
+    fn of(printed: &'static Printed) -> Self {
+        let mut outcome = Outcome::default();
+        outcome.tables.push(Table::default());
+        let name = format!("{}-{}", printed.source, printed.id);
+        let about = printed.chapter.clone();
+        Self { name, source: &printed.source, about, runs: Vec::new(), outcome }
+    }
+
+    fn is_of(&self, printed: &Printed) -> bool {
+        self.source == printed.source && self.about == printed.chapter
+    }
+}

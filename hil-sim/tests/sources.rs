@@ -1,0 +1,113 @@
+//! The printed values of both sources beside ours: every one has a verdict, and the errata are what the runs give.
+
+use std::sync::LazyLock;
+
+use hil_sim::Config;
+use hil_sim::experiments::source::errata::{ERRATA, OWN};
+use hil_sim::experiments::source::evidence::Evidence;
+use hil_sim::experiments::source::{PRINTED, Verdict, number, place_of};
+use hil_sim::experiments::{self, SOURCES};
+use hil_sim::outcome::Compared;
+
+use crate::generated;
+
+/// All experiments that report printed values, with the settings as they are and seed 1.
+static EVIDENCE: LazyLock<Evidence> = LazyLock::new(|| {
+    let mut evidence = Evidence::default();
+    for name in SOURCES {
+        evidence.add(name, &experiments::run(name, &Config::default(), 1).expect(name));
+    }
+    evidence
+});
+
+#[test]
+fn every_printed_value_has_a_verdict_and_the_errata_hold() {
+    assert_eq!(EVIDENCE.faults(), Vec::<String>::new());
+    // Verdicts: equal, equal but for unit or rounding, differs, unknown, statistics, none.
+    for (source, counts) in [("S1", [203, 52, 27, 32, 0, 0]), ("S0", [25, 0, 3, 20, 186, 0])] {
+        assert_eq!(EVIDENCE.count(source, None), counts, "{source}");
+    }
+    assert_eq!(place_of("S1", "Eq. 3.20", "k_FT").map(|k| EVIDENCE.verdict(k).number()), Some(2));
+}
+
+/// Typed from the sources once more, by hand.
+#[test]
+fn the_list_is_what_the_sources_print() {
+    #[rustfmt::skip] // a value a line
+    let typed = [
+        ("S1", "Eq. 3.5", "slope of I_A", "0.0022120"), ("S1", "Eq. 3.5", "offset of I_B", "-4.4966238"),
+        ("S1", "Eq. 3.3", "f_c", "5305"), ("S1", "section 3.2", "positive full scale, channel B", "4.6432"),
+        ("S1", "Table 3", "starting current I_p/I_n", "7.8"), ("S1", "Table 3", "rated current, star", "2.56"),
+        ("S1", "Table 4, -3 A", "n_ADC, channel A", "666"), ("S1", "Table 4, 3 A", "n_ADC, channel B", "3356"),
+        ("S1", "section 3.6.1", "r_s", "5.4"), ("S1", "section 3.6.2", "theta_rb", "0.671"),
+        ("S1", "section 3.6.3", "L_m", "177.1"), ("S1", "Eq. 3.20", "k_FT", "0.01973"),
+        ("S1", "Eq. 3.22", "T_FT", "1.0157"), ("S1", "Eq. 3.34", "gain", "0.0040532"),
+        ("S1", "section 3.7", "real frequency of the pole from the parameters", "977.6"),
+        ("S1", "Figure 24", "crossover, fictitious", "204.5"), ("S1", "section 3.8", "k_c", "52.48"),
+        ("S1", "Eq. 3.41", "pole", "0.9511"), ("S1", "Eq. 3.44", "k_s", "0.132546"), ("S1", "Eq. 3.44", "z_s", "0.90"),
+        ("S1", "Table 6, 1.5 A", "k_phi", "5.9470"), ("S1", "Table 6, 3.0 A", "Im p", "0.06461"),
+        ("S1", "Eq. 4.1", "gain", "0.01716"), ("S1", "Eq. 4.2", "zero", "0.974"),
+        ("S1", "Table 7, i = 4", "a (LPF)", "37.322148071647149"), ("S1", "Table 8, i = 2", "b (PP)", "0.00535736614345009"),
+        ("S0", "Table 1, h_1b", "Sg 50 us", "10609"), ("S0", "Table 2, C, tau_r", "Sg 50 us", "9.8831"),
+        ("S0", "Table 5, omega_m", "Ss 200 us", "8.6050"), ("S0", "Table 6, rbv", "tau_r", "0.0427"),
+        ("S0", "Table 7, Ss", "omega_m", "56.14"), ("S0", "Figure 3", "convergence time of r_s and tau_r, the slowest, Sg", "0.8"),
+    ];
+    for (source, place, quantity, value) in typed {
+        let found = place_of(source, place, quantity).map(|k| PRINTED[k].value.as_str());
+        assert_eq!(found, Some(value), "{source} {place}, {quantity}");
+    }
+    let mut keys: Vec<_> = PRINTED.iter().map(|p| (&p.source, &p.place, &p.quantity)).collect();
+    keys.sort_unstable();
+    assert!(keys.windows(2).all(|pair| pair[0] != pair[1]), "a value stands twice");
+}
+
+/// A constant of the program or of the list that is off by a percent costs a verdict.
+#[test]
+fn a_wrong_constant_is_seen() {
+    let compared = |place: &str, quantity: &str| {
+        let outcomes = ["printed-numbers", "filters"]
+            .map(|name| experiments::run(name, &Config::default(), 1).expect(name));
+        let all = outcomes.into_iter().flat_map(|outcome| outcome.compared);
+        let used = |one: &Compared| one.place == place && one.quantity == quantity;
+        all.into_iter().find(used).expect(place)
+    };
+    for (place, quantity) in
+        [("section 3.6.3", "L_m"), ("Table 7, i = 3", "a (LPF)"), ("Eq. 3.44", "z_s")]
+    {
+        let ours = compared(place, quantity);
+        let number = place_of("S1", place, quantity).expect(place);
+        let verdict = |used: f64| {
+            let mut outcome = hil_sim::Outcome::default();
+            outcome.compared.push(ours.clone().used(used));
+            let mut evidence = Evidence::default();
+            evidence.add("one", &outcome);
+            evidence.verdict(number)
+        };
+        let used = ours.used.expect("a constant of the program");
+        assert_ne!(verdict(used), Verdict::None, "{place}");
+        assert_eq!(verdict(1.01 * used), Verdict::None, "{place}");
+    }
+    assert_eq!(number("S1", "Table 2, U_0", "v_a"), 2.0 / 3.0);
+}
+
+#[test]
+fn the_errata_are_those_of_the_runs() {
+    let mut text = String::new();
+    let mut group = "";
+    for erratum in ERRATA.iter() {
+        for test in &erratum.tests {
+            assert!(generated::root().join(test).is_file(), "{}: no {test}", erratum.place);
+        }
+        if group != erratum.group {
+            group = &erratum.group;
+            text +=
+                &format!("\n## {group}\n\n| place | printed | holds | by |\n|---|---|---|---|\n");
+        }
+        let code = |run: &&str| if *run == OWN { OWN.to_owned() } else { format!("`{run}`") };
+        let runs: Vec<_> = erratum.runs(&EVIDENCE).iter().map(code).collect();
+        let cells = [&erratum.place, &erratum.printed, &erratum.holds(), &runs.join(", ")]
+            .map(|cell| cell.replace('|', "\\|"));
+        text += &format!("| {} |\n", cells.join(" | "));
+    }
+    generated::check("errata.md", "errata", &text);
+}
