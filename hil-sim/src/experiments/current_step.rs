@@ -58,7 +58,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let (nominal, larger) = plants();
     let z_c = printed("Eq. 3.38", "z_c");
-        let mut figure = Figure::new(
+    let mut figure = Figure::new(
         "step",
         "Current after a unit step: plant of Eq. 3.34 (top) and with its pole 3 % larger (bottom)",
         "Figures 26, 27",
