@@ -66,28 +66,23 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Figure 4, and where the modulator puts voltages that are too long.
 fn vectors(inverter: &Inverter) -> Figure {
-    let corner = |k: i32| {
-        let angle = f64::from(k) * TAU / 6.0;
-        (2.0 / 3.0 * inverter.vdc * angle.cos(), 2.0 / 3.0 * inverter.vdc * angle.sin())
+    let around = |n: u32, at: &dyn Fn(f64) -> (f64, f64)| -> Vec<(f64, f64)> {
+        (0..=n).map(|k| at(f64::from(k) * TAU / f64::from(n))).collect()
     };
-    let circle = |volts: f64| {
-        (0..=360)
-            .map(|k| f64::from(k).to_radians())
-            .map(|x| (volts * x.cos(), volts * x.sin()))
-            .collect()
-    };
+    let on = |length: f64| move |angle: f64| (length * angle.cos(), length * angle.sin());
     let given = |volts: f64| {
-        (0..=720)
-            .map(|k| vector(volts, f64::from(k) * TAU / 720.0))
-            .map(|wanted| inverter.voltage(inverter.compare(wanted)))
-            .collect()
+        around(720, &|angle| inverter.voltage(inverter.compare(vector(volts, angle))))
     };
     let inner = inverter.vdc / 3.0_f64.sqrt();
-    let panel = Panel::new("α (V)", "β (V)")
-        .equal_axes()
-        .with(Series::reference("hexagon of U_0 to U_300", (0..=6).map(corner).collect()))
-        .with(Series::points("vectors of Table 2", (0..6).map(corner).collect()))
-        .with(Series::limit("largest circle", circle(inner)))
+    let corners = around(6, &on(2.0 / 3.0 * inverter.vdc));
+    let hexagon = Series::reference("hexagon", corners.clone());
+    let mut panel = Panel::new("α (V)", "β (V)").equal_axes().with(hexagon);
+    let names = ["U_0", "U_60", "U_120", "U_180", "U_240", "U_300"];
+    for (name, corner) in names.into_iter().zip(corners) {
+        panel = panel.with(Series::points(name, vec![corner]));
+    }
+    let panel = panel
+        .with(Series::limit("largest circle", around(360, &on(inner))))
         .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
         .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));
     Figure::new(
