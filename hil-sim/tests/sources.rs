@@ -104,7 +104,7 @@ fn the_errata_are_those_of_the_runs() {
                 &format!("\n## {group}\n\n| place | printed | holds | by |\n|---|---|---|---|\n");
         }
         let code = |run: &&str| if *run == OWN { OWN.to_owned() } else { format!("`{run}`") };
-        let runs: Vec<_> = erratum.runs(&EVIDENCE).iter().map(code).collect();
+        let runs: Vec<_> = EVIDENCE.runs_of(erratum).iter().map(code).collect();
         let cells = [&erratum.place, &erratum.printed, &erratum.holds(), &runs.join(", ")]
             .map(|cell| cell.replace('|', "\\|"));
         text += &format!("| {} |\n", cells.join(" | "));

@@ -70,9 +70,8 @@ fn vectors(inverter: &Inverter) -> Figure {
         (0..=n).map(|k| at(f64::from(k) * TAU / f64::from(n))).collect()
     };
     let on = |length: f64| move |angle: f64| (length * angle.cos(), length * angle.sin());
-    let given = |volts: f64| {
-        around(720, &|angle| inverter.voltage(inverter.compare(vector(volts, angle))))
-    };
+    let given =
+        |volts: f64| around(720, &|angle| inverter.voltage(inverter.compare(vector(volts, angle))));
     let inner = inverter.vdc / 3.0_f64.sqrt();
     let corners = around(6, &on(2.0 / 3.0 * inverter.vdc));
     let hexagon = Series::reference("hexagon", corners.clone());

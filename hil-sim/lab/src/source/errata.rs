@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::evidence::Evidence;
-use super::{PRINTED, place_of, value_of};
+use super::{PRINTED, place_of};
 
 /// An erratum.
 #[derive(Clone, Debug, Deserialize)]
@@ -21,15 +20,15 @@ pub struct Erratum {
     /// What is printed.
     pub printed: String,
     /// What holds, with `{}` for each of `numbers`.
-    holds: String,
+    pub(super) holds: String,
     /// The printed values that differ by it: place, and quantity.
     #[serde(default)]
-    of: Vec<[String; 2]>,
+    pub(super) of: Vec<[String; 2]>,
     /// What the finding rests on: ours of `PLACE | QUANTITY`, `EXPERIMENT/METRIC`, or a
     /// formula of this source; and the number with the
     /// digits that are shown.
     #[serde(default)]
-    numbers: Vec<[String; 2]>,
+    pub(super) numbers: Vec<[String; 2]>,
     /// Tests that show it, where no number does: files of the repository.
     #[serde(default)]
     pub tests: Vec<String>,
@@ -72,60 +71,15 @@ impl Erratum {
         parts.zip(&self.numbers).fold(first, |text, (part, [_, number])| text + number + part)
     }
 
-    /// The experiments that give its numbers and the tests, each once; [`OWN`] for what follows from the print itself.
-    pub fn runs<'a>(&'a self, evidence: &'a Evidence) -> Vec<&'a str> {
-        let of = |[name, _]: &'a [String; 2]| match (self.place_of(name), name.split_once('/')) {
-            (Some(place), _) => evidence.by(place).collect(),
-            (None, Some((experiment, _))) if evidence.metric(name).is_some() => vec![experiment],
-            _ => Vec::new(),
-        };
-        let mut runs: Vec<_> = self.numbers.iter().flat_map(of).collect();
-        runs.extend(self.tests.iter().map(String::as_str));
-        runs.sort_unstable();
-        runs.dedup();
-        if runs.is_empty() { vec![OWN] } else { runs }
-    }
-
-    fn place_of(&self, name: &str) -> Option<usize> {
+    /// The place of a number that is ours of a printed value.
+    pub(super) fn place_of(&self, name: &str) -> Option<usize> {
         let (place, quantity) = name.split_once(" | ")?;
         place_of(&self.source, place, quantity)
-    }
-
-    /// Its faults: a form that is wrong, a number that no run gives, and one that is no longer what is shown.
-    pub fn faults(&self, evidence: &Evidence) -> Vec<String> {
-        let mut faults = Vec::new();
-        if self.holds.matches("{}").count() > self.numbers.len()
-            || (self.numbers.is_empty() && self.tests.is_empty())
-        {
-            faults.push(format!("{}: a number is missing", self.place));
-        }
-        for [place, quantity] in &self.of {
-            if !(0..PRINTED.len()).any(|k| {
-                let one = Self { of: vec![[place.clone(), quantity.clone()]], ..self.clone() };
-                one.explains(k)
-            }) {
-                faults.push(format!("{}: the list has no {place}, {quantity}", self.place));
-            }
-        }
-        for [name, shown] in &self.numbers {
-            let value = match self.place_of(name) {
-                Some(place) => evidence.value(place),
-                None => evidence.metric(name).or_else(|| value_of(&self.source, name)),
-            };
-            match value {
-                None => faults.push(format!("{}: no run gives {name}", self.place)),
-                Some(value) if rounded(value, shown) != *shown => {
-                    faults.push(format!("{}: {name} is {value}, shown as {shown}", self.place));
-                }
-                Some(_) => {}
-            }
-        }
-        faults
     }
 }
 
 /// A number with as many decimals as another is shown with; yes and no for what is shown so.
-fn rounded(value: f64, like: &str) -> String {
+pub(super) fn rounded(value: f64, like: &str) -> String {
     if like == "yes" || like == "no" {
         return if value == 0.0 { "no" } else { "yes" }.to_owned();
     }

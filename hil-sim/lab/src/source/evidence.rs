@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use sim_bench::outcome::{Cell, Compared, Figure, Outcome, Table};
 
-use super::errata::ERRATA;
-use super::{Kind, PRINTED, Printed, Verdict, place_of, verdict};
+use super::errata::{ERRATA, Erratum, OWN, rounded};
+use super::{Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
 
 /// What the experiments report.
 pub struct Evidence {
@@ -103,6 +103,53 @@ impl Evidence {
         Table::new("Printed values and ours", &[]).records(rows)
     }
 
+    /// The experiments that give the numbers of an erratum and the tests, each once; [`OWN`] for what follows from the print itself.
+    pub fn runs_of<'a>(&'a self, erratum: &'a Erratum) -> Vec<&'a str> {
+        let of = |[name, _]: &'a [String; 2]| match (erratum.place_of(name), name.split_once('/')) {
+            (Some(place), _) => self.by(place).collect(),
+            (None, Some((experiment, _))) if self.metric(name).is_some() => vec![experiment],
+            _ => Vec::new(),
+        };
+        let mut runs: Vec<_> = erratum.numbers.iter().flat_map(of).collect();
+        runs.extend(erratum.tests.iter().map(String::as_str));
+        runs.sort_unstable();
+        runs.dedup();
+        if runs.is_empty() { vec![OWN] } else { runs }
+    }
+
+    /// The faults of an erratum: a form that is wrong, a number that no run gives, and one that is no longer what is shown.
+    fn faults_of(&self, erratum: &Erratum) -> Vec<String> {
+        let mut faults = Vec::new();
+        if erratum.holds.matches("{}").count() > erratum.numbers.len()
+            || (erratum.numbers.is_empty() && erratum.tests.is_empty())
+        {
+            faults.push(format!("{}: a number is missing", erratum.place));
+        }
+        for [place, quantity] in &erratum.of {
+            if !(0..PRINTED.len()).any(|k| {
+                let one =
+                    Erratum { of: vec![[place.clone(), quantity.clone()]], ..erratum.clone() };
+                one.explains(k)
+            }) {
+                faults.push(format!("{}: the list has no {place}, {quantity}", erratum.place));
+            }
+        }
+        for [name, shown] in &erratum.numbers {
+            let value = match erratum.place_of(name) {
+                Some(place) => self.value(place),
+                None => self.metric(name).or_else(|| value_of(&erratum.source, name)),
+            };
+            match value {
+                None => faults.push(format!("{}: no run gives {name}", erratum.place)),
+                Some(value) if rounded(value, shown) != *shown => {
+                    faults.push(format!("{}: {name} is {value}, shown as {shown}", erratum.place));
+                }
+                Some(_) => {}
+            }
+        }
+        faults
+    }
+
     /// Places without a verdict, values astray, and faults of the errata.
     pub fn faults(&self) -> Vec<String> {
         let none = |(place, p): (usize, &Printed)| {
@@ -117,7 +164,7 @@ impl Evidence {
         };
         let mut faults: Vec<_> = PRINTED.iter().enumerate().filter_map(none).collect();
         faults.extend(self.astray.iter().map(|astray| format!("not in the list: {astray}")));
-        faults.extend(ERRATA.iter().flat_map(|erratum| erratum.faults(self)));
+        faults.extend(ERRATA.iter().flat_map(|erratum| self.faults_of(erratum)));
         faults
     }
 
@@ -205,7 +252,7 @@ impl Evidence {
                 ("place", erratum.place.as_str().into()),
                 ("printed", erratum.printed.as_str().into()),
                 ("what holds", erratum.holds().into()),
-                ("run", erratum.runs(self).join(", ").into()),
+                ("run", self.runs_of(erratum).join(", ").into()),
             ]
         });
         outcome.tables.push(Table::new("Errata", &[]).records(errata));
