@@ -126,11 +126,11 @@ pub struct Compared {
     pub simulated: Option<f64>,
     /// The least and the largest over seeds, of a mean over random runs.
     pub seeds: Option<[f64; 2]>,
-    /// What the program takes for it.
+    /// The constant that the program uses for it.
     pub used: Option<f64>,
     /// A reason for a relative difference, and the largest of it.
     pub but: Option<(&'static str, f64)>,
-    /// What the source does not state, where the value cannot be known for that.
+    /// The quantity that the source does not state, where the value cannot be known without it.
     pub unknown: Option<&'static str>,
 }
 

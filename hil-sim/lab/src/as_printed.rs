@@ -31,7 +31,7 @@ const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 struct Levels {
     error: Vec<f64>,
     torque: Vec<f64>,
-    /// Of the current beyond its reference in the last level, A.
+    /// Overshoot of the torque current at the last level, A.
     overshoot: f64,
     trace: Vec<(f64, f64)>,
 }

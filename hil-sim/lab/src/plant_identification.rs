@@ -49,7 +49,7 @@ impl Axis {
 struct Record {
     u: Vec<f64>,
     y: Vec<f64>,
-    /// What was taken from the two.
+    /// Means that were taken from voltage and current.
     mean: [f64; 2],
 }
 

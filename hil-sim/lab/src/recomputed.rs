@@ -54,7 +54,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// What the program has as a constant of its own.
+/// Compares the constants of the program with the printed values.
 fn constants(outcome: &mut Outcome) {
     let (drive, config, motor) =
         (Settings::default(), Config::default(), MachineSettings::default());

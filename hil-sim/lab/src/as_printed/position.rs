@@ -108,7 +108,7 @@ fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     config.drive.motor.inertia = config.motor.inertia as f32;
     config.drive.angle_source = AngleSource::Encoder;
     config.drive.speed.limit_rpm = Some(printed("section 4.1", "limit of the speed") as f32);
-    // Seven tenths of what the largest torque current accelerates.
+    // 70 % of the acceleration by the largest torque current.
     let fastest = 0.7 * LIMIT_A * torque / config.motor.inertia * 60.0 / TAU;
     config.drive.speed.ramp_rpm_per_s = Some(fastest as f32);
     config.load.mode = LoadMode::Free;

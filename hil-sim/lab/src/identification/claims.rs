@@ -1,4 +1,4 @@
-//! What sections 5 and 7 say of Tables 1 to 5, counted in the tables themselves.
+//! The claims of section 5 about Tables 1 to 5, counted in the tables themselves.
 
 use sim_bench::outcome::{Compared, Metrics};
 
@@ -27,7 +27,7 @@ fn at_50(rows: &[Row], signals: &[Signal], not: &[&str]) -> (f64, f64) {
     all.fold((f64::MAX, 0.0), |(least, most), error| (least.min(error), most.max(error)))
 }
 
-/// Adds the claims, and the numbers of what does not hold.
+/// Adds the claims, and the numbers behind the errata.
 pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
     let [fast, slow] = SPEEDS;
     let tables = [("A", fast), ("A", slow), ("B", fast), ("C", fast), ("C", slow)];

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::{PRINTED, place_of};
+use super::{PRINTED, Printed, place_of};
 
 /// An erratum.
 #[derive(Clone, Debug, Deserialize)]
@@ -53,15 +53,16 @@ impl Erratum {
     /// Whether this printed value differs by it. A quantity `*` stands for all of a place, a place that ends in `*` for all that
     /// begin so.
     pub fn explains(&self, place: usize) -> bool {
-        let printed = &PRINTED[place];
-        self.source == printed.source
-            && self.of.iter().any(|[place, quantity]| {
-                let here = match place.strip_suffix('*') {
-                    Some(begin) => printed.place.starts_with(begin),
-                    None => printed.place == *place,
-                };
-                here && (quantity == "*" || *quantity == printed.quantity)
-            })
+        self.of.iter().any(|of| self.names(of, &PRINTED[place]))
+    }
+
+    /// Whether a row of `of` names this printed value.
+    pub(super) fn names(&self, [place, quantity]: &[String; 2], printed: &Printed) -> bool {
+        let here = match place.strip_suffix('*') {
+            Some(begin) => printed.place.starts_with(begin),
+            None => printed.place == *place,
+        };
+        here && self.source == printed.source && (quantity == "*" || *quantity == printed.quantity)
     }
 
     /// What holds, with its numbers.

@@ -125,13 +125,9 @@ impl Evidence {
         {
             faults.push(format!("{}: a number is missing", erratum.place));
         }
-        for [place, quantity] in &erratum.of {
-            if !(0..PRINTED.len()).any(|k| {
-                let one =
-                    Erratum { of: vec![[place.clone(), quantity.clone()]], ..erratum.clone() };
-                one.explains(k)
-            }) {
-                faults.push(format!("{}: the list has no {place}, {quantity}", erratum.place));
+        for of in &erratum.of {
+            if !PRINTED.iter().any(|printed| erratum.names(of, printed)) {
+                faults.push(format!("{}: the list has no {}", erratum.place, of.join(", ")));
             }
         }
         for [name, shown] in &erratum.numbers {
