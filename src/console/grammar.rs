@@ -31,7 +31,8 @@ const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
 /// Largest divider of a trace.
 const LARGEST_DIVIDER: u16 = 1000;
 
-/// The commands.
+/// The commands. The number of each for life is its place, from 1 on: a new one comes last, and `-` takes the place of a
+/// retired one.
 pub const COMMANDS: &str = "help status start commission accept learn stop relock torque speed jog position home angle get \
     describe set apply revert save defaults backup learned faults history clear trace stream baud \
     log echo reboot board confirm version h ?";

@@ -94,7 +94,8 @@ impl fmt::Display for Description {
             Change::FromReset => "reset",
             Change::Board => "board",
         };
-        write!(f, "{{\"name\":\"{}\",\"unit\":\"{}\"", key.name(), key.unit())?;
+        write!(f, "{{\"name\":\"{}\",\"number\":{}", key.name(), key.id())?;
+        write!(f, ",\"unit\":\"{}\"", key.unit())?;
         write!(f, ",\"type\":\"{kind}\",\"auto\":{}", key.has_rule())?;
         match range {
             Some((min, max)) => write!(f, ",\"min\":{min},\"max\":{max}")?,

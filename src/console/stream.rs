@@ -173,7 +173,8 @@ pub(super) fn described(line: usize) -> Option<impl fmt::Display> {
     (line <= SIGNALS.len()).then(|| {
         fmt::from_fn(move |f| match SIGNALS.get(line) {
             Some(signal) => {
-                write!(f, "{{\"signal\":\"{}\",\"unit\":\"{}\"}}", signal.name, signal.unit())
+                let (name, id, unit) = (signal.name, signal.id, signal.unit());
+                write!(f, "{{\"signal\":\"{name}\",\"number\":{id},\"unit\":\"{unit}\"}}")
             }
             None => write!(
                 f,

@@ -5,6 +5,7 @@ mod documents;
 mod doubles;
 mod learning;
 mod lists;
+mod numbers;
 mod staging;
 mod stream;
 mod tags;

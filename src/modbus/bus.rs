@@ -10,9 +10,7 @@ use super::Port;
 use super::cia402;
 use super::faults::FaultLog;
 use super::float::from_float;
-use super::registers::{
-    COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, SETTINGS_END, STAGED, View,
-};
+use super::registers::{COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, STAGED, View};
 use super::slave::{self, Registers, Words};
 use crate::desk::Desk;
 use crate::desk::handle::DriveHandle;
@@ -232,14 +230,14 @@ impl<D: DriveHandle> Access<'_, D> {
     /// Stages settings, whole ones.
     fn stage(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
         self.may_command()?;
-        let first = usize::from(at - SETTINGS);
+        let first = at - SETTINGS;
         if !first.is_multiple_of(2) || !words.count().is_multiple_of(2) || words.count() > 2 * MOST
         {
             return Err(Exception::IllegalDataValue);
         }
         let mut values = Assignments::new();
         for n in 0..words.count() / 2 {
-            let key = keys::number(first / 2 + n).ok_or(Exception::IllegalDataAddress)?;
+            let key = keys::find_id(first / 2 + n as u16).ok_or(Exception::IllegalDataAddress)?;
             let half = |place| u32::from(words.get(2 * n + place).unwrap_or(0));
             let float = f32::from_bits(half(0) << 16 | half(1));
             if key.hardware() {
@@ -287,7 +285,7 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
     fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
         let word = words.get(0).unwrap_or(0);
         match (at, words.get(1)) {
-            (SETTINGS..SETTINGS_END, _) => self.stage(at, words),
+            (SETTINGS..STAGED, _) => self.stage(at, words),
             // The frequency first: a run command begins with it.
             (COMMAND, Some(frequency)) if words.count() == 2 => {
                 if word & ACTION == RUN {

@@ -12,8 +12,8 @@ use super::faults::{self, FaultLog};
 use super::float::to_float;
 use crate::desk::Desk;
 use crate::desk::order::Refusal;
-use crate::hash;
 use crate::link::Status;
+use crate::link::trace::{SIGNALS as ALL_SIGNALS, Sampled, values};
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
 use crate::settings::keys;
@@ -28,7 +28,10 @@ pub const FREQUENCY: u16 = 0x2001;
 pub const RESET: u16 = 0x2002;
 /// The control word of CiA 402.
 pub const CONTROL: u16 = 0x6040;
-/// The first setting; two registers each.
+/// The signals of a trace, up to [`SIGNALS_END`]: two registers each, by its number for life.
+pub const SIGNALS: u16 = 0x3000;
+const SIGNALS_END: u16 = 0x3200;
+/// The settings, up to [`STAGED`]: two registers each, by its number for life.
 pub const SETTINGS: u16 = 0x4000;
 /// Order about the staged settings: 1 puts them in force, 2 also saves, 3 drops them.
 pub const STAGED: u16 = 0x4fff;
@@ -37,16 +40,13 @@ pub const FAULTS: u16 = 0x5100;
 /// Registers of a fault.
 const PER_FAULT: u16 = 3;
 const FAULTS_END: u16 = FAULTS + PER_FAULT * faults::KEPT as u16;
-/// End of the settings.
-pub const SETTINGS_END: u16 = SETTINGS + 2 * keys::COUNT as u16;
-const _: () = assert!(SETTINGS_END <= STAGED);
 
 /// Pages: what lies in one and has no meaning reads as 0, so that a block may have holes.
 const PAGES: [(u16, u16); 6] = [
     (0x0000, 0x01ff),
     (0x2000, 0x21ff),
-    (SETTINGS, SETTINGS_END - 1),
-    (STAGED, STAGED),
+    (SIGNALS, SIGNALS_END - 1),
+    (SETTINGS, STAGED),
     (0x5000, 0x51ff),
     (0x6000, 0x60ff),
 ];
@@ -130,7 +130,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x211b: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for: `speed.limit_rpm` times pole pairs";
     STAGED: Word(|v| v.desk.settings().count() as u16), "", "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them";
     0x5000: Word(|_| 1), "", "layout of the pages";
-    0x5001: Double(|_| names()), "", "hash of the settings' names: the numbers of their registers hold for this value";
+    0x5001: Double(|_| 0x669f_b378), "", "always 0x669FB378: the numbers of the settings' registers never change";
     0x5003: Word(|_| keys::COUNT as u16), "", "number of settings";
     0x5004: Word(|_| { version(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | version(env!("CARGO_PKG_VERSION_MINOR")) }), "", "version of the firmware: major in the upper byte, minor in the lower";
     0x5005: Word(|_| version(env!("CARGO_PKG_VERSION_PATCH"))), "", "its patch level";
@@ -153,8 +153,11 @@ impl View<'_> {
         if !PAGES.iter().any(|(first, last)| (*first..=*last).contains(&at)) {
             return Err(Exception::IllegalDataAddress);
         }
-        if (SETTINGS..SETTINGS_END).contains(&at) {
-            let key = keys::number(usize::from(at - SETTINGS) / 2);
+        if (SIGNALS..SIGNALS_END).contains(&at) {
+            return Ok(half(self.signal((at - SIGNALS) / 2).to_bits(), at - SIGNALS));
+        }
+        if (SETTINGS..STAGED).contains(&at) {
+            let key = keys::find_id((at - SETTINGS) / 2);
             let bits = key.map_or(0, |key| to_float(key, self.desk.settings().latest()).to_bits());
             return Ok(half(bits, at - SETTINGS));
         }
@@ -166,6 +169,14 @@ impl View<'_> {
             });
         }
         Ok(ROWS.iter().find_map(|row| row.word(at, self)).unwrap_or(0))
+    }
+
+    /// The latest value of the signal with this number; 0 for none, and before the control runs.
+    fn signal(&self, id: u16) -> f32 {
+        let Some(s) = &self.status else { return 0.0 };
+        let values = values(&s.telemetry, &Sampled::new(&s.sample, s.state, s.limiting));
+        let found = ALL_SIGNALS.iter().zip(values).find(|(signal, _)| signal.id == id);
+        found.map_or(0.0, |(signal, value)| signal.shown(value, &self.settings.drive))
     }
 
     /// The state, if the motor has current or had it at the moment of a fault.
@@ -318,9 +329,4 @@ fn version(text: &str) -> u16 {
 /// Place of the board in its list.
 fn board(settings: &FirmwareSettings) -> u16 {
     keys::find(keys::BOARD).map_or(0, |key| to_float(key, settings) as u16)
-}
-
-/// Hash of the names of all settings, in their order.
-fn names() -> u32 {
-    hash::of(keys::all().flat_map(|key| key.name().bytes().chain([b'\n'])))
 }

@@ -32,20 +32,19 @@ pub fn all() -> impl Iterator<Item = Key> {
     SETTINGS.iter().map(Key::Drive).chain(OWN.iter().map(Key::Own))
 }
 
-/// The setting with this number in [`all`].
-pub fn number(index: usize) -> Option<Key> {
-    let own = || OWN.get(index.wrapping_sub(SETTINGS.len())).map(Key::Own);
-    SETTINGS.get(index).map(Key::Drive).or_else(own)
-}
-
 /// The setting with this name.
 pub fn find(name: &str) -> Option<Key> {
     all().find(|key| key.name() == name)
 }
 
-/// The setting with this [id](Key::id).
-pub fn find_id(id: u32) -> Option<Key> {
-    all().find(|key| key.id() == id)
+/// The setting with this [number for life](Key::id).
+pub fn find_id(id: u16) -> Option<Key> {
+    of_id(all(), id)
+}
+
+/// The same among these: neither order nor names matter.
+pub fn of_id(mut keys: impl Iterator<Item = Key>, id: u16) -> Option<Key> {
+    keys.find(|key| key.id() == id)
 }
 
 /// The same expression for either kind of entry, with the settings that it belongs to.
@@ -77,7 +76,7 @@ impl fmt::Debug for Key {
 }
 
 impl Key {
-    /// Name at the console and, hashed, in the flash.
+    /// Name at the console.
     pub fn name(self) -> &'static str {
         with!(self, |entry| entry.name)
     }
@@ -157,9 +156,9 @@ impl Key {
         with!(self, settings, |entry, s| entry.set(s, value))
     }
 
-    /// The id of the setting in the flash: the hash of its name.
-    pub fn id(self) -> u32 {
-        hash::of(self.name().bytes())
+    /// Its number for life: in the flash, and of its registers on the bus.
+    pub fn id(self) -> u16 {
+        with!(self, |entry| entry.id)
     }
 
     /// The value as 32 bits for the flash: the bits of a number, the hash of a word.
@@ -197,14 +196,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_unique_and_found() {
+    fn names_and_numbers_are_unique_and_found() {
         assert_eq!(all().count(), COUNT);
-        for (index, key) in all().enumerate() {
+        for key in all() {
             assert_eq!(find(key.name()).unwrap().name(), key.name());
             assert_eq!(find_id(key.id()).unwrap().name(), key.name());
-            assert_eq!(number(index).unwrap().name(), key.name());
         }
-        assert!(find("motor").is_none() && number(COUNT).is_none());
+        assert!(find("motor").is_none() && find_id(u16::MAX).is_none());
     }
 
     #[test]

@@ -14,17 +14,17 @@ pub const BOARD: &str = "board";
 /// In the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
 pub static OWN: [Entry<Settings>; 9] = [
-    entry!(number("s"), "command.timeout_s", [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
-    entry!(word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
-    entry!(word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
-    entry!(word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
-    entry!(whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
-    entry!(word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
-    entry!(word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
-    Entry::new(BOARD, "", Access::Word(
+    entry!(101: number("s"), "command.timeout_s", [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
+    entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
+    entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
+    entry!(104: word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
+    entry!(105: whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
+    entry!(106: word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
+    entry!(107: word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
+    Entry::new(108, BOARD, "", Access::Word(
         |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
         |s, place| s.board = boards::ALL[place % boards::ALL.len()],
         &boards::NAMES,
     ), "board that the firmware is built for").changed(Change::Board),
-    entry!(whole(), "board.confirmed", [command] confirmed: u32, "number of the board whose bench steps were done; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
+    entry!(109: whole(), "board.confirmed", [command] confirmed: u32, "number of the board whose bench steps were done; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
 ];

@@ -6,10 +6,10 @@
 //! | 1 | sequence number | checksum, 32 bits | |
 //! | 2 and on | id of the key | its value, 32 bits | |
 //!
-//! The id of a key is the hash of its name, so keys can be added and removed: a key that the record does not hold
-//! keeps its default, an entry that no key claims is skipped. The result of a learning, if there is one, follows the
-//! keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The checksum is
-//! the CRC-32 of Ethernet over everything but itself.
+//! The id of a key is its number for life, in version 1 the hash of its name, so keys can be added, removed and renamed: a key
+//! that the record does not hold keeps its default, an entry that no key claims is skipped. The result of a learning, if there
+//! is one, follows the keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The
+//! checksum is the CRC-32 of Ethernet over everything but itself.
 
 use core::fmt;
 
@@ -19,11 +19,12 @@ use drive_settings::entry::Change;
 use super::flash::{ERASED, SLOT_WORDS, halves, pair};
 use super::learned;
 use crate::boards;
+use crate::hash;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::{self, Key, find_id};
+use crate::settings::keys::{self, Key};
 
 /// The layout that is written.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Double words of the longest record that is written.
 pub const WORDS: usize = FIRST + keys::COUNT + learned::WORDS;
 const _: () = assert!(WORDS <= SLOT_WORDS);
@@ -81,7 +82,7 @@ impl fmt::Display for Rejected {
 pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
     for (key, word) in keys::all().zip(words.iter_mut().skip(FIRST)) {
-        *word = pair(key.id(), key.to_bits(settings));
+        *word = pair(key.id().into(), key.to_bits(settings));
     }
     let mut entries = keys::COUNT;
     if let Some(learned) = &settings.learned {
@@ -152,7 +153,11 @@ pub fn settings(
     settings.board = boards::ALL[0];
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
-        match find_id(id) {
+        let is_it = |key: &Key| match version {
+            ..=1 => hash::of(key.name().bytes()) == id,
+            _ => u32::from(key.id()) == id,
+        };
+        match keys::all().find(is_it) {
             // Numbers of the board are those of this image.
             Some(Key::Drive(entry)) if entry.change == Change::Board => {}
             Some(key) => key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name()))?,

@@ -105,8 +105,10 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
 fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by_older_firmware() {
     let old = codec::record(&with_r_s(7.0), 0);
     assert_eq!(codec::length(&old), 2 + keys::COUNT);
-    // Magic, version 1 and one entry a key: what is in the flash of boards.
-    assert_eq!(old[0], (keys::COUNT as u64) << 48 | 0x0001_7672_6469);
+    // Magic, version 2 and one entry a key: what is in the flash of boards.
+    assert_eq!(old[0], (keys::COUNT as u64) << 48 | 0x0002_7672_6469);
+    // By their numbers: a new name loses nothing.
+    assert!(keys::all().zip(&old[2..]).all(|(key, word)| u32::from(key.id()) == *word as u32));
     assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
     let mut fake = Fake::new();
     save(&mut fake, &with_r_s(7.0)).unwrap();
@@ -117,7 +119,7 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
     // No key has a number that what was learned has: those who do not know it leave it alone.
     for word in &new[2 + keys::COUNT..] {
         assert!(learned_words::index(*word as u32).is_some());
-        assert!(keys::all().all(|key| key.id() != *word as u32));
+        assert!(keys::all().all(|key| u32::from(key.id()) != *word as u32));
     }
 }
 
@@ -206,7 +208,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     // As a later firmware computes it.
     fake.hold(1, resealed(record));
     let kept = fake.words[1];
-    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Newer(2)));
+    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Newer(3)));
     save(&mut fake, &with_r_s(3.0)).unwrap();
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
     assert_eq!(fake.words[1], kept);
@@ -216,7 +218,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
 fn keys_may_come_and_go() {
     let mut record = codec::record(&with_r_s(7.0), 3);
     // The second key is one that this firmware does not know.
-    record[3] ^= 1;
+    record[3] ^= 1 << 12;
     let mut fake = Fake::new();
     fake.hold(0, resealed(record));
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
@@ -287,7 +289,7 @@ proptest! {
     #[test]
     fn every_value_of_every_key_survives(bits: u32, i in 0..keys::COUNT) {
         let mut settings = board();
-        let key = keys::number(i).unwrap();
+        let key = keys::all().nth(i).unwrap();
         let text = match key.get(&settings) {
             Value::Number(_) | Value::Auto => f32::from_bits(bits).to_string(),
             Value::Whole(_) => bits.to_string(),

@@ -5,8 +5,8 @@ use crate::modbus::Frame;
 use crate::settings::bus::{Baud, Format};
 
 /// A console with a bus; the bus commands if `lines` say so.
-struct Both {
-    talk: Talk,
+pub(super) struct Both {
+    pub talk: Talk,
     bus: FakeBus,
 }
 
@@ -18,7 +18,7 @@ impl Both {
         Self { talk, bus: FakeBus::default() }
     }
 
-    fn by_bus() -> Self {
+    pub fn by_bus() -> Self {
         Self::new("set bus.commands bus\napply\n")
     }
 
@@ -28,7 +28,7 @@ impl Both {
     }
 
     /// The answer to a request: without address and checksum.
-    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+    pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         let body = [&[1], pdu].concat();
         let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
         self.bus.asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
@@ -44,7 +44,7 @@ impl Both {
         if answer == pdu { 0 } else { answer[1] }
     }
 
-    fn read(&mut self, at: u16) -> u16 {
+    pub fn read(&mut self, at: u16) -> u16 {
         let [high, low] = at.to_be_bytes();
         let answer = self.ask(&[3, high, low, 0, 1]);
         assert_eq!(answer[..2], [3, 2]);
@@ -53,8 +53,7 @@ impl Both {
 
     /// Stages a setting, by its name.
     fn set(&mut self, name: &str, value: f32) -> u8 {
-        let place = keys::all().position(|key| key.name() == name).unwrap() as u16;
-        let at = (0x4000 + 2 * place).to_be_bytes();
+        let at = (0x4000 + 2 * keys::find(name).unwrap().id()).to_be_bytes();
         let answer = self.ask(&[&[16], &at[..], &[0, 2, 4], &value.to_be_bytes()].concat());
         if answer[0] == 16 { 0 } else { answer[1] }
     }

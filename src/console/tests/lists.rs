@@ -112,7 +112,7 @@ fn describe_prints_each_setting_as_json() {
         let object = object(line);
         let text = |name: &str| object[name].trim_matches('"').to_owned();
         assert_eq!((text("name"), text("help")), (key.name().to_owned(), key.help().to_owned()));
-        assert_eq!(object.len(), 14, "{line}");
+        assert_eq!((object.len(), object["number"].parse()), (15, Ok(key.id())), "{line}");
         match key.range(&staged) {
             Some((min, max)) => {
                 assert_eq!(object["min"].parse(), Ok(min), "{line}");

@@ -162,7 +162,7 @@ fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
 #[test]
 fn the_signals_and_the_layout_are_described_as_json() {
     let lines = Talk::new().say("describe stream\n");
-    assert_eq!(lines[0], r#"{"signal":"phi_deg","unit":"deg"}"#);
+    assert_eq!(lines[0], r#"{"signal":"phi_deg","number":0,"unit":"deg"}"#);
     assert_eq!(lines.len(), crate::link::trace::SIGNALS.len() + 2);
     let layout = &lines[lines.len() - 2];
     for part in

@@ -7,6 +7,8 @@ use heapless::Vec;
 
 /// A signal of a trace.
 pub struct Signal {
+    /// Number for life, by which it has registers on the bus. No other signal ever gets it.
+    pub id: u16,
     /// Name, which ends with the unit.
     pub name: &'static str,
 }
@@ -79,11 +81,11 @@ impl Signal {
 /// A value for each of the [`SIGNALS`].
 pub type Values = [f32; SIGNALS.len()];
 
-/// The signals, each with its value as it is recorded.
+/// The signals, each with its number for life (a new one takes the next of `tests/numbers.txt`) and its value as it is recorded.
 macro_rules! signals {
-    (|$t:ident, $s:ident| $($name:literal: $value:expr,)+) => {
+    (|$t:ident, $s:ident| $($id:literal: $name:literal = $value:expr,)+) => {
         /// Signals that can be recorded. The names end with the unit.
-        pub const SIGNALS: &[Signal] = &[$(Signal { name: $name }),+];
+        pub const SIGNALS: &[Signal] = &[$(Signal { id: $id, name: $name }),+];
 
         /// The values of all signals as they are recorded. All at once: the choice of one by its index costs more than its value.
         pub fn values($t: &Telemetry, $s: &Sampled) -> Values {
@@ -93,26 +95,26 @@ macro_rules! signals {
 }
 
 signals! { |t, s|
-    "phi_deg": t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
-    "flux_hz": t.flux_freq,
-    "speed_rpm": t.rotor_freq,
-    "i_d_ref_a": t.reference.d,
-    "i_q_ref_a": t.reference.q,
-    "i_d_a": t.current.d,
-    "i_q_a": t.current.q,
-    "v_d_v": t.voltage.d,
-    "v_q_v": t.voltage.q,
-    "delta_i_a": t.delta_i,
-    "saliency": t.saliency,
-    "dc_link_v": t.dc_link,
-    "turns": t.turns,
-    "i_a_a": s.currents[0].into(),
-    "i_b_a": s.currents[1].into(),
-    "i_c_a": s.currents[2].into(),
-    "torque_nm": t.current.d * t.current.q,
-    "heat_sink_c": s.heat_sink.into(),
-    "state": s.state.into(),
-    "limit": s.limit.into(),
+    0: "phi_deg" = t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
+    1: "flux_hz" = t.flux_freq,
+    2: "speed_rpm" = t.rotor_freq,
+    3: "i_d_ref_a" = t.reference.d,
+    4: "i_q_ref_a" = t.reference.q,
+    5: "i_d_a" = t.current.d,
+    6: "i_q_a" = t.current.q,
+    7: "v_d_v" = t.voltage.d,
+    8: "v_q_v" = t.voltage.q,
+    9: "delta_i_a" = t.delta_i,
+    10: "saliency" = t.saliency,
+    11: "dc_link_v" = t.dc_link,
+    12: "turns" = t.turns,
+    13: "i_a_a" = s.currents[0].into(),
+    14: "i_b_a" = s.currents[1].into(),
+    15: "i_c_a" = s.currents[2].into(),
+    16: "torque_nm" = t.current.d * t.current.q,
+    17: "heat_sink_c" = s.heat_sink.into(),
+    18: "state" = s.state.into(),
+    19: "limit" = s.limit.into(),
 }
 
 /// Index of the signal with this name.

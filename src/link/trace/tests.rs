@@ -256,11 +256,11 @@ const MEANINGS: [(&str, &str); 20] = [
 
 #[test]
 fn the_manual_lists_the_signals() {
-    let mut table = "| signal | meaning |\n|---|---|\n".to_owned();
+    let mut table = "| number | signal | meaning |\n|---|---|---|\n".to_owned();
     assert_eq!(SIGNALS.len(), MEANINGS.len());
     for (signal, (name, meaning)) in SIGNALS.iter().zip(MEANINGS) {
         assert_eq!(signal.name, name);
-        table += &format!("| `{name}` | {meaning} |\n");
+        table += &format!("| {} | `{name}` | {meaning} |\n", signal.id);
     }
     generated::check("console.md", "signals", &table);
 }

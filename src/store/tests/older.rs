@@ -13,7 +13,7 @@ fn board_of_1abee12(record: &[u8]) -> Fake {
     fake
 }
 
-/// A key that is renamed must be found by the hash of its old name, too.
+/// By the hashes of the names: records have numbers from version 2 on.
 #[test]
 fn records_saved_by_commit_1abee12_are_read() {
     let defaults = include_bytes!("defaults-1abee12.bin");

@@ -14,21 +14,22 @@
 /// ```text
 /// /// The help text, in one line.
 /// /// More documentation.
-/// field: Type = default, kind("unit", rule: |settings| value).range(..).flags();
+/// field: Type = default, NUMBER: kind("unit", rule: |settings| value).range(..).flags();
 ///
 /// /// Documentation of a field that is no setting itself.
 /// field: Type = default => [
 ///     /// The help text of a setting inside of it, or of another that stands here in the list.
-///     "name" [path from `Settings`] field: Type, kind("unit", |settings| value in effect).range(..).flags();
+///     "name" [path from `Settings`] field: Type, NUMBER: kind("unit", |settings| value in effect).range(..).flags();
 /// ];
 /// ```
 ///
-/// The kinds are those of `entry!`. A pure number, a word and a whole number have no unit; only `auto` has a rule, which becomes
+/// NUMBER is the setting's for life: a new one takes the next of `tests/numbers.txt`, wherever it stands. The kinds are those of
+/// `entry!`. A pure number, a word and a whole number have no unit; only `auto` has a rule, which becomes
 /// `Settings::rule`: the value that was set or, if none was, that of the rule.
 macro_rules! settings {
     (=> [$(
         #[doc = $first_help:literal]
-        $first_name:literal $first_path:tt $first_field:ident: $first_type:ty, $first_kind:ident($($first_argument:expr),*)
+        $first_name:literal $first_path:tt $first_field:ident: $first_type:ty, $first_id:literal: $first_kind:ident($($first_argument:expr),*)
         $(.$first_method:ident($($first_value:expr),*))*;
     )+];
     $(
@@ -38,10 +39,10 @@ macro_rules! settings {
                 #[doc = $help:literal]
                 $(#[doc = $more:literal])*
                 $field:ident: $type:ty = $default:expr
-                $(, $kind:ident($($unit:literal $(, $rule:ident: $value:expr)?)?) $(.$method:ident($($argument:expr),*))*)?
+                $(, $id:literal: $kind:ident($($unit:literal $(, $rule:ident: $value:expr)?)?) $(.$method:ident($($argument:expr),*))*)?
                 $(=> [$(
                     #[doc = $row_help:literal]
-                    $row_name:literal $row_path:tt $row_field:ident: $row_type:ty, $row_kind:ident($($row_argument:expr),*)
+                    $row_name:literal $row_path:tt $row_field:ident: $row_type:ty, $row_id:literal: $row_kind:ident($($row_argument:expr),*)
                     $(.$row_method:ident($($row_value:expr),*))*;
                 )+])?;
             )+
@@ -73,13 +74,13 @@ macro_rules! settings {
 
         /// The settings of the drive, in the order in which they are shown.
         pub static SETTINGS: &[Entry<Settings>] = &[$(entry!(
-            $first_kind($($first_argument),*), $first_name, $first_path $first_field: $first_type, $first_help.trim_ascii()
+            $first_id: $first_kind($($first_argument),*), $first_name, $first_path $first_field: $first_type, $first_help.trim_ascii()
         )$(.$first_method($($first_value),*))*,)+ $($(
             $(entry!(
-                $kind($($unit $(, Settings::$rule)?)?), concat!($prefix, stringify!($field)), $path $field: $type, $help.trim_ascii()
+                $id: $kind($($unit $(, Settings::$rule)?)?), concat!($prefix, stringify!($field)), $path $field: $type, $help.trim_ascii()
             )$(.$method($($argument),*))*,)?
             $($(entry!(
-                $row_kind($($row_argument),*), $row_name, $row_path $row_field: $row_type, $row_help.trim_ascii()
+                $row_id: $row_kind($($row_argument),*), $row_name, $row_path $row_field: $row_type, $row_help.trim_ascii()
             )$(.$row_method($($row_value),*))*,)+)?
         )+)+];
 

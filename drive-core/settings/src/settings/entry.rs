@@ -14,9 +14,11 @@ pub enum Change {
     Board,
 }
 
-/// A setting of the settings `S`: name, unit, help, range, and the way to its value.
+/// A setting of the settings `S`: number, name, unit, help, range, and the way to its value.
 pub struct Entry<S: 'static> {
-    /// Name at the console, in files and, hashed, in the flash.
+    /// Its number for life: in the flash, and of its registers on the bus. No other setting ever gets it.
+    pub id: u16,
+    /// Name at the console and in files.
     pub name: &'static str,
     /// Unit; empty if there is none.
     pub unit: &'static str,
@@ -53,6 +55,7 @@ enum Range<S> {
 impl<S> Entry<S> {
     /// A setting that anybody may change while the outputs are off. Give a number its range, too.
     pub const fn new(
+        id: u16,
         name: &'static str,
         unit: &'static str,
         access: Access<S>,
@@ -60,7 +63,7 @@ impl<S> Entry<S> {
     ) -> Self {
         let range = Range::Fixed(0.0, 0.0);
         let change = Change::WhileOff;
-        Self { name, unit, help, change, learned: false, hardware: false, access, range }
+        Self { id, name, unit, help, change, learned: false, hardware: false, access, range }
     }
 
     /// Accepted from `min` to `max`, both included.
@@ -203,29 +206,29 @@ impl<S> Entry<S> {
     }
 }
 
-/// A row of a table: kind with unit, name, path to the structure and field in it with its type, help. `Settings` is the type
+/// A row of a table: number for life, kind with unit, name, path to the structure and field in it with its type, help. `Settings` is the type
 /// of this name where the table is.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry {
-    (number($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
-        Entry::new($name, concat!($($unit)?), Access::Number(
+    ($id:literal: number($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($id, $name, concat!($($unit)?), Access::Number(
             |s: &Settings| s.$($path.)*$field, |s, value| s.$($path.)*$field = value
         ), $help)
     };
-    (auto($unit:expr, $effective:expr), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
-        Entry::new($name, $unit, Access::Auto(
+    ($id:literal: auto($unit:expr, $effective:expr), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($id, $name, $unit, Access::Auto(
             |s: &Settings| s.$($path.)*$field, |s, value| s.$($path.)*$field = value, $effective
         ), $help)
     };
-    (whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+    ($id:literal: whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
         // The range is within the type: see `parse`.
-        Entry::new($name, "", Access::Whole(
+        Entry::new($id, $name, "", Access::Whole(
             |s: &Settings| s.$($path.)*$field as u32, |s, value| s.$($path.)*$field = value as $type
         ), $help)
     };
-    (word($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
-        Entry::new($name, concat!($($unit)?), Access::Word(
+    ($id:literal: word($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($id, $name, concat!($($unit)?), Access::Word(
             |s: &Settings| s.$($path.)*$field.place(), |s, place| s.$($path.)*$field = <$type as Words>::at(place),
             <$type as Words>::WORDS
         ), $help)

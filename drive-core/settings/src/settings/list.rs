@@ -23,54 +23,54 @@ pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
 settings! {
     => [
         /// stator resistance of a phase
-        "motor.r_s" [motor] r_s: f32, number("ohm").from_to(0.001, 1000.0).learned();
+        "motor.r_s" [motor] r_s: f32, 0: number("ohm").from_to(0.001, 1000.0).learned();
         /// rotor resistance, referred to the stator
-        "motor.r_r" [motor] r_r: f32, number("ohm").from_to(0.001, 1000.0).learned();
+        "motor.r_r" [motor] r_r: f32, 1: number("ohm").from_to(0.001, 1000.0).learned();
         /// leakage inductance of the stator
-        "motor.l_ls" [motor] l_ls: f32, number("H").from_to(1e-6, 10.0).learned();
+        "motor.l_ls" [motor] l_ls: f32, 2: number("H").from_to(1e-6, 10.0).learned();
         /// leakage inductance of the rotor, referred to the stator
-        "motor.l_lr" [motor] l_lr: f32, number("H").from_to(1e-6, 10.0).learned();
+        "motor.l_lr" [motor] l_lr: f32, 3: number("H").from_to(1e-6, 10.0).learned();
         /// magnetising inductance
-        "motor.l_m" [motor] l_m: f32, number("H").from_to(1e-5, 100.0).learned();
+        "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-5, 100.0).learned();
         /// pairs of poles
-        "motor.pole_pairs" [motor] pole_pairs: u8, whole().from_to(1.0, 50.0).learned();
+        "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 50.0).learned();
         /// inertia of rotor and load; for the speed loop
-        "motor.inertia" [motor] inertia: f32, number("kg m2").from_to(1e-7, 1000.0);
+        "motor.inertia" [motor] inertia: f32, 6: number("kg m2").from_to(1e-7, 1000.0);
     ];
 
     /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
     /// drive from it; see [`rules`](super::rules). Defaults: the dissertation's motor, Table 3.
     Nameplate "nameplate." [nameplate] {
         /// rated power at the shaft
-        power_w: f32 = 1100.0, number("W").from_to(1.0, 1e6);
+        power_w: f32 = 1100.0, 7: number("W").from_to(1.0, 1e6);
         /// rated voltage between lines, rms
-        voltage_v: f32 = 380.0, number("V").from_to(5.0, 1000.0);
+        voltage_v: f32 = 380.0, 8: number("V").from_to(5.0, 1000.0);
         /// rated current of a line, rms; the rules take their currents from it
-        current_a: f32 = 2.56, number("A").from_to(0.01, 1000.0);
+        current_a: f32 = 2.56, 9: number("A").from_to(0.01, 1000.0);
         /// rated frequency
-        frequency_hz: f32 = 60.0, number("Hz").from_to(5.0, 400.0);
+        frequency_hz: f32 = 60.0, 10: number("Hz").from_to(5.0, 400.0);
         /// rated speed of the shaft
-        speed_rpm: f32 = 1720.0, number("rpm").from_to(1.0, 24_000.0);
+        speed_rpm: f32 = 1720.0, 11: number("rpm").from_to(1.0, 24_000.0);
     }
 
     /// The timer and the power stage. Defaults: section 3.9; 220 V rectified.
     Inverter "inverter." [inverter] {
         /// count at which the timer turns round
         /// (14167 at 170 MHz and 6 kHz).
-        top: u16 = 14_167, whole().from_to(1000.0, 65_534.0).changed(Change::Board).learned();
+        top: u16 = 14_167, 12: whole().from_to(1000.0, 65_534.0).changed(Change::Board).learned();
         /// Nominal voltage of the dc link, V. Its row is behind that of its sensor, which its range depends on.
         dc_link_v: f32 = 311.0;
         /// time with both switches of a leg off, at every change
-        dead_time_s: f32 = 2.2e-6, number("s").from_to(0.0, 6e-6).changed(Change::FromReset).learned().hardware();
+        dead_time_s: f32 = 2.2e-6, 13: number("s").from_to(0.0, 6e-6).changed(Change::FromReset).learned().hardware();
         /// whether the dead time is compensated
-        compensate: bool = true, word().learned();
+        compensate: bool = true, 14: word().learned();
         /// phase current from which on the compensation is full
         ///
         /// The rule is three times the spread of noise and prediction.
-        full_compensation_a: Option<f32> = None, auto("A", full_compensation_a: |s| s.share_of_range(0.03))
+        full_compensation_a: Option<f32> = None, 15: auto("A", full_compensation_a: |s| s.share_of_range(0.03))
             .from_to(1e-4, 100.0).learned();
         /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
-        drop_v: Option<f32> = None, auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
+        drop_v: Option<f32> = None, 16: auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
     }
 
     /// Scales of the converters and of the encoder. Defaults: Eq. 3.5; 0.11 V per code (451 V at full scale); the 5305 Hz
@@ -79,64 +79,64 @@ settings! {
         /// Current a, A.
         current_a: Line = Line::CHANNEL_A => [
             /// current a per code; negative if a current into the motor lowers the code
-            "scales.current_a.gain" [scales.current_a] gain: f32, number("A")
+            "scales.current_a.gain" [scales.current_a] gain: f32, 17: number("A")
                 .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 1.0)).learned().hardware();
             /// current a at code 0
-            "scales.current_a.offset" [scales.current_a] offset: f32, number("A")
+            "scales.current_a.offset" [scales.current_a] offset: f32, 18: number("A")
                 .beside(|s| s.offset_range(s.scales.current_a)).learned().hardware();
         ];
         /// Current b, A.
         current_b: Line = Line::CHANNEL_B => [
             /// current b per code
-            "scales.current_b.gain" [scales.current_b] gain: f32, number("A")
+            "scales.current_b.gain" [scales.current_b] gain: f32, 19: number("A")
                 .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 1.0)).learned().hardware();
             /// current b at code 0
-            "scales.current_b.offset" [scales.current_b] offset: f32, number("A")
+            "scales.current_b.offset" [scales.current_b] offset: f32, 20: number("A")
                 .beside(|s| s.offset_range(s.scales.current_b)).learned().hardware();
         ];
         /// Current c, A; for three shunts.
         current_c: Line = Line::CHANNEL_B => [
             /// current c per code; with three shunts
-            "scales.current_c.gain" [scales.current_c] gain: f32, number("A")
+            "scales.current_c.gain" [scales.current_c] gain: f32, 21: number("A")
                 .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 1.0)).learned().hardware();
             /// current c at code 0
-            "scales.current_c.offset" [scales.current_c] offset: f32, number("A").beside(|s| match s.scales.sensors {
+            "scales.current_c.offset" [scales.current_c] offset: f32, 22: number("A").beside(|s| match s.scales.sensors {
                 CurrentSensors::InLine => (-1000.0, 1000.0),
                 CurrentSensors::LowSide => s.offset_range(s.scales.current_c),
             }).learned().hardware();
         ];
         /// sensors of the currents: two in the lines a and b, or three shunts below the low sides
-        sensors: CurrentSensors = CurrentSensors::InLine, word().changed(Change::Board).learned();
+        sensors: CurrentSensors = CurrentSensors::InLine, 23: word().changed(Change::Board).learned();
         /// whether the currents are sampled in both zero vectors, and their mean is used; not with shunts below the low sides
         ///
         /// It has less noise, and is a quarter of a period older.
-        both_zero_vectors: bool = false, word().learned();
+        both_zero_vectors: bool = false, 24: word().learned();
         /// time from the turn-on of a low side until its shunt can be sampled
         ///
         /// Without the dead time.
-        shunt_settle_s: f32 = 2e-6, number("s").from_to(0.0, 20e-6).changed(Change::Board).learned();
+        shunt_settle_s: f32 = 2e-6, 25: number("s").from_to(0.0, 20e-6).changed(Change::Board).learned();
         /// Dc-link voltage, V.
         dc_link: Line = Line { gain: 0.11, offset: 0.0 } => [
             /// dc link per code
-            "scales.dc_link.gain" [scales.dc_link] gain: f32, number("V").from_to(1e-4, 10.0).learned().hardware();
+            "scales.dc_link.gain" [scales.dc_link] gain: f32, 26: number("V").from_to(1e-4, 10.0).learned().hardware();
             /// dc link at code 0
-            "scales.dc_link.offset" [scales.dc_link] offset: f32, number("V").from_to(-100.0, 100.0).learned().hardware();
+            "scales.dc_link.offset" [scales.dc_link] offset: f32, 27: number("V").from_to(-100.0, 100.0).learned().hardware();
         ];
         /// Code of the highest dc link that the power stage stands in operation. A code, so that no scale lifts it.
         dc_link_highest: u16 = 4095 => [
             /// code of the highest dc link that the power stage stands in operation
-            "scales.dc_link.highest" [scales] dc_link_highest: u16, whole().from_to(100.0, 4095.0).changed(Change::Board);
+            "scales.dc_link.highest" [scales] dc_link_highest: u16, 28: whole().from_to(100.0, 4095.0).changed(Change::Board);
             /// nominal voltage of the dc link
-            "inverter.dc_link_v" [inverter] dc_link_v: f32, number("V").beside(|s| (10.0, s.dc_link_max_v()));
+            "inverter.dc_link_v" [inverter] dc_link_v: f32, 29: number("V").beside(|s| (10.0, s.dc_link_max_v()));
         ];
         /// largest code of the currents
-        full_scale: u16 = 4095, whole().from_to(100.0, 65_535.0).changed(Change::Board);
+        full_scale: u16 = 4095, 30: whole().from_to(100.0, 65_535.0).changed(Change::Board);
         /// Thermistor of the heat sink.
         ntc: Ntc = Ntc::DEFAULT;
         /// delay of the analog filters of the currents
-        current_delay_s: f32 = 30e-6, number("s").from_to(0.0, 4.0 * PERIOD_S).learned();
+        current_delay_s: f32 = 30e-6, 31: number("s").from_to(0.0, 4.0 * PERIOD_S).learned();
         /// counts of the encoder a turn, four a line
-        encoder_counts: u32 = 10_000, whole().from_to(16.0, 1e7);
+        encoder_counts: u32 = 10_000, 32: whole().from_to(16.0, 1e7);
     }
 
     /// A thermistor with negative coefficient in a divider across the reference of the converter:
@@ -145,15 +145,15 @@ settings! {
     /// Defaults, assumed: 10 kohm, B 3435 K, from the reference, with 4.7 kohm to ground. The dissertation describes none.
     Ntc "scales.ntc." [scales.ntc] {
         /// thermistor of the heat sink at 25 degC
-        ohm_25: f32 = 10_000.0, number("ohm").from_to(10.0, 1e6).hardware();
+        ohm_25: f32 = 10_000.0, 33: number("ohm").from_to(10.0, 1e6).hardware();
         /// its B constant
-        beta_k: f32 = 3435.0, number("K").from_to(1000.0, 10_000.0).hardware();
+        beta_k: f32 = 3435.0, 34: number("K").from_to(1000.0, 10_000.0).hardware();
         /// resistor in series with it
-        divider_ohm: f32 = 4700.0, number("ohm").from_to(10.0, 1e6).hardware();
+        divider_ohm: f32 = 4700.0, 35: number("ohm").from_to(10.0, 1e6).hardware();
         /// whether the thermistor is the one at ground
         ///
         /// The code falls with the temperature then.
-        to_ground: bool = false, word().hardware();
+        to_ground: bool = false, 36: word().hardware();
     }
 
     /// An identified plant k / (z - p) at 6 kHz. Unset values follow [`rules`](super::rules).
@@ -185,29 +185,29 @@ settings! {
         /// Scales of converters and encoder.
         scales: Scales = Scales::DEFAULT;
         /// source of the flux angle
-        angle_source: AngleSource = AngleSource::Injection, word();
+        angle_source: AngleSource = AngleSource::Injection, 37: word();
         /// The plant that the current controllers are designed for.
         current_plant: CurrentPlant = CurrentPlant::DEFAULT => [
             /// plant that the current controllers are designed for
-            "current_plant" [current_plant] source: PlantSource, word();
+            "current_plant" [current_plant] source: PlantSource, 38: word();
             /// identified plant k/(z - p) of the direct axis
-            "current_plant.d.k" [current_plant.d] k: Option<f32>, auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 10.0);
+            "current_plant.d.k" [current_plant.d] k: Option<f32>, 39: auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 10.0);
             /// its pole
-            "current_plant.d.p" [current_plant.d] p: Option<f32>, auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
+            "current_plant.d.p" [current_plant.d] p: Option<f32>, 40: auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
             /// identified plant k/(z - p) of the quadrature axis
-            "current_plant.q.k" [current_plant.q] k: Option<f32>, auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 10.0);
+            "current_plant.q.k" [current_plant.q] k: Option<f32>, 41: auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 10.0);
             /// its pole
-            "current_plant.q.p" [current_plant.q] p: Option<f32>, auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
+            "current_plant.q.p" [current_plant.q] p: Option<f32>, 42: auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
         ];
         /// whether known delays are left uncompensated, as in the dissertation
         ///
         /// Those of the current measurement and of the demodulation, to show what they cost: with the encoder 4.7° at 1440 rpm,
         /// with the injection some 9° at standstill already (the flux slips) and 35° at 150 rpm.
-        ignore_delays: bool = false, word().learned();
+        ignore_delays: bool = false, 43: word().learned();
         /// whether the rotor time constant is tracked while running
         ///
         /// The drive takes the one that `online` finds.
-        track_rotor: bool = false, word();
+        track_rotor: bool = false, 44: word();
         /// The injection.
         injection: InjectionSettings = InjectionSettings::DEFAULT;
         /// The observer.
@@ -241,9 +241,9 @@ settings! {
         /// The larger of both is taken, but not more than the voltage that drives half the direct current: beyond, phases b and c
         /// would cross zero at a start, where the drop of the inverter is uncertain; and not more than the trip leaves room for
         /// beside the current limit. The voltage is between 20 and 110 V at 311 V.
-        amplitude_v: Option<f32> = None, auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
+        amplitude_v: Option<f32> = None, 45: auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
         /// demodulation of the carrier current
-        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().learned();
+        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, 46: word().learned();
         /// Settings of the chain of the dissertation.
         printed: PrintedChain = PrintedChain::DEFAULT;
         /// Settings of the synchronous demodulation.
@@ -258,18 +258,18 @@ settings! {
         ///
         /// `ref_delta_i` (section 3.3) from [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it
         /// follows the sign of i_q, and goes through zero linearly.
-        reference_a: f32 = 0.010, number("A").from_to(-1.0, 1.0).learned();
+        reference_a: f32 = 0.010, 47: number("A").from_to(-1.0, 1.0).learned();
         /// torque current from which on that reference is full
-        full_reference_iq_a: Option<f32> = None, auto("A", full_reference_iq_a: |s| s.share_of_rated(1.0))
+        full_reference_iq_a: Option<f32> = None, 48: auto("A", full_reference_iq_a: |s| s.share_of_rated(1.0))
             .from_to(0.01, 1000.0).learned();
         /// gain of the tracker (Eq. 3.44); not synchronous
-        k_s: f32 = 0.132_546, number("rad/A").from_to(0.0, 100.0);
+        k_s: f32 = 0.132_546, 49: number("rad/A").from_to(0.0, 100.0);
         /// its zero
-        z_s: f32 = 0.90, number().from_to(0.0, 1.0);
+        z_s: f32 = 0.90, 50: number().from_to(0.0, 1.0);
         /// length of the filters of rms-impedance
         ///
         /// In samples of [`DemodulatorKind::RmsImpedance`]; the default is two carrier periods.
-        rms_samples: u8 = 20, whole().from_to(DemodulatorKind::RMS_SAMPLES.0 as f32, DemodulatorKind::RMS_SAMPLES.1 as f32).learned();
+        rms_samples: u8 = 20, 51: whole().from_to(DemodulatorKind::RMS_SAMPLES.0 as f32, DemodulatorKind::RMS_SAMPLES.1 as f32).learned();
         /// Reference of the current difference over the torque current, A, learned with the shaft locked;
         /// replaces the constant one.
         learned: Option<ReferenceTable> = None;
@@ -280,45 +280,45 @@ settings! {
         /// natural frequency of the tracking without an observer
         ///
         /// Without an encoder the speed loop is designed for it in any case.
-        bandwidth_hz: f32 = 3.5, number("Hz").from_to(0.1, 30.0);
+        bandwidth_hz: f32 = 3.5, 52: number("Hz").from_to(0.1, 30.0);
         /// saliency fixed to the flux, until its slope is learned
         ///
         /// At the nominal magnetising current. Negative: the inductance along the flux is the larger one. Near zero the loop would
         /// have no gain.
-        flux_saliency: f32 = -0.035, number().beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
+        flux_saliency: f32 = -0.035, 53: number().beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
         /// whether a drive that has not learned starts without an encoder
         ///
         /// For motors whose saliency is known from elsewhere, as that of a model.
-        allow_unlearned: bool = false, word();
+        allow_unlearned: bool = false, 54: word();
         /// saliency per ampere of stator current
         ///
         /// For the observer until it is learned.
         current_saliency: Option<f32> = None,
-            auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
+            55: auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
         /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
         reference: Option<ReferenceTable> = None;
         /// whether a start checks the saliency of the motor
         ///
         /// See `saliency_check`. Without the check a start assumes it, and a shaft at standstill.
-        check: bool = true, word();
+        check: bool = true, 56: word();
         /// whether the lock is verified and watched
         ///
         /// See `lock_monitor`.
-        monitor: bool = true, word();
+        monitor: bool = true, 57: word();
         /// Carrier current over the torque current, learned with the shaft locked, for the monitor; unset: guessed.
         carrier: Option<CarrierTable> = None;
         /// share of the flux-fixed saliency that may be missing
         ///
         /// 1 is zero flux.
-        allowed_loss: f32 = 0.55, number().from_to(0.3, 0.9);
+        allowed_loss: f32 = 0.55, 58: number().from_to(0.3, 0.9);
         /// time constant of the mean of that share
-        loss_s: f32 = 0.12, number("s").from_to(0.01, 1.0);
+        loss_s: f32 = 0.12, 59: number("s").from_to(0.01, 1.0);
         /// speed that trips without an encoder
         ///
         /// Mechanical: the end of the range in which the angle is tracked.
-        tracked_rpm: Option<f32> = None, auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0) => [
+        tracked_rpm: Option<f32> = None, 60: auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0) => [
             /// whether the carrier is injected beside an encoder
-            "injection.beside_encoder" [injection] beside_encoder: bool, word();
+            "injection.beside_encoder" [injection] beside_encoder: bool, 61: word();
         ];
     }
 
@@ -327,11 +327,11 @@ settings! {
         /// whether the voltage of the motor gives the angle at speed, where the injection ends
         ///
         /// Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
-        enabled: bool = true, word();
+        enabled: bool = true, 62: word();
         /// leakage inductance of the fundamental wave at no current, as a share of that of motor.*
-        leakage_share: f32 = 1.0, number().from_to(0.5, 2.0);
+        leakage_share: f32 = 1.0, 63: number().from_to(0.5, 2.0);
         /// change of that share per ampere of stator current, peak
-        leakage_slope: f32 = 0.0, number("1/A").from_to(-1.0, 1.0);
+        leakage_slope: f32 = 0.0, 64: number("1/A").from_to(-1.0, 1.0);
     }
 
     /// Limits and protections. Unset ones follow [`rules`](super::rules).
@@ -339,65 +339,65 @@ settings! {
         /// phase current that trips
         ///
         /// A trip level beyond the sensors' range would never be reached.
-        trip_a: Option<f32> = None, auto("A", trip_a: |s| f32::min(s.share_of_rated(4.3), 0.962 * s.sensor_range_a()))
+        trip_a: Option<f32> = None, 65: auto("A", trip_a: |s| f32::min(s.share_of_rated(4.3), 0.962 * s.sensor_range_a()))
             .beside(|s| (0.05, s.sensor_range_a())).hardware();
         /// largest current that is regulated, peak
         ///
         /// The length of the current vector. The carrier and the noise stay clear of the trip.
-        current_a: Option<f32> = None, auto("A", current_limit_a: |s| f32::min(s.share_of_rated(3.5), 0.814 * s.trip_a()))
+        current_a: Option<f32> = None, 66: auto("A", current_limit_a: |s| f32::min(s.share_of_rated(3.5), 0.814 * s.trip_a()))
             .beside(|s| (0.01, s.trip_a()));
         /// dc link above which the drive trips
-        dc_over_v: Option<f32> = None, auto("V", dc_over_v: Settings::dc_over_rule).beside(Settings::dc_over_range).hardware();
+        dc_over_v: Option<f32> = None, 67: auto("V", dc_over_v: Settings::dc_over_rule).beside(Settings::dc_over_range).hardware();
         /// dc link below which it trips while the outputs are on
-        dc_under_v: Option<f32> = None, auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
+        dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
         /// speed of the shaft that trips
-        speed_rpm: Option<f32> = None, auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
+        speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
             .from_to(1.0, 20_000.0);
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
         /// of the inverter.
         unexplained_v: Option<f32> = None,
-            auto("V", unexplained_v: |s| 0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).from_to(0.01, 1000.0);
+            70: auto("V", unexplained_v: |s| 0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).from_to(0.01, 1000.0);
         /// current that the motor carries for any time at standstill, peak
-        motor_a: Option<f32> = None, auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
+        motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
         /// thermal time constant of its windings
-        motor_s: f32 = 300.0, number("s").from_to(1.0, 10_000.0);
+        motor_s: f32 = 300.0, 72: number("s").from_to(1.0, 10_000.0);
         /// current that the inverter carries for any time, peak
-        inverter_a: Option<f32> = None, auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a()));
+        inverter_a: Option<f32> = None, 73: auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a()));
         /// thermal time constant of its switches to the heat sink
-        inverter_s: f32 = 5.0, number("s").from_to(0.1, 1000.0);
+        inverter_s: f32 = 5.0, 74: number("s").from_to(0.1, 1000.0);
         /// temperature of the heat sink that trips
         ///
         /// The default suits most power modules.
-        heat_sink_c: f32 = 85.0, number("degC").from_to(0.0, 150.0).hardware();
+        heat_sink_c: f32 = 85.0, 75: number("degC").from_to(0.0, 150.0).hardware();
         /// temperature of the heat sink from which on the current limit falls, to nothing where it trips
-        derate_c: Option<f32> = None, auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
+        derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
     }
 
     /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).
     Sequence "sequence." [sequence] {
         /// time of the offset calibration
-        calibrate_s: f32 = 0.1, number("s").from_to(0.001, 10.0);
+        calibrate_s: f32 = 0.1, 77: number("s").from_to(0.001, 10.0);
         /// time with the low sides on
-        precharge_s: f32 = 0.010, number("s").from_to(0.0, 10.0);
+        precharge_s: f32 = 0.010, 78: number("s").from_to(0.0, 10.0);
         /// time with direct current alone
         ///
         /// The flux is within 1 % after five rotor time constants.
-        magnetise_s: Option<f32> = None, auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r())).beside(Settings::magnetise_range);
+        magnetise_s: Option<f32> = None, 79: auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r())).beside(Settings::magnetise_range);
         /// flux that the rule for the direct current aims at: low as in the dissertation, or high
-        flux: Flux = Flux::Low, word().learned();
+        flux: Flux = Flux::Low, 80: word().learned();
         /// direct (magnetising) current, peak
         ///
         /// 0.7 A is that of section 3.10. With high flux it is that of the rated flux or, where it is smaller, 0.55 times the rated
         /// current; and where the current limit is small, 4/7 of that, which leaves 0.82 of it for the torque.
-        i_d: Option<f32> = None, auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
+        i_d: Option<f32> = None, 81: auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
         /// slope of the torque current at a stop
-        stop_a_per_s: Option<f32> = None, auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5);
+        stop_a_per_s: Option<f32> = None, 82: auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5);
         /// whether a start with the observer looks for a turning shaft first
         ///
         /// For 0.25 s, without an encoder.
-        catch: bool = true, word();
+        catch: bool = true, 83: word();
     }
 
     /// The flux beside the torque; see `drive_core::current::voltage_limit`.
@@ -406,49 +406,49 @@ settings! {
         ///
         /// Half of that of `sequence.i_d` to all of it. A torque current gives less torque then, and a torque step beyond the present flux
         /// takes a rotor time constant.
-        economy: bool = false, word();
+        economy: bool = false, 84: word();
     }
 
     /// The speed loop, and the position loop around it. Unset values follow [`rules`](super::rules).
     SpeedSettings "speed." [speed] {
         /// largest torque current of speed and position mode
-        i_q_limit_a: Option<f32> = None, auto("A", i_q_limit_a: |s| 3.0 / 3.5 * s.current_limit_a())
+        i_q_limit_a: Option<f32> = None, 85: auto("A", i_q_limit_a: |s| 3.0 / 3.5 * s.current_limit_a())
             .beside(|s| (0.01, s.current_limit_a()));
         /// largest speed that is asked for
         ///
         /// In either mode. By rule the rated speed with the observer. The injection alone is good to 300 rpm on four poles; with an
         /// encoder it may be larger.
-        limit_rpm: Option<f32> = None, auto("rpm", speed_limit_rpm: Settings::speed_limit_rule).beside(|s| (1.0, s.speed_trip_rpm()));
+        limit_rpm: Option<f32> = None, 86: auto("rpm", speed_limit_rpm: Settings::speed_limit_rule).beside(|s| (1.0, s.speed_trip_rpm()));
         /// largest acceleration that is asked for
-        ramp_rpm_per_s: Option<f32> = None, auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
+        ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
         /// deceleration of a quick stop
         quick_rpm_per_s: Option<f32> = None,
-            auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
+            88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
         /// time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once
-        s_ramp_s: f32 = 0.0, number("s").from_to(0.0, 10.0);
+        s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0);
         /// phase margin of the speed loop: more is calmer and slower
         ///
         /// Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
-        phase_margin_deg: f32 = 60.0, number("deg").from_to(45.0, 70.0);
+        phase_margin_deg: f32 = 60.0, 90: number("deg").from_to(45.0, 70.0);
     }
 
     /// Limits of the torque by the voltage of the dc link, and the brake resistor; see `drive_core::dc_link`. Unset values follow
     /// [`rules`](super::rules). By default there is no brake resistor; where one is fitted, its energy and power stand on it.
     BrakingSettings "braking." [braking] {
         /// dc link without generating torque
-        high_v: Option<f32> = None, auto("V", dc_high_v: Settings::dc_high_rule).beside(Settings::dc_high_range);
+        high_v: Option<f32> = None, 91: auto("V", dc_high_v: Settings::dc_high_rule).beside(Settings::dc_high_range);
         /// dc link without motoring torque, below which the shaft feeds it
-        low_v: Option<f32> = None, auto("V", dc_low_v: |s| f32::max(s.share_of_dc_link(260.0), LOW_OF_TRIP * s.dc_under_v()))
+        low_v: Option<f32> = None, 92: auto("V", dc_low_v: |s| f32::max(s.share_of_dc_link(260.0), LOW_OF_TRIP * s.dc_under_v()))
             .beside(|s| (s.dc_under_v() + MARGIN * s.dc_under_v(), s.inverter.dc_link_v - MARGIN * s.inverter.dc_link_v));
         /// direct current that is added while generating torque is limited; 0 for none
-        flux_a: Option<f32> = None, auto("A", braking_flux_a: |s| f32::min(s.share_of_rated(1.0), WITHIN * s.current_limit_a()))
+        flux_a: Option<f32> = None, 93: auto("A", braking_flux_a: |s| f32::min(s.share_of_rated(1.0), WITHIN * s.current_limit_a()))
             .beside(|s| (0.0, s.current_limit_a()));
         /// brake resistor behind the chopper; 0 for none
-        ohm: f32 = 0.0, number("ohm").from_to(0.0, 1e5);
+        ohm: f32 = 0.0, 94: number("ohm").from_to(0.0, 1e5);
         /// energy that the brake resistor takes from cold
-        energy_j: f32 = 1000.0, number("J").from_to(1.0, 1e7);
+        energy_j: f32 = 1000.0, 95: number("J").from_to(1.0, 1e7);
         /// power that it takes for ever
-        power_w: f32 = 50.0, number("W").from_to(0.1, 1e5);
+        power_w: f32 = 50.0, 96: number("W").from_to(0.1, 1e5);
     }
 
     /// The supply of the dc link.
@@ -456,7 +456,7 @@ settings! {
         /// time that the dc link must be steady before the precharge relay closes; 0 without one
         ///
         /// See `drive_core::supply`.
-        relay_s: f32 = 0.0, number("s").from_to(0.0, 60.0);
+        relay_s: f32 = 0.0, 97: number("s").from_to(0.0, 60.0);
     }
 
     /// The mode for a motor that nobody has identified; see `drive_core::flux::volts_per_hertz`. Unset values follow
@@ -464,14 +464,14 @@ settings! {
     VoltsPerHertzMode "vf." [vf] {
         /// voltage between lines, rms, per frequency, of a motor that nobody has identified
         volts_per_hz: Option<f32> = None,
-            auto("V/Hz", volts_per_hz: |s| s.nameplate.voltage_v / s.nameplate.frequency_hz).from_to(0.01, 200.0);
+            98: auto("V/Hz", volts_per_hz: |s| s.nameplate.voltage_v / s.nameplate.frequency_hz).from_to(0.01, 200.0);
         /// current of this motor at standstill, peak
         ///
         /// By rule the magnetising current of most motors, 0.45 times the rated current.
-        boost_a: Option<f32> = None, auto("A", boost_a: |s| f32::min(0.45 * s.rated_a(), 0.6 * s.current_limit_a()))
+        boost_a: Option<f32> = None, 99: auto("A", boost_a: |s| f32::min(0.45 * s.rated_a(), 0.6 * s.current_limit_a()))
             .beside(|s| (0.01, s.current_limit_a()));
         /// share of its slip that is compensated
-        slip_share: f32 = 1.0, number().from_to(0.0, 1.5);
+        slip_share: f32 = 1.0, 100: number().from_to(0.0, 1.5);
     }
 }
 
