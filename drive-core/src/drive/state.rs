@@ -81,6 +81,7 @@ impl State {
     }
 
     /// The stage of a run that the state belongs to.
+    #[inline(always)] // out of line, 32 bytes more of control code
     pub const fn stage(self) -> Stage {
         match self {
             Self::Off => Stage::Off,
