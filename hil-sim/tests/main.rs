@@ -14,6 +14,7 @@ mod documents;
 mod full_range;
 #[path = "../../tests/common/generated.rs"]
 mod generated;
+mod hazards;
 mod identification_arx;
 mod identification_faults;
 mod identification_model;
