@@ -2,10 +2,17 @@
 //! the simulated motor shows it.
 
 use std::f64::consts::TAU;
+use std::path::Path;
+use std::process::Command;
+use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
+use induction_drive::modbus::float::to_float;
+use induction_drive::settings::keys;
+use virtual_board::board::confirmed;
+use virtual_board::image::ELF;
 use virtual_board::{Board, Image, Options};
 
 /// Periods from a frame to the end of its answer: 8 bytes, 3.5 characters of silence, and 30 bytes at 19 200 bit/s are 27 ms.
@@ -36,6 +43,13 @@ fn framed(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()
 }
 
+fn options(config: &Config) -> Options {
+    let mut config = config.clone();
+    config.load.mode = LoadMode::Free;
+    config.drive.injection.synchronous.allow_unlearned = true;
+    Options::new(&config, 7)
+}
+
 /// A board with a free shaft, and the master of its bus.
 struct Master {
     board: Board,
@@ -45,10 +59,11 @@ struct Master {
 impl Master {
     /// A board that has started, and was told these lines.
     fn new(lines: &[&str]) -> Result<Self> {
-        let mut config = Config::default();
-        config.load.mode = LoadMode::Free;
-        config.drive.injection.synchronous.allow_unlearned = true;
-        let board = Board::new(Image::built()?, Options::new(&config, 7))?;
+        Self::with(options(&Config::default()), lines)
+    }
+
+    fn with(options: Options, lines: &[&str]) -> Result<Self> {
+        let board = Board::new(Image::built()?, options)?;
         let mut master = Self { board, answered: ANSWERED };
         master.until_said("last run")?;
         for line in lines {
@@ -112,6 +127,12 @@ impl Master {
 
     fn rpm(&self) -> f64 {
         self.board.plant.mechanical_speed() * 60.0 / TAU
+    }
+
+    /// The two registers of a setting or a signal.
+    fn float(&mut self, at: u16) -> Result<f32> {
+        let words = self.read(at, 2)?;
+        Ok(f32::from_bits(u32::from(words[0]) << 16 | u32::from(words[1])))
     }
 
     fn outputs_on(&mut self) -> bool {
@@ -253,10 +274,7 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
 #[test]
 fn settings_are_written_and_saved() -> Result<()> {
     let mut master = Master::new(&BUS)?;
-    let read = |master: &mut Master| -> Result<f32> {
-        let words = master.read(0x4000, 2)?;
-        Ok(f32::from_bits(u32::from(words[0]) << 16 | u32::from(words[1])))
-    };
+    let read = |master: &mut Master| master.float(0x4000);
     assert_eq!(read(&mut master)?, 5.4);
     let write = |ohm: f32| [&[16, 0x40, 0, 0, 2, 4][..], &ohm.to_be_bytes()].concat();
     assert_eq!(master.ask(&write(5.5))?, [16, 0x40, 0, 0, 2]);
@@ -274,6 +292,129 @@ fn settings_are_written_and_saved() -> Result<()> {
     master.board.reset(virtual_board::periph::Reset::Pin);
     master.until_said("last run")?;
     assert_eq!(read(&mut master)?, 5.5);
+    Ok(())
+}
+
+/// What a master writes that was set up with the image of version 0.1.0: addresses, and values that are not the default.
+const WRITTEN: [(u16, f32); 7] = [
+    (0x400c, 0.013),
+    (0x4084, 3.2),
+    (0x40a4, 40.0),
+    (0x40ac, 1500.0),
+    (0x40ae, 600.0),
+    (0x40ca, 20.0),
+    (0x40ce, 0.0),
+];
+
+/// This image, or one with other names and more settings, has each setting of this program where its number says, with the value
+/// that was saved; it takes what a master has always written, keeps it over a reset, and runs.
+#[test]
+fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
+    let mut config = Config::default();
+    // Saved by this program, under their numbers.
+    (config.drive.motor.r_s, config.drive.motor.inertia) = (5.5, 0.011);
+    config.drive.current_plant.d.k = Some(0.003);
+    let options = options(&config);
+    let saved = confirmed::settings(&options)?;
+    let mut master = Master::with(options, &BUS)?;
+    for key in keys::all() {
+        let mut expected = to_float(key, &saved);
+        if key.name() == "bus.commands" {
+            expected = 1.0;
+        }
+        let found = master.float(0x4000 + 2 * key.id())?;
+        assert_eq!(found.to_bits(), expected.to_bits(), "{} {found}", key.name());
+    }
+    for (at, value) in WRITTEN {
+        let request = [&[16][..], &at.to_be_bytes(), &[0, 2, 4], &value.to_be_bytes()].concat();
+        assert_eq!(master.ask(&request)?, request[..5], "{at:#x}");
+    }
+    assert_eq!(master.write(0x4fff, 2)?, None);
+    master.board.run_periods(30_000)?;
+    master.board.reset(virtual_board::periph::Reset::Pin);
+    master.until_said("last run")?;
+    for (at, value) in WRITTEN {
+        assert_eq!(master.float(at)?, value, "{at:#x}");
+    }
+    let head = master.read(0x5000, 3)?;
+    assert_eq!(head, [1, 0x669f, 0xb378]);
+    assert_eq!(master.ask(&[16, 0x20, 0, 0, 2, 4, 0, 18, 0x01, 0xf4])?, [16, 0x20, 0, 0, 2]);
+    master.run(4.5)?;
+    let (rpm, shown) = (master.rpm(), f64::from(master.float(0x3004)?));
+    println!("{rpm:.2} rpm at the rotor, {shown:.2} in its register");
+    assert!((rpm / 150.0 - 1.0).abs() < 0.03 && (shown / rpm - 1.0).abs() < 0.03, "{rpm} {shown}");
+    assert_eq!(master.float(0x3024)?, 2.0, "it runs");
+    Ok(())
+}
+
+/// The same with an image of changed sources: 20 settings inserted, five renamed. It builds the image, which takes minutes.
+#[test]
+#[ignore = "builds another image"]
+fn the_bus_with_20_settings_inserted_and_five_renamed() -> Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // Outside of this tree, whose configuration would count twice.
+    let tree = env::temp_dir().join("induction-drive-numbers");
+    let mut copy = Command::new("git");
+    copy.args(["checkout-index", "--all", "--force"]).current_dir(root);
+    copy.arg(format!("--prefix={}/", tree.display()));
+    ensure!(copy.status()?.success(), "a copy of the sources");
+    let edit = |name: &str, edits: &[(&str, String)]| -> Result<()> {
+        let mut text = fs::read_to_string(tree.join(name))?;
+        for (old, new) in edits {
+            ensure!(text.matches(old).count() == 1, "{name}: {old}");
+            text = text.replace(old, new);
+        }
+        Ok(fs::write(tree.join(name), text)?)
+    };
+    // Three before all others of six groups, and two of the firmware.
+    let mut id = 1000;
+    let groups = [
+        "Nameplate \"nameplate.\" [nameplate] {",
+        "ObserverSettings \"observer.\" [observer] {",
+        "Limits \"limits.\" [limits] {",
+        "SpeedSettings \"speed.\" [speed] {",
+        "BrakingSettings \"braking.\" [braking] {",
+        "VoltsPerHertzMode \"vf.\" [vf] {",
+    ];
+    let mut edits = Vec::new();
+    for group in groups {
+        let mut text = group.to_owned();
+        for _ in 0..3 {
+            text +=
+                &format!("\n/// inserted\ninserted_{id}: u8 = 1, {id}: whole().from_to(0.0, 9.0);");
+            id += 1;
+        }
+        edits.push((group, text));
+    }
+    edits.push(("\"motor.r_s\"", "\"motor.stator_ohm\"".into()));
+    edits.push(("\"motor.inertia\"", "\"shaft.inertia\"".into()));
+    edits.push(("\"current_plant.d.k\"", "\"plant.gain_d\"".into()));
+    edit("drive-core/settings/src/settings/list.rs", &edits)?;
+    let inserted = |id| {
+        format!(
+            "entry!({id}: number(\"s\"), \"inserted_{id}\", [command] timeout_s: f32, \"inserted\").from_to(0.0, 1e4),\n"
+        )
+    };
+    let first = "entry!(101: number";
+    edit(
+        "src/settings/own.rs",
+        &[
+            ("[Entry<Settings>; 9]", "[Entry<Settings>; 11]".into()),
+            (first, inserted(id) + &inserted(id + 1) + first),
+            ("\"command.timeout_s\"", "\"command.silence_s\"".into()),
+            ("\"console.echo\"", "\"console.repeats\"".into()),
+        ],
+    )?;
+    let mut build = Command::new(env!("CARGO"));
+    build.args(["run", "-q", "-p", "xtask", "--", "firmware"]).current_dir(&tree);
+    build.env("CARGO_TARGET_DIR", tree.join("target"));
+    ensure!(build.status()?.success(), "the image of the changed sources");
+    let mut tests = Command::new(env::current_exe()?);
+    tests.args(["modbus::", "--nocapture"]).env("CARGO_TARGET_DIR", tree.join("target"));
+    ensure!(
+        tests.env_remove(ELF).status()?.success(),
+        "the bus of the image of the changed sources"
+    );
     Ok(())
 }
 
