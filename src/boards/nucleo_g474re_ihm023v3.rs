@@ -55,5 +55,8 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
+    // The same for those of a strip.
+    strip: None,
+    motor_sensor: None,
     pulls: morpho::PULLS,
 };

@@ -75,6 +75,14 @@ fn the_firmware_and_the_power_stage_agree() {
         assert_eq!(board.heat_sink.adc2().map(usize::from), Some(channel::HEAT_SINK));
         let analog = board.analog_only.iter().map(|pin| (pin.port as usize, u32::from(pin.number)));
         assert_eq!(analog.collect::<Vec<_>>(), stage.analog_only, "{name}");
+        let terminals = board.terminals();
+        let (analog, others) = terminals.split_at(boards::SLOW);
+        let (contacts, outputs) = others.split_at(induction_drive::strip::Wires::COUNT);
+        for (ours, theirs) in stage.terminals.into_iter().zip([contacts, outputs, analog]) {
+            let theirs =
+                theirs.iter().map(|pin| pin.map_or("-".into(), |p| p.to_string()[1..].to_owned()));
+            assert_eq!(ours, theirs.collect::<Vec<_>>().join(" "), "{name}");
+        }
         assert_eq!(f64::from(board.fault.pull_ohm.value), stage.fault_pull_ohm, "{name}");
         assert_eq!(board.ntc.value, stage.ntc, "{name}");
         assert_eq!(

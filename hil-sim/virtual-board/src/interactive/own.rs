@@ -3,7 +3,7 @@
 use hil_sim::console::own::to_program;
 
 /// A command of the board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Own {
     /// Lists these commands.
     Help,
@@ -13,6 +13,10 @@ pub enum Own {
     Unplug,
     /// Ends the session.
     Quit,
+    /// Closes or opens a contact of the terminal strip.
+    Contact(String, bool),
+    /// Gives the analog reference a current, mA.
+    Reference(f64),
 }
 
 /// Names and meanings.
@@ -31,8 +35,17 @@ impl Own {
     /// The line begins with `!`, and there is no such command.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
+        match line.split_once(' ') {
+            Some(("!close", name)) => return Ok(Some(Self::Contact(name.to_owned(), true))),
+            Some(("!open", name)) => return Ok(Some(Self::Contact(name.to_owned(), false))),
+            Some(("!reference", ma)) => {
+                let ma = ma.parse().map_err(|_| format!("`{line}`: not a number of mA"))?;
+                return Ok(Some(Self::Reference(ma)));
+            }
+            _ => {}
+        }
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
-        known.map(|(_, own, _)| Some(*own)).ok_or_else(|| {
+        known.map(|(_, own, _)| Some(own.clone())).ok_or_else(|| {
             let names = COMMANDS.map(|(name, ..)| name).join(", ");
             format!("`{line}`: no such command of the board; there are {names}")
         })
@@ -40,6 +53,8 @@ impl Own {
 
     /// A line about each command.
     pub fn help() -> impl Iterator<Item = String> {
-        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<8} {meaning}"))
+        let strip = "!close, !open TERMINAL, !reference MA set the wires of the terminal strip";
+        let known = COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<8} {meaning}"));
+        known.chain([strip.to_owned()])
     }
 }

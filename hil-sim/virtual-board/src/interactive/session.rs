@@ -219,6 +219,12 @@ impl Session {
             Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
             Own::Reset => self.board.reset(Reset::Pin),
             Own::Unplug => self.board.unplug(),
+            Own::Reference(ma) => self.board.set_reference([ma; 2]),
+            Own::Contact(name, closed) => {
+                if let Err(why) = self.board.set_contact(&name, closed) {
+                    self.add(Source::Board, why.to_string());
+                }
+            }
         }
         None
     }
