@@ -19,7 +19,7 @@ use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_settings::{Flux, Ntc};
 
-use crate::strip::Wires;
+use crate::strip::{self, TERMINALS};
 use pin::Pin;
 
 /// All boards.
@@ -214,10 +214,8 @@ pub struct Board {
     pub analog_only: &'static [Pin],
     /// The port of the field bus, on pins that the power stage leaves free; `None` is a board without a bus.
     pub bus: Option<Rs485>,
-    /// The terminal strip, on pins that the power stage leaves free; `None` is a board without one.
-    pub strip: Option<Strip>,
-    /// The sensor in the motor's winding, at ADC3 or ADC4.
-    pub motor_sensor: Option<Pin>,
+    /// The terminal strip, on pins that the power stage leaves free.
+    pub strip: Strip,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
 }
@@ -233,39 +231,25 @@ pub struct Rs485 {
     pub driver: Pin,
 }
 
-/// Number of the slow analog inputs.
-pub const SLOW: usize = 3;
-
-/// The terminal strip. Inputs are contacts behind opto-couplers or filters; the chip pulls an open one to the other level than a closed
-/// one has. Outputs are high where they are active, and are to be pulled down: they float in reset.
+/// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open one to the other level than a closed one
+/// has. Outputs are high where they are active, and are to be pulled down: they float in reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Strip {
-    /// Pins of the inputs, in the order of [`Wires::NAMES`].
-    pub inputs: [Option<Pin>; Wires::COUNT],
+    /// Pins in the order of [`TERMINALS`]; analog ones are at ADC3 or ADC4.
+    pub pins: [Option<Pin>; TERMINALS.len()],
     /// The level at a closed contact.
     pub closed_at: Level,
-    /// Outputs: RUN, FAULT, BRAKE.
-    pub outputs: [Option<Pin>; 3],
-    /// The analog reference, and a second, redundant input for it.
-    pub references: [Option<Pin>; 2],
-    /// Voltage at their pins at 10 V, and at 20 mA, V.
+    /// Voltage at the pins of the references at 10 V, and at 20 mA, V.
     pub full_v: f32,
 }
 
 impl Strip {
-    /// A strip without pins.
-    pub const NONE: Self = Self {
-        inputs: [None; Wires::COUNT],
-        closed_at: Level::Low,
-        outputs: [None; 3],
-        references: [None; 2],
-        full_v: 3.0,
-    };
+    /// A board without a strip.
+    pub const NONE: Self = Self::of([None; TERMINALS.len()]);
 
-    /// The inputs that the board has.
-    pub fn wires(&self) -> Wires {
-        let bits = self.inputs.iter().enumerate();
-        Wires(bits.fold(0, |bits, (n, pin)| bits | u8::from(pin.is_some()) << n))
+    /// Contacts to ground, and 150 ohm for the current loop.
+    pub const fn of(pins: [Option<Pin>; TERMINALS.len()]) -> Self {
+        Self { pins, closed_at: Level::Low, full_v: 3.0 }
     }
 }
 
@@ -283,31 +267,9 @@ impl Board {
         ((self.dc_link_limits.operation.value - offset) / gain) as u16 + 1
     }
 
-    /// The strip, without pins if there is none.
-    pub const fn strip(&self) -> Strip {
-        match self.strip {
-            Some(strip) => strip,
-            None => Strip::NONE,
-        }
-    }
-
-    /// The slow analog inputs, in the order of [`Channel`](crate::strip::Channel).
-    pub const fn slow_inputs(&self) -> [Option<Pin>; SLOW] {
-        let [first, second] = self.strip().references;
-        [first, second, self.motor_sensor]
-    }
-
-    /// These, then the other pins of the strip.
-    pub const fn terminals(&self) -> [Option<Pin>; SLOW + Wires::COUNT + 3] {
-        let Strip { inputs, outputs, .. } = self.strip();
-        let ([a, b, c, d, e, f, g], [run, fault, brake]) = (inputs, outputs);
-        let [first, second, sensor] = self.slow_inputs();
-        [first, second, sensor, a, b, c, d, e, f, g, run, fault, brake]
-    }
-
     /// Whether the pin belongs to a signal of the board.
     const fn uses(&self, pin: Pin) -> bool {
-        self.uses_beside_terminals(pin) || pin.is_one_of(&self.terminals())
+        self.uses_beside_terminals(pin) || pin.is_one_of(&self.strip.pins)
     }
 
     const fn uses_beside_terminals(&self, pin: Pin) -> bool {
@@ -373,14 +335,13 @@ const fn check(board: &Board) {
             "two wires of the bus on one pin"
         );
     }
-    let terminals = board.terminals();
     let mut i = 0;
-    while i < terminals.len() {
-        if let Some(pin) = terminals[i] {
-            let free = !board.uses_beside_terminals(pin);
-            let others = terminals.split_at(i + 1).1;
-            assert!(free && !pin.is_one_of(others), "a terminal has the pin of another signal");
-            assert!(i >= SLOW || pin.adc34().is_some(), "a slow input has no converter");
+    while i < TERMINALS.len() {
+        if let Some(pin) = board.strip.pins[i] {
+            let others = board.strip.pins.split_at(i + 1).1;
+            let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
+            assert!(free, "a terminal has the pin of another signal");
+            assert!(i >= strip::ANALOG || pin.adc34().is_some(), "a terminal has no converter");
         }
         i += 1;
     }

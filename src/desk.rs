@@ -68,9 +68,9 @@ pub struct Desk {
     refusal: Option<Refusal>,
     refused: Option<Commander>,
     /// Wires of the terminal strip that are closed.
-    wires: Wires,
+    pub(crate) wires: Wires,
     /// Why the strip's reference was lost, until that is cleared.
-    lost: Option<Lost>,
+    pub(crate) lost: Option<Lost>,
 }
 
 impl Desk {
@@ -133,16 +133,6 @@ impl Desk {
         self.refusal = Some(why);
     }
 
-    /// Notes which wires of the terminal strip are closed.
-    pub fn note_wires(&mut self, closed: Wires) {
-        self.wires = closed;
-    }
-
-    /// The wires of the terminal strip that are closed.
-    pub fn wires(&self) -> Wires {
-        self.wires
-    }
-
     /// The stop with which the terminal strip keeps the drive from running, whoever commands.
     pub fn hold(&self) -> Option<Stop> {
         self.settings.in_force().strip.hold(self.wires)
@@ -152,11 +142,6 @@ impl Desk {
     pub fn lose_reference(&mut self, why: Lost) {
         self.lost = Some(why);
         self.note_refusal(Commander::Strip, Refusal::Reference(why));
-    }
-
-    /// Why the strip's reference was lost.
-    pub fn lost(&self) -> Option<Lost> {
-        self.lost
     }
 
     /// Who commands: by the staged settings, which a start puts in force.

@@ -20,33 +20,34 @@ use crate::desk::order::Order;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
-use crate::settings::strip::{Reference, Settings};
+use crate::settings::strip::Reference;
 use debounce::Debounce;
 use reference::Lost;
 use sequence::{Act, Seen, Sequence};
 
-/// Inputs by their names at the terminals, a bit each.
+/// The terminals: first the analog ones, then the contacts, then the outputs.
+#[rustfmt::skip]
+pub const TERMINALS: [&str; 13] = [
+    "REFERENCE", "REFERENCE2", "MOTOR SENSOR",
+    "ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2",
+    "RUN", "FAULT", "BRAKE",
+];
+/// Number of the analog ones, and of the contacts.
+pub const ANALOG: usize = 3;
+/// See [`ANALOG`].
+pub const CONTACTS: usize = 7;
+
+/// Contacts that are closed, a bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wires(pub u8);
 
+#[allow(missing_docs)] // the page says what they do
 impl Wires {
-    /// Number of the inputs.
-    pub const COUNT: usize = 7;
-    /// Their names, in the order of the bits.
-    pub const NAMES: [&str; Self::COUNT] =
-        ["ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2"];
-    /// Closed: the drive may run.
     pub const ENABLE: Self = Self(1);
-    /// Closing starts.
     pub const START: Self = Self(1 << 1);
-    /// Closed: the drive may run.
     pub const STOP: Self = Self(1 << 2);
-    /// Closed at a start: the other direction.
     pub const REVERSE: Self = Self(1 << 3);
-    /// Closing clears a latched fault.
     pub const RESET: Self = Self(1 << 4);
-    /// The preset speeds 1 to 3, as a binary number.
-    pub const PRESETS: Self = Self(3 << 5);
 
     /// Whether all of these are among them.
     pub const fn has(self, others: Self) -> bool {
@@ -61,41 +62,21 @@ impl Wires {
 
 impl fmt::Display for Wires {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut closed = Self::NAMES.iter().enumerate().filter(|(n, _)| self.0 >> n & 1 == 1);
+        let names = TERMINALS.iter().skip(ANALOG).take(CONTACTS).enumerate();
+        let mut closed = names.filter(|(n, _)| self.0 >> n & 1 == 1);
         closed.try_for_each(|(_, name)| write!(f, " {name}"))
     }
 }
 
-/// The outputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Outputs {
-    /// The drive is not off.
-    pub run: bool,
-    /// A fault is latched, the reference was lost, or the control does not run.
-    pub fault: bool,
-    /// The brake is to be open.
-    pub brake: bool,
-}
-
-/// A slow analog input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Channel {
-    /// The reference.
-    Reference,
-    /// The second reference, which has to agree.
-    Second,
-    /// The sensor in the motor's winding.
-    MotorSensor,
-}
-
 /// The pins of the strip. Where the board has none, nothing is closed.
 pub trait Port {
-    /// The inputs whose contact is closed now; called once a millisecond, in which another analog input is converted.
+    /// The contacts that are closed now; called once a millisecond, in which another analog input is converted.
     fn look(&mut self) -> Wires;
-    /// The last code of an analog input; `None`: the board does not have it, or its converter gives none.
-    fn code(&self, channel: Channel) -> Option<u16>;
-    /// Sets the outputs.
-    fn show(&mut self, outputs: Outputs);
+    /// The last codes of reference, second reference, and the sensor in the motor's winding; `None`: the board does not have it, or its
+    /// converter gives none.
+    fn codes(&self) -> [Option<u16>; ANALOG];
+    /// Sets the outputs RUN, FAULT and BRAKE.
+    fn show(&mut self, outputs: [bool; 3]);
 }
 
 /// Speed at and below which the brake closes in a stop by ramp, rpm.
@@ -134,8 +115,9 @@ impl Strip {
         if core::mem::replace(&mut self.looked, now_ms as u8) == now_ms as u8 {
             return;
         }
-        let closed = self.debounce.look(port.look());
-        desk.note_wires(closed);
+        let contacts = port.look();
+        let closed = self.debounce.look(contacts);
+        desk.wires = closed;
         desk.note_activity(Commander::Strip, now_ms);
         let settings = desk.settings().in_force();
         let (own, speed) = (settings.strip, self.speed(settings, port, closed));
@@ -158,9 +140,10 @@ impl Strip {
         }
         let (held, busy) = (hold.is_some(), desk.is_busy());
         let seen = Seen { commands, held, busy, ended: off || stopping, off };
-        match (self.sequence.step(own.start, closed.has(Wires::START), seen), speed) {
+        let [contact, start] = [contacts, closed].map(|wires| wires.has(Wires::START));
+        match (self.sequence.step(own.start, contact, start, seen), speed) {
             (Act::Stop, _) => give(desk, Order::Stop(Stop::Ramp)),
-            (Act::Start, speed) => match desk.lost().or(speed.err()) {
+            (Act::Start, speed) => match desk.lost.or(speed.err()) {
                 Some(lost) => desk.lose_reference(lost),
                 None => {
                     self.reverse = own.reverse && closed.has(Wires::REVERSE);
@@ -192,13 +175,12 @@ impl Strip {
         closed: Wires,
     ) -> Result<i16, Lost> {
         let own = &settings.strip;
-        let (preset, strip) = (if own.presets { closed.preset() } else { 0 }, settings.board.strip);
-        let (Some(strip), 0, true) = (strip, preset, own.reference != Reference::Off) else {
+        let preset = if own.presets { closed.preset() } else { 0 };
+        if preset > 0 || own.reference == Reference::Off {
             self.lost = 0;
             return Ok([0, own.preset_1_rpm, own.preset_2_rpm, own.preset_3_rpm][preset] as i16);
-        };
-        let codes = [Channel::Reference, Channel::Second].map(|channel| port.code(channel));
-        let share = reference::share(own.reference, &strip, codes);
+        }
+        let share = reference::share(own.reference, &settings.board.strip, port.codes());
         self.lost = if share.is_ok() { 0 } else { self.lost.saturating_add(1) };
         match share {
             // The range of the setting is within the type.
@@ -209,19 +191,18 @@ impl Strip {
     }
 }
 
-/// The outputs for a report of the drive.
-fn outputs(desk: &Desk, status: Option<&Status>) -> Outputs {
+/// RUN, FAULT and BRAKE for a report of the drive.
+fn outputs(desk: &Desk, status: Option<&Status>) -> [bool; 3] {
     let settings = desk.settings().in_force();
-    let own: &Settings = &settings.strip;
-    let Some(Status { state, telemetry, .. }) = status else {
-        return Outputs { fault: own.outputs, ..Outputs::default() };
-    };
+    let own = &settings.strip;
+    let Some(Status { state, telemetry, .. }) = status else { return [false, own.outputs, false] };
     let pole_pairs = f32::from(settings.drive.motor.pole_pairs);
     let rpm = telemetry.rotor_freq * (60.0 / PERIOD_S) / pole_pairs;
     let turns = *state == State::Braking && rpm.abs() > BRAKE_RPM;
-    Outputs {
-        run: own.outputs && !state.is_off(),
-        fault: own.outputs && (state.fault().is_some() || desk.lost().is_some()),
-        brake: own.brake && (state.regulates() || turns),
-    }
+    let fault = state.fault().is_some() || desk.lost.is_some();
+    [
+        own.outputs && !state.is_off(),
+        own.outputs && fault,
+        own.brake && (state.regulates() || turns),
+    ]
 }

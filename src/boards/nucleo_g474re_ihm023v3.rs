@@ -6,7 +6,7 @@
 use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
 
 const SHUNTS: &str =
     "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
@@ -55,8 +55,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
-    // The same for those of a strip.
-    strip: None,
-    motor_sensor: None,
+    strip: Strip::NONE,
     pulls: morpho::PULLS,
 };

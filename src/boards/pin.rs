@@ -71,7 +71,7 @@ const ADC2: [(Pin, u8); 3] = [(pa(6), 3), (pa(7), 4), (pa(5), 13)];
 const ADC34: [(Pin, (u8, u8)); 4] =
     [(pb(13), (0, 5)), (pb(12), (1, 3)), (pb(14), (1, 4)), (pb(15), (1, 5))];
 
-const fn look_up(table: &[(Pin, u8)], pin: Pin) -> Option<u8> {
+const fn look_up<T: Copy>(table: &[(Pin, T)], pin: Pin) -> Option<T> {
     let mut i = 0;
     while i < table.len() {
         if table[i].0.equals(pin) {
@@ -128,14 +128,7 @@ impl Pin {
 
     /// Its converter, ADC3 (0) or ADC4 (1), and its channel there.
     pub const fn adc34(self) -> Option<(u8, u8)> {
-        let mut i = 0;
-        while i < ADC34.len() {
-            if ADC34[i].0.equals(self) {
-                return Some(ADC34[i].1);
-            }
-            i += 1;
-        }
-        None
+        look_up(&ADC34, self)
     }
 
     /// Its channel of ADC2.

@@ -12,18 +12,21 @@ use super::clocks::clock_on;
 use super::{StartError, adc, pins};
 use induction_drive::board;
 use induction_drive::boards::pin::Pin;
-use induction_drive::boards::{Level, SELECTED, SLOW};
-use induction_drive::strip::{self, Channel, Outputs, Wires};
+use induction_drive::boards::{Level, SELECTED};
+use induction_drive::strip::{self, ANALOG, CONTACTS, Wires};
 
-/// Strip and slow inputs of the board, as far as it has them.
-const STRIP: induction_drive::boards::Strip = SELECTED.strip();
-const INPUTS: [Option<Pin>; SLOW] = SELECTED.slow_inputs();
+/// Pins of the analog inputs, of the contacts, and of the outputs.
+const INPUTS: &[Option<Pin>] = SELECTED.strip.pins.split_at(ANALOG).0;
+const OTHERS: &[Option<Pin>] = SELECTED.strip.pins.split_at(ANALOG).1;
+const CONTACT: &[Option<Pin>] = OTHERS.split_at(CONTACTS).0;
+const OUTPUTS: &[Option<Pin>] = OTHERS.split_at(CONTACTS).1;
+const CLOSED_AT: Level = SELECTED.strip.closed_at;
 
 /// The pins of the strip.
 pub struct Port {
     three: pac::ADC3,
     four: pac::ADC4,
-    codes: [Option<u16>; SLOW],
+    codes: [Option<u16>; ANALOG],
     /// The input that is being converted.
     at: usize,
 }
@@ -36,11 +39,11 @@ impl Port {
         common: &pac::ADC345_COMMON,
         rcc: &mut Rcc,
     ) -> Self {
-        let open = if STRIP.closed_at == Level::Low { Level::High } else { Level::Low };
-        STRIP.inputs.into_iter().flatten().for_each(|pin| pins::pulled_input(pin, open));
-        STRIP.outputs.into_iter().flatten().for_each(|pin| pins::output(pin, Level::Low));
-        INPUTS.into_iter().flatten().for_each(pins::analog);
-        let port = Self { three, four, codes: [None; SLOW], at: 0 };
+        let open = if CLOSED_AT == Level::Low { Level::High } else { Level::Low };
+        CONTACT.iter().flatten().for_each(|pin| pins::pulled_input(*pin, open));
+        OUTPUTS.iter().flatten().for_each(|pin| pins::output(*pin, Level::Low));
+        INPUTS.iter().flatten().for_each(|pin| pins::analog(*pin));
+        let port = Self { three, four, codes: [None; ANALOG], at: 0 };
         if let Err(why) = port.start(common, rcc) {
             defmt::error!("reference and motor sensor have no converter: {=str}", why);
         }
@@ -63,7 +66,7 @@ impl Port {
             let ended = adc.isr().read().eos().bit();
             self.codes[self.at] = ended.then(|| adc.dr().read().rdata().bits());
         }
-        self.at = (self.at + 1) % SLOW;
+        self.at = (self.at + 1) % ANALOG;
         let Some((adc, channel)) = self.converter(self.at) else { return };
         adc.isr().write(|w| w.eos().clear());
         adc.cfgr().write(|w| w.ovrmod().set_bit());
@@ -83,20 +86,20 @@ impl Port {
 impl strip::Port for Port {
     fn look(&mut self) -> Wires {
         self.convert();
-        let high = STRIP.closed_at == Level::High;
+        let high = CLOSED_AT == Level::High;
         let closed = |pin: &Option<Pin>| pin.is_some_and(|pin| pins::is_high(pin) == high);
-        let inputs = STRIP.inputs.iter().enumerate();
+        let inputs = CONTACT.iter().enumerate();
         Wires(inputs.fold(0, |bits, (n, pin)| bits | u8::from(closed(pin)) << n))
     }
 
-    fn code(&self, channel: Channel) -> Option<u16> {
-        self.codes[channel as usize]
+    fn codes(&self) -> [Option<u16>; ANALOG] {
+        self.codes
     }
 
-    fn show(&mut self, Outputs { run, fault, brake }: Outputs) {
-        for (pin, active) in STRIP.outputs.into_iter().zip([run, fault, brake]) {
+    fn show(&mut self, outputs: [bool; 3]) {
+        for (pin, active) in OUTPUTS.iter().zip(outputs) {
             let level = if active { Level::High } else { Level::Low };
-            pin.into_iter().for_each(|pin| pins::set(pin, level));
+            pin.iter().for_each(|pin| pins::set(*pin, level));
         }
     }
 }

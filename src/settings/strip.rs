@@ -5,7 +5,7 @@ use drive_settings::value::Words;
 use drive_settings::{SettingsError, words};
 
 use crate::boards::{Board, EXTRA_LOW_V};
-use crate::strip::Wires;
+use crate::strip::{TERMINALS, Wires};
 
 words! {
     /// How START starts.
@@ -36,7 +36,7 @@ words! {
 }
 
 /// Settings of the terminal strip.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Whether ENABLE must be closed, whoever commands.
     pub enable: bool,
@@ -64,28 +64,6 @@ pub struct Settings {
     pub reference_rpm: u16,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        let [enable, reverse, reset, presets, outputs, brake] = [false; 6];
-        let (start, reference, reference_rpm) = (Start::Off, Reference::Off, 1500);
-        let [preset_1_rpm, preset_2_rpm, preset_3_rpm] = [300, 600, 900];
-        Self {
-            enable,
-            start,
-            reverse,
-            reset,
-            presets,
-            reference,
-            outputs,
-            brake,
-            preset_1_rpm,
-            preset_2_rpm,
-            preset_3_rpm,
-            reference_rpm,
-        }
-    }
-}
-
 /// A switch that is closed when the power comes is told from one that is being closed only by an ENABLE that comes with it.
 const NEEDS_ENABLE: &str = "needs strip.enable yes, so that a switch that is closed as the power comes does not start the drive";
 const NO_PIN: &str = "this board has no pin for it";
@@ -106,23 +84,22 @@ impl Settings {
     /// # Errors
     /// The first function that is not.
     pub fn check(&self, board: &Board) -> Result<(), SettingsError> {
-        let strip = board.strip();
-        let has = |wires| strip.wires().has(wires);
-        let [run, fault, brake] = strip.outputs.map(|pin| pin.is_some());
-        let redundant = strip.references[1].is_some();
+        let pins = TERMINALS.iter().zip(board.strip.pins);
+        let has = |name| pins.clone().any(|(terminal, pin)| *terminal == name && pin.is_some());
         let extra_low = board.dc_link_limits.operation.value <= EXTRA_LOW_V;
-        let (start, voltage) = (self.start, self.reference == Reference::Voltage);
-        let stop = start != Start::Buttons || has(Wires::STOP);
-        needs("strip.enable", self.enable, has(Wires::ENABLE), NO_PIN)?;
-        needs("strip.start", start, has(Wires::START) && stop, NO_PIN)?;
-        needs("strip.start", start, start != Start::Switch || self.enable, NEEDS_ENABLE)?;
-        needs("strip.reverse", self.reverse, has(Wires::REVERSE), NO_PIN)?;
-        needs("strip.reset", self.reset, has(Wires::RESET), NO_PIN)?;
-        needs("strip.presets", self.presets, has(Wires::PRESETS), NO_PIN)?;
-        needs("strip.reference", self.reference, strip.references[0].is_some(), NO_PIN)?;
-        needs("strip.reference", self.reference, !voltage || extra_low || redundant, NO_LIVE_ZERO)?;
-        needs("strip.outputs", self.outputs, run || fault, NO_PIN)?;
-        needs("strip.brake", self.brake, brake, NO_PIN)
+        let (start, reference) = (self.start, self.reference);
+        let live = reference != Reference::Voltage || extra_low || has("REFERENCE2");
+        let buttons = start == Start::Buttons;
+        needs("strip.enable", self.enable, has("ENABLE"), NO_PIN)?;
+        needs("strip.start", start, has("START") && (!buttons || has("STOP")), NO_PIN)?;
+        needs("strip.start", start, buttons || self.enable, NEEDS_ENABLE)?;
+        needs("strip.reverse", self.reverse, has("REVERSE"), NO_PIN)?;
+        needs("strip.reset", self.reset, has("RESET"), NO_PIN)?;
+        needs("strip.presets", self.presets, has("PRESET1") && has("PRESET2"), NO_PIN)?;
+        needs("strip.reference", reference, has("REFERENCE"), NO_PIN)?;
+        needs("strip.reference", reference, live, NO_LIVE_ZERO)?;
+        needs("strip.outputs", self.outputs, has("RUN") || has("FAULT"), NO_PIN)?;
+        needs("strip.brake", self.brake, has("BRAKE"), NO_PIN)
     }
 }
 

@@ -1,6 +1,6 @@
 //! From contacts that bounce to wires that are closed or open.
 
-use super::Wires;
+use super::{CONTACTS, Wires};
 
 /// Looks, a millisecond each, in a row for which an input must be closed to count as closed.
 pub const CLOSES: u8 = 20;
@@ -11,7 +11,7 @@ pub const OPENS: u8 = 2;
 /// never starts and never lets run.
 #[derive(Debug, Default)]
 pub struct Debounce {
-    counts: [u8; Wires::COUNT],
+    counts: [u8; CONTACTS],
     closed: Wires,
 }
 

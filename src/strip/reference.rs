@@ -6,6 +6,7 @@ use crate::board::ADC_FULL_SCALE;
 use crate::boards::Strip;
 use crate::boards::converter::{CODES, REFERENCE_V};
 use crate::settings::strip::Reference;
+use crate::strip::ANALOG;
 
 /// Looks in a row after which a reference counts as lost, a millisecond each; meanwhile the last speed holds.
 pub const LOOKS: u8 = 20;
@@ -41,10 +42,14 @@ pub enum Lost {
 ///
 /// # Errors
 /// They mean none.
-pub fn share(kind: Reference, strip: &Strip, codes: [Option<u16>; 2]) -> Result<f32, Lost> {
+pub fn share(
+    kind: Reference,
+    strip: &Strip,
+    [first, second, _]: [Option<u16>; ANALOG],
+) -> Result<f32, Lost> {
     // 1 at 10 V and at 20 mA.
     let of = |code: u16| f32::from(code) * (REFERENCE_V / f32::from(CODES)) / strip.full_v;
-    let code = codes[0].ok_or(Lost::Silent)?;
+    let code = first.ok_or(Lost::Silent)?;
     let share = of(code);
     if kind == Reference::Current {
         let ma = share * SIGNAL_MA.1;
@@ -55,8 +60,8 @@ pub fn share(kind: Reference, strip: &Strip, codes: [Option<u16>; 2]) -> Result<
         };
     }
     // The slower of two.
-    let other = match strip.references[1] {
-        Some(_) => codes[1].ok_or(Lost::Silent)?,
+    let other = match strip.pins[1] {
+        Some(_) => second.ok_or(Lost::Silent)?,
         None => code,
     };
     match of(other) {

@@ -2,8 +2,8 @@
 
 use crate::settings::strip::Start;
 
-/// Looks, a millisecond each, for which START must have been open, with the drive allowed to run, before its closing counts: neither
-/// a switch that is closed as the power comes nor one that bounces starts the drive.
+/// Looks, a millisecond each, for which the contact at START must have been open without a break, with the drive allowed to run, before
+/// its closing counts: neither a switch that is closed as the power comes nor one that bounces starts the drive.
 pub const ARMED: u8 = 100;
 
 /// What the sequence sees beside START.
@@ -37,19 +37,24 @@ pub enum Act {
 /// Follows START. A run that has ended for any reason needs a new edge.
 #[derive(Debug, Default)]
 pub struct Sequence {
-    /// Looks in a row at which START was open with the drive allowed to run, up to [`ARMED`].
+    /// Looks in a row at which the contact was open with the drive allowed to run, up to [`ARMED`], where it stays until START is closed.
     open: u8,
     /// Whether the drive runs for the strip.
     runs: bool,
 }
 
 impl Sequence {
-    /// Another look: `closed` is START.
-    pub fn step(&mut self, start: Start, closed: bool, seen: Seen) -> Act {
+    /// Another look: `contact` is that at START, `closed` what the debounce makes of it.
+    pub fn step(&mut self, start: Start, contact: bool, closed: bool, seen: Seen) -> Act {
         let Seen { commands, held, busy, off, ended } = seen;
         let may = commands && !held && start != Start::Off;
         let edge = may && closed && self.open == ARMED;
-        self.open = if may && !closed { (self.open + 1).min(ARMED) } else { 0 };
+        self.open = match self.open {
+            _ if !may || closed => 0,
+            ARMED => ARMED,
+            _ if contact => 0,
+            open => open + 1,
+        };
         self.runs &= commands && (busy || !ended);
         if edge && off && !busy {
             self.runs = true;

@@ -9,9 +9,9 @@ use super::debounce::{CLOSES, OPENS};
 use super::reference::{LOOKS, share};
 use super::sequence::ARMED;
 use super::*;
-use crate::boards::{ALL, Board, Strip as Pins};
+use crate::boards::{ALL, Board};
 use crate::generated;
-use crate::settings::strip::Start;
+use crate::settings::strip::{Settings, Start};
 
 fn code(full_v: f32, volts_of_ten: f32) -> u16 {
     (volts_of_ten * 0.1 * full_v / 3.3 * 4096.0).round() as u16
@@ -19,7 +19,7 @@ fn code(full_v: f32, volts_of_ten: f32) -> u16 {
 
 /// START over some looks, and whether the drive may run: the acts.
 fn acts(sequence: &mut Sequence, start: Start, looks: &[(bool, Seen)]) -> Vec<Act> {
-    looks.iter().map(|(closed, seen)| sequence.step(start, *closed, *seen)).collect()
+    looks.iter().map(|(closed, seen)| sequence.step(start, *closed, *closed, *seen)).collect()
 }
 
 const OFF: Seen = Seen { commands: true, held: false, busy: false, off: true, ended: true };
@@ -50,14 +50,14 @@ fn every_state_with_every_input() {
     for ((name, before), start) in
         histories().into_iter().flat_map(|h| Start::VALUES.iter().map(move |s| (h.clone(), *s)))
     {
-        for bits in 0..1 << 5 {
+        for bits in 0..1 << 4 {
             let bit = |n: u8| bits >> n & 1 == 1;
             let (closed, commands, held, busy) = (bit(0), bit(1), bit(2), bit(3));
             for (off, ended) in [(false, false), (false, true), (true, true)] {
                 let mut sequence = Sequence::default();
                 acts(&mut sequence, start, &before);
                 let seen = Seen { commands, held, busy, off, ended };
-                let act = sequence.step(start, closed, seen);
+                let act = sequence.step(start, closed, closed, seen);
                 let case = format!("{name} {start:?} {closed} {seen:?}");
                 let runs = matches!(name, "started" | "running" | "runs with START open")
                     && start != Start::Off
@@ -80,7 +80,7 @@ fn every_state_with_every_input() {
                     let open = ["nearly armed", "armed", "runs with START open"].contains(&name);
                     let edge = open && !closed && commands && !held && start != Start::Off;
                     for look in 0..300 {
-                        let act = sequence.step(start, true, OFF);
+                        let act = sequence.step(start, true, true, OFF);
                         assert_eq!(act == Act::Start, edge && look == 0, "{case}");
                     }
                 }
@@ -88,6 +88,20 @@ fn every_state_with_every_input() {
         }
     }
     assert_eq!(seen_acts.len(), 4);
+}
+
+/// A switch that bounces while the drive runs stops it, and does not start it anew as it comes to rest closed.
+#[test]
+fn a_switch_that_bounces_for_long_is_no_edge() {
+    for open in 1..ARMED {
+        let mut sequence = Sequence::default();
+        acts(&mut sequence, Start::Switch, &histories()[5].1);
+        for look in 0..1000 {
+            let act = sequence.step(Start::Switch, look % u32::from(open + 1) == 0, false, OFF);
+            assert_eq!(act, Act::Nothing);
+        }
+        assert_eq!(acts(&mut sequence, Start::Switch, &[(true, OFF); 300]), [Act::Nothing; 300]);
+    }
 }
 
 /// All wires, with each use of ENABLE and START: whether the drive may run, and how it is stopped.
@@ -118,7 +132,7 @@ proptest! {
         let mut debounce = Debounce::default();
         for (at, contact) in contacts.iter().enumerate() {
             let closed = debounce.look(Wires(*contact));
-            for bit in 0..Wires::COUNT {
+            for bit in 0..CONTACTS {
                 let of = |n: usize| contacts[at - n] >> bit & 1 == 1;
                 let two_open = at >= 1 && !of(0) && !of(1);
                 let long = usize::from(CLOSES) - 1;
@@ -147,8 +161,9 @@ fn a_contact_closes_in_20_looks_and_opens_in_2() {
 #[test]
 fn references_in_and_out_of_range() {
     let pins = |second: bool| {
-        let pin = ALL[0].motor_sensor;
-        Pins { references: [pin, pin.filter(|_| second)], ..Pins::NONE }
+        let mut pins = ALL[0].strip;
+        pins.pins[1] = pins.pins[1].filter(|_| second);
+        pins
     };
     let volts = |v| Some(code(3.0, v));
     let ma = |ma: f32| volts(ma / 2.0);
@@ -164,7 +179,7 @@ fn references_in_and_out_of_range() {
         (ma(21.1), Err(Lost::High)),
         (Some(4095), Err(Lost::High)),
     ] {
-        let found = share(Reference::Current, &pins(true), [given, None]);
+        let found = share(Reference::Current, &pins(true), [given, None, None]);
         assert_eq!(found.map(|x| (x * 100.0).round() / 100.0), expected, "{given:?}");
     }
     for (second, codes, expected) in [
@@ -181,7 +196,7 @@ fn references_in_and_out_of_range() {
         (true, [volts(0.0), volts(5.0)], Err(Lost::Differ)),
         (true, [Some(4095), Some(4095)], Err(Lost::End)),
     ] {
-        let found = share(Reference::Voltage, &pins(second), codes);
+        let found = share(Reference::Voltage, &pins(second), [codes[0], codes[1], None]);
         assert_eq!(found.map(|x| (x * 100.0).round() / 100.0), expected, "{codes:?}");
     }
     assert!(LOOKS >= 3);
@@ -216,7 +231,7 @@ fn what_a_board_cannot_do_is_refused_by_name() {
     let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
     assert_eq!(refused(voltage, ihm08m1), "");
     let mut high = *reference;
-    high.strip.as_mut().unwrap().references[1] = None;
+    high.strip.pins[1] = None;
     assert!(refused(voltage, &high).starts_with("strip.reference = 0-10v: it has no live zero"));
     let current = Settings { reference: Reference::Current, ..Settings::default() };
     assert_eq!(refused(current, &high), "");
@@ -227,15 +242,13 @@ fn what_a_board_cannot_do_is_refused_by_name() {
 fn the_manual_lists_the_terminals() {
     use std::fmt::Write;
     let mut text = String::from("| terminal |");
-    let with: Vec<_> = ALL.iter().filter(|board| board.strip.is_some()).collect();
-    with.iter().for_each(|board| write!(text, " {} |", board.name).unwrap());
-    write!(text, "\n|---|{}\n", "---|".repeat(with.len())).unwrap();
-    let names = ["REFERENCE", "REFERENCE2", "MOTOR SENSOR"];
-    let names = names.into_iter().chain(Wires::NAMES).chain(["RUN", "FAULT", "BRAKE"]);
-    for (n, name) in names.enumerate() {
+    let with = || ALL.iter().filter(|board| board.strip.pins.iter().any(Option::is_some));
+    with().for_each(|board| write!(text, " {} |", board.name).unwrap());
+    write!(text, "\n|---|{}\n", "---|".repeat(with().count())).unwrap();
+    for (n, name) in TERMINALS.into_iter().enumerate() {
         write!(text, "| {name} |").unwrap();
-        for board in &with {
-            let pin = board.terminals()[n].map_or("-".into(), |pin| pin.to_string());
+        for board in with() {
+            let pin = board.strip.pins[n].map_or("-".into(), |pin| pin.to_string());
             write!(text, " {pin} |").unwrap();
         }
         text.push('\n');

@@ -23,7 +23,7 @@ use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::bus::{Baud, Format};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
-use induction_drive::strip::{self, Channel, Outputs, Wires};
+use induction_drive::strip::{self, Wires};
 
 /// A drive without hardware.
 pub struct FakeDrive {
@@ -289,17 +289,17 @@ pub struct FakeStrip {
     /// Codes of reference, second reference, and motor sensor.
     pub codes: [Option<u16>; 3],
     /// Outputs that were set last.
-    pub outputs: Outputs,
+    pub outputs: [bool; 3],
 }
 
 impl strip::Port for FakeStrip {
     fn look(&mut self) -> Wires {
         self.closed
     }
-    fn code(&self, channel: Channel) -> Option<u16> {
-        self.codes[channel as usize]
+    fn codes(&self) -> [Option<u16>; 3] {
+        self.codes
     }
-    fn show(&mut self, outputs: Outputs) {
+    fn show(&mut self, outputs: [bool; 3]) {
         self.outputs = outputs;
     }
 }

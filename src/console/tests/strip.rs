@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::settings::bus::Commander;
-use crate::strip::{Outputs, Wires};
+use crate::strip::Wires;
 
 const ALL_OPEN: Wires = Wires(0);
 
@@ -14,7 +14,8 @@ impl Panel {
     fn new(lines: &str) -> Self {
         let mut talk = Talk::new();
         let all = "set strip.enable yes strip.start switch strip.reset yes strip.reverse yes\n\
-                   set strip.presets yes strip.outputs yes strip.brake yes strip.reference 4-20ma\n\
+                   set strip.presets yes strip.preset_1_rpm 300 strip.preset_2_rpm 600 strip.preset_3_rpm 900\n\
+                   set strip.reference_rpm 1500 strip.outputs yes strip.brake yes strip.reference 4-20ma\n\
                    set bus.commands strip\n";
         talk.say(format!("{all}{lines}apply\n"));
         talk.drive.commands.clear();
@@ -84,7 +85,7 @@ fn a_switch_starts_and_stops_with_the_reference_as_speed() {
     panel.close(Wires::REVERSE);
     let presets = [300.0, 900.0, 600.0].map(Command::Speed);
     assert_eq!(panel.commands(), presets);
-    assert_eq!(panel.0.strip.outputs, Outputs { run: true, ..Outputs::default() });
+    assert_eq!(panel.0.strip.outputs, [true, false, false]);
     panel.open(Wires::START);
     assert_eq!(panel.commands()[0], RAMP);
     assert!(panel.off());
@@ -186,7 +187,7 @@ fn after_a_fault_the_start_needs_a_new_edge() {
     panel.0.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
     panel.wait(2);
-    assert!(panel.0.strip.outputs.fault && !panel.0.strip.outputs.run);
+    assert!(panel.0.strip.outputs == [false, true, false]);
     // With the fault latched a new edge is refused, and told.
     panel.open(Wires::START);
     panel.close(Wires::START);
@@ -197,7 +198,7 @@ fn after_a_fault_the_start_needs_a_new_edge() {
     panel.close(Wires::RESET);
     panel.wait(1000);
     assert_eq!(panel.commands(), [Command::Clear]);
-    assert!(!panel.0.strip.outputs.fault);
+    assert!(!panel.0.strip.outputs[1]);
     panel.open(Wires::START);
     panel.close(Wires::START);
     assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
@@ -223,7 +224,7 @@ fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
     let why = "below 3.6 mA: a broken wire, or no supply";
     assert!(said.iter().any(|line| line.contains(why)), "{said:?}");
     assert!(panel.0.ask("status").contains(why));
-    assert!(panel.off() && panel.0.strip.outputs.fault);
+    assert!(panel.off() && panel.0.strip.outputs[1]);
     // It comes back: latched, and a new edge is not enough.
     panel.ma(12.0);
     panel.wait(1000);

@@ -1,7 +1,7 @@
 //! The terminal strip from outside: contacts, an analog reference, outputs.
 
 use anyhow::{Context, Result};
-use induction_drive::strip::Wires;
+use induction_drive::strip::{ANALOG, TERMINALS};
 
 use super::Board;
 use crate::chip::pins::{self, Pin};
@@ -17,14 +17,29 @@ impl Board {
         self.cpu.chip().gates.stage.terminals[kind].split(' ').map(pins::pin)
     }
 
+    /// Closes the contacts of these names and opens the others; a number is the current of the reference, mA.
+    ///
+    /// # Errors
+    /// A word is neither.
+    pub fn set_wires(&mut self, wires: &str) -> Result<()> {
+        self.chip().grounded = [0; 7];
+        wires.split_whitespace().try_for_each(|word| match word.parse() {
+            Ok(ma) => {
+                self.set_reference([ma; 2]);
+                Ok(())
+            }
+            Err(_) => self.set_contact(word, true),
+        })
+    }
+
     /// Closes or opens the contact at an input, by its name.
     ///
     /// # Errors
     /// The strip has no such input.
     pub fn set_contact(&mut self, name: &str, closed: bool) -> Result<()> {
-        let named = |terminal: &&str| terminal.eq_ignore_ascii_case(name);
-        let pin = Wires::NAMES.iter().position(|terminal| named(&terminal));
-        let pin = pin.and_then(|n| self.terminals(0).nth(n).flatten());
+        let mut contacts = TERMINALS.iter().skip(ANALOG).zip(self.terminals(0));
+        let pin = contacts.find(|(terminal, _)| terminal.eq_ignore_ascii_case(name));
+        let pin = pin.and_then(|(_, pin)| pin);
         let (port, pin) = pin.with_context(|| format!("{name}: no such contact"))?;
         let grounded = &mut self.chip().grounded[port];
         *grounded = *grounded & !(1 << pin) | u32::from(closed) << pin;

@@ -114,15 +114,15 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
         board.set_contact("ENABLE", false)?;
         wait(board, 60)?;
     }
-    let mut next = 0.0;
+    let (mut next, mut bounces) = (0.0, closed);
     let (started, off) = watch(board, |board, ms| {
         match fault {
             Fault::Reference => board.set_reference([ma; 2]),
             Fault::Open => board.set_contact(wire, false)?,
             Fault::Shorted => board.set_contact(wire, true)?,
             Fault::Chatters if ms >= next => {
-                next = ms + rng.random_range(0.2..BOUNCE_MS);
-                board.set_contact(wire, rng.random())?;
+                (next, bounces) = (ms + rng.random_range(0.2..BOUNCE_MS), !bounces);
+                board.set_contact(wire, bounces)?;
             }
             Fault::Chatters => {}
         }

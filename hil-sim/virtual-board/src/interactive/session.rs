@@ -219,11 +219,9 @@ impl Session {
             Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
             Own::Reset => self.board.reset(Reset::Pin),
             Own::Unplug => self.board.unplug(),
-            Own::Reference(ma) => self.board.set_reference([ma; 2]),
-            Own::Contact(name, closed) => {
-                if let Err(why) = self.board.set_contact(&name, closed) {
-                    self.add(Source::Board, why.to_string());
-                }
+            Own::Wires(wires) => {
+                let set = self.board.set_wires(&wires);
+                set.err().into_iter().for_each(|why| self.add(Source::Board, why.to_string()));
             }
         }
         None
