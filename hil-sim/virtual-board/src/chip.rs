@@ -146,7 +146,7 @@ defaults! {
         /// Converters of the control.
         pub adc: Adc,
         /// ADC3 and ADC4.
-        pub slow_adc: Adc = Adc { first: 2, ..Adc::default() },
+        pub slow_adc: Adc = Adc::from(2),
         /// Pins of each port that are connected to ground.
         pub grounded: [u32; 7],
         /// Comparators.

@@ -301,7 +301,7 @@ const CLASSES: &[Class] = &[
 
 /// What is judged at the terminal strip, instead of the control.
 const STRIP: &str =
-    "no start and no restart; off after 60 ms by ENABLE, after 0.8 s by START or a lost reference";
+    "no start and no restart; off after 150 ms by ENABLE, 250 ms by a ramp from 300 rpm";
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;

@@ -34,11 +34,11 @@ const HALF_MA: f64 = 12.0;
 /// Periods until the settings are in force, and until the speed stands.
 const SETTLING: u64 = 12_000;
 const RISING: u64 = 15_000;
-/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 600 rpm.
-const COASTED_MS: f64 = 60.0;
-const RAMPED_MS: f64 = 800.0;
+/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 300 rpm at 2000 rpm/s.
+const COASTED_MS: f64 = 150.0;
+const RAMPED_MS: f64 = 250.0;
 /// Time of a fault, of what comes after it, and longest between two bounces, ms.
-const FAULT_MS: f64 = 900.0;
+const FAULT_MS: f64 = 300.0;
 const BOUNCE_MS: f64 = 15.0;
 
 const WIRES: [&str; 6] = ["ENABLE", "START", "REVERSE", "RESET", "PRESET1", "PRESET2"];

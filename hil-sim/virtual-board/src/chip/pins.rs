@@ -33,12 +33,12 @@ pub const SERIAL: [Signal; 2] =
 pub const BUS: [Signal; 2] = [("USART3_TX", "B9:7 B10:7 C10:7"), ("USART3_RX", "B8:7 B11:7 C11:7")];
 /// The pin that enables the driver of the bus.
 const BUS_DRIVER: Pin = (2, 12);
-/// The pins of the channels of ADC1 to ADC4 from channel 1 on; `-` is inside the chip.
+/// The pins of the channels of ADC1 to ADC4 from channel 1 on; `-` is inside the chip or at no pin of it.
 const ANALOG: [&str; 4] = [
     "A0 A1 A2 A3 B14 C0 C1 C2 C3 F0 B12 B1 - B11 B0",
     "A0 A1 A6 A7 C4 C0 C1 C2 C3 F1 C5 B2 A5 B11 B15 - A4",
-    "B1 E9 E13 E7 B13 E8 D10 D11 D12 D13 D14 B0 - E10 E11 E12",
-    "E14 E15 B12 B14 B15 E8 D10 D11 D12 D13 D14 D8 D9 E10 E11 E12",
+    "B1 - - - B13 - - - - - - B0",
+    "- - B12 B14 B15",
 ];
 
 /// The pin of this name, as "A8".

@@ -19,7 +19,7 @@ pub enum Own {
 
 /// Names and meanings.
 #[rustfmt::skip]
-const COMMANDS: [(&str, Own, &str); 5] = [
+static COMMANDS: [(&str, Own, &str); 5] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
     ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
@@ -39,7 +39,7 @@ impl Own {
         }
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
         known.map(|(_, own, _)| Some(own.clone())).ok_or_else(|| {
-            let names = COMMANDS.map(|(name, ..)| name).join(", ");
+            let names = COMMANDS.each_ref().map(|(name, ..)| *name).join(", ");
             format!("`{line}`: no such command of the board; there are {names}")
         })
     }

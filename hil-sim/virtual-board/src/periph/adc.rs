@@ -54,7 +54,7 @@ pub struct Adc {
     /// Triggers to be lost, for each converter.
     pub lose_triggers: [u32; 2],
     /// Number of the first, less one.
-    pub first: u32,
+    first: u32,
     /// Whether RCC gives them a clock of their own.
     pub kernel_clock: bool,
     /// Channels that each converter has converted since they were taken.
@@ -62,6 +62,11 @@ pub struct Adc {
 }
 
 impl Adc {
+    /// A pair; the first has this number, less one.
+    pub fn from(first: u32) -> Self {
+        Self { first, ..Self::default() }
+    }
+
     /// Ticks per converter clock; `None` is no clock.
     fn clock(&self) -> Option<u64> {
         // The own clock, taken as that of the core, divided by PRESC; or synchronous, divided by 1, 2 or 4.
