@@ -19,6 +19,7 @@ use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_settings::{Flux, Ntc};
 
+use crate::strip::{self, TERMINALS};
 use pin::Pin;
 
 /// All boards.
@@ -213,6 +214,8 @@ pub struct Board {
     pub analog_only: &'static [Pin],
     /// The port of the field bus, on pins that the power stage leaves free; `None` is a board without a bus.
     pub bus: Option<Rs485>,
+    /// The terminal strip, on pins that the power stage leaves free.
+    pub strip: Strip,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
 }
@@ -226,6 +229,28 @@ pub struct Rs485 {
     pub receive: Pin,
     /// Driver enable (DE, with its inverse at /RE: one wire to both).
     pub driver: Pin,
+}
+
+/// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open one to the other level than a closed one
+/// has. Outputs are high where they are active, and are to be pulled down: they float in reset.
+#[derive(Clone, Copy, Debug)]
+pub struct Strip {
+    /// Pins in the order of [`TERMINALS`]; analog ones are at ADC3 or ADC4.
+    pub pins: [Option<Pin>; TERMINALS.len()],
+    /// The level at a closed contact.
+    pub closed_at: Level,
+    /// Voltage at the pins of the references at 10 V, and at 20 mA, V.
+    pub full_v: f32,
+}
+
+impl Strip {
+    /// A board without a strip.
+    pub const NONE: Self = Self::of([None; TERMINALS.len()]);
+
+    /// Contacts to ground, and 150 ohm for the current loop.
+    pub const fn of(pins: [Option<Pin>; TERMINALS.len()]) -> Self {
+        Self { pins, closed_at: Level::Low, full_v: 3.0 }
+    }
 }
 
 impl PartialEq for Board {
@@ -244,6 +269,10 @@ impl Board {
 
     /// Whether the pin belongs to a signal of the board.
     const fn uses(&self, pin: Pin) -> bool {
+        self.uses_beside_terminals(pin) || pin.is_one_of(&self.strip.pins)
+    }
+
+    const fn uses_beside_terminals(&self, pin: Pin) -> bool {
         let Currents { a, b, shunts } = self.currents;
         let c = match shunts {
             Some(Shunts { c, .. }) => c,
@@ -265,7 +294,7 @@ const CHIP_PULL_OHM: f32 = 25e3;
 const SURE_LEVEL: f32 = 2.6 / 3.3;
 /// Dc link from which on an over-current shut-down is required, V: extra-low voltage ends there, and so do switches that stand a
 /// short circuit until the next sample.
-const WITHOUT_OVER_CURRENT_V: f32 = 60.0;
+pub const EXTRA_LOW_V: f32 = 60.0;
 
 /// Checks a board when compiling.
 const fn check(board: &Board) {
@@ -306,6 +335,16 @@ const fn check(board: &Board) {
             "two wires of the bus on one pin"
         );
     }
+    let mut i = 0;
+    while i < TERMINALS.len() {
+        if let Some(pin) = board.strip.pins[i] {
+            let others = board.strip.pins.split_at(i + 1).1;
+            let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
+            assert!(free, "a terminal has the pin of another signal");
+            assert!(i >= strip::ANALOG || pin.adc34().is_some(), "a terminal has no converter");
+        }
+        i += 1;
+    }
     // Nominal dc link < end of generating torque <= operation < trip of the software < comparator <= what switches and capacitors
     // stand.
     let limits = &board.dc_link_limits;
@@ -321,7 +360,7 @@ const fn check(board: &Board) {
     let range_v = board.dc_link.line.value.gain * 4095.0 + board.dc_link.line.value.offset;
     assert!(comparator_v <= range_v, "the converter does not reach the trips of the dc link");
     assert!(
-        board.over_current.is_some() || operation_v <= WITHOUT_OVER_CURRENT_V,
+        board.over_current.is_some() || operation_v <= EXTRA_LOW_V,
         "above 60 V the power stage needs an over-current shut-down of its own"
     );
 }

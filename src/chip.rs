@@ -13,6 +13,7 @@ pub mod rs485;
 pub mod serial;
 pub mod sleep;
 pub mod stop;
+pub mod terminals;
 pub mod time;
 pub mod watchdog;
 pub mod window;

@@ -1,8 +1,8 @@
 //! The desk: who commands, which settings are staged, which task runs, and what is new. Types in, types out: no text and no bytes.
 //!
-//! Console ([`crate::console`]) and field bus ([`crate::modbus`]) are its front ends: they turn lines and registers into an
-//! [`Order`], and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the time-out of the one that commands are the same for
-//! both.
+//! Console ([`crate::console`]), field bus ([`crate::modbus`]) and terminal strip ([`crate::strip`]) are its front ends: they turn lines, registers
+//! and wires into an [`Order`], and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the time-out of the one that commands
+//! are the same for all.
 
 pub mod handle;
 pub mod news;
@@ -19,6 +19,8 @@ use drive_settings::entry::Change;
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
 use crate::settings::staging::{Applied, Assignments, Staging};
+use crate::strip::Wires;
+use crate::strip::reference::Lost;
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
 use order::{Order, Refusal, Reply};
@@ -62,9 +64,13 @@ pub struct Desk {
     /// A homing, and how the last one has ended, until that is announced.
     homing: Option<Homing>,
     homed: Option<Result<(), Failure>>,
-    /// The last refusal of the bus, and whether it is still to be announced.
+    /// The last refusal of bus or strip, and whose, if it is still to be announced.
     refusal: Option<Refusal>,
-    refusal_is_news: bool,
+    refused: Option<Commander>,
+    /// Wires of the terminal strip that are closed.
+    pub(crate) wires: Wires,
+    /// Why the strip's reference was lost, until that is cleared.
+    pub(crate) lost: Option<Lost>,
 }
 
 impl Desk {
@@ -87,7 +93,9 @@ impl Desk {
             homing: None,
             homed: None,
             refusal: None,
-            refusal_is_news: false,
+            refused: None,
+            wires: Wires::default(),
+            lost: None,
         }
     }
 
@@ -112,15 +120,28 @@ impl Desk {
         core::mem::replace(seen, self.designs) != self.designs
     }
 
-    /// The last refusal of the bus.
+    /// The last refusal of bus or strip.
     pub fn refusal(&self) -> Option<&Refusal> {
         self.refusal.as_ref()
     }
 
-    /// Notes a refusal of the bus; a master that repeats itself is announced once.
-    pub fn note_refusal(&mut self, why: Refusal) {
-        self.refusal_is_news |= self.refusal.as_ref() != Some(&why);
+    /// Notes a refusal of bus or strip; a master that repeats itself is announced once.
+    pub fn note_refusal(&mut self, from: Commander, why: Refusal) {
+        if from == Commander::Strip || self.refusal.as_ref() != Some(&why) {
+            self.refused = Some(from);
+        }
         self.refusal = Some(why);
+    }
+
+    /// The stop with which the terminal strip keeps the drive from running, whoever commands.
+    pub fn hold(&self) -> Option<Stop> {
+        self.settings.in_force().strip.hold(self.wires)
+    }
+
+    /// Latches that the strip's reference was lost, and announces it.
+    pub fn lose_reference(&mut self, why: Lost) {
+        self.lost = Some(why);
+        self.note_refusal(Commander::Strip, Refusal::Reference(why));
     }
 
     /// Who commands: by the staged settings, which a start puts in force.
@@ -189,7 +210,7 @@ impl Desk {
             .next(&status, settings, now_ms)
             .or_else(|| drive.session().news().map(News::Commissioning))
             .or_else(|| self.homed.take().map(News::Homed))
-            .or_else(|| core::mem::take(&mut self.refusal_is_news).then_some(News::BusRefused))
+            .or_else(|| self.refused.take().map(News::Refused))
     }
 
     /// Notes when the drive has passed the check of the wiring: it need not be repeated.
@@ -229,15 +250,15 @@ impl Desk {
     /// Carries out an order, or takes it as a task ([`Reply::Designing`]).
     ///
     /// # Errors
-    /// Nothing has changed, for this reason. A refusal of the bus is announced.
+    /// Nothing has changed, for this reason. A refusal of bus or strip is announced.
     pub fn order(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         let answer = if order.is_for_the_commander(from) && self.commander() != from {
             Err(Refusal::Authority(self.commander()))
         } else {
             self.carry_out(from, order, drive)
         };
-        if let (Commander::Bus, Err(why)) = (from, &answer) {
-            self.note_refusal(why.clone());
+        if let (Commander::Bus | Commander::Strip, Err(why)) = (from, &answer) {
+            self.note_refusal(from, why.clone());
         }
         answer
     }
@@ -265,7 +286,10 @@ impl Desk {
                 give(Command::Position(turns), "turns", drive)
             }
             Order::Home(plan) => self.home(plan, drive),
-            Order::Clear => give(Command::Clear, "", drive),
+            Order::Clear => {
+                self.lost = None;
+                give(Command::Clear, "", drive)
+            }
             Order::Defaults => {
                 may_stage(drive)?;
                 self.settings.set_defaults();
@@ -393,8 +417,8 @@ impl Desk {
         };
         match (from, done) {
             (Commander::Console, done) => self.done = Some(done),
-            (Commander::Bus, (_, Err(why))) => self.note_refusal(why),
-            (Commander::Bus, _) => {}
+            (from, (_, Err(why))) => self.note_refusal(from, why),
+            _ => {}
         }
     }
 
@@ -445,6 +469,7 @@ impl Desk {
     /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
     /// boost is a check at every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
+        self.not_held()?;
         if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
             return give(Command::Start(mode), "", drive);
         }
@@ -455,8 +480,14 @@ impl Desk {
         Ok(Reply::WiringFirst)
     }
 
+    /// Passes if the terminal strip lets the drive run.
+    fn not_held(&self) -> Result<(), Refusal> {
+        self.hold().map_or(Ok(()), |stop| Err(Refusal::Held(stop)))
+    }
+
     /// Lets the drive measure its motor.
     fn commission(&mut self, first: Step, last: Step, drive: &mut impl DriveHandle) -> Answer {
+        self.not_held()?;
         match drive.status().map(|status| status.state) {
             None => Err(drive.no_control().into()),
             Some(State::Fault(fault)) => Err(CommandError::Refused(Refused::Fault(fault)).into()),

@@ -5,6 +5,7 @@ use crate::console::handle::{Firmware, Port};
 use crate::desk::Desk;
 use crate::modbus::{self, bus::Bus};
 use crate::settings::FirmwareSettings;
+use crate::strip::{self, Strip};
 
 /// See the head of the module.
 pub struct Front {
@@ -14,12 +15,15 @@ pub struct Front {
     pub console: Console,
     /// The field bus.
     pub bus: Bus,
+    /// The terminal strip.
+    pub strip: Strip,
 }
 
 impl Front {
     /// The drive has these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
-        Self { desk: Desk::new(settings), console: Console::default(), bus: Bus::default() }
+        let (desk, console) = (Desk::new(settings), Console::default());
+        Self { desk, console, bus: Bus::default(), strip: Strip::default() }
     }
 
     /// A pass of the main loop. Takes seconds if controllers are designed; `line` answers by itself meanwhile. `now_ms` wraps.
@@ -27,13 +31,15 @@ impl Front {
         &mut self,
         port: &mut impl Port,
         line: &mut impl modbus::Port,
+        wires: &mut impl strip::Port,
         drive: &mut impl Firmware,
         now_ms: u32,
     ) {
-        let Self { desk, console, bus } = self;
+        let Self { desk, console, bus, strip } = self;
         desk.follow(drive);
         console.poll(port, desk, drive, now_ms);
         bus.serve(line, desk, drive, now_ms);
+        strip.serve(wires, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {
             line.set_busy(Some(desk.settings().in_force().bus.own()));
             desk.go_on(drive, now_ms);

@@ -18,6 +18,7 @@ pub mod monitor;
 pub mod rotor_tracking;
 pub mod settings;
 pub mod store;
+pub mod strip;
 
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]

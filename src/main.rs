@@ -44,11 +44,11 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)] // its stack comes in the place of that of the start
 fn run(board: task::bring_up::Board) -> ! {
-    let task::bring_up::Board { front, mut port, mut line, supervisor } = board;
+    let task::bring_up::Board { front, mut port, mut line, mut wires, supervisor } = board;
     front.console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        front.pass(&mut port, &mut line, supervisor, now_ms);
+        front.pass(&mut port, &mut line, &mut wires, supervisor, now_ms);
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

@@ -5,6 +5,7 @@ pub mod bus;
 pub mod keys;
 mod own;
 pub mod staging;
+pub mod strip;
 #[cfg(test)]
 mod tests;
 
@@ -26,6 +27,8 @@ pub struct FirmwareSettings {
     pub command: CommandSettings,
     /// Settings of the field bus.
     pub bus: bus::Settings,
+    /// Settings of the terminal strip.
+    pub strip: strip::Settings,
     /// Whether a pin chooses at a reset what starts: see [`board::boot_pin_counts`]. A state of the chip, which is not saved.
     pub boot_pin_counts: bool,
     /// Accepted result of a learning with these settings; it overrides them where both give a value.
@@ -55,7 +58,8 @@ impl FirmwareSettings {
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
         let (command, bus) = (CommandSettings::default(), bus::Settings::default());
-        Self { board, drive, command, bus, boot_pin_counts: true, learned: None }
+        let strip = strip::Settings::default();
+        Self { board, drive, command, bus, strip, boot_pin_counts: true, learned: None }
     }
 
     /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option

@@ -16,7 +16,7 @@ use drive_core::{Drive, Measured, State};
 
 #[path = "../../src/console/tests/doubles.rs"]
 mod doubles;
-use doubles::{FakeBus, FakeDrive, FakePort, found};
+use doubles::{FakeBus, FakeDrive, FakePort, FakeStrip, found};
 
 fuzz_target!(|bytes: &[u8]| {
     let settings = FirmwareSettings::of_the_board();
@@ -25,7 +25,7 @@ fuzz_target!(|bytes: &[u8]| {
     let initial = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));
     let mut drive = FakeDrive::new(initial.clone());
     let (mut front, mut bus) = (Front::new(settings), None::<FakeBus>);
-    let mut port = FakePort::default();
+    let (mut port, mut strip) = (FakePort::default(), FakeStrip::default());
     let mut now_ms = 0_u32;
     // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
     // drive. The byte behind 0xf7 stands for a word, which the fuzzer does not find letter by letter.
@@ -47,7 +47,7 @@ fuzz_target!(|bytes: &[u8]| {
             0xfe => {
                 drive.drive.step(&Measured { dc_link: 311.0, ..Measured::default() });
             }
-            0xff => front.pass(&mut port, &mut bus, &mut drive, now_ms),
+            0xff => front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms),
             _ => port.sent.push_back(byte),
         }
     }
@@ -59,7 +59,7 @@ fuzz_target!(|bytes: &[u8]| {
     while !port.sent.is_empty() || polls < 200 {
         polls = if port.sent.is_empty() { polls + 1 } else { 0 };
         now_ms = now_ms.wrapping_add(1);
-        front.pass(&mut port, &mut bus, &mut drive, now_ms);
+        front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
     }
     let mut lines = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);

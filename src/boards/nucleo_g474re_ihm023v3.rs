@@ -6,7 +6,7 @@
 use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
 
 const SHUNTS: &str =
     "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
@@ -55,5 +55,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
+    strip: Strip::NONE,
     pulls: morpho::PULLS,
 };

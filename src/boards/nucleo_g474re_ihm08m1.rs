@@ -7,11 +7,18 @@
 use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::pin::{pa, pb};
-use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};
+use super::pin::{Pin, pa, pb, pc};
+use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
 
 /// The port of NuttX to this board, which has turned motors: polarity, gain, sign and divider.
 const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
+
+#[rustfmt::skip] // All that the board leaves free beside PB4, PB6 and PB8: REFERENCE and the motor's sensor; ENABLE, START, STOP, RESET.
+const TERMINALS: [Option<Pin>; 13] = [
+    Some(pb(12)), None, Some(pb(13)),
+    Some(pb(5)), Some(pb(7)), Some(pb(9)), None, Some(pc(7)), None, None,
+    None, None, None,
+];
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -49,5 +56,6 @@ pub const BOARD: Board = Board {
     // Tied to the fault input (PA11, PB14) and to the low side of leg a (PB15).
     analog_only: &[pa(11), pb(14), pb(15)],
     bus: Some(morpho::BUS),
+    strip: Strip::of(TERMINALS),
     pulls: morpho::PULLS,
 };

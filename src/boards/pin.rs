@@ -67,7 +67,11 @@ const ADC1: [(Pin, u8); 2] = [(pa(2), 3), (pa(3), 4)];
 /// Channels of ADC2 alone.
 const ADC2: [(Pin, u8); 3] = [(pa(6), 3), (pa(7), 4), (pa(5), 13)];
 
-const fn look_up(table: &[(Pin, u8)], pin: Pin) -> Option<u8> {
+/// Channels of ADC3 (0) and ADC4 (1): `(pin, (converter, channel))`.
+const ADC34: [(Pin, (u8, u8)); 4] =
+    [(pb(13), (0, 5)), (pb(12), (1, 3)), (pb(14), (1, 4)), (pb(15), (1, 5))];
+
+const fn look_up<T: Copy>(table: &[(Pin, T)], pin: Pin) -> Option<T> {
     let mut i = 0;
     while i < table.len() {
         if table[i].0.equals(pin) {
@@ -82,6 +86,15 @@ impl Pin {
     /// Equality, when compiling.
     pub const fn equals(self, other: Self) -> bool {
         self.port as u8 == other.port as u8 && self.number == other.number
+    }
+
+    /// Whether it is one of these, of which some may be none.
+    pub const fn is_one_of(self, pins: &[Option<Self>]) -> bool {
+        match pins {
+            [] => false,
+            [Some(first), ..] if first.equals(self) => true,
+            [_, others @ ..] => self.is_one_of(others),
+        }
     }
 
     /// Whether it is one of these.
@@ -111,6 +124,11 @@ impl Pin {
             Some(channel) => Some(channel),
             None => look_up(&ADC1, self),
         }
+    }
+
+    /// Its converter, ADC3 (0) or ADC4 (1), and its channel there.
+    pub const fn adc34(self) -> Option<(u8, u8)> {
+        look_up(&ADC34, self)
     }
 
     /// Its channel of ADC2.

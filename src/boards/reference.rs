@@ -4,7 +4,15 @@ use drive_core::Line;
 use drive_settings::Flux;
 
 use super::converter::calibrated;
-use super::{Analog, Board, Currents, DcLinkLimits, Gates, Level, assumed, morpho, read};
+use super::pin::{Pin, pa, pb, pc};
+use super::{Analog, Board, Currents, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
+
+#[rustfmt::skip] // References at a converter each, and the motor's sensor; contacts; outputs.
+const TERMINALS: [Option<Pin>; 13] = [
+    Some(pb(12)), Some(pb(13)), Some(pb(14)),
+    Some(pb(5)), Some(pb(7)), Some(pb(9)), Some(pb(10)), Some(pb(11)), Some(pc(4)), Some(pc(5)),
+    Some(pc(7)), Some(pc(9)), Some(pa(12)),
+];
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -62,5 +70,7 @@ pub const BOARD: Board = Board {
     )),
     analog_only: &[],
     bus: Some(morpho::BUS),
+    // PB4 and PB6 have the pull-downs of USB-C after a reset, PB8 chooses what starts.
+    strip: Strip::of(TERMINALS),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

@@ -140,14 +140,11 @@ impl Adc {
     }
 }
 
-/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels (0: none) are those of its own
-/// current, of current c, of its slow signal, and of the chip's own reference. Both converters convert current c, so that up to
-/// the slow signal both sequences take the same time.
-fn prepare(
-    adc: &RegisterBlock,
-    channels: [u8; 4],
-    (low, high): (u16, u16),
-) -> Result<(), StartError> {
+/// Powers a converter, calibrates and enables it.
+///
+/// # Errors
+/// It did not finish a step in time.
+pub fn power_up(adc: &RegisterBlock) -> Result<(), StartError> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
@@ -163,8 +160,18 @@ fn prepare(
         adc.cr().modify(|_, w| w.aden().enabled());
         adc.isr().read().adrdy().bit()
     })
-    .ok_or("a converter does not start")?;
+    .ok_or("a converter does not start")
+}
 
+/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels (0: none) are those of its own
+/// current, of current c, of its slow signal, and of the chip's own reference. Both converters convert current c, so that up to
+/// the slow signal both sequences take the same time.
+fn prepare(
+    adc: &RegisterBlock,
+    channels: [u8; 4],
+    (low, high): (u16, u16),
+) -> Result<(), StartError> {
+    power_up(adc)?;
     let (current, ranks) = (channels[0], || channels.into_iter().filter(|channel| *channel != 0));
     let times = [board::CURRENT_SAMPLING, board::CURRENT_SAMPLING, board::SLOW_SAMPLING];
     for (channel, time) in channels.into_iter().zip(times).filter(|(channel, _)| *channel != 0) {

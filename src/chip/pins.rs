@@ -60,6 +60,11 @@ pub fn output(pin: Pin, level: Level) {
     mode(pin, OUTPUT);
 }
 
+/// Whether a pin is high.
+pub fn is_high(pin: Pin) -> bool {
+    registers(pin.port).idr().read().bits() >> pin.number & 1 == 1
+}
+
 /// Sets the level of an output, from any context: one write.
 #[inline(always)] // the control interrupt calls it, and nothing in the CCM may call into the flash
 pub fn set(pin: Pin, level: Level) {

@@ -75,9 +75,9 @@ impl Console {
             News::Homed(Err(why)) => out.news(format_args!("homing: {why}")),
             News::Stopped(Ok(s)) => out.news(format_args!("stopped: no command for {s} s")),
             News::Stopped(Err(why)) => out.news(format_args!("error: not stopped: {why}")),
-            News::BusRefused => {
+            News::Refused(from) => {
                 if let Some(why) = desk.refusal() {
-                    out.news(format_args!("bus: refused: {why}"));
+                    out.news(format_args!("{}: refused: {why}", from.word()));
                 }
             }
         }

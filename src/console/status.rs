@@ -12,9 +12,11 @@ use super::Console;
 use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
 use crate::desk::Desk;
+use crate::desk::order::Refusal;
 use crate::link::Status;
 use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
+use crate::strip::Wires;
 
 impl Console {
     /// Answers with the status line.
@@ -27,6 +29,11 @@ impl Console {
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
+            if desk.wires != Wires::default() {
+                write!(f, "; closed:{}", desk.wires)?;
+            }
+            desk.hold().map_or(Ok(()), |stop| write!(f, "; {}", Refusal::Held(stop)))?;
+            desk.lost.map_or(Ok(()), |lost| write!(f, "; the reference is lost, {lost}"))?;
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
             let settings = &desk.settings().in_force().drive;
             temperatures(f, status.stator_resistance, rotor, settings)?;

@@ -8,6 +8,7 @@ mod lists;
 mod numbers;
 mod staging;
 mod stream;
+mod strip;
 mod tags;
 mod torque;
 mod typing;
@@ -23,7 +24,7 @@ use crate::settings::FirmwareSettings;
 use crate::settings::keys;
 /// For the tests of the desk.
 pub(crate) use doubles::FakeDrive;
-use doubles::{FakeBus, FakePort, found};
+use doubles::{FakeBus, FakePort, FakeStrip, found};
 use drive_core::io::PERIOD_S;
 use drive_core::learned::{Learned, Verdict};
 use drive_core::{
@@ -41,6 +42,7 @@ struct Talk {
     front: Front,
     drive: FakeDrive,
     port: FakePort,
+    strip: FakeStrip,
     now_ms: u32,
 }
 
@@ -59,13 +61,15 @@ impl Talk {
             front: Front::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
+            strip: FakeStrip::default(),
             now_ms: 0,
         }
     }
 
     fn poll(&mut self) {
         let mut no_line = None::<FakeBus>;
-        self.front.pass(&mut self.port, &mut no_line, &mut self.drive, self.now_ms);
+        let Self { front, port, strip, drive, now_ms } = self;
+        front.pass(port, &mut no_line, strip, drive, *now_ms);
     }
 
     /// Sends bytes and gives the replies, until the console has nothing more to say.

@@ -7,6 +7,7 @@ use drive_settings::Settings;
 use super::handle::CommandError;
 use crate::commissioning;
 use crate::link::Status;
+use crate::settings::bus::Commander;
 
 /// Longest silence while the drive learns, ms.
 const PROGRESS_MS: u32 = 5000;
@@ -39,8 +40,8 @@ pub enum News {
     Homed(Result<(), Failure>),
     /// Silence of the one that commands, of this time, s, has stopped the drive; or the reason why not.
     Stopped(Result<f32, CommandError>),
-    /// The bus was refused something: [`Desk::refusal`](super::Desk::refusal).
-    BusRefused,
+    /// Bus or strip was refused something: [`Desk::refusal`](super::Desk::refusal).
+    Refused(Commander),
 }
 
 /// Follows the state of the drive.

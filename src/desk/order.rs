@@ -12,6 +12,7 @@ use crate::settings::bus::Commander;
 use crate::settings::keys::Key;
 use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;
+use crate::strip::reference::Lost;
 
 /// An order.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +66,7 @@ impl Order {
     /// Whether only the one that commands may give it. Anybody may stop the drive; the console may also clear a fault, and do all that needs
     /// the drive off.
     pub fn is_for_the_commander(&self, from: Commander) -> bool {
-        if from == Commander::Bus {
+        if from != Commander::Console {
             return !matches!(self, Self::Stop(_));
         }
         matches!(
@@ -173,13 +174,23 @@ pub enum Refusal {
     /// The bus repeats its run command after a stop from elsewhere.
     #[error("the drive has stopped for another reason: write a stop first")]
     Ended,
+    /// The terminal strip does not let the drive run.
+    #[error("the terminal strip holds the drive: {} is open", HOLDS[usize::from(*.0 != Stop::Coast)])]
+    Held(Stop),
+    /// The reference of the terminal strip was lost.
+    #[error("the reference is lost, {0}; close RESET or `clear`, then start anew")]
+    Reference(Lost),
 }
 
 /// Refusal by the side that commands, in the order of [`Commander`].
-const AUTHORITY: [&str; 2] = [
+const AUTHORITY: [&str; 3] = [
     "the console commands: `set bus.commands bus` lets the bus",
     "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over",
+    "the terminal strip commands: `stop` works here, `set bus.commands console` takes over",
 ];
+
+/// Terminals by the stop that an open wire makes.
+const HOLDS: [&str; 2] = ["ENABLE", "STOP"];
 
 impl Refusal {
     /// Its number in the register of the bus, and the meaning there. A number keeps its meaning.
@@ -196,6 +207,8 @@ impl Refusal {
             Self::Ended => 9,
             Self::Command(CommandError::NoAnswer | CommandError::NotStarted(_)) => 10,
             Self::Command(CommandError::Refused(_)) => 11,
+            Self::Held(_) => 13,
+            Self::Reference(_) => 14,
             _ => 12,
         }
     }

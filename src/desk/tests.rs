@@ -146,7 +146,11 @@ fn the_other_side_may_stop_and_nothing_else_that_moves() {
                     if from == Commander::Bus {
                         assert_eq!(desk.refusal().map(Refusal::code), Some(1));
                         let told = |desk: &mut Desk, drive: &mut FakeDrive| {
-                            (0..9).filter(|_| desk.news(drive, 0) == Some(News::BusRefused)).count()
+                            (0..9)
+                                .filter(|_| {
+                                    desk.news(drive, 0) == Some(News::Refused(Commander::Bus))
+                                })
+                                .count()
                         };
                         let expected = usize::from(situation != Situation::NoControl);
                         assert_eq!(told(&mut desk, &mut drive), expected);

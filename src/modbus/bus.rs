@@ -149,7 +149,7 @@ impl<D: DriveHandle> Access<'_, D> {
     }
 
     fn refuse(&mut self, why: Refusal) -> Result<(), Exception> {
-        self.desk.note_refusal(why.clone());
+        self.desk.note_refusal(Commander::Bus, why.clone());
         Err(why.into())
     }
 

@@ -136,7 +136,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x5005: Word(|_| version(env!("CARGO_PKG_VERSION_PATCH"))), "", "its patch level";
     0x5006: Word(|v| board(v.settings)), "", "board, as `board` in the settings";
     0x5007: Double(|v| v.seconds), "s", "time since the start";
-    0x5009: Word(|v| v.settings.bus.commander.place() as u16), "", "who commands: 0 console, 1 bus";
+    0x5009: Word(|v| v.settings.bus.commander.place() as u16), "", "who commands: 0 console, 1 bus, 2 terminal strip";
     0x500a: Word(|v| v.settings.learned.is_some().into()), "", "1 if learned values are in force";
     0x500b: Word(|v| v.desk.refusal().map_or(0, Refusal::code)), "", "reason of the last refused write since the start, see below; 0 for none";
     0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";

@@ -322,6 +322,16 @@ fn the_manual_lists_the_refusals() {
             "staged values, or lines of another board",
             "`apply` or `revert` at the console",
         ),
+        (
+            Refusal::Held(drive_core::Stop::Coast),
+            "the terminal strip holds the drive",
+            "close ENABLE, and STOP where it is used",
+        ),
+        (
+            Refusal::Reference(crate::strip::reference::Lost::Low),
+            "the strip's reference was lost",
+            "RESET or `clear`, then a new start",
+        ),
     ];
     let mut table = "| value | reason | cure |\n|---|---|---|\n".to_owned();
     for (number, (refusal, reason, cure)) in (1..).zip(rows) {

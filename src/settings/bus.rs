@@ -72,6 +72,8 @@ words! {
         Console = "console",
         /// The bus.
         Bus = "bus",
+        /// The terminal strip.
+        Strip = "strip",
     }
 }
 

@@ -140,7 +140,9 @@ impl Key {
     /// [`SettingsError::Range`].
     pub fn check(self, settings: &FirmwareSettings) -> Result<(), SettingsError> {
         let range = self.range(settings);
-        with!(self, settings, |entry, s| entry.check_in(range, s))
+        with!(self, settings, |entry, s| entry.check_in(range, s))?;
+        // Its words depend on the board and on each other.
+        if matches!(self, Self::Own(_)) { settings.strip.check(settings.board) } else { Ok(()) }
     }
 
     /// The value that a text stands for. Its range is checked by [`check`](Self::check).

@@ -6,6 +6,7 @@ use drive_settings::value::Words;
 
 use super::FirmwareSettings as Settings;
 use super::bus::{Baud, Commander, Format};
+use super::strip::{Reference, Start};
 use crate::boards;
 
 /// The setting that names the board.
@@ -13,7 +14,7 @@ pub const BOARD: &str = "board";
 
 /// In the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
-pub static OWN: [Entry<Settings>; 9] = [
+pub static OWN: [Entry<Settings>; 21] = [
     entry!(101: number("s"), "command.timeout_s", [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
     entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
     entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
@@ -21,6 +22,18 @@ pub static OWN: [Entry<Settings>; 9] = [
     entry!(105: whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
     entry!(106: word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
     entry!(107: word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
+    entry!(110: word(), "strip.enable", [strip] enable: bool, "whether ENABLE must be closed; open it stops the drive at once, whoever commands"),
+    entry!(111: word(), "strip.start", [strip] start: Start, "a switch at START starts and stops, or a button at START starts and one at STOP stops"),
+    entry!(112: word(), "strip.reverse", [strip] reverse: bool, "whether REVERSE, closed at a start, turns the other way"),
+    entry!(113: word(), "strip.reset", [strip] reset: bool, "whether closing RESET clears a latched fault"),
+    entry!(114: word(), "strip.presets", [strip] presets: bool, "whether PRESET1 and PRESET2 select a preset speed, as a binary number"),
+    entry!(115: whole(), "strip.preset_1_rpm", [strip] preset_1_rpm: u16, "speed with PRESET1 closed").from_to(0.0, 20_000.0),
+    entry!(116: whole(), "strip.preset_2_rpm", [strip] preset_2_rpm: u16, "speed with PRESET2 closed").from_to(0.0, 20_000.0),
+    entry!(117: whole(), "strip.preset_3_rpm", [strip] preset_3_rpm: u16, "speed with both closed").from_to(0.0, 20_000.0),
+    entry!(118: word(), "strip.reference", [strip] reference: Reference, "signal that gives the speed while no preset speed is selected"),
+    entry!(119: whole(), "strip.reference_rpm", [strip] reference_rpm: u16, "speed at 20 mA or 10 V").from_to(0.0, 20_000.0),
+    entry!(120: word(), "strip.outputs", [strip] outputs: bool, "whether the outputs RUN and FAULT are used"),
+    entry!(121: word(), "strip.brake", [strip] brake: bool, "whether the output BRAKE releases a brake while the drive has torque"),
     Entry::new(108, BOARD, "", Access::Word(
         |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
         |s, place| s.board = boards::ALL[place % boards::ALL.len()],

@@ -15,7 +15,9 @@ use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
 use crate::chip::window::Window;
-use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
+use crate::chip::{
+    adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, terminals, time,
+};
 use crate::task::control;
 use crate::task::sources::Sources;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
@@ -42,6 +44,8 @@ pub struct Board<'a> {
     pub port: Port,
     /// The port of the field bus, if the board has one.
     pub line: Option<rs485::Port>,
+    /// The terminal strip, with the slow analog inputs.
+    pub wires: terminals::Port,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -98,6 +102,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
+    let wires = terminals::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Before the control runs: these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
@@ -141,7 +146,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let drive = &settings.drive;
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
-    Ok(Board { front, port, line, supervisor })
+    Ok(Board { front, port, line, wires, supervisor })
 }
 
 /// Makes a value in its place, with a stack that comes in the place of those of other functions.

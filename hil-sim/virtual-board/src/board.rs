@@ -10,6 +10,7 @@ mod outside;
 pub mod poison;
 pub mod rom;
 pub mod snapshot;
+mod terminals;
 
 use std::collections::VecDeque;
 

@@ -12,6 +12,7 @@ mod class;
 mod faults;
 mod judge;
 mod scene;
+mod strip;
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -179,6 +180,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
             scene.board.reset(Reset::Power);
             after_power(scene, true)
         }
+        Run::Strip(fault) => strip::run(scene, fault, turn, &mut rng),
         Run::Reset => {
             scene.regulating(source, turn)?;
             scene.board.run_ticks(rng.random_range(0..LATEST))?;

@@ -143,8 +143,12 @@ defaults! {
         pub tim2: EncoderTimer,
         /// Time base.
         pub tim5: TimeBase,
-        /// Converters.
+        /// Converters of the control.
         pub adc: Adc,
+        /// ADC3 and ADC4.
+        pub slow_adc: Adc = Adc::from(2),
+        /// Pins of each port that are connected to ground.
+        pub grounded: [u32; 7],
         /// Comparators.
         pub comp: Comparators,
         /// Reference voltages of the comparators.
@@ -186,7 +190,7 @@ impl Chip {
         keep! { self, old:
             now accesses instructions keep_blocks watched forgiving rules flash_cycles
             analog dc_link comparator_offset fault_pull_ohm fault_low damage clock_error reference_error
-            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers tim1.drop_update tim2.position
+            pwr.supply_v iwdg.clock adc.own_reference adc.inputs adc.lose_triggers slow_adc.inputs grounded tim1.drop_update tim2.position
             rcc.flags rcc.crystal_lives rcc.pll_locks lpuart.line usart3.line gates
         }
         self.tim5 = old.tim5.after_reset();
@@ -240,6 +244,7 @@ impl Chip {
         [
             self.tim1.next_event(),
             self.adc.next_event(),
+            self.slow_adc.next_event(),
             self.lpuart.next_event(),
             self.usart3.next_event(),
             if self.stops(IWDG_STOP) { NEVER } else { self.iwdg.next_event() },
@@ -286,6 +291,7 @@ impl Chip {
         }
         self.compare_now();
         self.adc.happen(now);
+        self.slow_adc.happen(now);
         (self.rules.now, self.rules.at) = (now, self.at);
         self.check_analog_pins();
         self.check_outputs_back();

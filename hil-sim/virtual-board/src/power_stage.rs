@@ -108,6 +108,9 @@ pub struct PowerStage {
     pub fault_pull_ohm: f64,
     /// Pins, as in [`GATE_PINS`], that it ties to nets of others: they stay analog.
     pub analog_only: &'static [(usize, u32)],
+    /// Pins of the terminal strip, as in "A8 - C0", `-` for none: contacts to ground, outputs, and its analog inputs with that
+    /// of the motor's sensor.
+    pub terminals: [&'static str; 3],
     /// Thermistor of the heat sink.
     pub ntc: Ntc,
     /// The current sensors.

@@ -34,4 +34,5 @@ mod sessions;
 mod sources;
 mod stream;
 mod strict;
+mod strip;
 mod tracking;

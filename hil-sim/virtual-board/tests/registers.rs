@@ -240,7 +240,7 @@ fn pins_are_those_of_the_second_source() {
         theirs.sort_unstable();
         assert_eq!(ours, theirs, "{}", signal.0);
     }
-    for converter in 0..2 {
+    for converter in 0..4 {
         for channel in 0..19 {
             let theirs = metapac::analog_pin(converter, channel);
             assert_eq!(pins::analog(converter, channel), theirs, "ADC{} {channel}", converter + 1);

@@ -23,6 +23,7 @@ use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::bus::{Baud, Format};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
+use induction_drive::strip::{self, Wires};
 
 /// A drive without hardware.
 pub struct FakeDrive {
@@ -278,4 +279,27 @@ impl modbus::Port for FakeBus {
         self.answers.push_back(frame.clone());
     }
     fn set_busy(&mut self, _: Option<u8>) {}
+}
+
+/// The pins of the terminal strip.
+#[derive(Default)]
+pub struct FakeStrip {
+    /// Contacts that are closed.
+    pub closed: Wires,
+    /// Codes of reference, second reference, and motor sensor.
+    pub codes: [Option<u16>; 3],
+    /// Outputs that were set last.
+    pub outputs: [bool; 3],
+}
+
+impl strip::Port for FakeStrip {
+    fn look(&mut self) -> Wires {
+        self.closed
+    }
+    fn codes(&self) -> [Option<u16>; 3] {
+        self.codes
+    }
+    fn show(&mut self, outputs: [bool; 3]) {
+        self.outputs = outputs;
+    }
 }

@@ -7,6 +7,7 @@ use super::faults::{
     bad_code, current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor,
 };
 use super::scene::{Source, Target};
+use super::strip::Fault;
 use crate::{board::Board, chip::TICKS_PER_S, cpu::Register, memory::Region, periph::iwdg::LSI_HZ};
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
@@ -25,6 +26,8 @@ pub enum Run {
     DamagedPage,
     /// The reset pin is pulled: while it regulates, or while it starts.
     Reset,
+    /// Wires of the terminal strip, with the drive off and while it turns.
+    Strip(Fault),
 }
 
 /// Longest that outputs may be on with wrong control, ms, and the reason. Infinite: for the angle nothing is promised, and
@@ -58,7 +61,7 @@ const fn regulating(name: &'static str, bound: Bound, inject: Inject) -> Class {
     class(name, bound, Run::Regulating(inject))
 }
 
-/// A class of faults with the drive off.
+/// A class of faults with the drive off, or that only its outputs are judged by.
 const fn off(name: &'static str, why: &'static str, run: Run) -> Class {
     class(name, (0.0, why), run).with(&[Source::Sensorless]).not_at_speed()
 }
@@ -290,7 +293,15 @@ const CLASSES: &[Class] = &[
         Run::Saving,
     ),
     class("reset pin at any time", RESET, Run::Reset),
+    off("strip wire open", STRIP, Run::Strip(Fault::Open)),
+    off("strip wire shorted", STRIP, Run::Strip(Fault::Shorted)),
+    off("strip input chatters", STRIP, Run::Strip(Fault::Chatters)),
+    off("strip reference jumps", STRIP, Run::Strip(Fault::Reference)),
 ];
+
+/// What is judged at the terminal strip, instead of the control.
+const STRIP: &str =
+    "no start and no restart; off after 150 ms by ENABLE, 250 ms by a ramp from 300 rpm";
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;

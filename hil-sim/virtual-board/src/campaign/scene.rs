@@ -95,6 +95,8 @@ pub struct Scene {
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
     /// of these, and the first one to be saved again.
     off: [Snapshot; 2],
+    /// Off, and turning for the terminal strip, once a fault of its wires has asked for them.
+    pub strip: Option<[Snapshot; 2]>,
     /// One with each torque: without the encoder, and with it at each speed.
     sensorless: Vec<Snapshot>,
     encoder: Vec<Vec<Snapshot>>,
@@ -153,7 +155,7 @@ impl Scene {
         let settings = pair.shadow.settings();
         let board = pair.board;
         let target = Target::new(&board, &config, settings, speeds[0])?;
-        Ok(Self { board, target, settings: [old, new], off, sensorless, encoder })
+        Ok(Self { board, target, settings: [old, new], off, strip: None, sensorless, encoder })
     }
 
     /// Regulating torque, at speed every other pair of turns a generating one.

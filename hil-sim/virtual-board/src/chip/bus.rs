@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::{Chip, OWN_REFERENCE_CODE, pins};
 use crate::memory;
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, On};
-use crate::periph::{Effect, Reset, uart};
+use crate::periph::{Effect, Reset, gpio::IDR, uart};
 
 /// The peripherals whose clock can be off, a row each: name, first address, enable register and bit. The names become constants.
 macro_rules! clocked {
@@ -19,6 +19,7 @@ macro_rules! clocked {
 clocked! {
     TIM1 = 0x4001_2c00, APB2ENR, 11;
     ADC12 = 0x5000_0000, AHB2ENR, 13;
+    ADC345 = 0x5000_0400, AHB2ENR, 14;
     TIM8 = 0x4001_3400, APB2ENR, 13;
     TIM2 = 0x4000_0000, APB1ENR1, 0;
     TIM5 = 0x4000_0c00, APB1ENR1, 3;
@@ -149,6 +150,7 @@ impl Chip {
         match address & !0x3ff {
             TIM1 => self.tim1.read(offset, now),
             ADC12 => self.adc.read(offset, now),
+            ADC345 => self.slow_adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
             TIM8 => self.tim8.0.read(offset),
             TIM5 => self.tim5.read(offset, now, self.rcc.lsi_on()),
@@ -169,7 +171,10 @@ impl Chip {
                 _ => self.syscfg.read(offset),
             },
             EXTI => self.exti.read(offset),
-            GPIOA..=GPIOG => self.gpio[port(address)].read(offset),
+            GPIOA..=GPIOG => {
+                let low = if offset == IDR { self.grounded[port(address)] } else { 0 };
+                Some(self.gpio[port(address)].read(offset)? & !low)
+            }
             DAC1 => self.dac.read(0, offset, now),
             DAC3 => self.dac.read(1, offset, now),
             _ => None,
@@ -198,6 +203,7 @@ impl Chip {
         let effect = match address & !0x3ff {
             TIM1 => self.tim1.write(offset, value, rules)?,
             ADC12 => self.adc.write(offset, value, rules)?,
+            ADC345 => self.slow_adc.write(offset, value, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
             TIM8 => self.tim8.0.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,

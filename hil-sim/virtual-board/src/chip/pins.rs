@@ -33,13 +33,16 @@ pub const SERIAL: [Signal; 2] =
 pub const BUS: [Signal; 2] = [("USART3_TX", "B9:7 B10:7 C10:7"), ("USART3_RX", "B8:7 B11:7 C11:7")];
 /// The pin that enables the driver of the bus.
 const BUS_DRIVER: Pin = (2, 12);
-/// The pins of the channels of ADC1 and ADC2 from channel 1 on; `-` is inside the chip.
-const ANALOG: [&str; 2] = [
+/// The pins of the channels of ADC1 to ADC4 from channel 1 on; `-` is inside the chip or at no pin of it.
+const ANALOG: [&str; 4] = [
     "A0 A1 A2 A3 B14 C0 C1 C2 C3 F0 B12 B1 - B11 B0",
     "A0 A1 A6 A7 C4 C0 C1 C2 C3 F1 C5 B2 A5 B11 B15 - A4",
+    "B1 - - - B13 - - - - - - B0",
+    "- - B12 B14 B15",
 ];
 
-fn pin(name: &str) -> Option<Pin> {
+/// The pin of this name, as "A8".
+pub fn pin(name: &str) -> Option<Pin> {
     let (port, number) = name.split_at_checked(1)?;
     let number = number.parse().ok()?;
     Some((usize::from(port.as_bytes()[0] - b'A'), number))
@@ -53,7 +56,7 @@ pub fn pins_of(signal: Signal) -> impl Iterator<Item = (Pin, u32)> {
     })
 }
 
-/// The pin of a channel of ADC1 or ADC2, counted from 0; `None` is inside the chip.
+/// The pin of a channel of ADC1 to ADC4, counted from 0; `None` is inside the chip.
 pub fn analog(converter: usize, channel: u32) -> Option<Pin> {
     ANALOG[converter].split(' ').nth(channel.checked_sub(1)? as usize).and_then(pin)
 }
@@ -125,7 +128,8 @@ impl Chip {
 
     /// Channels were converted.
     pub(super) fn check_analog_pins(&mut self) {
-        for (n, channels) in self.adc.take_converted().into_iter().enumerate() {
+        let converted = [self.adc.take_converted(), self.slow_adc.take_converted()];
+        for (n, channels) in converted.as_flattened().iter().copied().enumerate() {
             if n == 0 && channels >> 18 & 1 != 0 {
                 let long = self.adc.own_reference_ticks() >= 4 * 170;
                 self.rules.require(long, Rule::OwnReference, || "ADC1_SMPR2.SMP18".into());

@@ -3,7 +3,7 @@
 use hil_sim::console::own::to_program;
 
 /// A command of the board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Own {
     /// Lists these commands.
     Help,
@@ -11,16 +11,19 @@ pub enum Own {
     Reset,
     /// Takes the supply of the controller away and gives it back.
     Unplug,
+    /// Closes these contacts of the terminal strip, opens the others, and gives the reference a current.
+    Wires(String),
     /// Ends the session.
     Quit,
 }
 
 /// Names and meanings.
 #[rustfmt::skip]
-const COMMANDS: [(&str, Own, &str); 4] = [
+static COMMANDS: [(&str, Own, &str); 5] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
     ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
+    ("!wires", Own::Wires(String::new()), "of the terminal strip: `!wires ENABLE START 12` closes these and no others, and gives 12 mA"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
 
@@ -31,9 +34,12 @@ impl Own {
     /// The line begins with `!`, and there is no such command.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
+        if let Some(wires) = line.strip_prefix("!wires ") {
+            return Ok(Some(Self::Wires(wires.to_owned())));
+        }
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
-        known.map(|(_, own, _)| Some(*own)).ok_or_else(|| {
-            let names = COMMANDS.map(|(name, ..)| name).join(", ");
+        known.map(|(_, own, _)| Some(own.clone())).ok_or_else(|| {
+            let names = COMMANDS.each_ref().map(|(name, ..)| *name).join(", ");
             format!("`{line}`: no such command of the board; there are {names}")
         })
     }

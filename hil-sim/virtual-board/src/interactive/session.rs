@@ -219,6 +219,10 @@ impl Session {
             Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
             Own::Reset => self.board.reset(Reset::Pin),
             Own::Unplug => self.board.unplug(),
+            Own::Wires(wires) => {
+                let set = self.board.set_wires(&wires);
+                set.err().into_iter().for_each(|why| self.add(Source::Board, why.to_string()));
+            }
         }
         None
     }

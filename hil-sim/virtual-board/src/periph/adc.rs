@@ -1,4 +1,4 @@
-//! ADC1 and ADC2 (RM0440, section 21): start-up with its times, sequences started together by a trigger output of TIM1 or by
+//! ADC1 and ADC2, or ADC3 and ADC4 (RM0440, section 21): start-up with its times, sequences started together by a trigger output of TIM1 or by
 //! software, analog watchdog 1 on single channels. Nothing else of them is modelled.
 
 mod converter;
@@ -53,6 +53,8 @@ pub struct Adc {
     pub own_reference: u16,
     /// Triggers to be lost, for each converter.
     pub lose_triggers: [u32; 2],
+    /// Number of the first, less one.
+    first: u32,
     /// Whether RCC gives them a clock of their own.
     pub kernel_clock: bool,
     /// Channels that each converter has converted since they were taken.
@@ -60,6 +62,11 @@ pub struct Adc {
 }
 
 impl Adc {
+    /// A pair; the first has this number, less one.
+    pub fn from(first: u32) -> Self {
+        Self { first, ..Self::default() }
+    }
+
     /// Ticks per converter clock; `None` is no clock.
     fn clock(&self) -> Option<u64> {
         // The own clock, taken as that of the core, divided by PRESC; or synchronous, divided by 1, 2 or 4.
@@ -167,9 +174,9 @@ impl Adc {
         match offset {
             CCR => self.common = value & 0x01ff_ef1f,
             0x000..0x200 => {
-                let (n, clock) = (offset >> 8, self.clock());
+                let (n, clock, first) = (offset >> 8, self.clock(), self.first);
                 let one = &mut self.converters[n as usize];
-                one.write(offset & 0xff, value, &mut Named { rules, n: n + 1, clock })?;
+                one.write(offset & 0xff, value, &mut Named { rules, n: first + n + 1, clock })?;
             }
             _ => return None,
         }

@@ -67,6 +67,7 @@ pub const REFERENCE: PowerStage = PowerStage {
     dc_link_pin: DIVIDER,
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[],
+    terminals: ["B5 B7 B9 B10 B11 C4 C5", "C7 C9 A12", "B12 B13 B14"],
     ntc: Ntc::DEFAULT,
     sensors: Sensors::InLine,
     dc_link_divider: None,
@@ -92,6 +93,7 @@ const IHM08M1: PowerStage = PowerStage {
     dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[(0, 11), (1, 14), (1, 15)],
+    terminals: ["B5 B7 B9 - C7 - -", "- - -", "B12 - B13"],
     ntc: Ntc::DEFAULT,
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
@@ -114,6 +116,7 @@ const IHM023V3: PowerStage = PowerStage {
     dc_link_pin: DIVIDER,
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[],
+    terminals: ["- - - - - - -", "- - -", "- - -"],
     ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),

@@ -103,9 +103,9 @@ pub fn pins_of(signal: &str) -> Vec<(Pin, u32)> {
     mine.filter_map(|known| Some((pin(known.pin)?, u32::from(known.af?)))).collect()
 }
 
-/// The pin of a channel of ADC1 or ADC2, counted from 0.
+/// The pin of a channel of ADC1 to ADC4, counted from 0.
 pub fn analog_pin(converter: usize, channel: u32) -> Option<Pin> {
-    let known = peripheral(["ADC1", "ADC2"][converter])?;
+    let known = peripheral(["ADC1", "ADC2", "ADC3", "ADC4"][converter])?;
     let signal = format!("IN{channel}");
     known.pins.iter().find(|known| known.signal == signal).and_then(|known| pin(known.pin))
 }

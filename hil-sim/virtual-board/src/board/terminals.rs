@@ -1,0 +1,69 @@
+//! The terminal strip from outside: contacts, an analog reference, outputs.
+
+use anyhow::{Context, Result};
+use induction_drive::strip::{ANALOG, TERMINALS};
+
+use super::Board;
+use crate::chip::pins::{self, Pin};
+use crate::periph::gpio::Pad;
+use crate::power_stage::{CODES, REFERENCE_V};
+
+/// Voltage at the pins of the reference at 20 mA: 150 Ohm.
+const FULL_V: f64 = 3.0;
+
+impl Board {
+    /// The pins of contacts (0), outputs (1) or analog inputs (2).
+    fn terminals(&self, kind: usize) -> impl Iterator<Item = Option<Pin>> + use<> {
+        self.cpu.chip().gates.stage.terminals[kind].split(' ').map(pins::pin)
+    }
+
+    /// Closes the contacts of these names and opens the others; a number is the current of the reference, mA.
+    ///
+    /// # Errors
+    /// A word is neither.
+    pub fn set_wires(&mut self, wires: &str) -> Result<()> {
+        self.chip().grounded = [0; 7];
+        wires.split_whitespace().try_for_each(|word| match word.parse() {
+            Ok(ma) => {
+                self.set_reference([ma; 2]);
+                Ok(())
+            }
+            Err(_) => self.set_contact(word, true),
+        })
+    }
+
+    /// Closes or opens the contact at an input, by its name.
+    ///
+    /// # Errors
+    /// The strip has no such input.
+    pub fn set_contact(&mut self, name: &str, closed: bool) -> Result<()> {
+        let mut contacts = TERMINALS.iter().skip(ANALOG).zip(self.terminals(0));
+        let pin = contacts.find(|(terminal, _)| terminal.eq_ignore_ascii_case(name));
+        let pin = pin.and_then(|(_, pin)| pin);
+        let (port, pin) = pin.with_context(|| format!("{name}: no such contact"))?;
+        let grounded = &mut self.chip().grounded[port];
+        *grounded = *grounded & !(1 << pin) | u32::from(closed) << pin;
+        Ok(())
+    }
+
+    /// Gives the reference, and the second one where there is one, a current, mA; a tenth of a volt in its place is 0.2 mA.
+    pub fn set_reference(&mut self, ma: [f64; 2]) {
+        for (pin, ma) in self.terminals(2).zip(ma) {
+            let code = (ma / 20.0 * FULL_V / REFERENCE_V * CODES).clamp(0.0, CODES - 1.0) as u16;
+            let Some(pin) = pin else { continue };
+            for (converter, channel) in (0..2).flat_map(|n| (1..19).map(move |c| (n, c))) {
+                if pins::analog(2 + converter, channel) == Some(pin) {
+                    self.chip().slow_adc.inputs[converter][channel as usize] = code;
+                }
+            }
+        }
+    }
+
+    /// Whether RUN, FAULT and BRAKE are active.
+    pub fn terminal_outputs(&self) -> [bool; 3] {
+        let gpio = &self.cpu.chip().gpio;
+        let active = |(port, pin): Pin| gpio[port].pad(pin) == Pad::Output(true);
+        let mut outputs = self.terminals(1).map(|pin| pin.is_some_and(active));
+        std::array::from_fn(|_| outputs.next().unwrap_or(false))
+    }
+}

@@ -1,0 +1,155 @@
+//! Faults of the wires at the terminal strip: with the drive off, and while it turns for the strip, by a switch at START.
+
+use anyhow::{Result, ensure};
+use hil_sim::plant::Load;
+use rand::{Rng, RngExt};
+
+use super::judge::Outcome;
+use super::scene::Scene;
+use crate::board::Board;
+use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
+
+/// A fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A wire breaks, and is mended.
+    Open,
+    /// A contact is bridged.
+    Shorted,
+    /// A contact bounces.
+    Chatters,
+    /// The reference is another at once.
+    Reference,
+}
+
+/// A strip that commands, with all its inputs.
+const SET_UP: [&str; 4] = [
+    "angle encoder",
+    "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes",
+    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 2000 bus.commands strip",
+    "apply",
+];
+/// Signal at the beginning, mA: 300 rpm.
+const HALF_MA: f64 = 12.0;
+/// Periods until the settings are in force, and until the speed stands.
+const SETTLING: u64 = 12_000;
+const RISING: u64 = 15_000;
+/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 300 rpm at 2000 rpm/s.
+const COASTED_MS: f64 = 150.0;
+const RAMPED_MS: f64 = 250.0;
+/// Time of a fault, of what comes after it, and longest between two bounces, ms.
+const FAULT_MS: f64 = 300.0;
+const BOUNCE_MS: f64 = 15.0;
+
+const WIRES: [&str; 6] = ["ENABLE", "START", "REVERSE", "RESET", "PRESET1", "PRESET2"];
+
+impl Scene {
+    /// The drive off with ENABLE closed, or turning for the strip.
+    fn strip(&mut self, turns: bool) -> Result<()> {
+        if self.strip.is_none() {
+            self.off(0)?;
+            let board = &mut self.board;
+            board.plant.set_load(Load::Free { torque: 0.0 })?;
+            board.set_reference([HALF_MA; 2]);
+            board.set_contact("ENABLE", true)?;
+            for line in SET_UP {
+                board.type_line(line);
+                wait(board, 300)?;
+            }
+            wait(board, SETTLING)?;
+            let off = board.keep()?;
+            board.set_contact("START", true)?;
+            wait(board, RISING)?;
+            ensure!(board.chip().tim1.outputs_on(), "no start: {}", board.take_console());
+            self.strip = Some([off, board.keep()?]);
+        }
+        let Some(snapshots) = &self.strip else { return Ok(()) };
+        self.board.go_back(&snapshots[usize::from(turns)])
+    }
+}
+
+fn wait(board: &mut Board, periods: u64) -> Result<()> {
+    board.run_periods(periods)?;
+    while board.next_period().is_some() {}
+    Ok(())
+}
+
+/// The time in which the outputs are watched for a fault: whether they came on, and when they went off, ms.
+fn watch(
+    board: &mut Board,
+    mut each: impl FnMut(&mut Board, f64) -> Result<()>,
+) -> Result<(bool, Option<f64>)> {
+    let (began, mut starts, mut off) = (board.chip().now, false, None);
+    let mut on = board.chip().tim1.outputs_on();
+    for period in 0..(FAULT_MS * 6.0) as u64 {
+        let ms = period as f64 / 6.0;
+        each(board, ms)?;
+        board.run_ticks(TICKS_PER_PERIOD)?;
+        while board.next_period().is_some() {}
+        let now = board.chip().tim1.outputs_on();
+        starts |= now && !on;
+        if on && !now {
+            off = Some((board.chip().now - began) as f64 * 1e3 / TICKS_PER_S as f64);
+        }
+        on = now;
+    }
+    Ok((starts, off))
+}
+
+/// A fault with the drive off or turning, and after it the wires as before: nothing starts, and what has to go off goes off.
+///
+/// # Errors
+/// It does not.
+pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Result<Outcome> {
+    let turns = turn % 2 == 1;
+    scene.strip(turns)?;
+    let board = &mut scene.board;
+    wait(board, rng.random_range(0..60))?;
+    let wire = WIRES[rng.random_range(0..WIRES.len())];
+    let ma = rng.random_range(0.0..24.0);
+    let closed = wire == "ENABLE" || wire == "START" && turns;
+    // A bridge across START with ENABLE closed is a start: here it comes before ENABLE.
+    let early = fault == Fault::Shorted && wire == "START" && !turns;
+    if early {
+        board.set_contact("ENABLE", false)?;
+        wait(board, 60)?;
+    }
+    let (mut next, mut bounces) = (0.0, closed);
+    let (started, off) = watch(board, |board, ms| {
+        match fault {
+            Fault::Reference => board.set_reference([ma; 2]),
+            Fault::Open => board.set_contact(wire, false)?,
+            Fault::Shorted => board.set_contact(wire, true)?,
+            Fault::Chatters if ms >= next => {
+                (next, bounces) = (ms + rng.random_range(0.2..BOUNCE_MS), !bounces);
+                board.set_contact(wire, bounces)?;
+            }
+            Fault::Chatters => {}
+        }
+        Ok(())
+    })?;
+    // START that was open for long is a switch that is closed again: it is not mended.
+    let mended = !(wire == "START" && fault == Fault::Open);
+    let (again, _) = watch(board, |board, _| {
+        board.set_reference([HALF_MA; 2]);
+        board.set_contact("ENABLE", true)?;
+        board.set_contact(wire, (closed || early) && mended)
+    })?;
+    let lost = fault == Fault::Reference && !(3.6..=21.0).contains(&ma);
+    let breaks = matches!(fault, Fault::Open | Fault::Chatters) && closed;
+    let bound = match wire {
+        _ if !turns || !(lost || breaks) => None,
+        "ENABLE" if breaks => Some(COASTED_MS),
+        _ => Some(RAMPED_MS),
+    };
+    let what = format!("{wire}, {ma:.1} mA, {}", if turns { "turning" } else { "off" });
+    ensure!(!started && !again, "{what}: the outputs came on");
+    // What is not to stop goes on.
+    let on = board.chip().tim1.outputs_on();
+    ensure!(on == (turns && bound.is_none()), "{what}: outputs {on}");
+    let late = bound.is_some_and(|bound| off.is_none_or(|ms| ms > bound));
+    let fault_is_told = board.terminal_outputs()[1] == (lost && turns);
+    ensure!(fault_is_told, "{what}: FAULT is {:?}", board.terminal_outputs());
+    ensure!(!late || fault == Fault::Chatters, "{what}: off after {off:?} ms");
+    Ok(Outcome { what, off_ms: off, ..Outcome::default() })
+}

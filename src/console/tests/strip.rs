@@ -1,0 +1,245 @@
+//! The terminal strip beside console and bus, with the drive behind it.
+
+use super::*;
+use crate::settings::bus::Commander;
+use crate::strip::Wires;
+
+const ALL_OPEN: Wires = Wires(0);
+
+/// A console with a strip that commands, by a switch at START and with a reference of 4 to 20 mA, unless `lines` say otherwise; ENABLE
+/// is closed.
+struct Panel(Talk);
+
+impl Panel {
+    fn new(lines: &str) -> Self {
+        let mut talk = Talk::new();
+        let all = "set strip.enable yes strip.start switch strip.reset yes strip.reverse yes\n\
+                   set strip.presets yes strip.preset_1_rpm 300 strip.preset_2_rpm 600 strip.preset_3_rpm 900\n\
+                   set strip.reference_rpm 1500 strip.outputs yes strip.brake yes strip.reference 4-20ma\n\
+                   set bus.commands strip\n";
+        talk.say(format!("{all}{lines}apply\n"));
+        talk.drive.commands.clear();
+        let mut panel = Self(talk);
+        panel.ma(4.0);
+        panel.wires(Wires::ENABLE);
+        panel.0.say("");
+        panel
+    }
+
+    /// Time passes, ms.
+    fn wait(&mut self, ms: u32) {
+        for _ in 0..ms {
+            self.0.now_ms += 1;
+            self.0.poll();
+        }
+    }
+
+    /// Sets the wires, and waits until START is armed.
+    fn wires(&mut self, closed: Wires) {
+        self.0.strip.closed = closed;
+        self.wait(200);
+    }
+
+    fn close(&mut self, wires: Wires) {
+        self.wires(Wires(self.0.strip.closed.0 | wires.0));
+    }
+
+    fn open(&mut self, wires: Wires) {
+        self.wires(Wires(self.0.strip.closed.0 & !wires.0));
+    }
+
+    fn ma(&mut self, ma: f32) {
+        self.0.strip.codes = [Some((ma / 20.0 * 3.0 / 3.3 * 4096.0).round() as u16); 3];
+    }
+
+    /// The drive regulates speed, as far as the strip can tell.
+    fn commands(&mut self) -> Vec<Command> {
+        std::mem::take(&mut self.0.drive.commands)
+    }
+
+    fn off(&self) -> bool {
+        self.0.drive.drive.state().is_off()
+    }
+}
+
+const START: Command = Command::Start(Mode::Speed);
+const RAMP: Command = Command::Stop(Stop::Ramp);
+const COAST: Command = Command::Stop(Stop::Coast);
+
+#[test]
+fn a_switch_starts_and_stops_with_the_reference_as_speed() {
+    let mut panel = Panel::new("");
+    assert_eq!((panel.commands(), panel.off()), (vec![], true));
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
+    panel.ma(12.0);
+    panel.wait(20);
+    assert_eq!(panel.commands(), [Command::Speed(750.0)]);
+    // Nothing new, nothing said.
+    panel.wait(500);
+    assert_eq!(panel.commands(), []);
+    // Preset speeds come before the reference; the direction is that of the start.
+    panel.close(Wires(1 << 5));
+    panel.close(Wires(1 << 6));
+    panel.open(Wires(1 << 5));
+    panel.close(Wires::REVERSE);
+    let presets = [300.0, 900.0, 600.0].map(Command::Speed);
+    assert_eq!(panel.commands(), presets);
+    assert_eq!(panel.0.strip.outputs, [true, false, false]);
+    panel.open(Wires::START);
+    assert_eq!(panel.commands()[0], RAMP);
+    assert!(panel.off());
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [START, Command::Speed(-600.0)]);
+    for line in ["start", "speed 1", "torque 1"] {
+        assert!(panel.0.ask(line).starts_with("error: the terminal strip commands"), "{line}");
+    }
+    assert_eq!(panel.0.ask("stop"), "ok");
+    // START is still closed.
+    panel.wait(1000);
+    assert_eq!(panel.commands(), [COAST]);
+}
+
+#[test]
+fn buttons_start_by_an_edge_and_a_broken_wire_of_stop_stops() {
+    let mut panel = Panel::new("set strip.start buttons\n");
+    // STOP open.
+    panel.close(Wires::START);
+    panel.open(Wires::START);
+    panel.close(Wires::STOP);
+    assert_eq!(panel.commands(), []);
+    panel.close(Wires::START);
+    panel.open(Wires::START);
+    assert_eq!((panel.commands(), panel.off()), (vec![START, Command::Speed(0.0)], false));
+    panel.0.strip.closed = Wires::ENABLE;
+    panel.wait(3);
+    assert_eq!(panel.commands(), [RAMP]);
+    panel.close(Wires::STOP);
+    assert_eq!((panel.commands(), panel.off()), (vec![], true));
+}
+
+/// What is closed as the strip begins to command, with the power or by a setting, starts nothing, in whatever order it comes.
+#[test]
+fn no_start_by_power_or_by_a_change_of_the_commander() {
+    for start in ["switch", "buttons"] {
+        let mut panel = Panel::new(&format!("set strip.start {start}\n"));
+        let all = Wires(0x1f);
+        let settings = *panel.0.front.desk.settings().in_force();
+        // The supply of the contacts comes after that of the chip, and bounces.
+        for late in [0, 1, 30, 3000] {
+            panel.0.front = Front::new(settings);
+            panel.0.strip.closed = ALL_OPEN;
+            panel.wait(late);
+            for bounce in 0..40 {
+                panel.0.strip.closed = if bounce % 3 == 0 { ALL_OPEN } else { all };
+                panel.wait(1);
+            }
+            panel.wires(all);
+            // RESET was open, too.
+            assert!(panel.commands().iter().all(|c| *c == Command::Clear), "{start} {late}");
+        }
+        panel.0.say("set bus.commands console\napply\n");
+        panel.wires(Wires(0x1f & !Wires::START.0));
+        panel.wires(all);
+        panel.0.say("set bus.commands strip\napply\n");
+        panel.wait(1000);
+        assert_eq!(panel.commands(), []);
+        assert_eq!(panel.0.front.desk.commander(), Commander::Strip);
+        panel.open(Wires::START);
+        panel.close(Wires::START);
+        assert_eq!(panel.commands()[0], START);
+    }
+}
+
+#[test]
+fn enable_stops_whoever_commands_and_starts_nothing() {
+    for commander in ["console", "bus", "strip"] {
+        let mut panel = Panel::new(&format!("set bus.commands {commander}\n"));
+        panel.wires(ALL_OPEN);
+        if commander == "console" {
+            let held = "error: the terminal strip holds the drive: ENABLE is open";
+            for line in ["start", "start speed", "learn", "commission"] {
+                assert_eq!(panel.0.say(format!("{line}\n")).last().unwrap(), held, "{line}");
+            }
+        }
+        // START closes first.
+        panel.close(Wires::START);
+        panel.close(Wires::ENABLE);
+        panel.wait(1000);
+        assert_eq!(panel.commands(), [], "{commander}");
+        // The others have a start of their own.
+        panel.open(Wires::START);
+        panel.0.drive.drive.command(&START).unwrap();
+        panel.commands();
+        panel.0.strip.closed = Wires::START;
+        panel.wait(2);
+        assert_eq!((panel.commands(), panel.off()), (vec![COAST], true), "{commander}");
+        panel.close(Wires::ENABLE);
+        panel.wait(1000);
+        assert_eq!(panel.commands(), [], "{commander}");
+    }
+}
+
+#[test]
+fn after_a_fault_the_start_needs_a_new_edge() {
+    let mut panel = Panel::new("");
+    panel.close(Wires::START);
+    panel.0.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
+    assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
+    panel.wait(2);
+    assert!(panel.0.strip.outputs == [false, true, false]);
+    // With the fault latched a new edge is refused, and told.
+    panel.open(Wires::START);
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [START]);
+    let told = |line: &String| line.starts_with("* strip: refused: fault 20 is latched");
+    let said = panel.0.say("");
+    assert!(said.iter().any(told), "{said:?}");
+    panel.close(Wires::RESET);
+    panel.wait(1000);
+    assert_eq!(panel.commands(), [Command::Clear]);
+    assert!(!panel.0.strip.outputs[1]);
+    panel.open(Wires::START);
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
+}
+
+#[test]
+fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
+    let mut panel = Panel::new("");
+    panel.close(Wires::START);
+    panel.ma(12.0);
+    panel.wait(30);
+    assert_eq!(panel.commands(), [START, Command::Speed(0.0), Command::Speed(750.0)]);
+    // A disturbance of less than 20 ms holds the speed.
+    panel.ma(0.0);
+    panel.wait(15);
+    panel.ma(12.0);
+    panel.wait(100);
+    assert_eq!(panel.commands(), []);
+    panel.ma(2.0);
+    panel.wait(40);
+    assert_eq!(panel.commands()[0], RAMP);
+    let said = panel.0.say("");
+    let why = "below 3.6 mA: a broken wire, or no supply";
+    assert!(said.iter().any(|line| line.contains(why)), "{said:?}");
+    assert!(panel.0.ask("status").contains(why));
+    assert!(panel.off() && panel.0.strip.outputs[1]);
+    // It comes back: latched, and a new edge is not enough.
+    panel.ma(12.0);
+    panel.wait(1000);
+    panel.open(Wires::START);
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), []);
+    panel.close(Wires::RESET);
+    panel.wait(1000);
+    assert_eq!(panel.commands(), [Command::Clear]);
+    panel.open(Wires::START);
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [START, Command::Speed(750.0)]);
+    // With a preset speed the reference does not matter.
+    panel.close(Wires(1 << 5));
+    panel.ma(0.0);
+    panel.wait(1000);
+    assert_eq!(panel.commands(), [Command::Speed(300.0)]);
+}

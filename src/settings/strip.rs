@@ -1,0 +1,119 @@
+//! The settings of the terminal strip: which functions its wires have. All are off by default.
+
+use drive_core::Stop;
+use drive_settings::value::Words;
+use drive_settings::{SettingsError, words};
+
+use crate::boards::{Board, EXTRA_LOW_V};
+use crate::strip::{TERMINALS, Wires};
+
+words! {
+    /// How START starts.
+    #[derive(Default)]
+    pub enum Start {
+        /// It does not.
+        #[default]
+        Off = "off",
+        /// A switch: closing starts, opening stops.
+        Switch = "switch",
+        /// Two buttons: closing START starts, opening STOP stops.
+        Buttons = "buttons",
+    }
+}
+
+words! {
+    /// The signal of the analog reference.
+    #[derive(Default)]
+    pub enum Reference {
+        /// None.
+        #[default]
+        Off = "off",
+        /// A current loop.
+        Current = "4-20ma",
+        /// A voltage, which has no live zero.
+        Voltage = "0-10v",
+    }
+}
+
+/// Settings of the terminal strip.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Whether ENABLE must be closed, whoever commands.
+    pub enable: bool,
+    /// How START and STOP work.
+    pub start: Start,
+    /// Whether REVERSE counts.
+    pub reverse: bool,
+    /// Whether RESET counts.
+    pub reset: bool,
+    /// Whether PRESET1 and PRESET2 count.
+    pub presets: bool,
+    /// The analog reference.
+    pub reference: Reference,
+    /// Whether the outputs run and fault are used.
+    pub outputs: bool,
+    /// Whether the output for the brake is used.
+    pub brake: bool,
+    /// Preset speeds, rpm.
+    pub preset_1_rpm: u16,
+    /// The second.
+    pub preset_2_rpm: u16,
+    /// The third.
+    pub preset_3_rpm: u16,
+    /// Speed at the full reference, rpm.
+    pub reference_rpm: u16,
+}
+
+/// A switch that is closed when the power comes is told from one that is being closed only by an ENABLE that comes with it.
+const NEEDS_ENABLE: &str = "needs strip.enable yes, so that a switch that is closed as the power comes does not start the drive";
+const NO_PIN: &str = "this board has no pin for it";
+const NO_LIVE_ZERO: &str =
+    "it has no live zero: above 60 V the board needs a second input that agrees; 4-20ma has one";
+
+impl Settings {
+    /// The stop that keeps the drive from running with these wires closed; `None` lets it run.
+    pub fn hold(&self, closed: Wires) -> Option<Stop> {
+        if self.enable && !closed.has(Wires::ENABLE) {
+            return Some(Stop::Coast);
+        }
+        (self.start == Start::Buttons && !closed.has(Wires::STOP)).then_some(Stop::Ramp)
+    }
+
+    /// Checks that the board has the pins of the functions in use, and that they are safe there.
+    ///
+    /// # Errors
+    /// The first function that is not.
+    pub fn check(&self, board: &Board) -> Result<(), SettingsError> {
+        let pins = TERMINALS.iter().zip(board.strip.pins);
+        let has = |name| pins.clone().any(|(terminal, pin)| *terminal == name && pin.is_some());
+        let extra_low = board.dc_link_limits.operation.value <= EXTRA_LOW_V;
+        let (start, reference) = (self.start, self.reference);
+        let live = reference != Reference::Voltage || extra_low || has("REFERENCE2");
+        let buttons = start == Start::Buttons;
+        needs("strip.enable", self.enable, has("ENABLE"), NO_PIN)?;
+        needs("strip.start", start, has("START") && (!buttons || has("STOP")), NO_PIN)?;
+        needs("strip.start", start, buttons || self.enable, NEEDS_ENABLE)?;
+        needs("strip.reverse", self.reverse, has("REVERSE"), NO_PIN)?;
+        needs("strip.reset", self.reset, has("RESET"), NO_PIN)?;
+        needs("strip.presets", self.presets, has("PRESET1") && has("PRESET2"), NO_PIN)?;
+        needs("strip.reference", reference, has("REFERENCE"), NO_PIN)?;
+        needs("strip.reference", reference, live, NO_LIVE_ZERO)?;
+        needs("strip.outputs", self.outputs, has("RUN") || has("FAULT"), NO_PIN)?;
+        needs("strip.brake", self.brake, has("BRAKE"), NO_PIN)
+    }
+}
+
+/// Refuses a function that is on, by its setting, unless `met`.
+fn needs<T: Words>(
+    name: &'static str,
+    value: T,
+    met: bool,
+    why: &'static str,
+) -> Result<(), SettingsError> {
+    // All are off in the first place.
+    if met || value.place() == 0 {
+        Ok(())
+    } else {
+        Err(SettingsError::Word(name, value.word(), why))
+    }
+}

@@ -1,0 +1,208 @@
+//! The terminal strip: wires to a panel or a PLC as a front end of the desk, beside console and field bus.
+//!
+//! Shapes: [`Port`] is what the pins show; the [`Debounce`] makes [`Wires`] of it, once a millisecond; [`Desk::hold`] says whether they
+//! let the drive run; the [`Sequence`] makes starts and stops of START; a [`reference`] is a speed. Nothing here waits.
+
+pub mod debounce;
+pub mod reference;
+pub mod sequence;
+#[cfg(test)]
+mod tests;
+
+use core::fmt;
+
+use drive_core::io::PERIOD_S;
+use drive_core::{Mode, State, Stop};
+
+use crate::desk::Desk;
+use crate::desk::handle::DriveHandle;
+use crate::desk::order::Order;
+use crate::link::Status;
+use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
+use crate::settings::strip::Reference;
+use debounce::Debounce;
+use reference::Lost;
+use sequence::{Act, Seen, Sequence};
+
+/// The terminals: first the analog ones, then the contacts, then the outputs.
+#[rustfmt::skip]
+pub const TERMINALS: [&str; 13] = [
+    "REFERENCE", "REFERENCE2", "MOTOR SENSOR",
+    "ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2",
+    "RUN", "FAULT", "BRAKE",
+];
+/// Number of the analog ones, and of the contacts.
+pub const ANALOG: usize = 3;
+/// See [`ANALOG`].
+pub const CONTACTS: usize = 7;
+
+/// Contacts that are closed, a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wires(pub u8);
+
+#[allow(missing_docs)] // the page says what they do
+impl Wires {
+    pub const ENABLE: Self = Self(1);
+    pub const START: Self = Self(1 << 1);
+    pub const STOP: Self = Self(1 << 2);
+    pub const REVERSE: Self = Self(1 << 3);
+    pub const RESET: Self = Self(1 << 4);
+
+    /// Whether all of these are among them.
+    pub const fn has(self, others: Self) -> bool {
+        self.0 & others.0 == others.0
+    }
+
+    /// The number of the preset speed; 0: none.
+    const fn preset(self) -> usize {
+        (self.0 >> 5 & 3) as usize
+    }
+}
+
+impl fmt::Display for Wires {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = TERMINALS.iter().skip(ANALOG).take(CONTACTS).enumerate();
+        let mut closed = names.filter(|(n, _)| self.0 >> n & 1 == 1);
+        closed.try_for_each(|(_, name)| write!(f, " {name}"))
+    }
+}
+
+/// The pins of the strip. Where the board has none, nothing is closed.
+pub trait Port {
+    /// The contacts that are closed now; called once a millisecond, in which another analog input is converted.
+    fn look(&mut self) -> Wires;
+    /// The last codes of reference, second reference, and the sensor in the motor's winding; `None`: the board does not have it, or its
+    /// converter gives none.
+    fn codes(&self) -> [Option<u16>; ANALOG];
+    /// Sets the outputs RUN, FAULT and BRAKE.
+    fn show(&mut self, outputs: [bool; 3]);
+}
+
+/// Speed at and below which the brake closes in a stop by ramp, rpm.
+pub const BRAKE_RPM: f32 = 30.0;
+/// Time between two references to the drive, ms: each costs the main loop up to two.
+const REFERENCE_MS: u32 = 8;
+
+/// See the head of the module.
+#[derive(Default)]
+pub struct Strip {
+    debounce: Debounce,
+    /// Time of the last look, ms, wrapping.
+    looked: u8,
+    sequence: Sequence,
+    reverse: bool,
+    /// Whether RESET was open at the last look.
+    reset_open: bool,
+    /// Looks in a row at a reference that is lost.
+    lost: u8,
+    /// The speed that the drive was given last since its start, rpm.
+    given: Option<i16>,
+}
+
+impl Strip {
+    /// Looks at the wires, once a millisecond, and gives the orders that they mean. `now_ms` wraps.
+    #[inline(never)] // its stack does not add to that of a design
+    pub fn serve(
+        &mut self,
+        port: &mut impl Port,
+        desk: &mut Desk,
+        drive: &mut impl DriveHandle,
+        now_ms: u32,
+    ) {
+        let status = drive.status();
+        port.show(outputs(desk, status.as_ref()));
+        if core::mem::replace(&mut self.looked, now_ms as u8) == now_ms as u8 {
+            return;
+        }
+        let contacts = port.look();
+        let closed = self.debounce.look(contacts);
+        desk.wires = closed;
+        desk.note_activity(Commander::Strip, now_ms);
+        let settings = desk.settings().in_force();
+        let (own, speed) = (settings.strip, self.speed(settings, port, closed));
+        let state = status.map_or(State::Off, |status| status.state);
+        let (off, hold) = (drive.is_off(), desk.hold());
+        let commands = desk.commander() == Commander::Strip;
+        // What is refused is announced.
+        let mut give = |desk: &mut Desk, order| drop(desk.order(Commander::Strip, order, drive));
+        let reset = core::mem::replace(&mut self.reset_open, !closed.has(Wires::RESET));
+        if commands && own.reset && reset && closed.has(Wires::RESET) {
+            give(desk, Order::Clear);
+        }
+        let stopping = state.is_stopping();
+        let harder = hold == Some(Stop::Coast) && state != State::Stopping;
+        if let Some(stop) = hold
+            && !off
+            && (harder || !stopping)
+        {
+            give(desk, Order::Stop(stop));
+        }
+        let (held, busy) = (hold.is_some(), desk.is_busy());
+        let seen = Seen { commands, held, busy, ended: off || stopping, off };
+        let [contact, start] = [contacts, closed].map(|wires| wires.has(Wires::START));
+        match (self.sequence.step(own.start, contact, start, seen), speed) {
+            (Act::Stop, _) => give(desk, Order::Stop(Stop::Ramp)),
+            (Act::Start, speed) => match desk.lost.or(speed.err()) {
+                Some(lost) => desk.lose_reference(lost),
+                None => {
+                    self.reverse = own.reverse && closed.has(Wires::REVERSE);
+                    self.given = None;
+                    give(desk, Order::Start(Mode::Speed));
+                }
+            },
+            (Act::Go, Err(lost)) => {
+                desk.lose_reference(lost);
+                give(desk, Order::Stop(Stop::Ramp));
+            }
+            (Act::Go, Ok(rpm)) => {
+                let rpm = if self.reverse { -rpm } else { rpm };
+                let due = self.given.is_none() || now_ms.is_multiple_of(REFERENCE_MS);
+                if due && self.given != Some(rpm) {
+                    self.given = Some(rpm);
+                    give(desk, Order::Speed(rpm.into()));
+                }
+            }
+            (Act::Nothing, _) => {}
+        }
+    }
+
+    /// The speed that the wires ask for, rpm; while a reference that is lost may come back, the last one.
+    fn speed(
+        &mut self,
+        settings: &FirmwareSettings,
+        port: &impl Port,
+        closed: Wires,
+    ) -> Result<i16, Lost> {
+        let own = &settings.strip;
+        let preset = if own.presets { closed.preset() } else { 0 };
+        if preset > 0 || own.reference == Reference::Off {
+            self.lost = 0;
+            return Ok([0, own.preset_1_rpm, own.preset_2_rpm, own.preset_3_rpm][preset] as i16);
+        }
+        let share = reference::share(own.reference, &settings.board.strip, port.codes());
+        self.lost = if share.is_ok() { 0 } else { self.lost.saturating_add(1) };
+        match share {
+            // The range of the setting is within the type.
+            Ok(share) => Ok(libm::roundf(share * f32::from(own.reference_rpm)) as i16),
+            Err(_) if self.lost < reference::LOOKS => Ok(self.given.unwrap_or(0).abs()),
+            Err(lost) => Err(lost),
+        }
+    }
+}
+
+/// RUN, FAULT and BRAKE for a report of the drive.
+fn outputs(desk: &Desk, status: Option<&Status>) -> [bool; 3] {
+    let settings = desk.settings().in_force();
+    let own = &settings.strip;
+    let Some(Status { state, telemetry, .. }) = status else { return [false, own.outputs, false] };
+    let pole_pairs = f32::from(settings.drive.motor.pole_pairs);
+    let rpm = telemetry.rotor_freq * (60.0 / PERIOD_S) / pole_pairs;
+    let turns = *state == State::Braking && rpm.abs() > BRAKE_RPM;
+    let fault = state.fault().is_some() || desk.lost.is_some();
+    [
+        own.outputs && !state.is_off(),
+        own.outputs && fault,
+        own.brake && (state.regulates() || turns),
+    ]
+}

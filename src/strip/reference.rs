@@ -1,0 +1,72 @@
+//! The analog reference: a share of the full speed, or why it is none.
+
+use thiserror::Error;
+
+use crate::board::ADC_FULL_SCALE;
+use crate::boards::Strip;
+use crate::boards::converter::{CODES, REFERENCE_V};
+use crate::settings::strip::Reference;
+use crate::strip::ANALOG;
+
+/// Looks in a row after which a reference counts as lost, a millisecond each; meanwhile the last speed holds.
+pub const LOOKS: u8 = 20;
+/// Range of a loop that is sound, mA (as NAMUR NE 43: 3.6 and 21 mA report a failure), and of the signal.
+const SOUND_MA: (f32, f32) = (3.6, 21.0);
+const SIGNAL_MA: (f32, f32) = (4.0, 20.0);
+/// Largest difference of two redundant inputs, share of 10 V.
+const AGREES: f32 = 0.03;
+/// Codes at the end of the range, where the converter does not see more.
+const END: u16 = ADC_FULL_SCALE - 5;
+
+/// Reason why a reference counts as lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Lost {
+    /// No code.
+    #[error("its converter does not answer")]
+    Silent,
+    /// Below 3.6 mA.
+    #[error("below 3.6 mA: a broken wire, or no supply")]
+    Low,
+    /// Above 21 mA.
+    #[error("above 21 mA: a short circuit")]
+    High,
+    /// At the end of the converter's range.
+    #[error("at the end of the converter's range")]
+    End,
+    /// Two inputs that should be the same.
+    #[error("the two inputs differ by more than 0.3 V")]
+    Differ,
+}
+
+/// The share of the full speed, 0 to 1, that the codes of the first and the second input mean.
+///
+/// # Errors
+/// They mean none.
+pub fn share(
+    kind: Reference,
+    strip: &Strip,
+    [first, second, _]: [Option<u16>; ANALOG],
+) -> Result<f32, Lost> {
+    // 1 at 10 V and at 20 mA.
+    let of = |code: u16| f32::from(code) * (REFERENCE_V / f32::from(CODES)) / strip.full_v;
+    let code = first.ok_or(Lost::Silent)?;
+    let share = of(code);
+    if kind == Reference::Current {
+        let ma = share * SIGNAL_MA.1;
+        return match ma {
+            _ if ma < SOUND_MA.0 => Err(Lost::Low),
+            _ if ma > SOUND_MA.1 => Err(Lost::High),
+            _ => Ok(((ma - SIGNAL_MA.0) / (SIGNAL_MA.1 - SIGNAL_MA.0)).clamp(0.0, 1.0)),
+        };
+    }
+    // The slower of two.
+    let other = match strip.pins[1] {
+        Some(_) => second.ok_or(Lost::Silent)?,
+        None => code,
+    };
+    match of(other) {
+        _ if code.max(other) >= END => Err(Lost::End),
+        other if (share - other).abs() > AGREES => Err(Lost::Differ),
+        other => Ok(share.min(other).min(1.0)),
+    }
+}

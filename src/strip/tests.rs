@@ -1,0 +1,257 @@
+//! The wires against exhaustive tables and random contacts.
+
+use std::collections::BTreeSet;
+
+use drive_settings::value::Words as _;
+use proptest::prelude::*;
+
+use super::debounce::{CLOSES, OPENS};
+use super::reference::{LOOKS, share};
+use super::sequence::ARMED;
+use super::*;
+use crate::boards::{ALL, Board};
+use crate::generated;
+use crate::settings::strip::{Settings, Start};
+
+fn code(full_v: f32, volts_of_ten: f32) -> u16 {
+    (volts_of_ten * 0.1 * full_v / 3.3 * 4096.0).round() as u16
+}
+
+/// START over some looks, and whether the drive may run: the acts.
+fn acts(sequence: &mut Sequence, start: Start, looks: &[(bool, Seen)]) -> Vec<Act> {
+    looks.iter().map(|(closed, seen)| sequence.step(start, *closed, *closed, *seen)).collect()
+}
+
+const OFF: Seen = Seen { commands: true, held: false, busy: false, off: true, ended: true };
+const RUNNING: Seen = Seen { off: false, ended: false, ..OFF };
+
+/// All states of the sequence, reached from the beginning: what was seen, and the looks before.
+fn histories() -> Vec<(&'static str, Vec<(bool, Seen)>)> {
+    let open = |n: u8| vec![(false, OFF); n.into()];
+    let armed = open(ARMED);
+    let started: Vec<_> = armed.iter().copied().chain([(true, OFF)]).collect();
+    let running: Vec<_> = started.iter().copied().chain([(true, RUNNING)]).collect();
+    vec![
+        ("power-up", vec![]),
+        ("closed at power-up", vec![(true, OFF); 500]),
+        ("nearly armed", open(ARMED - 1)),
+        ("armed", armed),
+        ("started", started),
+        ("running", running.clone()),
+        ("runs with START open", running.iter().copied().chain([(false, RUNNING); 99]).collect()),
+        ("ended by others", running.iter().copied().chain([(true, OFF); 300]).collect()),
+    ]
+}
+
+/// Each state, setting, wire and situation: when it starts, stops, and gives speeds. A start needs an edge.
+#[test]
+fn every_state_with_every_input() {
+    let mut seen_acts = BTreeSet::new();
+    for ((name, before), start) in
+        histories().into_iter().flat_map(|h| Start::VALUES.iter().map(move |s| (h.clone(), *s)))
+    {
+        for bits in 0..1 << 4 {
+            let bit = |n: u8| bits >> n & 1 == 1;
+            let (closed, commands, held, busy) = (bit(0), bit(1), bit(2), bit(3));
+            for (off, ended) in [(false, false), (false, true), (true, true)] {
+                let mut sequence = Sequence::default();
+                acts(&mut sequence, start, &before);
+                let seen = Seen { commands, held, busy, off, ended };
+                let act = sequence.step(start, closed, closed, seen);
+                let case = format!("{name} {start:?} {closed} {seen:?}");
+                let runs = matches!(name, "started" | "running" | "runs with START open")
+                    && start != Start::Off
+                    && commands
+                    && (busy || !ended);
+                let expected = match name {
+                    "armed"
+                        if commands && !held && closed && off && !busy && start != Start::Off =>
+                    {
+                        Act::Start
+                    }
+                    _ if !runs || busy => Act::Nothing,
+                    _ if start == Start::Switch && !closed => Act::Stop,
+                    _ => Act::Go,
+                };
+                assert_eq!(act, expected, "{case}");
+                seen_acts.insert(format!("{act:?}"));
+                // Whatever it was: a run that has ended begins again by a new edge alone.
+                if ended && !busy {
+                    let open = ["nearly armed", "armed", "runs with START open"].contains(&name);
+                    let edge = open && !closed && commands && !held && start != Start::Off;
+                    for look in 0..300 {
+                        let act = sequence.step(start, true, true, OFF);
+                        assert_eq!(act == Act::Start, edge && look == 0, "{case}");
+                    }
+                }
+            }
+        }
+    }
+    assert_eq!(seen_acts.len(), 4);
+}
+
+/// A switch that bounces while the drive runs stops it, and does not start it anew as it comes to rest closed.
+#[test]
+fn a_switch_that_bounces_for_long_is_no_edge() {
+    for open in 1..ARMED {
+        let mut sequence = Sequence::default();
+        acts(&mut sequence, Start::Switch, &histories()[5].1);
+        for look in 0..1000 {
+            let act = sequence.step(Start::Switch, look % u32::from(open + 1) == 0, false, OFF);
+            assert_eq!(act, Act::Nothing);
+        }
+        assert_eq!(acts(&mut sequence, Start::Switch, &[(true, OFF); 300]), [Act::Nothing; 300]);
+    }
+}
+
+/// All wires, with each use of ENABLE and START: whether the drive may run, and how it is stopped.
+#[test]
+fn the_table_of_what_holds_the_drive() {
+    for bits in 0..=u8::MAX >> 1 {
+        let closed = Wires(bits);
+        for (enable, start) in
+            [false, true].into_iter().flat_map(|e| Start::VALUES.iter().map(move |s| (e, *s)))
+        {
+            let own = Settings { enable, start, ..Settings::default() };
+            let expected = match (enable && bits & 1 == 0, start == Start::Buttons && bits & 4 == 0)
+            {
+                (true, _) => Some(Stop::Coast),
+                (false, true) => Some(Stop::Ramp),
+                _ => None,
+            };
+            assert_eq!(own.hold(closed), expected, "{closed} {own:?}");
+        }
+    }
+}
+
+proptest! {
+    /// An input is closed only behind 20 closed looks in a row or nearly so, and open two looks behind a break; one that chatters
+    /// with a look open in ten never closes.
+    #[test]
+    fn chatter_is_open(contacts in prop::collection::vec(0_u8..128, 1..400), every in 2_usize..11) {
+        let mut debounce = Debounce::default();
+        for (at, contact) in contacts.iter().enumerate() {
+            let closed = debounce.look(Wires(*contact));
+            for bit in 0..CONTACTS {
+                let of = |n: usize| contacts[at - n] >> bit & 1 == 1;
+                let two_open = at >= 1 && !of(0) && !of(1);
+                let long = usize::from(CLOSES) - 1;
+                let all_closed = at >= long && (0..=long).all(of);
+                let now = closed.0 >> bit & 1 == 1;
+                prop_assert!(!two_open || !now);
+                prop_assert!(!all_closed || now);
+            }
+        }
+        let mut debounce = Debounce::default();
+        for at in 0..1000 {
+            let contact = if at % every == 0 { 0 } else { 127 };
+            prop_assert_eq!(debounce.look(Wires(contact)), Wires(0));
+        }
+    }
+}
+
+#[test]
+fn a_contact_closes_in_20_looks_and_opens_in_2() {
+    let mut debounce = Debounce::default();
+    let closes = (1..).find(|_| debounce.look(Wires(127)) == Wires(127)).unwrap();
+    let opens = (1..).find(|_| debounce.look(Wires(0)) == Wires(0)).unwrap();
+    assert_eq!((closes, opens), (CLOSES, OPENS));
+}
+
+#[test]
+fn references_in_and_out_of_range() {
+    let pins = |second: bool| {
+        let mut pins = ALL[0].strip;
+        pins.pins[1] = pins.pins[1].filter(|_| second);
+        pins
+    };
+    let volts = |v| Some(code(3.0, v));
+    let ma = |ma: f32| volts(ma / 2.0);
+    for (given, expected) in [
+        (None, Err(Lost::Silent)),
+        (ma(0.0), Err(Lost::Low)),
+        (ma(3.55), Err(Lost::Low)),
+        (ma(3.65), Ok(0.0)),
+        (ma(4.0), Ok(0.0)),
+        (ma(12.0), Ok(0.5)),
+        (ma(20.0), Ok(1.0)),
+        (ma(20.9), Ok(1.0)),
+        (ma(21.1), Err(Lost::High)),
+        (Some(4095), Err(Lost::High)),
+    ] {
+        let found = share(Reference::Current, &pins(true), [given, None, None]);
+        assert_eq!(found.map(|x| (x * 100.0).round() / 100.0), expected, "{given:?}");
+    }
+    for (second, codes, expected) in [
+        (false, [volts(0.0), None], Ok(0.0)),
+        (false, [volts(5.0), None], Ok(0.5)),
+        (false, [volts(10.5), None], Ok(1.0)),
+        (false, [Some(4095), None], Err(Lost::End)),
+        (false, [None, None], Err(Lost::Silent)),
+        (true, [volts(5.0), None], Err(Lost::Silent)),
+        (true, [volts(5.0), volts(5.2)], Ok(0.5)),
+        (true, [volts(5.2), volts(5.0)], Ok(0.5)),
+        (true, [volts(5.0), volts(5.4)], Err(Lost::Differ)),
+        (true, [volts(5.4), volts(5.0)], Err(Lost::Differ)),
+        (true, [volts(0.0), volts(5.0)], Err(Lost::Differ)),
+        (true, [Some(4095), Some(4095)], Err(Lost::End)),
+    ] {
+        let found = share(Reference::Voltage, &pins(second), [codes[0], codes[1], None]);
+        assert_eq!(found.map(|x| (x * 100.0).round() / 100.0), expected, "{codes:?}");
+    }
+    assert!(LOOKS >= 3);
+}
+
+/// Functions without their pins, a switch without ENABLE, and a signal without a live zero are refused by name.
+#[test]
+fn what_a_board_cannot_do_is_refused_by_name() {
+    let all = Settings {
+        enable: true,
+        start: Start::Buttons,
+        reverse: true,
+        reset: true,
+        presets: true,
+        reference: Reference::Voltage,
+        outputs: true,
+        brake: true,
+        ..Settings::default()
+    };
+    let [reference, ihm08m1, ihm023v3] = ALL;
+    let refused = |own: Settings, board: &Board| {
+        own.check(board).err().map(|why| why.to_string()).unwrap_or_default()
+    };
+    assert_eq!(refused(all, reference), "");
+    assert!(ALL.iter().all(|board| refused(Settings::default(), board).is_empty()));
+    assert!(refused(all, ihm08m1).starts_with("strip.reverse = yes: this board has no pin"));
+    assert!(refused(all, ihm023v3).starts_with("strip.enable = yes: this board has no pin"));
+    let switch = Settings { start: Start::Switch, ..Settings::default() };
+    assert!(refused(switch, reference).starts_with("strip.start = switch: needs strip.enable"));
+    assert_eq!(refused(Settings { enable: true, ..switch }, reference), "");
+    // 48 V, one input; more volts, one input.
+    let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
+    assert_eq!(refused(voltage, ihm08m1), "");
+    let mut high = *reference;
+    high.strip.pins[1] = None;
+    assert!(refused(voltage, &high).starts_with("strip.reference = 0-10v: it has no live zero"));
+    let current = Settings { reference: Reference::Current, ..Settings::default() };
+    assert_eq!(refused(current, &high), "");
+}
+
+/// The wiring of each board, as `docs/terminal-strip.md` has to contain it.
+#[test]
+fn the_manual_lists_the_terminals() {
+    use std::fmt::Write;
+    let mut text = String::from("| terminal |");
+    let with = || ALL.iter().filter(|board| board.strip.pins.iter().any(Option::is_some));
+    with().for_each(|board| write!(text, " {} |", board.name).unwrap());
+    write!(text, "\n|---|{}\n", "---|".repeat(with().count())).unwrap();
+    for (n, name) in TERMINALS.into_iter().enumerate() {
+        write!(text, "| {name} |").unwrap();
+        for board in with() {
+            let pin = board.strip.pins[n].map_or("-".into(), |pin| pin.to_string());
+            write!(text, " {pin} |").unwrap();
+        }
+        text.push('\n');
+    }
+    generated::check("terminal-strip.md", "terminals", &text);
+}
