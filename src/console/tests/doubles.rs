@@ -126,7 +126,7 @@ impl DriveHandle for FakeDrive {
         self.saved = Some(*settings);
         Ok(())
     }
-    fn reboot(&mut self) {
+    fn reboot(&mut self, loader: bool) {
         self.reboots += 1;
     }
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
