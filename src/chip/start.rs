@@ -1,6 +1,7 @@
 //! The start block: the first code after a reset, in the first page of the flash, with nothing set up yet. In assembler, because
 //! no Rust may run before statics are initialised, and because nothing outside of the page may be relied on.
 //!
+//! * What ST's loader jumps to begins with a reset: the loader leaves pins and clocks as it has used them.
 //! * A reset that [`into_loader`] has asked for ends in ST's loader (AN2606: from the state after a reset, with the
 //!   system memory at address 0).
 //! * Otherwise the CRC unit sums up the image. A wrong sum, or a word that the flash cannot correct, is what an update leaves that
@@ -35,6 +36,8 @@ global_asm!(
     ".type __pre_init, %function; .type into_loader, %function; .type NonMaskableInt, %function",
     ".Lblock: .thumb_func",
     "__pre_init: push {{r4, lr}}",
+    // A port has its clock (AHB2ENR): no reset, but the loader's jump.
+    "ldr r0, ={rcc}; ldr r1, [r0, #0x4c]; cmp r1, #0; bne .Lreset",
     "ldr r0, ={backup}; ldr r1, [r0]; ldr r2, ={word}; cmp r1, r2; beq .Lenter",
     // Each piece through the CRC unit (AHB1ENR, CRC_CR: bits reversed, from all ones).
     "ldr r0, ={rcc}; ldr r1, [r0, #0x48]; orr r1, #0x1000; str r1, [r0, #0x48]; ldr r1, [r0, #0x48]",
@@ -72,7 +75,7 @@ global_asm!(
     "ldr r0, =.Lok; bl .Lsend",
     ".thumb_func",
     "into_loader: ldr r0, ={word}; bl .Lkeep",
-    "ldr r0, ={aircr}; ldr r1, ={reset}; str r1, [r0]; dsb",
+    ".Lreset: ldr r0, ={aircr}; ldr r1, ={reset}; str r1, [r0]; dsb",
     ".Lwait: b .Lwait",
     // Keeps r0 in the backup register (APB1ENR1; PWR_CR1.DBP).
     ".Lkeep: ldr r1, ={rcc}; ldr r2, [r1, #0x58]; orr r2, #0x10000000; str r2, [r1, #0x58]; ldr r2, [r1, #0x58]",

@@ -35,3 +35,4 @@ mod sources;
 mod stream;
 mod strict;
 mod tracking;
+mod update;

@@ -11,16 +11,20 @@ pub enum Own {
     Reset,
     /// Takes the supply of the controller away and gives it back.
     Unplug,
+    /// Switches the supplies of the power stage.
+    Stage(bool),
     /// Ends the session.
     Quit,
 }
 
 /// Names and meanings.
 #[rustfmt::skip]
-const COMMANDS: [(&str, Own, &str); 4] = [
+const COMMANDS: [(&str, Own, &str); 6] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
     ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
+    ("!stage off", Own::Stage(false), "takes the supplies of gate drivers and dc link away, as `update` needs it"),
+    ("!stage on", Own::Stage(true), "gives them back"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
 
@@ -40,6 +44,6 @@ impl Own {
 
     /// A line about each command.
     pub fn help() -> impl Iterator<Item = String> {
-        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<8} {meaning}"))
+        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<10} {meaning}"))
     }
 }
