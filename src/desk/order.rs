@@ -172,7 +172,9 @@ pub enum Refusal {
     #[error("settings that were not saved would be lost: `save` first, or `reboot now`")]
     Unsaved,
     /// The dc link, V, is charged.
-    #[error("the dc link has {0:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most")]
+    #[error(
+        "the dc link has {0:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most"
+    )]
     Charged(f32),
     /// The bus sets a setting of the hardware.
     #[error("{} belongs to the hardware: set it at the console", .0.name())]

@@ -5,7 +5,7 @@
 //!
 //! Own code for the protocol: no crate of it is maintained, and it is nine commands of a few bytes.
 
-use std::io::{Read, Write};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -13,6 +13,7 @@ use clap::Args;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serialport::Parity;
 
+use super::Port;
 use crate::board;
 use crate::error::Error;
 
@@ -45,22 +46,6 @@ const ACK: u8 = 0x79;
 const ANSWER: Duration = Duration::from_secs(2);
 const GREETING: Duration = Duration::from_secs(30);
 
-/// A port whose parity can be chosen.
-pub trait Wire: Read + Write {
-    /// Even parity, or none.
-    ///
-    /// # Errors
-    /// Those of the port.
-    fn even(&mut self, even: bool) -> std::io::Result<()>;
-}
-
-impl Wire for super::Port {
-    fn even(&mut self, even: bool) -> std::io::Result<()> {
-        let parity = if even { Parity::Even } else { Parity::None };
-        Ok(self.set_parity(parity)?)
-    }
-}
-
 /// An image.
 pub struct Image {
     bytes: Vec<u8>,
@@ -79,12 +64,14 @@ impl Image {
             Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
         };
         // The list of pieces (`memory.x`) begins with the piece before it.
-        let begins = |at: &usize| word(*at) == Some(FLASH) && word(at + 4) == Some(FLASH + *at as u32);
+        let begins =
+            |at: &usize| [word(*at), word(at + 4)] == [FLASH, FLASH + *at as u32].map(Some);
         let list = (0..PAGE).step_by(4).find(begins).ok_or("no image of this drive")?;
         let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
         let mut digest = crc.digest();
         for at in (list..list + 32).step_by(8) {
-            let place = |at| word(at).and_then(|word| word.checked_sub(FLASH)).map(|at| at as usize);
+            let place =
+                |at| word(at).and_then(|word| word.checked_sub(FLASH)).map(|at| at as usize);
             let piece = place(at).zip(place(at + 4)).and_then(|(from, to)| bytes.get(from..to));
             digest.update(piece.ok_or("cut short")?);
         }
@@ -125,25 +112,20 @@ pub fn run(options: &Options) -> Result<(), Error> {
 }
 
 fn lost(what: impl std::fmt::Display) -> Error {
-    Error::Internal(format!(
-        "{what}; the image is not whole: `cargo sim update` again, and if nothing answers, see docs/update.md"
-    ))
+    let next =
+        "the image is not whole: `cargo sim update` again; if nothing answers, docs/update.md";
+    Error::Internal(format!("{what}; {next}"))
 }
 
 /// Writes an image; what the new one says to `version`.
 ///
 /// # Errors
 /// As of [`run`].
-pub fn update(
-    port: &mut impl Wire,
-    image: &Image,
-    mut show: impl FnMut(&str),
-) -> Result<String, Error> {
-    let closed = |why: std::io::Error| Error::Internal(format!("the port: {why}"));
+pub fn update(port: &mut Port, image: &Image, mut show: impl FnMut(&str)) -> Result<String, Error> {
     // Ends a line that may have begun; what is said to that goes by.
-    port.write_all(b"\n").map_err(closed)?;
+    send(port, b"\n").map_err(Error::Internal)?;
     line(port, Duration::from_millis(300), |_| false);
-    port.write_all(b"update gates-off\n").map_err(closed)?;
+    send(port, b"update gates-off\n").map_err(Error::Internal)?;
     match line(port, ANSWER, |line| line.starts_with("ok: ST's") || line.starts_with("error: ")) {
         Some(answer) if answer.starts_with("error") => return Err(Error::Refused(answer)),
         Some(_) => {}
@@ -151,19 +133,19 @@ pub fn update(
     }
     // The firmware resets 0.1 s after its answer.
     std::thread::sleep(Duration::from_millis(500));
-    port.even(true).map_err(closed)?;
-    write(port, image, &mut show).map_err(lost)?;
-    port.even(false).map_err(closed)?;
+    let even = port.set_parity(Parity::Even).map_err(|why| why.to_string());
+    even.and_then(|()| write(port, image, &mut show)).map_err(lost)?;
+    port.set_parity(Parity::None).map_err(lost)?;
     show("written; waiting for the greeting");
     line(port, GREETING, |line| line.contains("induction-drive"))
         .ok_or_else(|| lost("the image does not greet"))?;
-    port.write_all(b"version\n").map_err(closed)?;
+    send(port, b"version\n").map_err(lost)?;
     let sum = format!(", image {:08x}, ", image.check);
     line(port, ANSWER, |line| line.contains(&sum)).ok_or_else(|| lost("another image runs"))
 }
 
 /// The loader does its part.
-fn write(port: &mut impl Wire, image: &Image, show: &mut impl FnMut(&str)) -> Result<(), String> {
+fn write(port: &mut Port, image: &Image, show: &mut impl FnMut(&str)) -> Result<(), String> {
     synchronise(port)?;
     let [count, high, low, _] = read(port, ANSWER)?;
     if count != 1 || [high, low] != PRODUCT {
@@ -181,8 +163,7 @@ fn write(port: &mut impl Wire, image: &Image, show: &mut impl FnMut(&str)) -> Re
             checked(port, &[&[(BLOCK - 1) as u8], data].concat())?;
             command(port, 0x11)?;
             checked(port, &at)?;
-            port.write_all(&[(BLOCK - 1) as u8, !(BLOCK - 1) as u8]).map_err(|e| e.to_string())?;
-            acknowledged(port)?;
+            command(port, (BLOCK - 1) as u8)?;
             if read::<BLOCK>(port, ANSWER)?[..] != *data {
                 return Err(format!("page {page} reads back differently"));
             }
@@ -196,64 +177,56 @@ fn write(port: &mut impl Wire, image: &Image, show: &mut impl FnMut(&str)) -> Re
 }
 
 /// Begins with the loader, and asks it for its product.
-fn synchronise(port: &mut impl Wire) -> Result<(), String> {
-    // Many, if it runs already and is in the middle of a command.
-    let heard = [1, 2 * BLOCK].into_iter().any(|count| {
-        port.write_all(&vec![0x7f; count]).is_ok() && read::<1>(port, ANSWER).is_ok()
-    });
-    if !heard {
-        return Err("ST's loader does not answer".into());
-    }
-    let mut last = Ok(());
-    for _ in 0..3 {
-        while read::<1>(port, Duration::from_millis(200)).is_ok() {}
-        last = command(port, 0x02);
-        if last.is_ok() {
-            break;
+fn synchronise(port: &mut Port) -> Result<(), String> {
+    // Many, if it runs already and is in the middle of a command; half of one may be left of them.
+    for count in [1, 2 * BLOCK, 1, 1] {
+        send(port, &vec![0x7f; count])?;
+        if read::<1>(port, ANSWER).is_ok() {
+            while read::<1>(port, Duration::from_millis(200)).is_ok() {}
+            if command(port, 0x02).is_ok() {
+                return Ok(());
+            }
         }
-        // Half a command may be left of the many.
-        port.write_all(&[0x7f]).map_err(|why| why.to_string())?;
     }
-    last
+    Err("ST's loader does not answer".into())
 }
 
-fn command(port: &mut impl Wire, code: u8) -> Result<(), String> {
-    port.write_all(&[code, !code]).map_err(|why| why.to_string())?;
+fn send(port: &mut Port, bytes: &[u8]) -> Result<(), String> {
+    port.write_all(bytes).map_err(|why| why.to_string())
+}
+
+fn command(port: &mut Port, code: u8) -> Result<(), String> {
+    send(port, &[code, !code])?;
     acknowledged(port)
 }
 
 /// Sends bytes with their sum behind them.
-fn checked(port: &mut impl Wire, bytes: &[u8]) -> Result<(), String> {
+fn checked(port: &mut Port, bytes: &[u8]) -> Result<(), String> {
     let sum = bytes.iter().fold(0, |sum, byte| sum ^ byte);
-    port.write_all(&[bytes, &[sum]].concat()).map_err(|why| why.to_string())?;
+    send(port, &[bytes, &[sum]].concat())?;
     acknowledged(port)
 }
 
-fn acknowledged(port: &mut impl Wire) -> Result<(), String> {
+fn acknowledged(port: &mut Port) -> Result<(), String> {
     let [answer] = read(port, ANSWER)?;
     if answer == ACK { Ok(()) } else { Err(format!("the loader refuses, {answer:#04x}")) }
 }
 
-fn read<const N: usize>(port: &mut impl Wire, patience: Duration) -> Result<[u8; N], String> {
+fn read<const N: usize>(port: &mut Port, patience: Duration) -> Result<[u8; N], String> {
     let (mut bytes, mut filled, end) = ([0; N], 0, Instant::now() + patience);
-    while filled < N && Instant::now() < end {
+    while filled < N {
         match port.read(&mut bytes[filled..]) {
-            Ok(0) => return Err("the port is closed".into()),
-            Ok(count) => filled += count,
-            Err(why) if is_slow(&why) => {}
-            Err(why) => return Err(why.to_string()),
+            Ok(count) if count > 0 => filled += count,
+            Err(why) if why.kind() != ErrorKind::TimedOut => return Err(why.to_string()),
+            _ if Instant::now() > end => return Err("the loader is silent".into()),
+            _ => {}
         }
     }
-    if filled == N { Ok(bytes) } else { Err("the loader is silent".into()) }
-}
-
-fn is_slow(why: &std::io::Error) -> bool {
-    use std::io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    matches!(why.kind(), TimedOut | WouldBlock | Interrupted)
+    Ok(bytes)
 }
 
 /// The next line of this kind, until the time is over.
-fn line(port: &mut impl Wire, patience: Duration, wanted: impl Fn(&str) -> bool) -> Option<String> {
+fn line(port: &mut Port, patience: Duration, wanted: impl Fn(&str) -> bool) -> Option<String> {
     let (mut text, end) = (Vec::new(), Instant::now() + patience);
     while Instant::now() < end {
         match read::<1>(port, Duration::from_millis(200)) {

@@ -19,8 +19,8 @@ use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::periph::{
-    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dacs, encoder::EncoderTimer, flash::Flash, gpio::Gpio,
-    iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
+    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dacs, encoder::EncoderTimer, flash::Flash,
+    gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
 };
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};

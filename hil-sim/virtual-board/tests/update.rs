@@ -1,13 +1,10 @@
 //! The check sum of the image, `update`, and ST's boot loader behind it.
 
-use std::io::{Read as _, Write};
-use std::os::unix::net::UnixStream;
-use std::time::Duration;
-
 use anyhow::{Result, ensure};
 use hil_sim::Config;
-use hil_sim::console::update::{self, Wire};
+use hil_sim::console::update;
 use rand::{RngExt as _, SeedableRng as _};
+use virtual_board::interactive::pty::Pty;
 use virtual_board::memory::FLASH;
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
@@ -85,31 +82,6 @@ fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
     until(&mut board, "induction-drive", GREETING).map(drop)
 }
 
-/// The computer's end of the line.
-struct Line(UnixStream);
-
-impl std::io::Read for Line {
-    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        self.0.read(bytes)
-    }
-}
-
-impl Write for Line {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Wire for Line {
-    fn even(&mut self, _: bool) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
 /// The image as the `.bin` of `cargo firmware`, with another commit in its text and the sum of that, if wanted.
 fn binary(board: &Board, other: bool) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -138,32 +110,19 @@ fn binary(board: &Board, other: bool) -> Vec<u8> {
 
 /// `cargo sim update` with these bytes, beside the board; what the new image says to `version`. Ends early when the power goes.
 fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
-    let (mut ours, theirs) = UnixStream::pair()?;
-    ours.set_nonblocking(true)?;
-    theirs.set_read_timeout(Some(Duration::from_millis(20)))?;
     let image = update::Image::new(bytes).map_err(anyhow::Error::msg)?;
-    let host = std::thread::spawn(move || update::update(&mut Line(theirs), &image, |_| ()));
+    let mut pty = Pty::open()?;
+    let (mut port, _) = hil_sim::console::open(&pty.path.to_string_lossy(), 115_200)?;
+    let host = std::thread::spawn(move || update::update(&mut port, &image, |_| ()));
     let resets = board.resets.len();
-    let mut buffer = [0; 4096];
     while !host.is_finished() {
-        let count = ours.read(&mut buffer).unwrap_or(0);
-        board.send(&buffer[..count]);
-        // Small steps: the computer answers at once.
+        board.send(&pty.read()?);
         board.run_periods(if board.loader.is_some() { 1 } else { 6 })?;
-        let lost = board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power);
-        if lost {
-            drop(ours);
-            let _ = host.join();
+        if board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power) {
+            // The program finds nobody at the line, and ends.
             return Ok(None);
         }
-        let said = board.chip().lpuart.line.take();
-        if !said.is_empty() {
-            ours.set_nonblocking(false)?;
-            ours.write_all(&said)?;
-            ours.set_nonblocking(true)?;
-        } else if count == 0 && board.loader.is_some() {
-            std::thread::yield_now();
-        }
+        pty.write(&board.chip().lpuart.line.take())?;
     }
     let said = host.join().map_err(|_| anyhow::anyhow!("the program panicked"))?;
     Ok(Some(said?))
@@ -209,14 +168,41 @@ fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
     println!("{:.1} s simulated\n{old}{said}", board.time() - began);
     ensure!(said.contains(", commit next"), "{said}");
     ensure!(ask(&mut board, "get speed.ramp_rpm_per_s")?.contains("= 777"));
-    // In the loader already, and from a damaged image.
-    board.cpu.write(FLASH + 0x1000, &[0, 0]);
-    board.reset(Reset::Pin);
-    until(&mut board, "damaged", 3000)?;
-    ensure!(ask(&mut board, "@1 update gates-off")?.starts_with("ok: ST's loader is next"));
-    board.run_periods(60)?;
-    ensure!(board.loader.is_some());
     Ok(())
+}
+
+/// What the program sends, without waiting for answers, until the power goes in an operation of the flash, counted from 1.
+fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
+    let summed = |bytes: &[u8]| [bytes, &[bytes.iter().fold(0, |sum, byte| sum ^ byte)]].concat();
+    board.type_line("update gates-off");
+    while board.loader.is_none() {
+        board.run_periods(60)?;
+    }
+    let flash = &mut board.chip().flash;
+    flash.power_loss_at = Some(flash.operations + operation);
+    board.send(&[0x7f]);
+    let mut pages: Vec<_> = pages(bytes).collect();
+    pages.rotate_left(1);
+    for (n, page) in pages {
+        board.send(&[&[0x44, 0xbb], &summed(&[0, 0, 0, n as u8])[..]].concat());
+        for (block, data) in page.chunks(256).enumerate() {
+            let at = (FLASH + (2048 * n + 256 * block) as u32).to_be_bytes();
+            let data = summed(&[&[0xff], data].concat());
+            board.send(&[&[0x31, 0xce], &summed(&at)[..], &data[..]].concat());
+        }
+        while board.loader.as_ref().is_some_and(|loader| !loader.line.is_empty()) {
+            board.run_periods(60)?;
+        }
+        if board.resets.last().is_some_and(|(_, cause)| *cause == Reset::Power) {
+            return Ok(());
+        }
+    }
+    anyhow::bail!("{operation}: no loss of power")
+}
+
+/// The pages of an image that are not empty.
+fn pages(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    bytes.chunks(2048).enumerate().filter(|(_, page)| page.iter().any(|byte| *byte != 0xff))
 }
 
 /// The power goes at drawn operations of the flash: afterwards the old or the new image runs, or the start block says why not and
@@ -224,47 +210,48 @@ fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
 fn power_losses(count: u32, first_page: u32) -> Result<()> {
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(37);
     let mut board = unsupplied()?;
-    let (old, next) = (binary(&board, false), binary(&board, true));
-    let pages = next.chunks(2048).filter(|page| page.iter().any(|byte| *byte != 0xff)).count();
-    let operations = pages as u64 * (1 + 256);
-    let (mut greeted, mut told, mut silent) = (0, 0, 0);
+    let [old, next] = [false, true].map(|other| {
+        let mut bytes = binary(&board, other);
+        bytes.resize(bytes.len().next_multiple_of(2048), 0xff);
+        bytes
+    });
+    let operations = pages(&next).count() as u64 * (1 + 256);
+    let (mut started, mut told, mut silent) = (0, 0, 0);
     for n in 0..count + first_page {
         // The image as it was, whole.
-        for (at, page) in old.chunks(2048).enumerate() {
-            board.cpu.write(FLASH + 2048 * at as u32, page);
+        for (at, page) in pages(&old) {
+            let at = FLASH + 2048 * at as u32;
+            board.cpu.write(at, page);
+            board.chip().flash.by_loader(at..at + 2048, page);
         }
         board.forgive();
         board.reset(Reset::Pin);
         until(&mut board, "induction-drive", GREETING)?;
-        let within = if n < count { operations } else { 257 };
-        let at = operations - rng.random_range(0..within);
-        let flash = &mut board.chip().flash;
-        flash.power_loss_at = Some(flash.operations + at);
-        ensure!(update(&mut board, next.clone())?.is_none(), "{at}: no loss of power");
+        let at = operations - rng.random_range(0..if n < count { operations } else { 257 });
+        lose_power(&mut board, &next, at)?;
+        board.take_console();
         let mut said = String::new();
         for _ in 0..GREETING / 600 {
             board.run_periods(600)?;
             said += &board.take_console();
-            if said.ends_with('\n') || board.loader.is_some() {
+            if said.ends_with('\n') {
                 break;
             }
         }
+        let in_first_page = at + 257 > operations;
         match said.as_str() {
-            text if text.contains("induction-drive") => greeted += 1,
-            text if text.contains("the image is damaged") => told += 1,
-            "" => {
-                ensure!(at + 257 > operations, "{at} of {operations}: silent");
-                silent += 1;
+            text if text.contains("induction-drive") => started += 1,
+            text if text.starts_with("error: the image is damaged") => {
+                told += 1;
+                ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's"), "{at}");
+                board.run_periods(60)?;
+                ensure!(board.loader.is_some(), "{at}: no loader");
             }
-            text => anyhow::bail!("{at}: {text}"),
-        }
-        // Again, as far as the start block takes it.
-        if said.contains("damaged") && n % 10 == 0 {
-            let said = update(&mut board, next.clone())?.unwrap_or_default();
-            ensure!(said.contains(", commit next"), "{at}: {said}");
+            "" if in_first_page => silent += 1,
+            text => anyhow::bail!("{at} of {operations}: {text:?}"),
         }
     }
-    println!("{operations} operations; {greeted} started, {told} told why not, {silent} in the first page");
+    println!("{operations} operations; {started} started, {told} told why not, {silent} silent");
     Ok(())
 }
 

@@ -8,7 +8,7 @@ use induction_drive::board::HSI_HZ;
 
 use super::Board;
 use crate::chip::TICKS_PER_S;
-use crate::memory::{FLASH, FLASH_SIZE, STORED, SYSTEM, is_reserved};
+use crate::memory::{FLASH, FLASH_SIZE, STORED, SYSTEM};
 use crate::periph::Reset;
 use crate::periph::flash::{ERASE, PAGE, PROGRAM};
 use crate::periph::rcc::{AHB2ENR, On};
@@ -102,7 +102,10 @@ impl Board {
     pub(super) fn enter_loader(&mut self) -> Result<()> {
         let chip = self.cpu.chip();
         ensure!(chip.syscfg.get(0) & 7 == 1, "the system memory is not at address 0");
-        ensure!(chip.rcc.system_hz() == u64::from(HSI_HZ), "the loader needs the clock after a reset");
+        ensure!(
+            chip.rcc.system_hz() == u64::from(HSI_HZ),
+            "the loader needs the clock after a reset"
+        );
         self.begin_loader();
         Ok(())
     }
@@ -127,6 +130,10 @@ impl Board {
     /// Lets the loader take the bytes that have come.
     pub(super) fn serve_loader(&mut self) {
         let now = self.cpu.chip().now;
+        if self.loader.is_some() {
+            // No interrupt does it meanwhile.
+            self.advance_plant(now);
+        }
         while let Some(loader) = &mut self.loader {
             if self.cpu.chip().flash.power_lost || loader.ready_at > now {
                 return;
@@ -137,8 +144,7 @@ impl Board {
             loader.ready_at += BYTE;
             if !loader.synchronised {
                 loader.synchronised = byte == 0x7f;
-                let answer = [ACK];
-                self.answer(&answer[..usize::from(byte == 0x7f)]);
+                self.answer(&[ACK][..usize::from(byte == 0x7f)]);
                 continue;
             }
             loader.heard.push(byte);
@@ -172,30 +178,20 @@ impl Board {
             [_, _] => last(false),
             [0x44, _, _, _] | [_, _, _] => (true, Vec::new()),
             [0x44, _, high, low, ref rest @ ..] => {
-                let count = usize::from(high) << 8 | usize::from(low);
-                let special = count > 0xfff0;
-                let length = if special { 1 } else { 2 * (count + 1) + 1 };
-                if rest.len() < length {
+                let length = 2 * address(&[high, low]) as usize + 2;
+                if rest.len() <= length {
                     return (true, Vec::new());
                 }
-                let pages: Vec<usize> = if special {
-                    // Both banks, the first, the second.
-                    match low {
-                        0xff => (0..256).collect(),
-                        0xfe => (0..128).collect(),
-                        _ => (128..256).collect(),
-                    }
-                } else {
-                    rest[..length - 1].chunks(2).map(|page| address(page) as usize).collect()
-                };
-                last(sums_up(&heard[2..]) && pages.into_iter().all(|page| self.erase(page)))
+                let mut pages = rest[..length].chunks(2).map(address);
+                last(sums_up(&heard[2..]) && pages.all(|page| self.erase(page)))
             }
             [_, _, ref at @ ..] if at.len() < 5 => (true, Vec::new()),
             [command, _, ref at @ ..] if at.len() == 5 => {
-                let right = sums_up(at) && !is_reserved(address(&at[..4]));
+                let place = address(&at[..4]);
+                let right = sums_up(at) && (FLASH..FLASH + FLASH_SIZE).contains(&place);
                 if right && command == 0x21 {
                     self.answer(&[ACK]);
-                    self.jump(address(&at[..4]));
+                    self.jump(place);
                     return (false, Vec::new());
                 }
                 more(right)
@@ -208,17 +204,18 @@ impl Board {
                 (false, [vec![ACK], bytes].concat())
             }
             [0x31, _, ref at @ ..] if at.len() > 6 && at.len() == usize::from(at[5]) + 8 => {
-                let done = sums_up(&at[5..]) && self.program(address(&at[..4]), &at[6..at.len() - 1]);
+                let done =
+                    sums_up(&at[5..]) && self.program(address(&at[..4]), &at[6..at.len() - 1]);
                 last(done)
             }
             _ => (true, Vec::new()),
         }
     }
 
-    /// Some bytes of any memory.
+    /// Some bytes of the flash.
     fn contents(&mut self, from: u32, count: usize) -> Vec<u8> {
         let mut bytes = vec![0; count];
-        if from < STORED || from >= FLASH + FLASH_SIZE {
+        if from < STORED {
             self.cpu.read(from, &mut bytes);
         } else {
             let at = (from - STORED) as usize;
@@ -227,18 +224,13 @@ impl Board {
         bytes
     }
 
-    /// Writes to the flash, or to a memory.
+    /// Writes to the flash.
     fn program(&mut self, from: u32, bytes: &[u8]) -> bool {
-        if !(FLASH..FLASH + FLASH_SIZE).contains(&from) {
-            return self.cpu.write(from, bytes);
-        }
         for (n, word) in bytes.chunks(8).enumerate() {
             let (at, mut new) = (from + 8 * n as u32, [0xff; 8]);
             new[..word.len()].copy_from_slice(word);
-            if self.chip().flash.power_lost {
-                return true;
-            }
-            if !at.is_multiple_of(8) || self.contents(at, 8) != [0xff; 8] {
+            let erased = at.is_multiple_of(8) && self.contents(at, 8) == [0xff; 8];
+            if !erased || self.chip().flash.power_lost {
                 return false;
             }
             self.change(at, &new, PROGRAM);
@@ -246,11 +238,13 @@ impl Board {
         true
     }
 
-    fn erase(&mut self, page: usize) -> bool {
-        if page < 256 && !self.chip().flash.power_lost {
-            self.change(FLASH + (page * PAGE) as u32, &[0xff; PAGE], ERASE);
+    fn erase(&mut self, page: u32) -> bool {
+        let at = FLASH + page * PAGE as u32;
+        let inside = at < FLASH + FLASH_SIZE && !self.chip().flash.power_lost;
+        if inside {
+            self.change(at, &[0xff; PAGE], ERASE);
         }
-        page < 256
+        inside
     }
 
     /// An operation of the flash that takes some ticks.
