@@ -12,6 +12,7 @@ pub mod pwm;
 pub mod rs485;
 pub mod serial;
 pub mod sleep;
+pub mod start;
 pub mod stop;
 pub mod terminals;
 pub mod time;

@@ -23,7 +23,7 @@ use crate::strip::Wires;
 use crate::strip::reference::Lost;
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
-use order::{Order, Refusal, Reply};
+use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
 
 /// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
 const BUS_SILENT_S: f32 = 1.0;
@@ -306,7 +306,16 @@ impl Desk {
                 self.unsaved = true;
                 Ok(Reply::Done)
             }
-            Order::Reboot(now) => self.reboot(from, now, drive),
+            Order::Reboot(now) => self.reboot(from, order, now, drive).map(|()| Reply::Rebooting),
+            Order::Update => {
+                let line = self.settings.in_force().drive.scales.dc_link;
+                // Measured now: while the drive is off, its own value stands still.
+                let dc_link = drive.status().map_or(0.0, |status| line.at(status.sample.dc_link));
+                if dc_link > LOADER_DC_LINK_V {
+                    return Err(Refusal::Charged(dc_link));
+                }
+                self.reboot(from, order, false, drive).map(|()| Reply::Loader)
+            }
             Order::BoardIs(board) => {
                 let own = self.settings.in_force().board;
                 self.foreign = (board != own).then_some(board.name);
@@ -402,10 +411,10 @@ impl Desk {
     #[inline(never)] // its stack does not add to that of the front ends
     pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         let Some((from, order)) = self.task.take() else { return };
-        if matches!(order, Order::Reboot(_)) {
+        if matches!(order, Order::Reboot(_) | Order::Update) {
             let since = *self.reboot_ms.get_or_insert(now_ms);
             if now_ms.wrapping_sub(since) >= REBOOT_MS {
-                return drive.reboot();
+                return drive.reboot(order == Order::Update);
             }
             return self.task = Some((from, order));
         }
@@ -514,13 +523,19 @@ impl Desk {
         Ok(Reply::Done)
     }
 
-    fn reboot(&mut self, from: Commander, now: bool, drive: &impl DriveHandle) -> Answer {
+    fn reboot(
+        &mut self,
+        from: Commander,
+        order: Order,
+        now: bool,
+        drive: &impl DriveHandle,
+    ) -> Result<(), Refusal> {
         must_be_off(drive)?;
         if !now && (self.unsaved || self.settings.is_staged()) {
             return Err(Refusal::Unsaved);
         }
-        (self.task, self.reboot_ms) = (Some((from, Order::Reboot(now))), None);
-        Ok(Reply::Rebooting)
+        (self.task, self.reboot_ms) = (Some((from, order)), None);
+        Ok(())
     }
 }
 

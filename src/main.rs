@@ -2,6 +2,7 @@
 //!
 //! Order of events:
 //!
+//! * the start block (`chip/start.rs`): ST's loader if it was asked for, the check sum of the image, the control code to CCM.
 //! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, converters, the
 //!   drive (`task/bring_up.rs`).
 //! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,

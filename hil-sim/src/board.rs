@@ -5,6 +5,8 @@
 
 mod build;
 
+pub use build::image;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

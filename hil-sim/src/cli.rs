@@ -133,6 +133,11 @@ enum Command {
     /// For a board and for the pseudo-terminal of `cargo sim board` alike. `!help` lists the commands of this program;
     /// other lines go to the drive. Exit code 1 when the drive refuses a line of --command or of standard input.
     Console(console::Options),
+    /// Write another image to a board over the serial port of its console, through ST's loader; settings are kept
+    ///
+    /// The drive must be off, its dc link below 20 V, and the supply of the gate drivers off. Builds the image, erases and
+    /// writes its pages, reads them back, starts it and compares its check sum. Exit code 2 when file, port or drive refuse.
+    Update(console::update::Options),
 }
 
 /// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
@@ -170,6 +175,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Board(options)) => board::become_board(&options),
         Some(Command::Console(options)) => console::run(&options),
+        Some(Command::Update(options)) => console::update::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -12,6 +12,7 @@ pub mod own;
 pub mod session;
 pub mod trace;
 pub mod transfer;
+pub mod update;
 
 use std::io::IsTerminal as _;
 use std::time::Duration;

@@ -12,31 +12,6 @@ unsafe extern "C" {
     static mut _stack_end: u32;
 }
 
-/// Copies the control code from the flash to CCM, where it is fetched without wait states.
-///
-/// Called by the start-up code before anything else, because the functions that copy and clear memory
-/// are among what is copied; in assembler, because no Rust may run before statics are initialised.
-#[unsafe(naked)]
-#[unsafe(export_name = "__pre_init")] // SAFETY: the name cortex-m-rt calls, defined nowhere else.
-unsafe extern "C" fn copy_control_code() {
-    core::arch::naked_asm!(
-        "ldr r0, =__sccm",
-        "ldr r1, =__eccm",
-        "ldr r2, =__siccm",
-        "2:",
-        "cmp r0, r1",
-        "beq 3f",
-        "ldm r2!, {{r3}}",
-        "stm r0!, {{r3}}",
-        "b 2b",
-        "3:",
-        // The writes end before the code is fetched.
-        "dsb",
-        "isb",
-        "bx lr",
-    )
-}
-
 /// The code in CCM, and the address it was copied from.
 pub fn control_code() -> (MemoryRange, u32) {
     unsafe extern "C" {

@@ -134,9 +134,10 @@ extern "C" fn after_hard_fault(program_counter: u32, link: u32) -> ! {
 /// Handler of a stopped crystal, and of an error in the flash that cannot be corrected. If the crystal does not start
 /// again after the reset, the firmware runs from the internal oscillator.
 ///
-/// A double word of the settings that a power failure has torn does not stop the firmware.
-#[exception]
-unsafe fn NonMaskableInt() {
+/// A double word of the settings that a power failure has torn does not stop the firmware. The vector leads to the start block,
+/// which comes here once it has gone on to `main`.
+#[unsafe(no_mangle)] // SAFETY: the name that `start.rs` calls, defined nowhere else.
+extern "C" fn non_maskable() {
     if flash::forgive_torn() {
         return;
     }

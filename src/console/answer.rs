@@ -169,6 +169,7 @@ fn remark(reply: Reply) -> impl fmt::Display {
         Reply::Applied(applied) => write!(f, "{applied}"),
         Reply::BootPin => f.write_str(": with the boot pin in use, see `board`"),
         Reply::Rebooting => f.write_str(": rebooting"),
+        Reply::Loader => f.write_str(": ST's loader is next"),
     })
 }
 

@@ -35,7 +35,7 @@ const LARGEST_DIVIDER: u16 = 1000;
 /// retired one.
 pub const COMMANDS: &str = "help status start commission accept learn stop relock torque speed jog position home angle get \
     describe set apply revert save defaults backup learned faults history clear trace stream baud \
-    log echo reboot board confirm version h ?";
+    log echo reboot update board confirm version h ?";
 
 /// The words of a line.
 struct Words<'a>(SplitAsciiWhitespace<'a>);
@@ -211,6 +211,12 @@ fn order<'a>(word: &str, words: &mut Words<'a>) -> Result<Option<Order>, ParseEr
             Some("now") => Order::Reboot(true),
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
+        // ST's loader holds PA9 high (AN2606).
+        "update" => words.one_of(
+            "`gates-off`: ST's loader switches a gate on, so the supply of the gate drivers must be off. That word",
+            "gates-off",
+            &[("gates-off", Order::Update)],
+        )?,
         "confirm" => words.one_of("what to confirm", "board", &[("board", Order::Confirm)])?,
         _ => return Ok(None),
     }))

@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 40] = [
+pub const HELP: [&str; 41] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position; vf: turn a motor that is not identified",
@@ -38,6 +38,7 @@ pub const HELP: [&str; 40] = [
     "log off|error|warn|info|debug  how much goes to the log",
     "echo on|off               whether typed characters are sent back",
     "reboot [now]              reset the controller; `now` drops settings that were not saved",
+    "update gates-off          reset into ST's loader, which writes another image; the supply of the gate drivers must be off: the loader switches a gate on",
     "board [NAME]              the board with what is assumed of it; NAME: the lines that follow are for that board",
     "confirm board             the bench steps of the board are done: allow to start, and save",
     "version                   which firmware this is",

@@ -51,8 +51,8 @@ pub trait DriveHandle {
     /// # Errors
     /// The flash failed.
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError>;
-    /// Resets the chip. Only while the outputs are off.
-    fn reboot(&mut self);
+    /// Resets the chip, into ST's loader or the firmware. Only while the outputs are off.
+    fn reboot(&mut self, loader: bool);
     /// Calls `show` with the result of a learning that ended since the last call, accepted or not.
     fn learned(&mut self, show: &mut dyn FnMut(&Learned));
 }

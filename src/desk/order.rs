@@ -56,6 +56,8 @@ pub enum Order {
     Echo(bool),
     /// Reset the controller; whether unsaved settings may be lost.
     Reboot(bool),
+    /// Reset it into ST's loader: the gate drivers have no supply.
+    Update,
     /// Check that what follows belongs to this board.
     BoardIs(&'static Board),
     /// Note that the bench steps of the board were done, and save.
@@ -117,6 +119,8 @@ pub enum Reply {
     BootPin,
     /// The chip is about to be reset.
     Rebooting,
+    /// It is about to be reset into ST's loader.
+    Loader,
 }
 
 /// Reason why an order was not carried out.
@@ -168,6 +172,11 @@ pub enum Refusal {
     /// Changes would be lost.
     #[error("settings that were not saved would be lost: `save` first, or `reboot now`")]
     Unsaved,
+    /// The dc link, V, is charged.
+    #[error(
+        "the dc link has {0:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most"
+    )]
+    Charged(f32),
     /// The bus sets a setting of the hardware.
     #[error("{} belongs to the hardware: set it at the console", .0.name())]
     Hardware(Key),
@@ -181,6 +190,9 @@ pub enum Refusal {
     #[error("the reference is lost, {0}; close RESET or `clear`, then start anew")]
     Reference(Lost),
 }
+
+/// Highest dc link beside ST's loader, V.
+pub const LOADER_DC_LINK_V: f32 = 20.0;
 
 /// Refusal by the side that commands, in the order of [`Commander`].
 const AUTHORITY: [&str; 3] = [

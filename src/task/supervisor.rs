@@ -12,7 +12,7 @@ use drive_settings::{Scales, Settings, SettingsError};
 
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{memory, over_voltage, pwm, stop, time};
+use crate::chip::{memory, over_voltage, pwm, start, stop, time};
 use crate::task::check::Check;
 use crate::task::clock::Clock;
 use crate::task::control;
@@ -338,8 +338,11 @@ impl DriveHandle for Supervisor {
         }
     }
 
-    fn reboot(&mut self) {
+    fn reboot(&mut self, loader: bool) {
         pwm::outputs_off();
+        if loader {
+            start::into_loader();
+        }
         cortex_m::peripheral::SCB::sys_reset();
     }
 }
@@ -390,7 +393,7 @@ impl Firmware for Supervisor {
 
     fn version(&self, to: &mut dyn fmt::Write) -> fmt::Result {
         to.write_str(VERSION)?;
-        to.write_str(", build ")?;
+        write!(to, ", image {:08x}, build ", start::check())?;
         memory::build_id().iter().try_for_each(|byte| write!(to, "{byte:02x}"))?;
         let banks = if self.chip.dual_bank { 2 } else { 1 };
         write!(to, "; option bytes {:08x}, {banks} bank(s)", self.chip.options)

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{self, Target};
-use crate::{control, paths, run, sections, sources, stack};
+use crate::{control, paths, run, seal, sections, sources, stack};
 
 /// The name that probe-rs has for the controller of the board.
 pub const CHIP: &str = "STM32G474RETx";
@@ -46,11 +46,12 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
     run::step(&format!("firmware for {board}"), &mut command)?;
     let elf = target.image()?;
     check(&elf)?;
+    seal::seal(&elf).context("the check sum of the image")?;
     if board == REFERENCE {
         return Ok(elf);
     }
     let copy = run::folder(format!("{BOARDS}/{board}"))?.join("induction-drive");
-    for extension in ["", "map"] {
+    for extension in ["", "map", "bin", "hex"] {
         fs::copy(elf.with_extension(extension), copy.with_extension(extension))
             .with_context(|| copy.display().to_string())?;
     }

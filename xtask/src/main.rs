@@ -15,6 +15,7 @@ mod paths;
 mod prove;
 mod rooms;
 mod run;
+mod seal;
 mod sections;
 mod size;
 mod sources;

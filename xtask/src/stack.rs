@@ -41,7 +41,7 @@ const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write
 /// Part of the name of a veneer, which ends with the name of its target.
 pub const VENEER: &str = "LongThunk_";
 /// Sections with code.
-const SECTIONS: [&str; 4] = [".text", ".ccm", ".design", ".background"];
+const SECTIONS: [&str; 5] = [".start", ".text", ".ccm", ".design", ".background"];
 /// The section with code in the bank that is written: no interrupt may need it.
 const WRITTEN_BANK: &str = ".background";
 

@@ -49,6 +49,8 @@ pub struct Board {
     pub plant: Plant,
     connection: Connection,
     addresses: Option<Addresses>,
+    /// ST's boot loader, while it runs.
+    pub loader: Option<rom::Loader>,
     /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
     /// The check that control interrupts leave the preempted code intact, if wanted.
@@ -100,6 +102,7 @@ impl Board {
             ensure!(inside, "a segment at {:#x} is not in the flash of the code", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
+        cpu.write(memory::SYSTEM, &rom::CODE);
         let addresses = Addresses::find(&image)?;
         let log = Log::find(&image)?;
         let mut board = Self {
@@ -110,6 +113,7 @@ impl Board {
             plant,
             connection: Connection::new(&options),
             addresses,
+            loader: None,
             disturb: None,
             poison: None,
             went_off: None,
@@ -197,8 +201,13 @@ impl Board {
         self.progress.sleeping = false;
         self.progress.hung = false;
         self.progress.entered = None;
+        self.loader = None;
         self.follow_outputs();
         self.cpu.reset(memory::FLASH);
+        // Without a vector the core locks up.
+        if self.cpu.word(memory::FLASH + 4) == Some(u32::MAX) {
+            self.hang();
+        }
     }
 
     /// Goes on for a number of PWM periods.
@@ -245,6 +254,7 @@ impl Board {
     /// Lets due events happen.
     fn events(&mut self) -> Result<()> {
         self.follow_outputs();
+        self.serve_loader();
         while let Some((at, top)) = self.cpu.chip_mut().catch_up() {
             if top { self.crest(at)? } else { self.valley(at) }
         }

@@ -19,8 +19,8 @@ use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::periph::{
-    adc::Adc, analog::Comparators, dac::Dacs, encoder::EncoderTimer, flash::Flash, gpio::Gpio,
-    iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
+    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dacs, encoder::EncoderTimer, flash::Flash,
+    gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
 };
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
@@ -129,6 +129,10 @@ defaults! {
         pub pwr: Pwr,
         /// Flash.
         pub flash: Flash,
+        /// CRC unit.
+        pub crc: CrcUnit,
+        /// Backup registers.
+        pub tamp: Store = Store::new(plain::TAMP),
         /// Ports A to G.
         pub gpio: [Gpio; 7] = std::array::from_fn(Gpio::new),
         /// System configuration.
@@ -184,7 +188,7 @@ impl Chip {
         if cause == Reset::Power {
             old.rcc.flags = 0;
         } else {
-            keep! { self, old: debug halt }
+            keep! { self, old: debug halt tamp }
         }
         old.rcc.flags |= Rcc::new(cause).flags;
         keep! { self, old:

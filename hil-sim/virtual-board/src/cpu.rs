@@ -188,7 +188,7 @@ impl Cpu {
     pub fn follow_flash(&mut self) -> Result<(), uc_error> {
         let chip = self.chip();
         let wanted =
-            chip.flash.bad_code.is_some() || chip.flash.is_busy(chip.now.saturating_sub(WRITES));
+            chip.flash.has_bad_code() || chip.flash.is_busy(chip.now.saturating_sub(WRITES));
         if wanted == self.flash_reads.is_some() {
             return Ok(());
         }

@@ -55,8 +55,12 @@ pub const BIT_BAND: u32 = 0x4200_0000;
 /// Peripheral registers that have such an alias.
 pub const PERIPHERALS: u32 = 0x4000_0000;
 
+/// The system memory, with ST's boot loader.
+pub const SYSTEM: u32 = 0x1fff_0000;
+
 /// All regions but the alias of CCM: first address, bytes, kind.
-pub const MAP: [(u32, u32, Backing); 10] = [
+pub const MAP: [(u32, u32, Backing); 11] = [
+    (SYSTEM, 0x7000, Backing::Flash),
     (FLASH, STORED - FLASH, Backing::Flash),
     (STORED, FLASH + FLASH_SIZE - STORED, Backing::Registers),
     (0x1fff_7000, 0x1000, Backing::Registers),

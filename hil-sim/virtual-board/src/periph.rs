@@ -2,6 +2,7 @@
 
 pub mod adc;
 pub mod analog;
+pub mod crc;
 pub mod dac;
 pub mod encoder;
 pub mod flash;

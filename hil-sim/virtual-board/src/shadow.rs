@@ -67,7 +67,7 @@ impl DriveHandle for Orders {
     fn save(&mut self, _: &FirmwareSettings) -> Result<(), FlashError> {
         Ok(())
     }
-    fn reboot(&mut self) {}
+    fn reboot(&mut self, _: bool) {}
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
         self.learned.take().iter().for_each(show);
     }

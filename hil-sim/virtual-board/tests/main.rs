@@ -36,3 +36,4 @@ mod stream;
 mod strict;
 mod strip;
 mod tracking;
+mod update;

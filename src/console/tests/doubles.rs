@@ -37,8 +37,10 @@ pub struct FakeDrive {
     pub plan: Option<Plan>,
     /// See `plan`.
     pub triggered: bool,
-    /// Times that the chip was reset.
+    /// Times that the chip was reset, and whether into ST's loader.
     pub reboots: u32,
+    /// See `reboots`.
+    pub in_loader: bool,
     /// Commands so far.
     pub commands: Vec<Command>,
     /// Settings saved last.
@@ -67,6 +69,7 @@ impl FakeDrive {
             plan: None,
             triggered: false,
             reboots: 0,
+            in_loader: false,
             commands: Vec::new(),
             saved: None,
             worn_out: false,
@@ -127,8 +130,9 @@ impl DriveHandle for FakeDrive {
         self.saved = Some(*settings);
         Ok(())
     }
-    fn reboot(&mut self) {
+    fn reboot(&mut self, loader: bool) {
         self.reboots += 1;
+        self.in_loader = loader;
     }
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
         if let Some(found) = self.found.take() {

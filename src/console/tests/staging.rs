@@ -317,3 +317,23 @@ fn a_reboot_loses_nothing_silently_and_waits_for_its_answer() {
     assert_eq!(talk.ask("echo off"), "ok");
     assert_eq!(talk.ask("reboot now"), "ok: rebooting");
 }
+
+#[test]
+fn an_update_waits_for_what_the_loader_needs() {
+    let mut talk = Talk::new();
+    // 450 V at full scale.
+    talk.drive.sample.dc_link = 4095 * 21 / 450;
+    let charged = "error: the dc link has 21 V, and ST's loader drives a gate: 20 V at most";
+    assert_eq!(talk.ask("update gates-off"), charged);
+    talk.drive.sample.dc_link = 4095 * 19 / 450;
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    assert!(talk.ask("update gates-off").starts_with("error: settings that were not saved"));
+    assert_eq!(talk.ask("save"), "ok");
+    assert_eq!(talk.ask("start"), "ok");
+    assert_eq!(talk.ask("update gates-off"), "error: the drive must be off: `stop` first");
+    assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.ask("update gates-off"), "ok: ST's loader is next");
+    talk.now_ms += 101;
+    talk.poll();
+    assert!(talk.drive.in_loader && talk.drive.reboots == 1);
+}

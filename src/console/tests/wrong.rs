@@ -66,6 +66,8 @@ const WRONG: [(&str, &[&str]); 65] = [
     ("log loud", &["level", "loud", "off error warn info debug"]),
     ("echo maybe", &["maybe", "on off"]),
     ("reboot later", &["later"]),
+    ("update", &["`gates-off`", "switches a gate on", "is missing"]),
+    ("update now", &["now", "gates-off"]),
     ("board mine", &["board", "mine", "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3"]),
     ("confirm", &["what to confirm"]),
     ("confirm motor", &["motor", "board"]),

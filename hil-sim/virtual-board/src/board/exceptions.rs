@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::Board;
+use super::{Board, rom};
 use crate::cpu::{Register, Stop};
 use crate::{chip::CONTROL_INTERRUPT, memory, scs};
 
@@ -91,6 +91,7 @@ impl Board {
         }
         match self.cpu.run() {
             Stop::Asked => {}
+            Stop::Wait if rom::is_inside(self.cpu.get(Register::PC)) => self.enter_loader()?,
             Stop::Wait => self.progress.sleeping = true,
             Stop::Return(exc_return) => self.leave(exc_return)?,
             Stop::Access(address) if memory::is_reserved(address) || self.cpu.chip().forgiving => {

@@ -15,6 +15,9 @@ impl Board {
 
     /// Puts bytes on the wire to the console.
     pub fn send(&mut self, bytes: &[u8]) {
+        if let Some(loader) = &mut self.loader {
+            return loader.line.extend(bytes);
+        }
         let chip = self.chip();
         chip.lpuart.line.to_chip.extend(bytes.iter().map(|byte| u16::from(*byte)));
         chip.lpuart.wake(chip.now);
@@ -51,6 +54,17 @@ impl Board {
         if let Some(log) = &mut self.log {
             self.progress.lines.extend(log.take(&mut self.cpu)?);
         }
+        Ok(())
+    }
+
+    /// The power stage loses its supplies, of the gate drivers and of the dc link, V, or has them again.
+    ///
+    /// # Errors
+    /// A dc link that the plant refuses.
+    pub fn supply_stage(&mut self, on: bool, dc_link_v: f64) -> Result<()> {
+        self.chip().gates.without_supply = !on;
+        self.chip().look_at_gates();
+        self.plant.set_dc_link(dc_link_v)?;
         Ok(())
     }
 

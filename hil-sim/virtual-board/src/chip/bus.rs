@@ -38,6 +38,8 @@ clocked! {
     DAC1 = 0x5000_0800, AHB2ENR, 16;
     DAC3 = 0x5000_1000, AHB2ENR, 18;
     FLASH = 0x4002_2000, AHB1ENR, 8;
+    CRC = 0x4002_3000, AHB1ENR, 12;
+    TAMP = 0x4000_2400, APB1ENR1, 10;
 }
 const EXTI: u32 = 0x4001_0400;
 const IWDG: u32 = 0x4000_3000;
@@ -158,6 +160,8 @@ impl Chip {
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH => self.flash.read(offset, now),
+            CRC => self.crc.read(offset),
+            TAMP => self.tamp.read(offset),
             port @ (LPUART1 | USART3) => {
                 let port = if port == LPUART1 { &mut self.lpuart } else { &mut self.usart3 };
                 let value = port.read(offset);
@@ -210,6 +214,9 @@ impl Chip {
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => self.pwr.write(offset, value, locked)?,
             FLASH => self.flash.write(offset, value, rules)?,
+            CRC => self.crc.write(offset, value)?,
+            TAMP if !self.pwr.opens_backup() => Effect::None,
+            TAMP => self.tamp.write(offset, value)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
             USART3 => self.usart3.write(offset, value, now)?,
             IWDG => self.iwdg.write(offset, value, rules)?,

@@ -71,7 +71,7 @@ impl Chip {
     /// A fetch or a read of some bytes of the flash: raises what their check code says. Whether the core waits before it goes on.
     #[inline]
     pub fn fetch(&mut self, address: u32, size: u32) -> bool {
-        if self.flash.bad_code.is_some() && self.flash.is_bad(address, size) {
+        if self.flash.has_bad_code() && self.flash.is_bad(address, size) {
             self.flash_error();
         }
         let waits = self.flash.delays(address, self.now);

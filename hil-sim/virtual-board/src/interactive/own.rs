@@ -13,16 +13,20 @@ pub enum Own {
     Unplug,
     /// Closes these contacts of the terminal strip, opens the others, and gives the reference a current.
     Wires(String),
+    /// Switches the supplies of the power stage.
+    Stage(bool),
     /// Ends the session.
     Quit,
 }
 
 /// Names and meanings.
 #[rustfmt::skip]
-static COMMANDS: [(&str, Own, &str); 5] = [
+static COMMANDS: [(&str, Own, &str); 7] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
     ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
+    ("!stage off", Own::Stage(false), "takes the supplies of gate drivers and dc link away, as `update` needs it"),
+    ("!stage on", Own::Stage(true), "gives them back"),
     ("!wires", Own::Wires(String::new()), "of the terminal strip: `!wires ENABLE START 12` closes these and no others, and gives 12 mA"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
@@ -46,6 +50,6 @@ impl Own {
 
     /// A line about each command.
     pub fn help() -> impl Iterator<Item = String> {
-        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<8} {meaning}"))
+        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<10} {meaning}"))
     }
 }

@@ -77,6 +77,8 @@ pub struct Session {
     wire: Splitter,
     resets: usize,
     last: Option<Period>,
+    /// The dc link at the beginning, V.
+    dc_link_v: f64,
     /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
     flux: Option<[f64; 3]>,
     /// All lines so far.
@@ -91,6 +93,7 @@ impl Session {
     /// A session with a board that has just been powered.
     pub fn new(board: Board, pty: Pty, bus: Pty, inputs: Inputs) -> Self {
         Self {
+            dc_link_v: board.plant.dc_link(),
             board,
             pty,
             bus,
@@ -190,7 +193,9 @@ impl Session {
                 Due::End | Due::Nothing => {}
             }
         }
-        let went = (0..SLICE).try_for_each(|_| self.period());
+        // The loader's answers are awaited.
+        let slice = if self.board.loader.is_some() { SLICE / 10 } else { SLICE };
+        let went = (0..slice).try_for_each(|_| self.period());
         self.hear()?;
         if let Some([drive, motor, flux]) = self.flux.take().filter(|_| self.inputs.flux) {
             // A reader that has gone away is no reason to stop.
@@ -223,6 +228,12 @@ impl Session {
                 let set = self.board.set_wires(&wires);
                 set.err().into_iter().for_each(|why| self.add(Source::Board, why.to_string()));
             }
+            Own::Stage(on) => {
+                let volts = if on { self.dc_link_v } else { 1.0 };
+                if let Err(why) = self.board.supply_stage(on, volts) {
+                    return Some(End::Failed(why));
+                }
+            }
         }
         None
     }
@@ -236,6 +247,9 @@ impl Session {
     fn send(&mut self, bytes: &[u8]) {
         if !bytes.is_empty() {
             self.board.send(bytes);
+            if self.board.loader.is_some() {
+                return;
+            }
             for line in self.typed.push(bytes) {
                 // The person who asks for more of the log sees it.
                 let level = line.trim().strip_prefix("log ").and_then(LogLevel::named);
@@ -282,6 +296,7 @@ impl Session {
             _ => None,
         };
         let text: Vec<u8> = bytes.iter().filter_map(text).collect();
+        let text = if self.board.loader.is_some() { Vec::new() } else { text };
         for line in self.said.push(&text) {
             let begun = line.split_once("ok: every ").and_then(|(_, rest)| rest.split(' ').next());
             let rate = begun.and_then(|periods| periods.parse::<f64>().ok()).map(|n| RATE_HZ / n);

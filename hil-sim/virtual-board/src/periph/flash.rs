@@ -42,10 +42,12 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
 /// Bytes of the part that can be written.
 const SIZE: usize = (FLASH + FLASH_SIZE - STORED) as usize;
-const PAGE: usize = 2048;
+/// Bytes of a page.
+pub const PAGE: usize = 2048;
 /// Typical times, ticks: a double word 82 us, a page 22 ms (datasheet).
-const PROGRAM: u64 = 82 * 170;
-const ERASE: u64 = 22_000 * 170;
+pub const PROGRAM: u64 = 82 * 170;
+/// The same.
+pub const ERASE: u64 = 22_000 * 170;
 
 defaults! {
     /// The flash; by default erased.
@@ -66,6 +68,8 @@ defaults! {
         torn: Vec<bool> = vec![false; SIZE / 8],
         /// Address of a double word of the code whose check code is wrong.
         pub bad_code: Option<u32>,
+        /// Addresses in the code whose check code the boot loader has left wrong, when the power went.
+        torn_code: Range<u32> = 0..0,
         /// Double words of the last operation.
         changing: Range<usize> = 0..0,
         /// Operations since the beginning: double words programmed, pages erased.
@@ -83,6 +87,7 @@ impl Flash {
         Self {
             bytes: self.bytes,
             torn: self.torn,
+            torn_code: self.torn_code,
             operations: self.operations,
             options: self.options,
             ..Self::default()
@@ -127,10 +132,31 @@ impl Flash {
         self.is_busy(now) && (address >= BANK_2 || self.options & DBANK == 0)
     }
 
+    /// Whether the code has double words whose check code is wrong.
+    pub fn has_bad_code(&self) -> bool {
+        self.bad_code.is_some() || !self.torn_code.is_empty()
+    }
+
     /// A read or a fetch of some bytes: whether their check code is wrong.
     pub fn is_bad(&mut self, address: u32, size: u32) -> bool {
-        let bad = self.bad_code.filter(|bad| *bad < address + size && address < bad + 8);
-        bad.inspect(|bad| self.note_error(*bad)).is_some()
+        let bad = [self.bad_code.map_or(0..0, |bad| bad..bad + 8), self.torn_code.clone()];
+        let bad = bad.into_iter().find(|bad| bad.start < address + size && address < bad.end);
+        bad.inspect(|bad| self.note_error(bad.start)).is_some()
+    }
+
+    /// The boot loader erases or programs these addresses, double words of the code or of the stored part, and may lose its
+    /// power. The stored part takes these bytes.
+    pub fn by_loader(&mut self, range: Range<u32>, bytes: &[u8]) {
+        let lost = self.power_goes();
+        if let Some(at) = range.start.checked_sub(STORED) {
+            let at = at as usize;
+            self.bytes[at..at + bytes.len()].copy_from_slice(bytes);
+            self.torn[at / 8..(at + bytes.len()) / 8].fill(lost);
+        } else if lost {
+            self.torn_code = range;
+        } else if range.contains(&self.torn_code.start) {
+            self.torn_code = 0..0;
+        }
     }
 
     fn note_error(&mut self, address: u32) {

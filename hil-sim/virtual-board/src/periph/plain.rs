@@ -42,6 +42,8 @@ pub const SYSCFG: &[Plain] = &[
     (0x20, 0, u32::MAX),
     (0x24, 0, 0),
 ];
+/// The backup registers (RM0440, TAMP): one of them.
+pub const TAMP: &[Plain] = &[(0x100, 0, u32::MAX)];
 /// Of the system configuration: errors that go to the breaks of the timers.
 pub const CFGR2: u32 = 0x1c;
 /// CFGR2: a lock-up of the core.

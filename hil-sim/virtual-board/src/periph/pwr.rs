@@ -16,7 +16,7 @@ registers! {
     _ = 0x2c, 0, 0xffef;
     CR5 = 0x80, 0x100, 0x100;
 }
-bits! { PVDE = 0, PVDO = 11 }
+bits! { PVDE = 0, DBP = 8, PVDO = 11 }
 /// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last is a pin.
 const LEVELS: [f64; 7] = [2.05, 2.2, 2.36, 2.52, 2.64, 2.81, 2.9];
 
@@ -65,6 +65,11 @@ impl Pwr {
             (_, 0) => Range::Boost,
             _ => Range::Normal,
         }
+    }
+
+    /// Whether the backup registers can be written.
+    pub fn opens_backup(&self) -> bool {
+        self.store.get(CR1) & DBP != 0
     }
 
     /// Whether the supply monitor is on.

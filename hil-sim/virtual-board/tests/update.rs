@@ -1,0 +1,268 @@
+//! The check sum of the image, `update`, and ST's boot loader behind it.
+
+use anyhow::{Result, ensure};
+use hil_sim::Config;
+use hil_sim::console::update;
+use rand::{RngExt as _, SeedableRng as _};
+use virtual_board::interactive::pty::Pty;
+use virtual_board::memory::FLASH;
+use virtual_board::periph::Reset;
+use virtual_board::{Board, Image, Options};
+
+/// Control periods until the image greets, at most.
+const GREETING: u64 = 30_000;
+
+fn board() -> Result<Board> {
+    Board::new(Image::built()?, Options::new(&Config::default(), 37))
+}
+
+/// Goes on until the console says this; all that it has said.
+fn until(board: &mut Board, text: &str, periods: u64) -> Result<String> {
+    let mut said = String::new();
+    for _ in 0..periods / 60 {
+        board.run_periods(60)?;
+        said += &board.take_console();
+        if said.contains(text) && said.ends_with('\n') {
+            return Ok(said);
+        }
+    }
+    anyhow::bail!("no `{text}` in {said:?}")
+}
+
+fn ask(board: &mut Board, line: &str) -> Result<String> {
+    board.type_line(line);
+    until(board, "\n", 3000)
+}
+
+/// The modes of all pins but PA2 and PA3.
+fn modes(board: &mut Board) -> Vec<u32> {
+    let console = |port: usize| if port == 0 { 0xf0 } else { 0 };
+    let gpio = board.chip().gpio.iter().enumerate();
+    gpio.map(|(n, port)| port.read(0).unwrap_or(0) | console(n)).collect()
+}
+
+/// The greeting comes with a whole image. One bit that is wrong, anywhere outside of the start block, or a word that the flash
+/// cannot correct, leaves all pins alone but those of the console, which says why.
+#[test]
+fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
+    let mut board = board()?;
+    until(&mut board, "induction-drive", GREETING)?;
+    let version = ask(&mut board, "version")?;
+    let check = board.cpu.word(board.image.symbol("__check")?.address).unwrap_or(0);
+    ensure!(version.contains(&format!(", image {check:08x}, ")), "{version}");
+    board.reset(Reset::Pin);
+    let untouched = modes(&mut board);
+    let refused = |board: &mut Board, why: &str| -> Result<()> {
+        let said = until(board, "damaged", 3000)?;
+        ensure!(said.starts_with("error: the image is damaged: `update"), "{why}: {said}");
+        let said = ask(board, "@7 status")?;
+        ensure!(said.starts_with("error: the image is damaged"), "{why}: {said}");
+        ensure!(modes(board) == untouched, "{why}: pins");
+        Ok(())
+    };
+    for segment in board.image.segments.clone() {
+        let last = segment.address + segment.bytes.len() as u32 - 1;
+        for at in [segment.address, last].into_iter().filter(|at| *at >= FLASH + 2048) {
+            let byte = board.cpu.byte(at).unwrap_or(0);
+            board.cpu.write(at, &[byte ^ 0x10]);
+            board.reset(Reset::Pin);
+            refused(&mut board, &format!("{at:#x}"))?;
+            board.cpu.write(at, &[byte]);
+        }
+    }
+    board.reset(Reset::Pin);
+    board.chip().flash.bad_code = Some(FLASH + 0x2_0000);
+    refused(&mut board, "check code")?;
+    board.reset(Reset::Pin);
+    let began = board.time();
+    while modes(&mut board) == untouched {
+        board.run_periods(1)?;
+    }
+    println!("{:.1} ms to the first pin", 1e3 * (board.time() - began));
+    until(&mut board, "induction-drive", GREETING).map(drop)
+}
+
+/// The image as the `.bin` of `cargo firmware`, with another commit in its text and the sum of that, if wanted.
+fn binary(board: &Board, other: bool) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for segment in &board.image.segments {
+        let at = (segment.address - FLASH) as usize;
+        bytes.resize(bytes.len().max(at + segment.bytes.len()), 0xff);
+        bytes[at..at + segment.bytes.len()].copy_from_slice(&segment.bytes);
+    }
+    if other {
+        let commit = b", commit ";
+        let at = bytes.windows(9).position(|text| text == commit).expect("a commit") + 9;
+        bytes[at..at + 4].copy_from_slice(b"next");
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4"));
+        let pieces = (board.image.symbol("__pieces").expect("pieces").address - FLASH) as usize;
+        let sum = (0..4).fold(u32::MAX, |sum, n| {
+            let [from, to] = [0, 4].map(|at| (word(pieces + 8 * n + at) - FLASH) as usize);
+            bytes[from..to].iter().fold(sum, |sum, byte| {
+                let step = |v: u32, _| v >> 1 ^ if v & 1 != 0 { 0xedb8_8320 } else { 0 };
+                (0..8).fold(sum ^ u32::from(*byte), step)
+            })
+        });
+        bytes[pieces + 32..pieces + 36].copy_from_slice(&(!sum).to_le_bytes());
+    }
+    bytes
+}
+
+/// `cargo sim update` with these bytes, beside the board; what the new image says to `version`. Ends early when the power goes.
+fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
+    let image = update::Image::new(bytes).map_err(anyhow::Error::msg)?;
+    let mut pty = Pty::open()?;
+    let (mut port, _) = hil_sim::console::open(&pty.path.to_string_lossy(), 115_200)?;
+    let host = std::thread::spawn(move || update::update(&mut port, &image, |_| ()));
+    let resets = board.resets.len();
+    while !host.is_finished() {
+        board.send(&pty.read()?);
+        board.run_periods(if board.loader.is_some() { 1 } else { 6 })?;
+        if board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power) {
+            // The program finds nobody at the line, and ends.
+            return Ok(None);
+        }
+        pty.write(&board.chip().lpuart.line.take())?;
+    }
+    let said = host.join().map_err(|_| anyhow::anyhow!("the program panicked"))?;
+    Ok(Some(said?))
+}
+
+/// A board without voltage at its power stage.
+fn unsupplied() -> Result<Board> {
+    let mut board = board()?;
+    board.supply_stage(false, 1.0)?;
+    until(&mut board, "induction-drive", GREETING)?;
+    Ok(board)
+}
+
+/// Refused: without the word, with a charged dc link, with values that would be lost. With the supply of the drivers on, the judge
+/// of the gates sees what the loader does.
+#[test]
+fn update_asks_for_the_conditions_that_the_loader_needs() -> Result<()> {
+    let mut board = board()?;
+    until(&mut board, "induction-drive", GREETING)?;
+    ensure!(ask(&mut board, "update")?.contains("switches a gate on"));
+    ensure!(ask(&mut board, "update gates-off")?.contains("the dc link has 311 V"));
+    board.supply_stage(true, 10.0)?;
+    board.run_periods(600)?;
+    ask(&mut board, "set motor.r_s 5")?;
+    ensure!(ask(&mut board, "update gates-off")?.contains("would be lost"));
+    ask(&mut board, "revert")?;
+    ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's loader is next"));
+    let why = board.run_periods(1200).expect_err("nothing was noticed").to_string();
+    ensure!(why.contains("high side b is on while the outputs are off"), "{why}");
+    Ok(())
+}
+
+/// The program writes another image, starts it and reads its check sum; settings stay.
+#[test]
+fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
+    let mut board = unsupplied()?;
+    ask(&mut board, "set speed.ramp_rpm_per_s 777")?;
+    board.type_line("save");
+    until(&mut board, "ok", 60_000)?;
+    let (old, began) = (ask(&mut board, "version")?, board.time());
+    let next = binary(&board, true);
+    let said = update(&mut board, next)?.expect("no power was lost");
+    println!("{:.1} s simulated\n{old}{said}", board.time() - began);
+    ensure!(said.contains(", commit next"), "{said}");
+    ensure!(ask(&mut board, "get speed.ramp_rpm_per_s")?.contains("= 777"));
+    Ok(())
+}
+
+/// What the program sends, without waiting for answers, until the power goes in an operation of the flash, counted from 1.
+fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
+    let summed = |bytes: &[u8]| [bytes, &[bytes.iter().fold(0, |sum, byte| sum ^ byte)]].concat();
+    board.type_line("update gates-off");
+    while board.loader.is_none() {
+        board.run_periods(60)?;
+    }
+    let flash = &mut board.chip().flash;
+    flash.power_loss_at = Some(flash.operations + operation);
+    board.send(&[0x7f]);
+    let mut pages: Vec<_> = pages(bytes).collect();
+    pages.rotate_left(1);
+    for (n, page) in pages {
+        board.send(&[&[0x44, 0xbb], &summed(&[0, 0, 0, n as u8])[..]].concat());
+        for (block, data) in page.chunks(256).enumerate() {
+            let at = (FLASH + (2048 * n + 256 * block) as u32).to_be_bytes();
+            let data = summed(&[&[0xff], data].concat());
+            board.send(&[&[0x31, 0xce], &summed(&at)[..], &data[..]].concat());
+        }
+        while board.loader.as_ref().is_some_and(|loader| !loader.line.is_empty()) {
+            board.run_periods(60)?;
+        }
+        if board.resets.last().is_some_and(|(_, cause)| *cause == Reset::Power) {
+            return Ok(());
+        }
+    }
+    anyhow::bail!("{operation}: no loss of power")
+}
+
+/// The pages of an image that are not empty.
+fn pages(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    bytes.chunks(2048).enumerate().filter(|(_, page)| page.iter().any(|byte| *byte != 0xff))
+}
+
+/// The power goes at drawn operations of the flash: afterwards the old or the new image runs, or the start block says why not and
+/// takes the update, or, while the first page is written, nothing starts.
+fn power_losses(count: u32, first_page: u32) -> Result<()> {
+    let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(37);
+    let mut board = unsupplied()?;
+    let [old, next] = [false, true].map(|other| {
+        let mut bytes = binary(&board, other);
+        bytes.resize(bytes.len().next_multiple_of(2048), 0xff);
+        bytes
+    });
+    let operations = pages(&next).count() as u64 * (1 + 256);
+    let (mut started, mut told, mut silent) = (0, 0, 0);
+    for n in 0..count + first_page {
+        // The image as it was, whole.
+        for (at, page) in pages(&old) {
+            let at = FLASH + 2048 * at as u32;
+            board.cpu.write(at, page);
+            board.chip().flash.by_loader(at..at + 2048, page);
+        }
+        board.forgive();
+        board.reset(Reset::Pin);
+        until(&mut board, "induction-drive", GREETING)?;
+        let at = operations - rng.random_range(0..if n < count { operations } else { 257 });
+        lose_power(&mut board, &next, at)?;
+        board.take_console();
+        let mut said = String::new();
+        for _ in 0..GREETING / 600 {
+            board.run_periods(600)?;
+            said += &board.take_console();
+            if said.ends_with('\n') {
+                break;
+            }
+        }
+        let in_first_page = at + 257 > operations;
+        match said.as_str() {
+            text if text.contains("induction-drive") => started += 1,
+            text if text.starts_with("error: the image is damaged") => {
+                told += 1;
+                ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's"), "{at}");
+                board.run_periods(60)?;
+                ensure!(board.loader.is_some(), "{at}: no loader");
+            }
+            "" if in_first_page => silent += 1,
+            text => anyhow::bail!("{at} of {operations}: {text:?}"),
+        }
+    }
+    println!("{operations} operations; {started} started, {told} told why not, {silent} silent");
+    Ok(())
+}
+
+#[test]
+fn a_loss_of_power_leaves_an_image_that_starts_or_says_why_not() -> Result<()> {
+    power_losses(2, 1)
+}
+
+/// `cargo test --release --test image update::fifty -- --ignored --nocapture`
+#[test]
+#[ignore = "long"]
+fn fifty_losses_of_power_and_ten_in_the_first_page() -> Result<()> {
+    power_losses(50, 10)
+}
