@@ -18,6 +18,7 @@ use crate::board;
 use crate::console;
 use crate::error::Error;
 use crate::experiments;
+use crate::first_light;
 use crate::input::{Input, OUT};
 use part::Part;
 use run::{Output, Trace};
@@ -133,6 +134,10 @@ enum Command {
     /// For a board and for the pseudo-terminal of `cargo sim board` alike. `!help` lists the commands of this program;
     /// other lines go to the drive. Exit code 1 when the drive refuses a line of --command or of standard input.
     Console(console::Options),
+    /// First power-up of a board, step by step: says what to do and measure, talks to the drive, judges, and stops on doubt
+    ///
+    /// Ends in one file of evidence, with which a later run goes on. Exit code 1 for a step that was not passed.
+    FirstLight(first_light::Options),
 }
 
 /// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
@@ -170,6 +175,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Board(options)) => board::become_board(&options),
         Some(Command::Console(options)) => console::run(&options),
+        Some(Command::FirstLight(options)) => first_light::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

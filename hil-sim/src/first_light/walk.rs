@@ -1,0 +1,353 @@
+//! Walks through the table: one step after the other, each judged, until one gives doubt.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::evidence::{Evidence, Record, SCHEMA, Verdict};
+use super::person::Person;
+use super::table::{Act, Board, Limits, Ready, Table};
+use super::wire::Wire;
+use crate::error::Error;
+
+/// `command.timeout_s` while a step may switch the stage on: a drive that hears nothing for so long stops by itself.
+pub const TIMEOUT_S: u32 = 2;
+/// Beginnings of lines that come unasked and end a step, unless the step waits for them.
+const DOUBTS: [&str; 5] =
+    ["* fault ", "* induction-drive", "* error", "* stopped: no command", "* refused"];
+/// Longest time in which a controller that starts again answers, s.
+const STARTS_S: u32 = 20;
+/// Time between two looks at what was said, s.
+const LOOK_S: f64 = 0.2;
+
+/// Where results go, and what may end a walk.
+#[derive(Default)]
+pub struct Session {
+    /// The file of the evidence; none is written without.
+    pub file: Option<PathBuf>,
+    /// Who and what; for a new file.
+    pub bench: String,
+    /// The board that is expected; otherwise that of the image.
+    pub board: Option<String>,
+    /// Leaves out the steps that may be skipped.
+    pub skip: bool,
+    /// Set by Ctrl-C.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+/// A walk through the table with a drive and a person.
+pub struct Walk<'a, W, P> {
+    table: &'a Table,
+    board: &'a Board,
+    wire: W,
+    person: P,
+    session: Session,
+    evidence: Evidence,
+    record: Record,
+    /// Heard since the last line was sent.
+    said: Vec<String>,
+    /// Unasked lines that end the step, unless it waits for them.
+    doubts: Vec<String>,
+    /// Last readings, by the text at which they stand.
+    readings: BTreeMap<String, f64>,
+}
+
+/// Why a step was not passed.
+struct Failure(Verdict, String);
+type Checked<T = ()> = Result<T, Failure>;
+
+fn doubt<T>(why: impl Into<String>) -> Checked<T> {
+    Err(Failure(Verdict::Stopped, why.into()))
+}
+
+/// The answer of a person who is there.
+fn there<T>(answer: Option<T>) -> Checked<T> {
+    answer.ok_or_else(|| Failure(Verdict::Interrupted, "interrupted by the person".to_owned()))
+}
+
+impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
+    /// Begins, or goes on with the evidence of a file.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the drive does not answer, or board or build are not those of the evidence.
+    pub fn new(table: &'a Table, mut wire: W, person: P, session: Session) -> Result<Self, Error> {
+        let old = session.file.as_deref().map(Evidence::open).transpose()?.flatten();
+        let (name, build) = identity(&mut wire).map_err(Error::Refused)?;
+        let new = || {
+            let (board, bench) = (name.clone(), session.bench.clone());
+            Evidence { schema: SCHEMA, bench, board, build: build.clone(), steps: Vec::new() }
+        };
+        let evidence = old.unwrap_or_else(new);
+        let expected = session.board.as_ref().unwrap_or(&evidence.board);
+        for (what, there, wanted) in [
+            ("board", &name, expected),
+            ("board", &name, &evidence.board),
+            ("build", &build, &evidence.build),
+        ] {
+            if there != wanted {
+                return Err(Error::Refused(format!(
+                    "{what} {there}: allowed is {wanted}; another image or board begins with a new evidence file"
+                )));
+            }
+        }
+        let record = Record::new("", Verdict::Interrupted);
+        let (said, doubts, readings) = Default::default();
+        let board = table.board(&name)?;
+        Ok(Self { table, board, wire, person, session, evidence, record, said, doubts, readings })
+    }
+
+    /// The evidence so far.
+    pub fn evidence(&self) -> &Evidence {
+        &self.evidence
+    }
+
+    /// Walks to the end.
+    ///
+    /// # Errors
+    /// As [`Walk::step`].
+    pub fn run(&mut self) -> Result<(), Error> {
+        while self.step()? {}
+        Ok(())
+    }
+
+    /// Walks through the next step; false when there is none.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] for a step that was not passed; those of the table and of the file.
+    pub fn step(&mut self) -> Result<bool, Error> {
+        let Some(ready) = self.table.next(&self.evidence)? else { return Ok(false) };
+        let step = ready.step();
+        let skip = self.session.skip && step.optional;
+        let begun = if skip { Verdict::Skipped } else { Verdict::Interrupted };
+        self.record = Record::new(&step.name, begun);
+        // Before anything is done: what breaks off leaves a trace in the file.
+        self.evidence.steps.push(self.record.clone());
+        self.write()?;
+        if skip {
+            return Ok(true);
+        }
+        let end = self.walk(&ready);
+        let mut off = Ok(());
+        if step.switches_on() || end.is_err() {
+            off = self.switch_off();
+        }
+        (self.record.verdict, self.record.why) = match (end, off) {
+            (Ok(()), Ok(())) => (Verdict::Passed, String::new()),
+            (Ok(()), Err(Failure(verdict, why))) => (verdict, why),
+            (Err(Failure(verdict, why)), Ok(())) => (verdict, why),
+            (Err(Failure(verdict, why)), Err(Failure(_, off))) => (
+                verdict,
+                format!("{why}; {off}: without lines the drive stops after {TIMEOUT_S} s"),
+            ),
+        };
+        self.evidence.steps.pop();
+        self.evidence.steps.push(self.record.clone());
+        self.write()?;
+        if self.record.verdict == Verdict::Passed {
+            return Ok(true);
+        }
+        let otherwise = self.board.fill(&step.otherwise);
+        let reason = format!("{}\n{otherwise}", self.record.why);
+        Err(Error::Lost { name: format!("step {}, {}", ready.place().0, step.name), reason })
+    }
+
+    fn write(&self) -> Result<(), Error> {
+        self.session.file.as_deref().map_or(Ok(()), |file| self.evidence.write(file))
+    }
+
+    fn walk(&mut self, ready: &Ready) -> Checked {
+        let (number, first) = ready.place();
+        if let Some(part) = first {
+            self.person.tell(&format!("\n{}\n{}", part.title, self.board.fill(&part.before)));
+        }
+        self.person.tell(&format!("\nStep {number}: {}", ready.step().name));
+        (self.said, self.doubts, self.readings) = Default::default();
+        self.wire.unasked();
+        if ready.step().switches_on() {
+            self.send(&format!("set command.timeout_s {TIMEOUT_S}"))?;
+            self.send("save")?;
+        }
+        ready.step().acts.iter().try_for_each(|act| self.act(act))?;
+        self.doubts.first().map_or(Ok(()), |line| doubt(line.clone()))
+    }
+
+    /// `stop`, and the silence of the console may be as long as it likes again.
+    fn switch_off(&mut self) -> Checked {
+        let stopped = self.send("stop");
+        self.doubts.clear();
+        // In a fault the settings stay as they are until `clear`.
+        self.send("set command.timeout_s 0").and_then(|()| self.send("save")).or(stopped)
+    }
+
+    fn act(&mut self, act: &Act) -> Checked {
+        let board = self.board;
+        match act {
+            Act::Hand(what) => there(self.person.hand(&board.fill(what)))?,
+            Act::Restart(what) => {
+                there(self.person.hand(&board.fill(what)))?;
+                self.starts_again()?;
+            }
+            Act::Reboot(_) => {
+                self.send("reboot")?;
+                self.starts_again()?;
+            }
+            Act::Send(line) => self.send(&board.fill(line))?,
+            Act::Often { line, times } => (0..*times).try_for_each(|_| self.send(line))?,
+            Act::Setting(key) => {
+                let value = there(self.person.measure(key, "by the nameplate"))?;
+                self.send(&format!("set {key} {value}"))?;
+            }
+            Act::Wait(seconds) => self.wire.wait(*seconds),
+            Act::Hear(_) | Act::HearLate { .. } => {
+                act.heard().map_or(Ok(()), |(text, seconds)| self.hear(text, seconds))?;
+            }
+            Act::Never(text) => {
+                if let Some(line) = self.said.iter().find(|line| line.contains(text)) {
+                    return doubt(format!("`{text}` in `{line}`"));
+                }
+            }
+            Act::See(what) => {
+                let what = board.fill(what);
+                let so = there(self.person.see(&what))?;
+                self.find(&format!("{what}: {}", if so { "yes" } else { "no" }));
+                if !so {
+                    return doubt(format!("not so: {what}"));
+                }
+            }
+            Act::Measure { what, unit, is } => {
+                let value = there(self.person.measure(what, unit))?;
+                self.judge(what, value, unit, is)?;
+            }
+            Act::Read(read) => {
+                let found = self.said.iter().find_map(|line| read.of(line));
+                let Some(value) = found else {
+                    return doubt(format!("no number at `{}`", read.place()));
+                };
+                self.judge(read.place(), value, &read.unit, &read.is)?;
+            }
+            Act::Noise(signal) => self.noise(signal)?,
+            Act::Third(act) if board.has_third_sensor() => self.act(act)?,
+            Act::Third(_) => {}
+        }
+        if self.session.interrupted.load(Ordering::Relaxed) {
+            return there(None);
+        }
+        self.look()
+    }
+
+    fn find(&mut self, what: &str) {
+        self.person.tell(&format!("  {what}"));
+        self.record.found.push(what.to_owned());
+    }
+
+    fn note(&mut self, line: &str) {
+        self.record.console += line;
+        self.record.console.push('\n');
+    }
+
+    fn send(&mut self, line: &str) -> Checked {
+        self.drain();
+        self.note(&format!("> {line}"));
+        let answer = self.wire.ask(line).or_else(|why| doubt(why.to_string()))?;
+        answer.lines.iter().for_each(|line| self.note(line));
+        if answer.lines.len() == 1 {
+            self.person.tell(&format!("  {line}: {}", answer.lines[0]));
+        }
+        self.said.clone_from(&answer.lines);
+        answer.error().map_or(Ok(()), |error| doubt(format!("`{line}`: {error}")))
+    }
+
+    /// Takes what was said unasked.
+    fn drain(&mut self) {
+        for line in self.wire.unasked() {
+            self.person.tell(&format!("  {line}"));
+            self.note(&line);
+            if DOUBTS.iter().any(|doubt| line.starts_with(doubt)) || line.contains(": refused") {
+                self.doubts.push(line.clone());
+            }
+            self.said.push(line);
+        }
+    }
+
+    /// Fails for an unasked line that nobody waits for.
+    fn look(&mut self) -> Checked {
+        self.drain();
+        // A later act may wait for a fault.
+        match self.doubts.first() {
+            Some(line) if !line.starts_with("* fault ") => doubt(line.clone()),
+            _ => Ok(()),
+        }
+    }
+
+    fn hear(&mut self, text: &str, seconds: f64) -> Checked {
+        let mut left = seconds;
+        loop {
+            self.drain();
+            if self.said.iter().any(|line| line.contains(text)) {
+                self.doubts.retain(|line| !line.contains(text));
+                return Ok(());
+            }
+            if let Some(line) = self.doubts.first() {
+                return doubt(line.clone());
+            }
+            if left <= 0.0 || self.session.interrupted.load(Ordering::Relaxed) {
+                return doubt(format!("`{text}` was not said within {seconds} s"));
+            }
+            left -= LOOK_S;
+            self.wire.wait(LOOK_S);
+        }
+    }
+
+    fn starts_again(&mut self) -> Checked {
+        self.wire.reopen().or_else(|why| doubt(why.to_string()))?;
+        for _ in 0..STARTS_S {
+            self.wire.wait(1.0);
+            if let Ok((name, build)) = identity(&mut self.wire) {
+                self.drain();
+                self.doubts.clear();
+                return match name == self.evidence.board && build == self.evidence.build {
+                    true => Ok(()),
+                    false => doubt(format!("another image: board {name}, build {build}")),
+                };
+            }
+        }
+        doubt(format!("the controller does not answer within {STARTS_S} s"))
+    }
+
+    fn judge(&mut self, what: &str, value: f64, unit: &str, is: &Limits) -> Checked {
+        let before = self.readings.insert(what.to_owned(), value).unwrap_or(f64::NAN);
+        let range = is.range(self.board, before);
+        let limits = format!("{:.4} to {:.4} {unit}", range.start(), range.end());
+        let found = format!("{}: {value:.4} {unit}; allowed: {limits}", what.trim_matches([' ', ',']));
+        self.find(&found);
+        if range.contains(&value) { Ok(()) } else { doubt(found) }
+    }
+
+    /// Mean and noise of a signal in the trace that was printed.
+    fn noise(&mut self, signal: &str) -> Checked {
+        let mut rows = self.said.iter().map(|line| line.split(',').collect::<Vec<_>>());
+        let column = rows.by_ref().find_map(|row| row.iter().position(|name| *name == signal));
+        let values = rows.filter_map(|row| row.get(column?)?.parse::<f64>().ok());
+        let values: Vec<f64> = values.collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let rms = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let text = |name: &str| super::table::Value::Text(name.to_owned());
+        let is = Limits::Range { from: text("-MEAN"), to: text("MEAN") };
+        self.judge(&format!("mean of {signal}"), mean, "A", &is)?;
+        self.judge(&format!("noise of {signal}"), rms, "A rms", &Limits::Below { below: text("NOISE") })
+    }
+}
+
+/// Board and build of a drive.
+fn identity(wire: &mut impl Wire) -> Result<(String, String), String> {
+    let mut ask = |line: &str| wire.ask(line).map_err(|why| why.to_string());
+    let said = [ask("board")?, ask("version")?].map(|answer| answer.lines.join("\n"));
+    let between = |text: &str, from: &str, to: char| {
+        let rest = text.split_once(from)?.1;
+        Some(rest.split_once(to)?.0.to_owned())
+    };
+    let found = between(&said[0], "board ", ':').zip(between(&said[1], ", build ", ';'));
+    found.ok_or_else(|| format!("no board and build in `{}`", said.join(" ")))
+}
