@@ -10,9 +10,9 @@ use super::evidence::{Evidence, Verdict};
 use crate::error::Error;
 
 /// First words of the lines after which every gate stays off. Any other line counts as one that switches the stage on.
-const HARMLESS: [&str; 12] = [
+const HARMLESS: [&str; 13] = [
     "status", "version", "faults", "board", "save", "clear", "set", "trace", "stop", "backup",
-    "accept", "reboot",
+    "accept", "reboot", "get",
 ];
 /// Longest wait for a text of [`Act::Hear`], s.
 const HEAR_S: f64 = 15.0;

@@ -18,6 +18,8 @@ const DOUBTS: [&str; 5] =
     ["* fault ", "* induction-drive", "* error", "* stopped: no command", "* refused"];
 /// Longest time in which a controller that starts again answers, s.
 const STARTS_S: u32 = 20;
+/// Longest time until a drive is off after `stop`, s.
+const STOPS_S: u32 = 10;
 /// Time between two looks at what was said, s.
 const LOOK_S: f64 = 0.2;
 
@@ -174,10 +176,18 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
 
     /// `stop`, and the silence of the console may be as long as it likes again.
     fn switch_off(&mut self) -> Checked {
-        let stopped = self.send("stop");
-        self.doubts.clear();
-        // In a fault the settings stay as they are until `clear`.
-        self.send("set command.timeout_s 0").and_then(|()| self.send("save")).or(stopped)
+        // Refused in a fault, where the outputs are off already.
+        let _ = self.send("stop");
+        for _ in 0..STOPS_S {
+            self.send("status")?;
+            if self.said.iter().any(|line| line.starts_with("off") || line.starts_with("in fault"))
+            {
+                self.doubts.clear();
+                return self.send("set command.timeout_s 0").and_then(|()| self.send("save"));
+            }
+            self.wire.wait(1.0);
+        }
+        doubt(format!("not off {STOPS_S} s after `stop`"))
     }
 
     fn act(&mut self, act: &Act) -> Checked {
@@ -291,8 +301,11 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             if let Some(line) = self.doubts.first() {
                 return doubt(line.clone());
             }
-            if left <= 0.0 || self.session.interrupted.load(Ordering::Relaxed) {
-                return doubt(format!("`{text}` was not said within {seconds} s"));
+            // An answer that is no `ok` is whole.
+            let waits = self.said.iter().any(|line| line.starts_with("ok"));
+            if !waits || left <= 0.0 || self.session.interrupted.load(Ordering::Relaxed) {
+                let said = self.said.join("; ");
+                return doubt(format!("`{text}` was not said within {seconds} s, but `{said}`"));
             }
             left -= LOOK_S;
             self.wire.wait(LOOK_S);
@@ -318,8 +331,12 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     fn judge(&mut self, what: &str, value: f64, unit: &str, is: &Limits) -> Checked {
         let before = self.readings.insert(what.to_owned(), value).unwrap_or(f64::NAN);
         let range = is.range(self.board, before);
-        let limits = format!("{:.4} to {:.4} {unit}", range.start(), range.end());
-        let found = format!("{}: {value:.4} {unit}; allowed: {limits}", what.trim_matches([' ', ',']));
+        let limits = match *range.start() {
+            f64::NEG_INFINITY => format!("at most {} {unit}", range.end()),
+            start => format!("{start:.4} to {:.4} {unit}", range.end()),
+        };
+        let found =
+            format!("{}: {value:.4} {unit}; allowed: {limits}", what.trim_matches([' ', ',']));
         self.find(&found);
         if range.contains(&value) { Ok(()) } else { doubt(found) }
     }
@@ -336,7 +353,12 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         let text = |name: &str| super::table::Value::Text(name.to_owned());
         let is = Limits::Range { from: text("-MEAN"), to: text("MEAN") };
         self.judge(&format!("mean of {signal}"), mean, "A", &is)?;
-        self.judge(&format!("noise of {signal}"), rms, "A rms", &Limits::Below { below: text("NOISE") })
+        self.judge(
+            &format!("noise of {signal}"),
+            rms,
+            "A rms",
+            &Limits::Below { below: text("NOISE") },
+        )
     }
 }
 

@@ -51,8 +51,11 @@ impl Port {
         let urgent = Arc::new(Mutex::new(link.urgent()));
         let alive = Arc::downgrade(&urgent);
         std::thread::spawn(move || {
+            let mut told = false;
             while let Some(urgent) = alive.upgrade() {
-                let stops = interrupted.load(Ordering::Relaxed);
+                // Once: a second one would cut the answers short that the walk waits for.
+                let stops = !told && interrupted.load(Ordering::Relaxed);
+                told |= stops;
                 // A port that is gone is found so by the next request.
                 let _ = locked(&urgent).send(if stops { "stop" } else { "" });
                 drop(urgent);
