@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use hil_sim::first_light::evidence::{Evidence, Record, SCHEMA, Verdict};
-use hil_sim::first_light::table::{Act, Limits, Read, Table, Value};
+use hil_sim::first_light::table::{Act, Limits, Read, Table};
 use hil_sim::plant::{
     Complex, Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel,
     SaliencySettings,
@@ -12,25 +12,8 @@ use hil_sim::plant::{
 
 use crate::generated;
 
-fn value(value: &Value) -> String {
-    match value {
-        Value::Number(number) => number.to_string(),
-        Value::Text(name) => name.clone(),
-    }
-}
-
 fn limits(is: &Limits, unit: &str) -> String {
-    match is {
-        Limits::Range { from, to } => format!("{} to {} {unit}", value(from), value(to)),
-        Limits::About { about, share } => {
-            format!("{} {unit} within {} %", value(about), share * 100.0)
-        }
-        Limits::Least { least, plus } => format!("{} {unit}, +{plus}/-0 {unit}", value(least)),
-        Limits::Below { below } => format!("below {} {unit}", value(below)),
-        Limits::Rise { rise, within } => {
-            format!("{} {unit} more than before, within {}", value(rise), value(within))
-        }
-    }
+    format!("{} to {} {unit}", is[0], is[1])
 }
 
 /// Whether an act belongs to the column "expect", and its text.
@@ -41,41 +24,34 @@ fn shown(act: &Act) -> (bool, String) {
         Act::Send(line) => (false, code(line)),
         Act::Often { line, times } => (false, format!("`{line}`, {times} times")),
         Act::Setting(key) => (false, format!("`set {key} …`")),
-        Act::Reboot(_) => (false, code("reboot")),
         Act::Wait(seconds) => (false, format!("wait {seconds} s")),
-        Act::Hear(text) | Act::HearLate { text, .. } => {
-            (true, format!("`{}`", text.replace('`', "")))
-        }
+        Act::Hear(text) => (true, format!("`{}`", text.replace('`', ""))),
         Act::Never(text) => (true, format!("not `{text}`")),
         Act::See(what) => (true, what.clone()),
         Act::Measure { what, unit, is } => (true, format!("{what} {}", limits(is, unit))),
-        Act::Read(Read { unit, is, .. }) => {
-            let Act::Read(read) = act else { unreachable!() };
+        Act::Read(read) => {
             let place = read.place().trim_matches([' ', ',']);
-            (true, format!("`{place}` {}", limits(is, unit)))
+            let more = if read.rise { " more than before" } else { "" };
+            (true, format!("`{place}` {}{more}", limits(&read.is, &read.unit)))
         }
         Act::Noise(signal) => {
             (true, format!("`{signal}`: mean within MEAN A of zero, noise below NOISE A rms"))
-        }
-        Act::Third(act) => {
-            let (expect, text) = shown(act);
-            (expect, format!("({text})"))
         }
     }
 }
 
 fn page(table: &Table) -> String {
-    let names: Vec<&String> = table.boards()[0].values.keys().collect();
+    let names: Vec<&String> = table.boards[0].values.keys().collect();
     let mut text = format!(
         "| board | {} |\n|---|",
         names.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(" | ")
     );
     text += &"---|".repeat(names.len());
-    for board in table.boards() {
-        let values: Vec<String> = names.iter().map(|name| value(&board.values[*name])).collect();
+    for board in &table.boards {
+        let values: Vec<&str> = names.iter().map(|name| board.values[*name].as_str()).collect();
         write!(text, "\n| {} | {} |", board.name, values.join(" | ")).unwrap();
     }
-    text += "\n\nV; noise, mean and SENSOR in A; DEAD in µs; HIGHSIDE and LOWSIDE: the level at which a gate goes on. In brackets: boards with three sensors.\n";
+    text += "\n\nV; noise, mean and SENSOR in A; DEAD in µs; UNDER: just below TRIP; HIGHSIDE and LOWSIDE: the level at which a gate goes on.\n";
     let mut number = 0;
     for part in &table.parts {
         write!(text, "\n## {}\n\n{}\n\n", part.title, part.before.trim()).unwrap();
@@ -87,7 +63,7 @@ fn page(table: &Table) -> String {
                 let texts = acts.iter().filter(|(expect, _)| *expect == wanted);
                 texts.map(|(_, text)| text.as_str()).collect::<Vec<_>>().join("; ")
             };
-            let mark = if step.judges.is_some() {
+            let mark = if step.judges {
                 " **J**"
             } else if step.optional {
                 " **O**"
@@ -123,7 +99,7 @@ fn nothing_switches_the_stage_on_before_gates_and_fault_input_were_judged() {
     let table = Table::read().unwrap();
     let names: Vec<&str> = table.steps().map(|(_, step)| step.name.as_str()).collect();
     let judges: Vec<&str> =
-        table.steps().filter(|(_, s)| s.judges.is_some()).map(|(_, s)| s.name.as_str()).collect();
+        table.steps().filter(|(_, s)| s.judges).map(|(_, s)| s.name.as_str()).collect();
     assert!(judges.len() >= 8, "{judges:?}");
     let first = table.steps().position(|(_, step)| step.switches_on()).unwrap();
     assert_eq!(names[first], "confirm");
@@ -138,7 +114,7 @@ fn nothing_switches_the_stage_on_before_gates_and_fault_input_were_judged() {
                 let steps: Vec<Record> = names[..count].iter().map(record).collect();
                 let passed = names[..count].contains(judge) && verdict == Verdict::Passed;
                 match table.next(&evidence(steps)) {
-                    Ok(Some(ready)) if ready.step().switches_on() => {
+                    Ok(Some(ready)) if ready.place().1.switches_on() => {
                         assert!(passed && count >= first, "{count} {judge} {verdict:?}");
                         energised += 1;
                     }
@@ -174,15 +150,15 @@ fn a_step_that_switches_on_ends_off() {
 #[test]
 fn every_limit_is_a_number_on_every_board() {
     let table = Table::read().unwrap();
-    for board in table.boards() {
+    for board in &table.boards {
         for (_, step) in table.steps() {
             for act in &step.acts {
                 let is = match act {
                     Act::Measure { is, .. } | Act::Read(Read { is, .. }) => is,
                     _ => continue,
                 };
-                let range = is.range(board, 0.0);
-                assert!(range.start() < range.end(), "{} {}: {range:?}", board.name, step.name);
+                let [least, most] = is.each_ref().map(|end| board.number(end));
+                assert!(least < most, "{} {}: {is:?}", board.name, step.name);
             }
         }
     }
@@ -272,12 +248,8 @@ fn contributed_evidence_is_whole_and_its_trace_is_that_of_its_motor() {
     assert!(!files.is_empty());
     for path in files {
         let evidence = Evidence::open(&path).unwrap().unwrap();
-        table.board(&evidence.board).unwrap();
-        for (_, step) in table.steps() {
-            let verdict = evidence.verdict(&step.name);
-            let skipped = step.optional && verdict == Some(Verdict::Skipped);
-            assert!(skipped || verdict == Some(Verdict::Passed), "{path:?} {}", step.name);
-        }
+        let left = table.next(&evidence).unwrap().map(|ready| ready.place().1.name.clone());
+        assert_eq!(left, None, "{path:?}");
         if evidence.verdict("trace") == Some(Verdict::Skipped) {
             continue;
         }

@@ -2,7 +2,6 @@
 //! fault input were judged.
 
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 
 use serde::Deserialize;
 
@@ -10,32 +9,21 @@ use super::evidence::{Evidence, Verdict};
 use crate::error::Error;
 
 /// First words of the lines after which every gate stays off. Any other line counts as one that switches the stage on.
+#[rustfmt::skip]
 const HARMLESS: [&str; 13] = [
-    "status", "version", "faults", "board", "save", "clear", "set", "trace", "stop", "backup",
-    "accept", "reboot", "get",
+    "status", "version", "faults", "board", "get", "set", "save", "clear", "trace", "stop", "backup", "accept", "reboot",
 ];
-/// Longest wait for a text of [`Act::Hear`], s.
-const HEAR_S: f64 = 15.0;
 
 /// The boards with their values, and the steps.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
+    /// The boards.
     #[serde(rename = "board")]
-    boards: Vec<Board>,
+    pub boards: Vec<Board>,
     /// The parts, in order.
     #[serde(rename = "part")]
     pub parts: Vec<Part>,
-}
-
-/// A number, or a text: the name of a board's value.
-#[derive(Clone, Debug, Deserialize, PartialEq)]
-#[serde(untagged)]
-pub enum Value {
-    /// A number.
-    Number(f64),
-    /// A text.
-    Text(String),
 }
 
 /// A board with its values.
@@ -45,7 +33,7 @@ pub struct Board {
     pub name: String,
     /// By name, in capitals.
     #[serde(flatten)]
-    pub values: BTreeMap<String, Value>,
+    pub values: BTreeMap<String, String>,
 }
 
 /// Steps that share a set-up.
@@ -61,27 +49,23 @@ pub struct Part {
     pub steps: Vec<Step>,
 }
 
-/// What a step proves before the stage may be switched on.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-pub enum Judge {
-    /// The gates are off when they have to be.
-    Gates,
-    /// The fault input switches off.
-    Break,
-}
-
 /// A step.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
     /// Its name in the evidence.
     pub name: String,
-    /// What it proves; the stage stays off until all such steps were passed.
-    pub judges: Option<Judge>,
+    /// Whether it judges gates or fault input: the stage stays off until all such steps were passed.
+    #[serde(default)]
+    pub judges: bool,
     /// Whether it may be skipped.
     #[serde(default)]
     pub optional: bool,
+    /// Whether it is for boards with three current sensors.
+    #[serde(default)]
+    pub third: bool,
+    /// Longest wait for what has to be heard, s.
+    pub patience_s: Option<f64>,
     /// In order.
     pub acts: Vec<Act>,
     /// Where to look if it does not give what it should.
@@ -98,17 +82,17 @@ pub enum Act {
     Send(String),
     Often { line: String, times: u32 },
     Setting(String),
-    Reboot(bool),
     Wait(f64),
     Hear(String),
-    HearLate { text: String, seconds: f64 },
     Never(String),
     See(String),
     Measure { what: String, unit: String, is: Limits },
     Read(Read),
     Noise(String),
-    Third(Box<Act>),
 }
+
+/// The two ends of the allowed numbers, as expressions.
+pub type Limits = [String; 2];
 
 /// A number in an answer.
 #[derive(Clone, Debug, Deserialize)]
@@ -120,20 +104,11 @@ pub struct Read {
     pub before: Option<String>,
     /// Its unit.
     pub unit: String,
+    /// Whether the limits are relative to the reading before.
+    #[serde(default)]
+    pub rise: bool,
     /// Where it has to be.
     pub is: Limits,
-}
-
-/// Where a number has to be.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
-#[expect(missing_docs, reason = "as of the acts")]
-pub enum Limits {
-    Range { from: Value, to: Value },
-    About { about: Value, share: f64 },
-    Least { least: Value, plus: f64 },
-    Below { below: Value },
-    Rise { rise: Value, within: Value },
 }
 
 /// A step that may be walked through now. [`Table::next`] makes it.
@@ -144,15 +119,10 @@ pub struct Ready<'a> {
 }
 
 impl<'a> Ready<'a> {
-    /// The step.
-    pub fn step(&self) -> &'a Step {
-        self.step
-    }
-
-    /// Its number, and its part where it is the first of it.
-    pub fn place(&self) -> (usize, Option<&'a Part>) {
+    /// Its number, the step, and its part where it is the first of it.
+    pub fn place(&self) -> (usize, &'a Step, Option<&'a Part>) {
         let first = self.part.steps.first().is_some_and(|first| first.name == self.step.name);
-        (self.number, first.then_some(self.part))
+        (self.number, self.step, first.then_some(self.part))
     }
 }
 
@@ -165,20 +135,14 @@ impl Table {
         toml::from_str(include_str!("steps.toml")).map_err(|why| Error::Internal(why.to_string()))
     }
 
-    /// The boards.
-    pub fn boards(&self) -> &[Board] {
-        &self.boards
-    }
-
     /// The board of a name.
     ///
     /// # Errors
     /// [`Error::Unknown`].
     pub fn board(&self, name: &str) -> Result<&Board, Error> {
+        let names = self.boards.iter().map(|board| board.name.as_str());
         let found = self.boards.iter().find(|board| board.name == name);
-        found.ok_or_else(|| {
-            Error::unknown("board", name, self.boards.iter().map(|board| board.name.as_str()))
-        })
+        found.ok_or_else(|| Error::unknown("board", name, names))
     }
 
     /// All steps with their parts, in order.
@@ -191,103 +155,62 @@ impl Table {
     /// # Errors
     /// [`Error::Refused`] for a step that would switch the stage on before every step that judges gates and fault input was passed.
     pub fn next(&self, evidence: &Evidence) -> Result<Option<Ready<'_>>, Error> {
-        let is_done = |step: &Step| match evidence.verdict(&step.name) {
-            Some(Verdict::Skipped) => step.optional,
-            verdict => verdict == Some(Verdict::Passed),
-        };
-        let first = self.steps().enumerate().find(|(_, (_, step))| !is_done(step));
-        let Some((index, (part, step))) = first else { return Ok(None) };
+        let third = self.board(&evidence.board)?.has_third_sensor();
         let passed = |step: &Step| evidence.verdict(&step.name) == Some(Verdict::Passed);
-        let mut judges = self.steps().filter(|(_, step)| step.judges.is_some());
-        if step.switches_on()
-            && let Some((_, judge)) = judges.find(|(_, judge)| !passed(judge))
-        {
-            return Err(Error::Refused(format!(
+        let skipped = |step: &Step| evidence.verdict(&step.name) == Some(Verdict::Skipped);
+        let left =
+            |step: &Step| !(passed(step) || step.optional && skipped(step) || step.third && !third);
+        let first = self.steps().enumerate().find(|(_, (_, step))| left(step));
+        let Some((index, (part, step))) = first else { return Ok(None) };
+        let unjudged = self.steps().map(|(_, step)| step).find(|step| step.judges && !passed(step));
+        match unjudged.filter(|_| step.switches_on()) {
+            None => Ok(Some(Ready { number: index + 1, part, step })),
+            Some(judge) => Err(Error::Refused(format!(
                 "step {} switches the stage on before step {} was passed",
                 step.name, judge.name
-            )));
+            ))),
         }
-        Ok(Some(Ready { number: index + 1, part, step }))
     }
 }
 
 impl Step {
     /// Whether one of its lines can switch a gate on.
     pub fn switches_on(&self) -> bool {
-        let lines = self.acts.iter().filter_map(|act| match act {
-            Act::Send(line) | Act::Often { line, .. } => Some(line.as_str()),
-            Act::Third(act) => match &**act {
-                Act::Send(line) => Some(line.as_str()),
-                _ => None,
-            },
-            _ => None,
-        });
-        lines.flat_map(|line| line.split(' ').next()).any(|word| !HARMLESS.contains(&word))
+        self.acts.iter().any(|act| match act {
+            Act::Send(line) | Act::Often { line, .. } => {
+                line.split(' ').next().is_none_or(|word| !HARMLESS.contains(&word))
+            }
+            _ => false,
+        })
     }
 }
 
 impl Board {
     /// A text with the board's values in place of their names, and its own in place of NAME.
     pub fn fill(&self, text: &str) -> String {
-        let is_name = |c: char| c.is_ascii_uppercase();
-        let mut filled = String::new();
-        let mut rest = text;
-        while let Some(at) = rest.find(is_name) {
-            let end = rest[at..].find(|c| !is_name(c)).map_or(rest.len(), |length| at + length);
-            let word = &rest[at..end];
-            filled += &rest[..at];
-            filled += &match self.values.get(word) {
-                Some(Value::Number(number)) => number.to_string(),
-                Some(Value::Text(text)) => text.clone(),
-                None if word == "NAME" => self.name.clone(),
-                None => word.to_owned(),
-            };
-            rest = &rest[end..];
-        }
-        filled + rest
+        // From the last to the first: a name comes before the one that it is the beginning of.
+        let text = text.replace("NAME", &self.name);
+        self.values.iter().rev().fold(text, |text, (name, value)| text.replace(name, value))
     }
 
-    /// A number; one that the board does not have is none, and no reading is within it.
-    pub fn number(&self, value: &Value) -> f64 {
-        match value {
-            Value::Number(number) => *number,
-            Value::Text(name) => self.fill(name).parse().unwrap_or(f64::NAN),
+    /// The value of an expression; what is none is not a number, and no reading is within it.
+    pub fn number(&self, expression: &str) -> f64 {
+        let text = self.fill(expression);
+        // A sign at the beginning is no operator.
+        let Some(at) = text.rfind(['+', '-', '*']).filter(|at| *at > 0) else {
+            return text.parse().unwrap_or(f64::NAN);
+        };
+        let (a, b) = (self.number(&text[..at]), self.number(&text[at + 1..]));
+        match &text[at..=at] {
+            "+" => a + b,
+            "-" => a - b,
+            _ => a * b,
         }
     }
 
     /// Whether it has three current sensors.
     pub fn has_third_sensor(&self) -> bool {
-        self.values.get("SENSORS") == Some(&Value::Number(3.0))
-    }
-}
-
-impl Act {
-    /// Longest wait, s, and the text that has to be heard.
-    pub fn heard(&self) -> Option<(&str, f64)> {
-        match self {
-            Self::Hear(text) => Some((text, HEAR_S)),
-            Self::HearLate { text, seconds } => Some((text, *seconds)),
-            _ => None,
-        }
-    }
-}
-
-impl Limits {
-    /// The allowed numbers; `before` is the last reading of the same.
-    pub fn range(&self, board: &Board, before: f64) -> RangeInclusive<f64> {
-        match self {
-            Self::Range { from, to } => board.number(from)..=board.number(to),
-            Self::About { about, share } => {
-                let about = board.number(about);
-                about * (1.0 - share)..=about * (1.0 + share)
-            }
-            Self::Least { least, plus } => board.number(least)..=board.number(least) + plus,
-            Self::Below { below } => f64::NEG_INFINITY..=board.number(below),
-            Self::Rise { rise, within } => {
-                let (middle, within) = (before + board.number(rise), board.number(within));
-                middle - within..=middle + within
-            }
-        }
+        self.number("SENSORS") == 3.0
     }
 }
 
@@ -299,10 +222,11 @@ impl Read {
 
     /// The number in a line.
     pub fn of(&self, line: &str) -> Option<f64> {
-        let word = match (&self.after, &self.before) {
-            (Some(after), _) => line.split_once(after.as_str())?.1.split(' ').next()?,
-            (None, before) => line.split_once(before.as_deref()?)?.0.rsplit(' ').next()?,
+        let (before, after) = line.split_once(self.place())?;
+        let word = match self.after {
+            Some(_) => after.split(' ').next(),
+            None => before.rsplit(' ').next(),
         };
-        word.parse().ok()
+        word?.parse().ok()
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::evidence::{Evidence, Record, SCHEMA, Verdict};
 use super::person::Person;
-use super::table::{Act, Board, Limits, Ready, Table};
+use super::table::{Act, Board, Limits, Read, Ready, Table};
 use super::wire::Wire;
 use crate::error::Error;
 
@@ -16,6 +16,8 @@ pub const TIMEOUT_S: u32 = 2;
 /// Beginnings of lines that come unasked and end a step, unless the step waits for them.
 const DOUBTS: [&str; 5] =
     ["* fault ", "* induction-drive", "* error", "* stopped: no command", "* refused"];
+/// Longest wait for what has to be heard, unless the step says otherwise, s.
+const PATIENCE_S: f64 = 15.0;
 /// Longest time in which a controller that starts again answers, s.
 const STARTS_S: u32 = 20;
 /// Longest time until a drive is off after `stop`, s.
@@ -53,6 +55,7 @@ pub struct Walk<'a, W, P> {
     doubts: Vec<String>,
     /// Last readings, by the text at which they stand.
     readings: BTreeMap<String, f64>,
+    patience_s: f64,
 }
 
 /// Why a step was not passed.
@@ -76,27 +79,34 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     pub fn new(table: &'a Table, mut wire: W, person: P, session: Session) -> Result<Self, Error> {
         let old = session.file.as_deref().map(Evidence::open).transpose()?.flatten();
         let (name, build) = identity(&mut wire).map_err(Error::Refused)?;
-        let new = || {
-            let (board, bench) = (name.clone(), session.bench.clone());
-            Evidence { schema: SCHEMA, bench, board, build: build.clone(), steps: Vec::new() }
-        };
-        let evidence = old.unwrap_or_else(new);
-        let expected = session.board.as_ref().unwrap_or(&evidence.board);
-        for (what, there, wanted) in [
-            ("board", &name, expected),
-            ("board", &name, &evidence.board),
-            ("build", &build, &evidence.build),
-        ] {
-            if there != wanted {
-                return Err(Error::Refused(format!(
-                    "{what} {there}: allowed is {wanted}; another image or board begins with a new evidence file"
-                )));
-            }
+        let (bench, steps) = (session.bench.clone(), Vec::new());
+        let (board, image) = (name.clone(), build.clone());
+        let new = Evidence { schema: SCHEMA, bench, board, build: image, steps };
+        let evidence = old.unwrap_or(new);
+        let wanted = session.board.as_ref().unwrap_or(&evidence.board);
+        if (&name, &name, &build) != (wanted, &evidence.board, &evidence.build) {
+            return Err(Error::Refused(format!(
+                "board {name}, build {build}: allowed are board {wanted}, and board {}, build {} of the evidence; \
+                 another image begins with a new file",
+                evidence.board, evidence.build
+            )));
         }
         let record = Record::new("", Verdict::Interrupted);
-        let (said, doubts, readings) = Default::default();
+        let (said, doubts, readings, patience_s) = Default::default();
         let board = table.board(&name)?;
-        Ok(Self { table, board, wire, person, session, evidence, record, said, doubts, readings })
+        Ok(Self {
+            table,
+            board,
+            wire,
+            person,
+            session,
+            evidence,
+            record,
+            said,
+            doubts,
+            readings,
+            patience_s,
+        })
     }
 
     /// The evidence so far.
@@ -119,7 +129,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     /// [`Error::Lost`] for a step that was not passed; those of the table and of the file.
     pub fn step(&mut self) -> Result<bool, Error> {
         let Some(ready) = self.table.next(&self.evidence)? else { return Ok(false) };
-        let step = ready.step();
+        let (number, step, _) = ready.place();
         let skip = self.session.skip && step.optional;
         let begun = if skip { Verdict::Skipped } else { Verdict::Interrupted };
         self.record = Record::new(&step.name, begun);
@@ -129,29 +139,26 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         if skip {
             return Ok(true);
         }
-        let end = self.walk(&ready);
-        let mut off = Ok(());
+        let mut end = self.walk(&ready);
         if step.switches_on() || end.is_err() {
-            off = self.switch_off();
+            let off = self.switch_off();
+            if let Err(Failure(_, why)) = &off {
+                self.find(&format!("{why}; without lines the drive stops after {TIMEOUT_S} s"));
+            }
+            end = end.and(off);
         }
-        (self.record.verdict, self.record.why) = match (end, off) {
-            (Ok(()), Ok(())) => (Verdict::Passed, String::new()),
-            (Ok(()), Err(Failure(verdict, why))) => (verdict, why),
-            (Err(Failure(verdict, why)), Ok(())) => (verdict, why),
-            (Err(Failure(verdict, why)), Err(Failure(_, off))) => (
-                verdict,
-                format!("{why}; {off}: without lines the drive stops after {TIMEOUT_S} s"),
-            ),
-        };
+        self.record.verdict = Verdict::Passed;
+        if let Err(Failure(verdict, why)) = end {
+            (self.record.verdict, self.record.why) = (verdict, why);
+        }
         self.evidence.steps.pop();
         self.evidence.steps.push(self.record.clone());
         self.write()?;
         if self.record.verdict == Verdict::Passed {
             return Ok(true);
         }
-        let otherwise = self.board.fill(&step.otherwise);
-        let reason = format!("{}\n{otherwise}", self.record.why);
-        Err(Error::Lost { name: format!("step {}, {}", ready.place().0, step.name), reason })
+        let reason = format!("{}\n{}", self.record.why, self.board.fill(&step.otherwise));
+        Err(Error::Lost { name: format!("step {number}, {}", step.name), reason })
     }
 
     fn write(&self) -> Result<(), Error> {
@@ -159,18 +166,19 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     }
 
     fn walk(&mut self, ready: &Ready) -> Checked {
-        let (number, first) = ready.place();
+        let (number, step, first) = ready.place();
         if let Some(part) = first {
             self.person.tell(&format!("\n{}\n{}", part.title, self.board.fill(&part.before)));
         }
-        self.person.tell(&format!("\nStep {number}: {}", ready.step().name));
+        self.person.tell(&format!("\nStep {number}: {}", step.name));
         (self.said, self.doubts, self.readings) = Default::default();
+        self.patience_s = step.patience_s.unwrap_or(PATIENCE_S);
         self.wire.unasked();
-        if ready.step().switches_on() {
+        if step.switches_on() {
             self.send(&format!("set command.timeout_s {TIMEOUT_S}"))?;
             self.send("save")?;
         }
-        ready.step().acts.iter().try_for_each(|act| self.act(act))?;
+        step.acts.iter().try_for_each(|act| self.act(act))?;
         self.doubts.first().map_or(Ok(()), |line| doubt(line.clone()))
     }
 
@@ -198,20 +206,19 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
                 there(self.person.hand(&board.fill(what)))?;
                 self.starts_again()?;
             }
-            Act::Reboot(_) => {
-                self.send("reboot")?;
-                self.starts_again()?;
+            Act::Send(line) => {
+                self.send(&board.fill(line))?;
+                if line == "reboot" {
+                    self.starts_again()?;
+                }
             }
-            Act::Send(line) => self.send(&board.fill(line))?,
             Act::Often { line, times } => (0..*times).try_for_each(|_| self.send(line))?,
             Act::Setting(key) => {
                 let value = there(self.person.measure(key, "by the nameplate"))?;
                 self.send(&format!("set {key} {value}"))?;
             }
             Act::Wait(seconds) => self.wire.wait(*seconds),
-            Act::Hear(_) | Act::HearLate { .. } => {
-                act.heard().map_or(Ok(()), |(text, seconds)| self.hear(text, seconds))?;
-            }
+            Act::Hear(text) => self.hear(text)?,
             Act::Never(text) => {
                 if let Some(line) = self.said.iter().find(|line| line.contains(text)) {
                     return doubt(format!("`{text}` in `{line}`"));
@@ -227,18 +234,10 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             }
             Act::Measure { what, unit, is } => {
                 let value = there(self.person.measure(what, unit))?;
-                self.judge(what, value, unit, is)?;
+                self.judge(what, value, unit, is, 0.0)?;
             }
-            Act::Read(read) => {
-                let found = self.said.iter().find_map(|line| read.of(line));
-                let Some(value) = found else {
-                    return doubt(format!("no number at `{}`", read.place()));
-                };
-                self.judge(read.place(), value, &read.unit, &read.is)?;
-            }
+            Act::Read(read) => self.read(read)?,
             Act::Noise(signal) => self.noise(signal)?,
-            Act::Third(act) if board.has_third_sensor() => self.act(act)?,
-            Act::Third(_) => {}
         }
         if self.session.interrupted.load(Ordering::Relaxed) {
             return there(None);
@@ -290,8 +289,8 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         }
     }
 
-    fn hear(&mut self, text: &str, seconds: f64) -> Checked {
-        let mut left = seconds;
+    fn hear(&mut self, text: &str) -> Checked {
+        let (seconds, mut left) = (self.patience_s, self.patience_s);
         loop {
             self.drain();
             if self.said.iter().any(|line| line.contains(text)) {
@@ -319,26 +318,33 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             if let Ok((name, build)) = identity(&mut self.wire) {
                 self.drain();
                 self.doubts.clear();
-                return match name == self.evidence.board && build == self.evidence.build {
-                    true => Ok(()),
-                    false => doubt(format!("another image: board {name}, build {build}")),
-                };
+                if (&name, &build) == (&self.evidence.board, &self.evidence.build) {
+                    return Ok(());
+                }
+                return doubt(format!("another image: board {name}, build {build}"));
             }
         }
         doubt(format!("the controller does not answer within {STARTS_S} s"))
     }
 
-    fn judge(&mut self, what: &str, value: f64, unit: &str, is: &Limits) -> Checked {
-        let before = self.readings.insert(what.to_owned(), value).unwrap_or(f64::NAN);
-        let range = is.range(self.board, before);
-        let limits = match *range.start() {
-            f64::NEG_INFINITY => format!("at most {} {unit}", range.end()),
-            start => format!("{start:.4} to {:.4} {unit}", range.end()),
+    /// A number in the last answer.
+    fn read(&mut self, read: &Read) -> Checked {
+        let place = read.place();
+        let Some(value) = self.said.iter().find_map(|line| read.of(line)) else {
+            return doubt(format!("no number at `{place}`"));
         };
-        let found =
-            format!("{}: {value:.4} {unit}; allowed: {limits}", what.trim_matches([' ', ',']));
+        let before = self.readings.insert(place.to_owned(), value);
+        let from = if read.rise { before.unwrap_or(f64::NAN) } else { 0.0 };
+        self.judge(place, value, &read.unit, &read.is, from)
+    }
+
+    /// Whether a number is between its limits, which count from `from`.
+    fn judge(&mut self, what: &str, value: f64, unit: &str, is: &Limits, from: f64) -> Checked {
+        let [least, most] = is.each_ref().map(|end| from + self.board.number(end));
+        let what = what.trim_matches([' ', ',']);
+        let found = format!("{what}: {value:.4} {unit}; allowed: {least:.4} to {most:.4} {unit}");
         self.find(&found);
-        if range.contains(&value) { Ok(()) } else { doubt(found) }
+        if (least..=most).contains(&value) { Ok(()) } else { doubt(found) }
     }
 
     /// Mean and noise of a signal in the trace that was printed.
@@ -350,15 +356,10 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let rms = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
-        let text = |name: &str| super::table::Value::Text(name.to_owned());
-        let is = Limits::Range { from: text("-MEAN"), to: text("MEAN") };
-        self.judge(&format!("mean of {signal}"), mean, "A", &is)?;
-        self.judge(
-            &format!("noise of {signal}"),
-            rms,
-            "A rms",
-            &Limits::Below { below: text("NOISE") },
-        )
+        let limits = |ends: [&str; 2]| ends.map(str::to_owned);
+        let (about, noise) = (limits(["0-MEAN", "MEAN"]), limits(["0", "NOISE"]));
+        self.judge(&format!("mean of {signal}"), mean, "A", &about, 0.0)?;
+        self.judge(&format!("noise of {signal}"), rms, "A rms", &noise, 0.0)
     }
 }
 
