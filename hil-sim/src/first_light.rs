@@ -9,6 +9,7 @@ pub mod wire;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -16,11 +17,11 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use crate::error::Error;
 use person::Terminal;
 use table::Table;
-use walk::{Session, Walk};
+use walk::Walk;
 use wire::Port;
 
 /// Options of a first light.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct Options {
     /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` names
     #[arg(long, value_name = "PATH")]
@@ -49,19 +50,13 @@ pub struct Options {
 /// drive does not answer, or it is not that of the evidence.
 pub fn run(options: &Options) -> Result<(), Error> {
     let table = Table::read()?;
-    let session = Session {
-        file: Some(options.evidence.clone()),
-        bench: options.bench.clone(),
-        board: options.board.clone(),
-        skip: options.skip_learning,
-        interrupted: Arc::default(),
-    };
+    let interrupted = Arc::<AtomicBool>::default();
     for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, session.interrupted.clone())
+        signal_hook::flag::register(signal, interrupted.clone())
             .map_err(|why| Error::Internal(format!("cannot listen for Ctrl-C: {why}")))?;
     }
-    let wire = Port::new(&options.port, options.baud, session.interrupted.clone())?;
-    Walk::new(&table, wire, Terminal::new()?, session)?.run()?;
+    let wire = Port::new(&options.port, options.baud, interrupted.clone())?;
+    Walk::new(&table, (wire, Terminal::new()?), options.clone(), interrupted)?.run()?;
     println!("\nAll steps were passed or skipped: {}", options.evidence.display());
     Ok(())
 }

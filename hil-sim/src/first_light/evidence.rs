@@ -77,16 +77,44 @@ impl Evidence {
         self.steps.iter().rev().find(|record| record.name == step).map(|record| record.verdict)
     }
 
+    /// Whether it is of this board and build.
+    ///
+    /// # Errors
+    /// The text for the person.
+    pub fn is_of(&self, found: &str) -> Result<(), String> {
+        let own = format!("board {}, build {}", self.board, self.build);
+        let other =
+            format!("{found}: allowed is {own}; another image begins with a new evidence file");
+        if found == own { Ok(()) } else { Err(other) }
+    }
+
+    /// Adds what was found at the present step.
+    pub fn found(&mut self, what: &str) {
+        self.steps.last_mut().into_iter().for_each(|record| record.found.push(what.to_owned()));
+    }
+
+    /// Adds a line of the console at the present step.
+    pub fn console(&mut self, line: &str) {
+        self.steps.last_mut().into_iter().for_each(|record| record.console += &format!("{line}\n"));
+    }
+
+    /// Ends the present step.
+    pub fn end(&mut self, verdict: Verdict, why: String) {
+        if let Some(record) = self.steps.last_mut() {
+            (record.verdict, record.why) = (verdict, why);
+        }
+    }
+
     /// Reads a file; none if it does not exist.
     ///
     /// # Errors
     /// [`Error::Refused`] when it cannot be read, or is none of this version.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
+        if !path.exists() {
+            return Ok(None);
+        }
         let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
-        let text = match std::fs::read_to_string(path) {
-            Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            text => text.map_err(|why| refused(why.to_string()))?,
-        };
+        let text = std::fs::read_to_string(path).map_err(|why| refused(why.to_string()))?;
         let evidence: Self = toml::from_str(&text).map_err(|why| refused(why.to_string()))?;
         match evidence.schema {
             SCHEMA => Ok(Some(evidence)),

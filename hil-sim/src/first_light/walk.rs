@@ -1,10 +1,10 @@
 //! Walks through the table: one step after the other, each judged, until one gives doubt.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::Options;
 use super::evidence::{Evidence, Record, SCHEMA, Verdict};
 use super::person::Person;
 use super::table::{Act, Board, Limits, Read, Ready, Table};
@@ -25,30 +25,16 @@ const STOPS_S: u32 = 10;
 /// Time between two looks at what was said, s.
 const LOOK_S: f64 = 0.2;
 
-/// Where results go, and what may end a walk.
-#[derive(Default)]
-pub struct Session {
-    /// The file of the evidence; none is written without.
-    pub file: Option<PathBuf>,
-    /// Who and what; for a new file.
-    pub bench: String,
-    /// The board that is expected; otherwise that of the image.
-    pub board: Option<String>,
-    /// Leaves out the steps that may be skipped.
-    pub skip: bool,
-    /// Set by Ctrl-C.
-    pub interrupted: Arc<AtomicBool>,
-}
-
 /// A walk through the table with a drive and a person.
 pub struct Walk<'a, W, P> {
     table: &'a Table,
     board: &'a Board,
     wire: W,
     person: P,
-    session: Session,
+    options: Options,
+    interrupted: Arc<AtomicBool>,
+    /// The last attempt is the one at the present step.
     evidence: Evidence,
-    record: Record,
     /// Heard since the last line was sent.
     said: Vec<String>,
     /// Unasked lines that end the step, unless it waits for them.
@@ -72,36 +58,34 @@ fn there<T>(answer: Option<T>) -> Checked<T> {
 }
 
 impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
-    /// Begins, or goes on with the evidence of a file.
+    /// Begins, or goes on with the evidence of a file; `interrupted` ends it.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the drive does not answer, or board or build are not those of the evidence.
-    pub fn new(table: &'a Table, mut wire: W, person: P, session: Session) -> Result<Self, Error> {
-        let old = session.file.as_deref().map(Evidence::open).transpose()?.flatten();
-        let (name, build) = identity(&mut wire).map_err(Error::Refused)?;
-        let (bench, steps) = (session.bench.clone(), Vec::new());
-        let (board, image) = (name.clone(), build.clone());
-        let new = Evidence { schema: SCHEMA, bench, board, build: image, steps };
-        let evidence = old.unwrap_or(new);
-        let wanted = session.board.as_ref().unwrap_or(&evidence.board);
-        if (&name, &name, &build) != (wanted, &evidence.board, &evidence.build) {
-            return Err(Error::Refused(format!(
-                "board {name}, build {build}: allowed are board {wanted}, and board {}, build {} of the evidence; \
-                 another image begins with a new file",
-                evidence.board, evidence.build
-            )));
+    /// [`Error::Refused`] when the drive does not answer, or board or build are not those of options and evidence.
+    pub fn new(
+        table: &'a Table,
+        (mut wire, person): (W, P),
+        options: Options,
+        interrupted: Arc<AtomicBool>,
+    ) -> Result<Self, Error> {
+        let (board, build) = identity(&mut wire).map_err(Error::Refused)?;
+        let (found, bench) = (format!("board {board}, build {build}"), options.bench.clone());
+        let new = Evidence { schema: SCHEMA, bench, board, build, steps: Vec::new() };
+        let evidence = Evidence::open(&options.evidence)?.unwrap_or(new);
+        evidence.is_of(&found).map_err(Error::Refused)?;
+        let board = table.board(&evidence.board)?;
+        if options.board.as_ref().is_some_and(|wanted| *wanted != board.name) {
+            return Err(Error::unknown("board", &board.name, options.board.as_deref().into_iter()));
         }
-        let record = Record::new("", Verdict::Interrupted);
         let (said, doubts, readings, patience_s) = Default::default();
-        let board = table.board(&name)?;
         Ok(Self {
             table,
             board,
             wire,
             person,
-            session,
+            options,
+            interrupted,
             evidence,
-            record,
             said,
             doubts,
             readings,
@@ -130,12 +114,11 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     pub fn step(&mut self) -> Result<bool, Error> {
         let Some(ready) = self.table.next(&self.evidence)? else { return Ok(false) };
         let (number, step, _) = ready.place();
-        let skip = self.session.skip && step.optional;
+        let skip = self.options.skip_learning && step.optional;
         let begun = if skip { Verdict::Skipped } else { Verdict::Interrupted };
-        self.record = Record::new(&step.name, begun);
         // Before anything is done: what breaks off leaves a trace in the file.
-        self.evidence.steps.push(self.record.clone());
-        self.write()?;
+        self.evidence.steps.push(Record::new(&step.name, begun));
+        self.evidence.write(&self.options.evidence)?;
         if skip {
             return Ok(true);
         }
@@ -147,22 +130,14 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             }
             end = end.and(off);
         }
-        self.record.verdict = Verdict::Passed;
-        if let Err(Failure(verdict, why)) = end {
-            (self.record.verdict, self.record.why) = (verdict, why);
+        let Failure(verdict, why) = end.err().unwrap_or(Failure(Verdict::Passed, String::new()));
+        let reason = format!("{why}\n{}", self.board.fill(&step.otherwise));
+        self.evidence.end(verdict, why);
+        self.evidence.write(&self.options.evidence)?;
+        match verdict {
+            Verdict::Passed => Ok(true),
+            _ => Err(Error::Lost { name: format!("step {number}, {}", step.name), reason }),
         }
-        self.evidence.steps.pop();
-        self.evidence.steps.push(self.record.clone());
-        self.write()?;
-        if self.record.verdict == Verdict::Passed {
-            return Ok(true);
-        }
-        let reason = format!("{}\n{}", self.record.why, self.board.fill(&step.otherwise));
-        Err(Error::Lost { name: format!("step {number}, {}", step.name), reason })
-    }
-
-    fn write(&self) -> Result<(), Error> {
-        self.session.file.as_deref().map_or(Ok(()), |file| self.evidence.write(file))
     }
 
     fn walk(&mut self, ready: &Ready) -> Checked {
@@ -239,27 +214,19 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             Act::Read(read) => self.read(read)?,
             Act::Noise(signal) => self.noise(signal)?,
         }
-        if self.session.interrupted.load(Ordering::Relaxed) {
-            return there(None);
-        }
         self.look()
     }
 
     fn find(&mut self, what: &str) {
         self.person.tell(&format!("  {what}"));
-        self.record.found.push(what.to_owned());
-    }
-
-    fn note(&mut self, line: &str) {
-        self.record.console += line;
-        self.record.console.push('\n');
+        self.evidence.found(what);
     }
 
     fn send(&mut self, line: &str) -> Checked {
         self.drain();
-        self.note(&format!("> {line}"));
+        self.evidence.console(&format!("> {line}"));
         let answer = self.wire.ask(line).or_else(|why| doubt(why.to_string()))?;
-        answer.lines.iter().for_each(|line| self.note(line));
+        answer.lines.iter().for_each(|line| self.evidence.console(line));
         if answer.lines.len() == 1 {
             self.person.tell(&format!("  {line}: {}", answer.lines[0]));
         }
@@ -271,7 +238,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     fn drain(&mut self) {
         for line in self.wire.unasked() {
             self.person.tell(&format!("  {line}"));
-            self.note(&line);
+            self.evidence.console(&line);
             if DOUBTS.iter().any(|doubt| line.starts_with(doubt)) || line.contains(": refused") {
                 self.doubts.push(line.clone());
             }
@@ -279,9 +246,12 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         }
     }
 
-    /// Fails for an unasked line that nobody waits for.
+    /// Fails for an unasked line that nobody waits for, and when it is interrupted.
     fn look(&mut self) -> Checked {
         self.drain();
+        if self.interrupted.load(Ordering::Relaxed) {
+            return there(None);
+        }
         // A later act may wait for a fault.
         match self.doubts.first() {
             Some(line) if !line.starts_with("* fault ") => doubt(line.clone()),
@@ -290,9 +260,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     }
 
     fn hear(&mut self, text: &str) -> Checked {
-        let (seconds, mut left) = (self.patience_s, self.patience_s);
+        let mut left = self.patience_s;
         loop {
-            self.drain();
+            self.look()?;
             if self.said.iter().any(|line| line.contains(text)) {
                 self.doubts.retain(|line| !line.contains(text));
                 return Ok(());
@@ -302,9 +272,8 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             }
             // An answer that is no `ok` is whole.
             let waits = self.said.iter().any(|line| line.starts_with("ok"));
-            if !waits || left <= 0.0 || self.session.interrupted.load(Ordering::Relaxed) {
-                let said = self.said.join("; ");
-                return doubt(format!("`{text}` was not said within {seconds} s, but `{said}`"));
+            if !waits || left <= 0.0 {
+                return doubt(format!("not `{text}`, but `{}`", self.said.join("; ")));
             }
             left -= LOOK_S;
             self.wire.wait(LOOK_S);
@@ -315,13 +284,11 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         self.wire.reopen().or_else(|why| doubt(why.to_string()))?;
         for _ in 0..STARTS_S {
             self.wire.wait(1.0);
-            if let Ok((name, build)) = identity(&mut self.wire) {
+            if let Ok((board, build)) = identity(&mut self.wire) {
                 self.drain();
                 self.doubts.clear();
-                if (&name, &build) == (&self.evidence.board, &self.evidence.build) {
-                    return Ok(());
-                }
-                return doubt(format!("another image: board {name}, build {build}"));
+                let found = format!("board {board}, build {build}");
+                return self.evidence.is_of(&found).or_else(doubt);
             }
         }
         doubt(format!("the controller does not answer within {STARTS_S} s"))

@@ -3,7 +3,7 @@
 
 use std::cell::{RefCell, RefMut};
 use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -16,10 +16,11 @@ use hil_sim::Error;
 use hil_sim::config::LoadMode;
 use hil_sim::console::answer::{Meaning, meaning, tagged};
 use hil_sim::console::link::{Answer, LinkError};
+use hil_sim::first_light::Options as Light;
 use hil_sim::first_light::evidence::{Evidence, Record, SCHEMA, Verdict};
 use hil_sim::first_light::person::Person;
 use hil_sim::first_light::table::Table;
-use hil_sim::first_light::walk::{Session, Walk};
+use hil_sim::first_light::walk::Walk;
 use hil_sim::first_light::wire::{Port, Wire};
 use hil_sim::plant::Load;
 use induction_drive::board::{ADC_FULL_SCALE, protection};
@@ -78,6 +79,7 @@ struct Bench {
     crystal_log: bool,
     /// Whether the power stage is.
     connected: bool,
+    motor: bool,
     gone: bool,
 }
 
@@ -112,6 +114,7 @@ impl Lab {
             on_in_reset: false,
             crystal_log: false,
             connected,
+            motor: false,
             gone: false,
         };
         // Where nothing is connected the chip pulls the break input down.
@@ -312,11 +315,12 @@ impl Bench {
         } else if is("dc link") {
             let volts = what.split(' ').find_map(|word| word.parse().ok()).unwrap_or(0.0);
             self.board.plant.set_dc_link(volts)?;
-            if is("at ") {
+            if !self.motor {
                 // Without a phase no current flows through a sensor: fault 30 comes as without a motor.
                 self.board.plant.set_open_phase(Some(0))?;
             }
         } else if is("connect the motor") {
+            self.motor = true;
             self.board.plant.set_open_phase(None)?;
         } else if is("lock the shaft") {
             self.board.plant.set_load(Load::Locked)?;
@@ -456,9 +460,15 @@ impl Person for Lab {
     }
 }
 
-fn session(file: PathBuf) -> Session {
+fn options(file: &Path) -> Light {
     let bench = "emulated: virtual board, simulated motor, scripted person".to_owned();
-    Session { file: Some(file), bench, board: None, skip: true, interrupted: Arc::default() }
+    let (port, evidence) = (String::new(), file.to_owned());
+    Light { port, baud: 0, board: None, evidence, bench, skip_learning: true }
+}
+
+/// A walk of a lab.
+fn walk<'a>(table: &'a Table, lab: &Lab, options: Light) -> Result<Walk<'a, Lab, Lab>, Error> {
+    Walk::new(table, (lab.clone(), lab.clone()), options, Arc::default())
 }
 
 /// A fresh board with nothing connected, and its first walk.
@@ -471,8 +481,7 @@ fn whole(stage: &'static PowerStage, counting: Counting, skip: bool) -> Result<P
     let table = Table::read()?;
     let file = folder(&format!("first-light-{}-{skip}", stage.name)).join("evidence.toml");
     let lab = fresh(stage, counting)?;
-    let session = Session { skip, ..session(file.clone()) };
-    Walk::new(&table, lab.clone(), lab.clone(), session)?.run()?;
+    walk(&table, &lab, Light { skip_learning: skip, ..options(&file) })?.run()?;
     let evidence = Evidence::open(&file)?.context("a file")?;
     ensure!(table.next(&evidence)?.is_none());
     let skipped = evidence.verdict("learn") == Some(Verdict::Skipped);
@@ -524,8 +533,7 @@ impl Begun {
         let (connected, confirmed) = (first >= connected, first >= confirmed);
         let lab = Lab::new(&REFERENCE, defect, connected, confirmed, Counting::default())?;
         let file = folder(&format!("first-light-{defect:?}")).join("evidence.toml");
-        let walk = Walk::new(&table, lab.clone(), lab.clone(), Session::default())?;
-        let mut evidence = walk.evidence().clone();
+        let mut evidence = walk(&table, &lab, options(&file))?.evidence().clone();
         let before = table.steps().take(first.context("a step")?);
         evidence.steps.extend(before.map(|(_, step)| Record::new(&step.name, Verdict::Passed)));
         evidence.write(&file)?;
@@ -534,8 +542,7 @@ impl Begun {
 
     /// Walks on; the step that stops, and why.
     fn stops(&self) -> Result<Record> {
-        let session = session(self.file.clone());
-        let end = Walk::new(&self.table, self.lab.clone(), self.lab.clone(), session)?.run();
+        let end = walk(&self.table, &self.lab, options(&self.file))?.run();
         let why = end.err().context("no step stops")?.to_string();
         let evidence = Evidence::open(&self.file)?.context("a file")?;
         let last = evidence.steps.last().context("a record")?.clone();
@@ -625,7 +632,8 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let evidence =
         Evidence { schema: SCHEMA, bench, board: REFERENCE.name.to_owned(), build, steps };
     evidence.write(&file)?;
-    let why = Walk::new(&table, port, Puller(board), session(file.clone()))?.run().err();
+    let bench = (port, Puller(board));
+    let why = Walk::new(&table, bench, options(&file), Arc::default())?.run().err();
     let why = why.context("it has ended")?.to_string();
     let evidence = Evidence::open(&file)?.context("a file")?;
     let last = evidence.steps.last().context("a record")?;
@@ -640,9 +648,8 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
 fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
     let begun = Begun::at("noise", D::None)?;
     let interrupted = Arc::new(AtomicBool::new(true));
-    let lab = begun.lab.clone();
-    let session = Session { interrupted, ..session(begun.file.clone()) };
-    ensure!(Walk::new(&begun.table, lab.clone(), lab, session)?.run().is_err());
+    let bench = (begun.lab.clone(), begun.lab.clone());
+    ensure!(Walk::new(&begun.table, bench, options(&begun.file), interrupted)?.run().is_err());
     let evidence = Evidence::open(&begun.file)?.context("a file")?;
     ensure!(evidence.verdict("noise") == Some(Verdict::Interrupted));
     ensure!(begun.lab.bench().sent.iter().any(|line| line == "stop"));
@@ -653,18 +660,17 @@ fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
 #[test]
 fn another_image_is_refused() -> Result<()> {
     let begun = Begun::at("noise", D::None)?;
-    let refused = |session: Session, text: &str| {
-        let lab = begun.lab.clone();
-        let why = Walk::new(&begun.table, lab.clone(), lab, session).err().context("refused")?;
-        ensure!(why.to_string().contains(text), "{why}");
+    let refused = |options: Light, text: &str| {
+        let why = walk(&begun.table, &begun.lab, options).err().context("refused")?.to_string();
+        ensure!(why.contains(text), "{why}");
         Ok(())
     };
-    let other = Some(ALL[1].name.to_owned());
-    refused(Session { board: other, ..session(begun.file.clone()) }, ALL[1].name)?;
+    let board = Some(ALL[1].name.to_owned());
+    refused(Light { board, ..options(&begun.file) }, ALL[1].name)?;
     let mut evidence = Evidence::open(&begun.file)?.context("a file")?;
     evidence.build = "0123456789abcdef".to_owned();
     evidence.write(&begun.file)?;
-    refused(session(begun.file.clone()), "0123456789abcdef")
+    refused(options(&begun.file), "0123456789abcdef")
 }
 
 /// A port that is lost, and a person who leaves, while the motor turns: the drive is off within seconds, by itself and by
@@ -686,8 +692,7 @@ fn a_lost_port_and_a_lost_person_stop_the_drive_and_the_walk_goes_on() -> Result
         (bench.defect, bench.gone) = (D::None, false);
         bench.unasked.clear();
         drop(bench);
-        let lab = begun.lab.clone();
-        let mut walk = Walk::new(&begun.table, lab.clone(), lab, session(begun.file.clone()))?;
+        let mut walk = walk(&begun.table, &begun.lab, options(&begun.file))?;
         walk.step()?;
         let steps = &walk.evidence().steps;
         let verdicts: Vec<_> =
