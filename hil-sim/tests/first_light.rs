@@ -67,6 +67,8 @@ fn page(table: &Table) -> String {
                 " **J**"
             } else if step.optional {
                 " **O**"
+            } else if step.third {
+                " (three sensors)"
             } else {
                 ""
             };

@@ -88,21 +88,13 @@ impl Evidence {
         if found == own { Ok(()) } else { Err(other) }
     }
 
-    /// Adds what was found at the present step.
-    pub fn found(&mut self, what: &str) {
-        self.steps.last_mut().into_iter().for_each(|record| record.found.push(what.to_owned()));
-    }
-
-    /// Adds a line of the console at the present step.
-    pub fn console(&mut self, line: &str) {
-        self.steps.last_mut().into_iter().for_each(|record| record.console += &format!("{line}\n"));
-    }
-
-    /// Ends the present step.
-    pub fn end(&mut self, verdict: Verdict, why: String) {
-        if let Some(record) = self.steps.last_mut() {
-            (record.verdict, record.why) = (verdict, why);
-        }
+    /// The last attempt.
+    ///
+    /// # Panics
+    /// Before the first one.
+    pub fn record(&mut self) -> &mut Record {
+        let last = self.steps.len() - 1;
+        &mut self.steps[last]
     }
 
     /// Reads a file; none if it does not exist.

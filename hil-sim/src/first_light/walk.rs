@@ -74,8 +74,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         let evidence = Evidence::open(&options.evidence)?.unwrap_or(new);
         evidence.is_of(&found).map_err(Error::Refused)?;
         let board = table.board(&evidence.board)?;
-        if options.board.as_ref().is_some_and(|wanted| *wanted != board.name) {
-            return Err(Error::unknown("board", &board.name, options.board.as_deref().into_iter()));
+        if let Some(wanted) = options.board.as_ref().filter(|wanted| **wanted != board.name) {
+            let image = &board.name;
+            return Err(Error::Refused(format!("--board {wanted}: the image is that of {image}")));
         }
         let (said, doubts, readings, patience_s) = Default::default();
         Ok(Self {
@@ -132,7 +133,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         }
         let Failure(verdict, why) = end.err().unwrap_or(Failure(Verdict::Passed, String::new()));
         let reason = format!("{why}\n{}", self.board.fill(&step.otherwise));
-        self.evidence.end(verdict, why);
+        (self.evidence.record().verdict, self.evidence.record().why) = (verdict, why);
         self.evidence.write(&self.options.evidence)?;
         match verdict {
             Verdict::Passed => Ok(true),
@@ -219,14 +220,18 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
 
     fn find(&mut self, what: &str) {
         self.person.tell(&format!("  {what}"));
-        self.evidence.found(what);
+        self.evidence.record().found.push(what.to_owned());
+    }
+
+    fn note(&mut self, line: &str) {
+        self.evidence.record().console += &format!("{line}\n");
     }
 
     fn send(&mut self, line: &str) -> Checked {
         self.drain();
-        self.evidence.console(&format!("> {line}"));
+        self.note(&format!("> {line}"));
         let answer = self.wire.ask(line).or_else(|why| doubt(why.to_string()))?;
-        answer.lines.iter().for_each(|line| self.evidence.console(line));
+        answer.lines.iter().for_each(|line| self.note(line));
         if answer.lines.len() == 1 {
             self.person.tell(&format!("  {line}: {}", answer.lines[0]));
         }
@@ -238,7 +243,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     fn drain(&mut self) {
         for line in self.wire.unasked() {
             self.person.tell(&format!("  {line}"));
-            self.evidence.console(&line);
+            self.note(&line);
             if DOUBTS.iter().any(|doubt| line.starts_with(doubt)) || line.contains(": refused") {
                 self.doubts.push(line.clone());
             }
