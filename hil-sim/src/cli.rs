@@ -18,6 +18,7 @@ use crate::board;
 use crate::console;
 use crate::error::Error;
 use crate::experiments;
+use crate::first_light;
 use crate::input::{Input, OUT};
 use part::Part;
 use run::{Output, Trace};
@@ -138,6 +139,10 @@ enum Command {
     /// The drive must be off, its dc link below 20 V, and the supply of the gate drivers off. Builds the image, erases and
     /// writes its pages, reads them back, starts it and compares its check sum. Exit code 2 when file, port or drive refuse.
     Update(console::update::Options),
+    /// First power-up of a board, step by step: says what to do and measure, talks to the drive, judges, and stops on doubt
+    ///
+    /// Ends in one file of evidence, with which a later run goes on. Exit code 1 for a step that was not passed.
+    FirstLight(first_light::Options),
 }
 
 /// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
@@ -176,6 +181,7 @@ pub fn main() -> ExitCode {
         Some(Command::Board(options)) => board::become_board(&options),
         Some(Command::Console(options)) => console::run(&options),
         Some(Command::Update(options)) => console::update::run(&options),
+        Some(Command::FirstLight(options)) => first_light::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

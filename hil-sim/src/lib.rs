@@ -6,6 +6,7 @@ pub mod board;
 pub mod cli;
 pub mod console;
 pub mod experiments;
+pub mod first_light;
 pub mod input;
 mod prelude;
 mod random;

@@ -11,6 +11,7 @@ mod commission;
 mod common;
 mod console;
 mod documents;
+mod first_light;
 mod full_range;
 #[path = "../../tests/common/generated.rs"]
 mod generated;

@@ -12,7 +12,7 @@ mod common;
 mod cost;
 mod dc_link;
 mod drivers;
-mod first_power_up;
+mod first_light;
 mod foreign;
 mod hardware;
 mod homing;

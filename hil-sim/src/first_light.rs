@@ -1,0 +1,62 @@
+//! `cargo sim first-light`: first power-up of a board, step by step, with a person at the bench. It says what to do and what to measure,
+//! sends the lines of the console, judges, and stops on doubt; it ends in one file of evidence.
+
+pub mod evidence;
+pub mod person;
+pub mod table;
+pub mod walk;
+pub mod wire;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use crate::error::Error;
+use person::Terminal;
+use table::Table;
+use walk::Walk;
+use wire::Port;
+
+/// Options of a first light.
+#[derive(Args, Clone)]
+pub struct Options {
+    /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` names
+    #[arg(long, value_name = "PATH")]
+    pub port: String,
+    /// Bits per second
+    #[arg(long, value_name = "N", default_value_t = 115_200)]
+    pub baud: u32,
+    /// Board that is expected [default: that of the image]
+    #[arg(long, value_name = "NAME")]
+    pub board: Option<String>,
+    /// File of the evidence; one that exists is gone on with, at the first step that was not passed
+    #[arg(long, value_name = "FILE", default_value = "out/first-light.toml")]
+    pub evidence: PathBuf,
+    /// Instruments, supply and motor, for a new file
+    #[arg(long, value_name = "TEXT", default_value = "not stated")]
+    pub bench: String,
+    /// Leaves out learning and trace; the evidence says `skipped`
+    #[arg(long)]
+    pub skip_learning: bool,
+}
+
+/// Walks through all steps that the evidence does not have.
+///
+/// # Errors
+/// [`Error::Lost`] for a step that was not passed, after the drive was stopped; [`Error::Refused`] when the port cannot be opened, the
+/// drive does not answer, or it is not that of the evidence.
+pub fn run(options: &Options) -> Result<(), Error> {
+    let table = Table::read()?;
+    let interrupted = Arc::<AtomicBool>::default();
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, interrupted.clone())
+            .map_err(|why| Error::Internal(format!("cannot listen for Ctrl-C: {why}")))?;
+    }
+    let wire = Port::new(&options.port, options.baud, interrupted.clone())?;
+    Walk::new(&table, (wire, Terminal::new()?), options.clone(), interrupted)?.run()?;
+    println!("\nAll steps were passed or skipped: {}", options.evidence.display());
+    Ok(())
+}

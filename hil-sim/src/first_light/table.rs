@@ -1,0 +1,232 @@
+//! The steps as data. [`Table::next`] alone hands out a step to walk through, so that nothing switches the stage on before gates and
+//! fault input were judged.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::evidence::{Evidence, Verdict};
+use crate::error::Error;
+
+/// First words of the lines after which every gate stays off. Any other line counts as one that switches the stage on.
+#[rustfmt::skip]
+const HARMLESS: [&str; 13] = [
+    "status", "version", "faults", "board", "get", "set", "save", "clear", "trace", "stop", "backup", "accept", "reboot",
+];
+
+/// The boards with their values, and the steps.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// The boards.
+    #[serde(rename = "board")]
+    pub boards: Vec<Board>,
+    /// The parts, in order.
+    #[serde(rename = "part")]
+    pub parts: Vec<Part>,
+}
+
+/// A board with its values.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Board {
+    /// Its name, as the firmware says it.
+    pub name: String,
+    /// By name, in capitals.
+    #[serde(flatten)]
+    pub values: BTreeMap<String, String>,
+}
+
+/// Steps that share a set-up.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// Its title.
+    pub title: String,
+    /// The set-up.
+    pub before: String,
+    /// Its steps, in order.
+    #[serde(rename = "step")]
+    pub steps: Vec<Step>,
+}
+
+/// A step.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// Its name in the evidence.
+    pub name: String,
+    /// Whether it judges gates or fault input: the stage stays off until all such steps were passed.
+    #[serde(default)]
+    pub judges: bool,
+    /// Whether it may be skipped.
+    #[serde(default)]
+    pub optional: bool,
+    /// Whether it is for boards with three current sensors.
+    #[serde(default)]
+    pub third: bool,
+    /// Longest wait for what has to be heard, s.
+    pub patience_s: Option<f64>,
+    /// In order.
+    pub acts: Vec<Act>,
+    /// Where to look if it does not give what it should.
+    pub otherwise: String,
+}
+
+/// One thing to do, to hear or to measure; `steps.toml` explains them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[expect(missing_docs, reason = "the head of the table explains them to those who write it")]
+pub enum Act {
+    Hand(String),
+    Restart(String),
+    Send(String),
+    Often { line: String, times: u32 },
+    Setting(String),
+    Wait(f64),
+    Hear(String),
+    Never(String),
+    See(String),
+    Measure { what: String, unit: String, is: Limits },
+    Read(Read),
+    Noise(String),
+}
+
+/// The two ends of the allowed numbers, as expressions.
+pub type Limits = [String; 2];
+
+/// A number in an answer.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Read {
+    /// It stands behind this text.
+    pub after: Option<String>,
+    /// It stands before this text.
+    pub before: Option<String>,
+    /// Its unit.
+    pub unit: String,
+    /// Whether the limits are relative to the reading before.
+    #[serde(default)]
+    pub rise: bool,
+    /// Where it has to be.
+    pub is: Limits,
+}
+
+/// A step that may be walked through now. [`Table::next`] makes it.
+pub struct Ready<'a> {
+    number: usize,
+    part: &'a Part,
+    step: &'a Step,
+}
+
+impl<'a> Ready<'a> {
+    /// Its number, the step, and its part where it is the first of it.
+    pub fn place(&self) -> (usize, &'a Step, Option<&'a Part>) {
+        let first = self.part.steps.first().is_some_and(|first| first.name == self.step.name);
+        (self.number, self.step, first.then_some(self.part))
+    }
+}
+
+impl Table {
+    /// The table of this program.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a table that is none; a test reads it.
+    pub fn read() -> Result<Self, Error> {
+        toml::from_str(include_str!("steps.toml")).map_err(|why| Error::Internal(why.to_string()))
+    }
+
+    /// The board of a name.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`].
+    pub fn board(&self, name: &str) -> Result<&Board, Error> {
+        let names = self.boards.iter().map(|board| board.name.as_str());
+        let found = self.boards.iter().find(|board| board.name == name);
+        found.ok_or_else(|| Error::unknown("board", name, names))
+    }
+
+    /// All steps with their parts, in order.
+    pub fn steps(&self) -> impl Iterator<Item = (&Part, &Step)> {
+        self.parts.iter().flat_map(|part| part.steps.iter().map(move |step| (part, step)))
+    }
+
+    /// The first step that the evidence does not have; none at the end.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for a step that would switch the stage on before every step that judges gates and fault input was passed.
+    pub fn next(&self, evidence: &Evidence) -> Result<Option<Ready<'_>>, Error> {
+        let third = self.board(&evidence.board)?.has_third_sensor();
+        let passed = |step: &Step| evidence.verdict(&step.name) == Some(Verdict::Passed);
+        let skipped = |step: &Step| evidence.verdict(&step.name) == Some(Verdict::Skipped);
+        let left =
+            |step: &Step| !(passed(step) || step.optional && skipped(step) || step.third && !third);
+        let first = self.steps().enumerate().find(|(_, (_, step))| left(step));
+        let Some((index, (part, step))) = first else { return Ok(None) };
+        let unjudged = self.steps().map(|(_, step)| step).find(|step| step.judges && !passed(step));
+        match unjudged.filter(|_| step.switches_on()) {
+            None => Ok(Some(Ready { number: index + 1, part, step })),
+            Some(judge) => Err(Error::Refused(format!(
+                "step {} switches the stage on before step {} was passed",
+                step.name, judge.name
+            ))),
+        }
+    }
+}
+
+impl Step {
+    /// Whether one of its lines can switch a gate on.
+    pub fn switches_on(&self) -> bool {
+        self.acts.iter().any(|act| match act {
+            Act::Send(line) | Act::Often { line, .. } => {
+                line.split(' ').next().is_none_or(|word| !HARMLESS.contains(&word))
+            }
+            _ => false,
+        })
+    }
+}
+
+impl Board {
+    /// A text with the board's values in place of their names, and its own in place of NAME.
+    pub fn fill(&self, text: &str) -> String {
+        // From the last to the first: a name comes before the one that it is the beginning of.
+        let text = text.replace("NAME", &self.name);
+        self.values.iter().rev().fold(text, |text, (name, value)| text.replace(name, value))
+    }
+
+    /// The value of an expression; what is none is not a number, and no reading is within it.
+    pub fn number(&self, expression: &str) -> f64 {
+        let text = self.fill(expression);
+        // A sign at the beginning is no operator.
+        let Some(at) = text.rfind(['+', '-', '*']).filter(|at| *at > 0) else {
+            return text.parse().unwrap_or(f64::NAN);
+        };
+        let (a, b) = (self.number(&text[..at]), self.number(&text[at + 1..]));
+        match &text[at..=at] {
+            "+" => a + b,
+            "-" => a - b,
+            _ => a * b,
+        }
+    }
+
+    /// Whether it has three current sensors.
+    pub fn has_third_sensor(&self) -> bool {
+        self.number("SENSORS") == 3.0
+    }
+}
+
+impl Read {
+    /// The text that it stands at.
+    pub fn place(&self) -> &str {
+        self.after.as_deref().or(self.before.as_deref()).unwrap_or_default()
+    }
+
+    /// The number in a line.
+    pub fn of(&self, line: &str) -> Option<f64> {
+        let (before, after) = line.split_once(self.place())?;
+        let word = match self.after {
+            Some(_) => after.split(' ').next(),
+            None => before.rsplit(' ').next(),
+        };
+        word?.parse().ok()
+    }
+}

@@ -1,0 +1,107 @@
+//! The way to the drive.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::console::link::{Answer, Link, LinkError, Urgent};
+use crate::console::open;
+use crate::error::Error;
+
+/// Time between two signs of life: a quarter of the time after which the drive stops ([`super::walk::TIMEOUT_S`]).
+const ALIVE: Duration = Duration::from_millis(500);
+/// Longest time that a port is away while the controller starts again.
+const AWAY: Duration = Duration::from_secs(60);
+
+/// A drive, and the time beside it.
+pub trait Wire {
+    /// Sends a line and hears its answer.
+    ///
+    /// # Errors
+    /// There is no whole answer.
+    fn ask(&mut self, line: &str) -> Result<Answer, LinkError>;
+    /// Lets some seconds pass.
+    fn wait(&mut self, seconds: f64);
+    /// The lines that came unasked since the last call.
+    fn unasked(&mut self) -> Vec<String>;
+    /// The controller starts again: opens the port once more.
+    ///
+    /// # Errors
+    /// It does not come back.
+    fn reopen(&mut self) -> Result<(), Error>;
+}
+
+/// A drive at a serial port. A thread sends signs of life, and `stop` when the person interrupts.
+pub struct Port {
+    path: String,
+    baud: u32,
+    link: Link,
+    urgent: Arc<Mutex<Urgent>>,
+    unasked: Arc<Mutex<Vec<String>>>,
+}
+
+impl Port {
+    /// Opens a port.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when it cannot be opened.
+    pub fn new(path: &str, baud: u32, interrupted: Arc<AtomicBool>) -> Result<Self, Error> {
+        let unasked = Arc::default();
+        let link = connect(path, baud, &unasked)?;
+        let urgent = Arc::new(Mutex::new(link.urgent()));
+        let alive = Arc::downgrade(&urgent);
+        std::thread::spawn(move || {
+            let mut told = false;
+            while let Some(urgent) = alive.upgrade() {
+                // Once: a second one would cut the answers short that the walk waits for.
+                let stops = !told && interrupted.load(Ordering::Relaxed);
+                told |= stops;
+                // A port that is gone is found so by the next request.
+                let _ = locked(&urgent).send(if stops { "stop" } else { "" });
+                drop(urgent);
+                std::thread::sleep(ALIVE);
+            }
+        });
+        Ok(Self { path: path.to_owned(), baud, link, urgent, unasked })
+    }
+}
+
+impl Wire for Port {
+    fn ask(&mut self, line: &str) -> Result<Answer, LinkError> {
+        self.link.ask(line, |_| ())
+    }
+
+    fn wait(&mut self, seconds: f64) {
+        std::thread::sleep(Duration::from_secs_f64(seconds));
+    }
+
+    fn unasked(&mut self) -> Vec<String> {
+        std::mem::take(&mut *locked(&self.unasked))
+    }
+
+    fn reopen(&mut self) -> Result<(), Error> {
+        let began = Instant::now();
+        loop {
+            match connect(&self.path, self.baud, &self.unasked) {
+                Err(_) if began.elapsed() < AWAY => std::thread::sleep(ALIVE),
+                link => {
+                    self.link = link?;
+                    *locked(&self.urgent) = self.link.urgent();
+                    return Ok(());
+                }
+            }
+        }
+    }
+}
+
+fn connect(path: &str, baud: u32, unasked: &Arc<Mutex<Vec<String>>>) -> Result<Link, Error> {
+    let (reader, writer) = open(path, baud)?;
+    let to = unasked.clone();
+    let mut link = Link::new(reader, writer, move |line: &str| locked(&to).push(line.to_owned()));
+    link.begin();
+    Ok(link)
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
