@@ -13,6 +13,7 @@ mod tests;
 
 mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
+mod nucleo_g474re_ipmm10b;
 mod reference;
 
 use drive_core::Line;
@@ -23,13 +24,18 @@ use crate::strip::{self, TERMINALS};
 use pin::Pin;
 
 /// All boards.
-pub const ALL: [&Board; 3] =
-    [&reference::BOARD, &nucleo_g474re_ihm08m1::BOARD, &nucleo_g474re_ihm023v3::BOARD];
+pub const ALL: [&Board; 4] = [
+    &reference::BOARD,
+    &nucleo_g474re_ihm08m1::BOARD,
+    &nucleo_g474re_ihm023v3::BOARD,
+    &nucleo_g474re_ipmm10b::BOARD,
+];
 
 /// Their names.
-pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name];
+pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name, ALL[3].name];
 /// Their names in a line.
-pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3";
+pub const ALL_NAMES: &str =
+    "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {

@@ -19,12 +19,12 @@ pub const HEAT_SINK: Pin = pc(2);
 /// The port of the field bus: three pins beside each other on CN7, which the boards here do not use.
 pub const BUS: Rs485 = Rs485 { transmit: pc(10), receive: pc(11), driver: pc(12) };
 
+/// Bench step of a thermistor.
+pub const NTC_STEP: &str = "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink";
+
 /// A thermistor with this resistor in series. Another topology shows another temperature, or one that falls.
 pub const fn ntc(divider_ohm: f32) -> Stated<Ntc> {
-    assumed(
-        Ntc { divider_ohm, ..Ntc::DEFAULT },
-        "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink",
-    )
+    assumed(Ntc { divider_ohm, ..Ntc::DEFAULT }, NTC_STEP)
 }
 
 /// A fault output that pulls PA6 low, and its pull-up.

@@ -7,7 +7,7 @@ use super::shunts::Shunts;
 use super::{DcLinkPin, GateLimits, PowerStage, Sensors, Switches};
 
 /// All of them.
-pub const ALL: [&PowerStage; 3] = [&REFERENCE, &IHM08M1, &IHM023V3];
+pub const ALL: [&PowerStage; 4] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B];
 
 /// TTL levels: below 0.8 V is low, above 2.0 V high.
 const TTL: (f64, f64) = (0.8, 2.0);
@@ -122,6 +122,28 @@ const IHM023V3: PowerStage = PowerStage {
     dc_link_divider: Some(1.0 / 0.0075),
     // 125 ns (L6390 data sheet); drop of an IGBT, assumed.
     delay_and_drop: Some((125e-9, 1.5)),
+    motor: None,
+    supply_v: Some(320.0),
+};
+
+/// STEVAL-IPMM10B behind X-NUCLEO-IHM09M1 at 320 V: a SLLIMM module of the second series. Shunts and gain: UM2702, page 16; all
+/// else is assumed.
+const IPMM10B: PowerStage = PowerStage {
+    name: "nucleo-g474re-ipmm10b",
+    driver: {
+        let input =
+            Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
+        Driver { high: input, low: input, interlock: true, dead_time_s: 0.0 }
+    },
+    limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
+    switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
+    dc_link_pin: DIVIDER,
+    fault_pull_ohm: FAULT_PULL_OHM,
+    analog_only: &[],
+    ntc: Ntc { ohm_25: 85e3, beta_k: 4092.0, divider_ohm: 12e3, ..Ntc::DEFAULT },
+    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
+    dc_link_divider: Some(1.0 / 0.0075),
+    delay_and_drop: Some((125e-9, 1.0)),
     motor: None,
     supply_v: Some(320.0),
 };
