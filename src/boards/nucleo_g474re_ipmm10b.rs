@@ -6,7 +6,7 @@
 use drive_settings::{Flux, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho};
+use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho};
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -66,5 +66,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
+    strip: Strip::NONE,
     pulls: "10 kOhm to ground at all six driver inputs: those of the module are weak",
 };

@@ -140,6 +140,7 @@ const IPMM10B: PowerStage = PowerStage {
     dc_link_pin: DIVIDER,
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[],
+    terminals: ["- - - - - - -", "- - -", "- - -"],
     ntc: Ntc { ohm_25: 85e3, beta_k: 4092.0, divider_ohm: 12e3, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
