@@ -11,6 +11,7 @@ mod learning;
 mod lock_monitor;
 mod online_tracking;
 mod position_step;
+mod power_limit;
 mod protections;
 mod replay;
 mod saliency_check;

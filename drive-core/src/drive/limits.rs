@@ -12,6 +12,8 @@ use crate::{Fault, Measured};
 pub(super) struct Limits {
     pub dc_link: DcLinkState,
     pub voltage: VoltageLimitState,
+    /// Power that the model of the power limit leaves, over 3/2, W.
+    pub power_error: f32,
     /// Present limits, by dc link, voltage and heat together.
     pub now: DcLinkLimits,
     /// Why the torque current is smaller than asked for.
@@ -24,7 +26,13 @@ pub(super) struct Limits {
 impl Limits {
     pub fn start(&mut self, c: &Coefficients) {
         let voltage = c.voltage_limit.start();
-        *self = Self { voltage, now: DcLinkLimits::default(), why: Limiting::None, ..*self };
+        *self = Self {
+            voltage,
+            power_error: 0.0,
+            now: DcLinkLimits::default(),
+            why: Limiting::None,
+            ..*self
+        };
         self.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 
@@ -51,6 +59,12 @@ impl Limits {
 }
 
 impl Kept {
+    /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
+    pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
+        let Limits { power_error, now, .. } = &mut self.limits;
+        c.power.step(c, power_error, now, &self.seen, (magnetising, drop));
+    }
+
     /// Adds the current of the last [`Thermal::EVERY`] periods to the thermal loads, and finds the torque current that heat
     /// sink, motor and inverter do not bear; in every state. `is_energised`: whether a current is driven.
     ///

@@ -149,6 +149,7 @@ impl Settings {
             catching: self.catching([d.k_c, q.k_c]),
             voltage_limit: if self.flux.economy { limit.economical(m) } else { limit },
             dc_link: DcLink::new(&self.dc_link_limits()),
+            power: self.power_limit(),
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),
             protection: Protection {
@@ -156,7 +157,6 @@ impl Settings {
                 dc_over: self.dc_over_v(),
                 dc_under: self.dc_under_v(),
                 rotor_freq: self.freq_of_rpm(self.highest_rpm()),
-                current_squared: current_limit * current_limit,
                 i_q: current_limit,
             },
             observer: self.uses_observer().then(|| Observer::new(m, &leakage, i_d, current_lag)),
@@ -164,7 +164,6 @@ impl Settings {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),
                 verify: periods(VERIFY_S),
-                i_d,
                 stop_ramp: self.stop_a_per_s() * PERIOD_S,
             },
         })

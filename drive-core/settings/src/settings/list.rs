@@ -16,7 +16,7 @@ use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
-use drive_core::{AngleSource, Line, Motor, PERIOD_S};
+use drive_core::{AngleSource, Line, Most, Motor, PERIOD_S};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
@@ -373,6 +373,16 @@ settings! {
         heat_sink_c: f32 = 85.0, number("degC").from_to(0.0, 150.0).hardware();
         /// temperature of the heat sink from which on the current limit falls, to nothing where it trips
         derate_c: Option<f32> = None, auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
+        /// largest current from the dc link, motoring; 1000 for none
+        ///
+        /// What the copper takes of the direct current is below any limit.
+        dc_motoring_a: f32 = Most::NONE.current_a, number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, Most::NONE.current_a));
+        /// largest current into the dc link, generating; 1000 for none
+        dc_generating_a: f32 = Most::NONE.current_a, number("A").from_to(0.0, Most::NONE.current_a);
+        /// largest power from the dc link, motoring; 1e6 for none
+        motoring_w: f32 = Most::NONE.power_w, number("W").beside(|s| (s.magnetising_w(), Most::NONE.power_w));
+        /// largest power into the dc link, generating; 1e6 for none
+        generating_w: f32 = Most::NONE.power_w, number("W").from_to(0.0, Most::NONE.power_w);
     }
 
     /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).
