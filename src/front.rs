@@ -32,6 +32,7 @@ impl Front {
     ) {
         let Self { desk, console, bus } = self;
         desk.follow(drive);
+        desk.read_motor(drive, now_ms);
         console.poll(port, desk, drive, now_ms);
         bus.serve(line, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {

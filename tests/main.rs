@@ -9,6 +9,7 @@ mod five_demodulators;
 mod homing;
 mod learning;
 mod lock_monitor;
+mod motor_sensor;
 mod online_tracking;
 mod position_step;
 mod power_limit;

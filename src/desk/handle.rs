@@ -44,6 +44,10 @@ pub trait DriveHandle {
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
+    /// Code of the motor's temperature sensor, 12 bits; `None` where the board has no input for it.
+    fn motor_code(&mut self) -> Option<u16> {
+        None
+    }
     /// The commissioning.
     fn session(&mut self) -> &mut Session;
     /// Saves the settings. Takes up to two erasures: only while the outputs are off.

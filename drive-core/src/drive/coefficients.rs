@@ -12,7 +12,7 @@ use crate::protect::{
     WiringCheck,
 };
 use crate::{
-    Angle, AngleSource, DcLink, FrontEnd, Learning, Motion, PowerLimit, Relay, UnitVector,
+    Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, PowerLimit, Relay, UnitVector,
 };
 
 /// The coefficients of the control step, designed outside the interrupt.
@@ -92,6 +92,8 @@ pub struct Coefficients {
     pub volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub unlearned: bool,
+    /// Temperatures of the motor, °C, from which on the torque falls and at which there is none, where it has a sensor.
+    pub motor_c: Option<[u8; 2]>,
     /// The watch on sensors that stand still.
     pub travel_watch: TravelWatch,
     /// The measurement of the asymmetry at a start, where the synchronous demodulation tracks.
@@ -101,6 +103,11 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
+    /// The fault of a motor sensor of which no reading has come.
+    pub(crate) fn motor_unread(&self) -> Option<Fault> {
+        self.motor_c.map(|_| Fault::MotorSensorUnread)
+    }
+
     /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.front_end, &self.current_loop);

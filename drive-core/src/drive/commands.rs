@@ -118,8 +118,10 @@ impl Drive {
                 self.changes = self.changes.wrapping_add(1);
                 return Ok(accepted(tau_r, taken));
             }
+            Command::MotorTemperature(reading) => self.take_motor_temperature(reading),
             Command::Configure(ref coefficients) => {
                 self.c = *coefficients;
+                self.kept.limits.motor_fault = self.c.motor_unread();
                 self.kept.home = None;
                 self.changes = self.changes.wrapping_add(1);
             }
@@ -176,6 +178,9 @@ impl Drive {
     }
 
     pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
+        if let Some(fault) = self.kept.limits.motor_fault {
+            return Err(Refused::Stands(fault));
+        }
         match &job {
             _ if !self.is_charged() => Err(Refused::NotCharged),
             Job::Field(Goal::Learn) if !self.can_learn() => Err(Refused::NeedsInjection),

@@ -21,6 +21,10 @@ pub(super) struct Limits {
     /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
     pub too_hot_for: f32,
     pub too_hot: Limiting,
+    /// Share of the squared current that the motor does not bear by its sensor, of 255.
+    pub motor_hot: u8,
+    /// What stands against a start by that sensor.
+    pub motor_fault: Option<Fault>,
 }
 
 impl Limits {
@@ -81,6 +85,8 @@ impl Kept {
         let borne = c.thermal.step(thermal, square);
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);
         let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
+        let sensor = (1.0 - f32::from(limits.motor_hot) * (1.0 / 255.0), Limiting::Motor);
+        let loads = if sensor.0 < loads.0 { sensor } else { loads };
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
             let (largest, i_d) = (c.protection.i_q, references.current.d);
@@ -102,6 +108,21 @@ impl Drive {
     /// Whether the dc link is charged: a relay that there is has closed.
     pub(super) fn is_charged(&self) -> bool {
         self.c.relay.is_none() || self.kept.relay.closed
+    }
+
+    /// Takes a reading of the motor's sensor: from the first temperature on the squared current falls, to none at the second.
+    #[cold]
+    pub(super) fn take_motor_temperature(&mut self, reading: Result<f32, Fault>) {
+        let Some([from, trip]) = self.c.motor_c.map(|c| c.map(f32::from)) else { return };
+        let limits = &mut self.kept.limits;
+        // A conversion of NaN is 0, but NaN is not below the trip.
+        let hot = |celsius: f32| (255.0 / (trip - from) * (celsius - from)) as u8;
+        limits.motor_hot = reading.map_or(255, hot);
+        let judged = reading.and_then(|celsius| Fault::MotorHot.unless(celsius < trip));
+        limits.motor_fault = judged.err();
+        if let (Err(fault), false) = (judged, self.is_off()) {
+            self.end(fault.into());
+        }
     }
 
     /// Why the torque is smaller than asked for.

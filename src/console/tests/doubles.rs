@@ -26,6 +26,8 @@ use induction_drive::store::history::History;
 
 /// A drive without hardware.
 pub struct FakeDrive {
+    /// Code of the motor's temperature sensor.
+    pub motor_code: Option<u16>,
     /// The drive.
     pub drive: Drive,
     /// Whether its control runs.
@@ -74,6 +76,7 @@ impl FakeDrive {
             streamed: (0, VecDeque::new()),
             session: Session::new(&Settings::default()),
             history: History::default(),
+            motor_code: None,
         }
     }
 }
@@ -115,6 +118,9 @@ impl DriveHandle for FakeDrive {
     fn configured(&mut self, settings: &FirmwareSettings) {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
+    }
+    fn motor_code(&mut self) -> Option<u16> {
+        self.motor_code
     }
     fn session(&mut self) -> &mut Session {
         &mut self.session

@@ -144,6 +144,7 @@ impl Settings {
             relay: self.relay(),
             volts_per_hertz: self.volts_per_hertz(),
             learning: self.learning(),
+            motor_c: self.motor_sensor.limits(),
             unlearned: tracks && !t.allow_unlearned,
             prediction: Prediction::new(m, motor_plant, allowed_v, allowed_mean_v),
             catching: self.catching([d.k_c, q.k_c]),

@@ -11,6 +11,7 @@ use core::f32::consts::SQRT_2;
 
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
+use super::motor_sensor::SensorKind;
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource};
@@ -37,6 +38,18 @@ settings! {
         /// inertia of rotor and load; for the speed loop
         "motor.inertia" [motor] inertia: f32, number("kg m2").from_to(1e-7, 1000.0);
     ];
+
+    /// The temperature sensor of the motor, from ground to an input of the board, fed from the reference of the converter.
+    MotorSensor "motor." [motor_sensor] {
+        /// temperature sensor of the motor
+        sensor: SensorKind = SensorKind::None, word();
+        /// resistor between that sensor and the reference of the converter
+        sensor_ohm: f32 = 4700.0, number("ohm").from_to(100.0, 1e6).hardware();
+        /// temperature of the motor, degC, from which on its torque falls, to nothing where it trips
+        sensor_derate_c: u8 = 120, whole().beside(|s| (1.0, f32::from(s.motor_sensor.sensor_trip_c) - 1.0));
+        /// temperature of the motor, degC, that trips
+        sensor_trip_c: u8 = 140, whole().from_to(2.0, 199.0);
+    }
 
     /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
     /// drive from it; see [`rules`](super::rules). Defaults: the dissertation's motor, Table 3.
@@ -178,6 +191,8 @@ settings! {
     Settings "" [] {
         /// The motor.
         motor: Motor = Motor::DEFAULT;
+        /// Its temperature sensor.
+        motor_sensor: MotorSensor = MotorSensor::DEFAULT;
         /// Its nameplate.
         nameplate: Nameplate = Nameplate::DEFAULT;
         /// The timer and the power stage.
