@@ -80,9 +80,22 @@ impl Kept {
         measured: &Measured,
         is_energised: bool,
     ) -> Result<(), Fault> {
-        let Self { limits, thermal, references, seen, .. } = self;
-        let square = if is_energised { seen.current.length_squared() } else { 0.0 };
-        let borne = c.thermal.step(thermal, square);
+        let square = if is_energised { self.seen.current.length_squared() } else { 0.0 };
+        let borne = c.thermal.step(&mut self.thermal, square);
+        self.judge_heat(c, measured);
+        if is_energised {
+            borne
+        } else {
+            c.dc_link.rest(&mut self.limits.dc_link, Thermal::EVERY);
+            Ok(())
+        }
+    }
+
+    /// Finds the torque current that heat sink, motor and inverter do not bear.
+    #[cold] // in the flash
+    #[inline(never)]
+    fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
+        let Self { limits, thermal, references, .. } = self;
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);
         let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
         let sensor = (1.0 - f32::from(limits.motor_hot) * (1.0 / 255.0), Limiting::Motor);
@@ -95,12 +108,6 @@ impl Kept {
         } else {
             (0.0, Limiting::None)
         };
-        if is_energised {
-            borne
-        } else {
-            c.dc_link.rest(&mut limits.dc_link, Thermal::EVERY);
-            Ok(())
-        }
     }
 }
 
