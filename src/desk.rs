@@ -13,7 +13,7 @@ mod tests;
 use drive_commission::Step;
 use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
 use drive_core::learned::Learned;
-use drive_core::{Accepted, Command, Mode, Refused, State, Stop};
+use drive_core::{Accepted, Command, Fault, Mode, Refused, State, Stop};
 use drive_settings::entry::Change;
 
 use crate::settings::FirmwareSettings;
@@ -29,6 +29,8 @@ use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
 const BUS_SILENT_S: f32 = 1.0;
 /// From the answer to a reset, ms: the transmit queue empties in 44.
 const REBOOT_MS: u32 = 100;
+/// Time between two readings of the motor's temperature sensor, ms.
+const MOTOR_MS: u32 = 100;
 
 /// The answer to an order.
 pub type Answer = Result<Reply, Refusal>;
@@ -71,6 +73,9 @@ pub struct Desk {
     pub(crate) wires: Wires,
     /// Why the strip's reference was lost, until that is cleared.
     pub(crate) lost: Option<Lost>,
+    /// Last reading of the motor's temperature sensor, °C, and its time.
+    motor: Option<Result<f32, Fault>>,
+    motor_ms: u32,
 }
 
 impl Desk {
@@ -96,6 +101,8 @@ impl Desk {
             refused: None,
             wires: Wires::default(),
             lost: None,
+            motor: None,
+            motor_ms: 0,
         }
     }
 
@@ -175,6 +182,31 @@ impl Desk {
         if let Some(homed) = self.go_on_homing(drive) {
             self.homed = Some(homed);
         }
+    }
+
+    /// Tells the drive what the motor's temperature sensor reads, by its code of 12 bits; `None`: the board has no input for it, or its
+    /// converter gives none. `now_ms` wraps.
+    pub fn read_motor(
+        &mut self,
+        code: Option<u16>,
+        drive: &mut impl DriveHandle,
+        now_ms: u32,
+    ) {
+        if now_ms.wrapping_sub(self.motor_ms) < MOTOR_MS {
+            return;
+        }
+        let sensor = self.settings.in_force().drive.motor_sensor;
+        self.motor = code.and_then(|code| sensor.celsius(code));
+        self.motor_ms = now_ms;
+        if let Some(reading) = self.motor {
+            // It is taken in every state; without an answer there is no control.
+            let _ = drive.command(Command::MotorTemperature(reading));
+        }
+    }
+
+    /// The last reading of the motor's temperature sensor, °C.
+    pub fn motor(&self) -> Option<Result<f32, Fault>> {
+        self.motor
     }
 
     /// Stops the drive when the one that commands is silent for too long. Called at the end of each pass of the main loop: what has come

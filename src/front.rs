@@ -37,6 +37,8 @@ impl Front {
     ) {
         let Self { desk, console, bus, strip } = self;
         desk.follow(drive);
+        let [.., motor] = wires.codes();
+        desk.read_motor(motor, drive, now_ms);
         console.poll(port, desk, drive, now_ms);
         bus.serve(line, desk, drive, now_ms);
         strip.serve(wires, desk, drive, now_ms);

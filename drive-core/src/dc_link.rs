@@ -21,6 +21,8 @@
 //! sagging mains stays where it is, and `held` gives way below it, so that the torque comes back; in an outage the shaft
 //! holds the link at `held`.
 
+pub mod power;
+
 use core::fmt;
 
 use crate::PERIOD_S;
@@ -106,6 +108,8 @@ pub enum Limiting {
     DcLinkLow,
     /// The shaft feeds the link, which has no supply.
     RideThrough,
+    /// Dc current or power is at its limit.
+    Power,
 }
 
 /// Reason of the limit, in words.
@@ -121,6 +125,7 @@ impl fmt::Display for Limiting {
             Self::ResistorHot => "the dc link is high and the brake resistor hot",
             Self::DcLinkLow => "the dc link is low",
             Self::RideThrough => "the dc link has no supply: the shaft feeds it",
+            Self::Power => "dc current or power is at its limit",
         })
     }
 }

@@ -376,7 +376,8 @@ impl Drive {
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
         let phase = Phase::Off(Left::default());
-        let kept = Kept { seen: Telemetry::still(), ..Kept::default() };
+        let limits = Limits { motor_fault: coefficients.motor_unread(), ..Limits::default() };
+        let kept = Kept { seen: Telemetry::still(), limits, ..Kept::default() };
         Self { c: coefficients, changes: 0, kept, phase }
     }
 

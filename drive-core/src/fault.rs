@@ -84,6 +84,10 @@ faults! {
     WrongReference = 51, "the reference voltage of the converters is wrong";
     SensorSilentA = 52, "current sensor a stands still while the current turns: open or stuck";
     SensorSilentB = 53, "current sensor b stands still while the current turns: open or stuck";
+    MotorSensorOpen = 54, "temperature sensor of the motor open";
+    MotorSensorShorted = 55, "temperature sensor of the motor shorted";
+    MotorHot = 56, "motor too hot by its temperature sensor";
+    MotorSensorUnread = 57, "no reading of the motor's temperature sensor came";
 }
 
 impl Fault {

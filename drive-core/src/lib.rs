@@ -65,6 +65,7 @@ pub mod protect;
 mod supply;
 pub mod table;
 
+pub use dc_link::power::{Most, PowerLimit};
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
     Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode, Protection,

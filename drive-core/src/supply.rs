@@ -5,6 +5,8 @@
 //! and a capacitor C the link approaches its end E as `E - v = (E - v_0) exp(-t/RC)`, so that at most
 //! `band / (exp(t/RC) - 1)` is missing where it closes.
 
+use core::num::NonZeroU32;
+
 /// Coefficients of the relay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relay {
@@ -13,7 +15,7 @@ pub struct Relay {
     /// Largest distance of a steady link, V.
     band_v: f32,
     /// Control periods of a steady link until it closes.
-    settle: u32,
+    settle: NonZeroU32,
 }
 
 /// State of the relay. It is kept over stops and starts.
@@ -28,9 +30,9 @@ pub struct RelayState {
 
 impl Relay {
     /// A relay that closes `settle` control periods after the link has become steady within `band_v`, and opens below
-    /// `least_v`, both V.
-    pub fn new(least_v: f32, band_v: f32, settle: u32) -> Self {
-        Self { least_v, band_v, settle }
+    /// `least_v`, both V. None with 0 periods.
+    pub fn new(least_v: f32, band_v: f32, settle: u32) -> Option<Self> {
+        Some(Self { least_v, band_v, settle: NonZeroU32::new(settle)? })
     }
 
     /// One control period with the voltage of the dc link, V.
@@ -44,7 +46,7 @@ impl Relay {
             (state.from_v, state.steady) = (dc_link, 0);
         } else {
             state.steady += 1;
-            state.closed = state.steady >= self.settle;
+            state.closed = state.steady >= self.settle.get();
         }
     }
 }
@@ -61,7 +63,7 @@ mod tests {
     #[test]
     fn it_closes_near_the_end_of_charging_whatever_the_resistor() {
         for tau_s in [0.05_f32, 0.5, 2.0] {
-            let relay = Relay::new(200.0, 5.0, 3000);
+            let relay = Relay::new(200.0, 5.0, 3000).unwrap();
             let mut state = RelayState::default();
             let (mut v, mut n) = (0.0_f32, 0);
             while !state.closed {
@@ -79,7 +81,7 @@ mod tests {
 
     #[test]
     fn it_opens_at_once_below_the_least_and_closes_anew() {
-        let relay = Relay::new(200.0, 5.0, 10);
+        let relay = Relay::new(200.0, 5.0, 10).unwrap();
         let mut state = RelayState::default();
         let steps = |state: &mut RelayState, v: f32, n: u32| {
             (0..n).for_each(|_| relay.step(state, v));

@@ -172,7 +172,7 @@ const quiet = () => {};
 const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2', '#db2777', '#85888c'];
 const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°', nm: 'Nm', c: '°C' };
 const WORDS = { state: ['off', 'starting', 'running', 'stopping'],
-  limit: ['none', 'voltage', 'heat sink', 'motor', 'inverter', 'dc link high', 'brake resistor', 'dc link low', 'ride-through'] };
+  limit: ['none', 'voltage', 'heat sink', 'motor', 'inverter', 'dc link high', 'brake resistor', 'dc link low', 'ride-through', 'dc current or power'] };
 let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, plots = [], shown = 0, phi = null;
 /** The streamed signals, and the speed that was asked for beside the present one. */
 const plotted = () => streamed.concat(streamed.includes('speed_rpm') ? 'asked_rpm' : []);

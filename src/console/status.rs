@@ -5,7 +5,7 @@ use core::fmt;
 
 use drive_core::current::VoltageLimit;
 use drive_core::io::PERIOD_S;
-use drive_core::{Hardware, Limiting, State};
+use drive_core::{Fault, Hardware, Limiting, State};
 use drive_settings::{CurrentSensors, Settings};
 
 use super::Console;
@@ -36,7 +36,7 @@ impl Console {
             desk.lost.map_or(Ok(()), |lost| write!(f, "; the reference is lost, {lost}"))?;
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
             let settings = &desk.settings().in_force().drive;
-            temperatures(f, status.stator_resistance, rotor, settings)?;
+            temperatures(f, status.stator_resistance, rotor, desk.motor(), settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
         self.out.answer(format_args!("{line}"));
@@ -122,9 +122,12 @@ const COLD_C: f32 = 25.0;
 /// Temperatures below 0 °C at which the resistance of copper, and of the aluminium of a cage, would be none.
 const COPPER_C: f32 = 235.0;
 const ALUMINIUM_C: f32 = 225.0;
+/// Difference between sensor and stator that is told, K: 15 % of the resistance.
+const DOUBTFUL_K: f32 = 40.0;
 
 /// Writes the temperatures of stator and rotor that their tracked resistances mean, if those of the settings are of 25 °C:
-/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one.
+/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one. Behind them that of the `sensor`, °C, if there is
+/// one, and whether both differ.
 ///
 /// # Errors
 /// Those of the formatter.
@@ -132,11 +135,23 @@ fn temperatures(
     f: &mut fmt::Formatter<'_>,
     stator: Option<f32>,
     tau_r: Option<f32>,
+    sensor: Option<Result<f32, Fault>>,
     settings: &Settings,
 ) -> fmt::Result {
     let celsius = |more: f32, metal: f32| COLD_C + more * (metal + COLD_C);
-    if let Some(more) = stator {
-        write!(f, "; stator {:.0} degC", celsius(more, COPPER_C))?;
+    let stator = stator.map(|more| celsius(more, COPPER_C));
+    if let Some(stator) = stator {
+        write!(f, "; stator {stator:.0} degC")?;
+    }
+    match sensor {
+        Some(Ok(motor)) => write!(f, "; motor {motor:.0} degC by its sensor")?,
+        Some(Err(fault)) => write!(f, "; {fault}")?,
+        None => {}
+    }
+    if let (Some(stator), Some(Ok(motor))) = (stator, sensor)
+        && (stator - motor).abs() > DOUBTFUL_K
+    {
+        write!(f, ", which the stator's resistance does not confirm")?;
     }
     tau_r.map_or(Ok(()), |tau_r| {
         let more = settings.motor.tau_r() / tau_r - 1.0;

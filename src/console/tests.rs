@@ -418,3 +418,32 @@ proptest! {
         prop_assert_eq!(replies.last().unwrap(), "ok");
     }
 }
+
+/// The sensor is read ten times a second, from the settings in force; `status` and a refused start say what it reads.
+#[test]
+fn the_motor_sensor_is_read_and_shown() {
+    let mut settings = FirmwareSettings::of_the_board();
+    settings.command.wiring_checked = true;
+    settings.confirm_board();
+    settings.drive.angle_source = drive_core::AngleSource::Encoder;
+    settings.drive.motor_sensor.sensor = drive_settings::SensorKind::Pt1000;
+    let mut talk = Talk::with(settings);
+    assert!(talk.ask("start").contains("fault 57 stands"));
+    // 1385 ohm of 1385 + 4700.
+    talk.strip.codes[2] = Some(932);
+    talk.now_ms = 100;
+    let status = talk.ask("status");
+    assert!(status.contains("; motor 100 degC by its sensor"), "{status}");
+    for now_ms in 101..1100 {
+        talk.now_ms = now_ms;
+        talk.poll();
+    }
+    assert_eq!(talk.drive.commands.len(), 2 + 9);
+    for (code, fault) in [(4095, "fault 54 stands"), (0, "fault 55 stands")] {
+        talk.strip.codes[2] = Some(code);
+        talk.now_ms += 100;
+        talk.poll();
+        let refused = talk.ask("start");
+        assert!(refused.contains(fault), "{refused}");
+    }
+}

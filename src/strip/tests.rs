@@ -216,7 +216,7 @@ fn what_a_board_cannot_do_is_refused_by_name() {
         brake: true,
         ..Settings::default()
     };
-    let [reference, ihm08m1, ihm023v3] = ALL;
+    let [reference, ihm08m1, ihm023v3, _] = ALL;
     let refused = |own: Settings, board: &Board| {
         own.check(board).err().map(|why| why.to_string()).unwrap_or_default()
     };

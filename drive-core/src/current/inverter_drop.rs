@@ -40,7 +40,7 @@ pub struct InverterDrop {
     /// Duration of the magnetisation, control periods.
     end: u32,
     /// r_r (L_m/L_r)^2, ohm.
-    rotor: f32,
+    pub(crate) rotor: f32,
     /// Stator resistance of the settings, ohm.
     r_s: f32,
     /// The drop, V, where it need not be measured.

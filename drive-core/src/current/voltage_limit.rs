@@ -50,12 +50,11 @@ const MOST_TRIM: f32 = 1.3;
 /// Coefficients of the limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltageLimit {
-    r_s: f32,
+    pub(crate) r_s: f32,
     leakage: f32,
     stator: f32,
-    /// Setting of the direct current, and the torque current that it leaves, A.
-    i_d: f32,
-    i_q: f32,
+    /// Setting of the direct current, A.
+    pub i_d: f32,
     /// Square of the largest current, A^2.
     current_squared: f32,
     /// Direct current of the least loss per torque current; 0 where that is not asked for.
@@ -105,7 +104,6 @@ impl VoltageLimit {
             leakage,
             stator: leakage + motor.coupled_inductance(),
             i_d,
-            i_q: fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d),
             current_squared: largest_a * largest_a,
             economy: 0.0,
         }
@@ -138,8 +136,19 @@ impl VoltageLimit {
 
     /// State without a limit.
     pub fn start(&self) -> VoltageLimitState {
-        let most = Dq { d: self.i_d, q: self.i_q };
+        let most = Dq { d: self.i_d, q: self.beside(self.i_d) };
         VoltageLimitState { trim: 1.0, available: 0.0, most, by_voltage: false }
+    }
+
+    /// Torque current that a direct current leaves, A.
+    #[inline]
+    pub fn beside(&self, i_d: f32) -> f32 {
+        fpu_sqrt::sqrtf(self.current_squared - i_d * i_d)
+    }
+
+    /// Voltage of the magnetising current per speed of the rotor, V per A and electrical turn a period.
+    pub fn emf(&self) -> f32 {
+        (self.stator - self.leakage) * (TAU / PERIOD_S)
     }
 
     /// Updates the limits.
@@ -160,11 +169,7 @@ impl VoltageLimit {
         let i_d = if kept { self.i_d } else { self.direct(available, flux_freq, current.q) };
         state.available = if kept { 0.0 } else { available };
         let all = i_d + added;
-        let rest = if all == self.i_d {
-            self.i_q
-        } else {
-            fpu_sqrt::sqrtf(self.current_squared - all * all)
-        };
+        let rest = self.beside(all);
         state.by_voltage = by_leakage < rest;
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }

@@ -35,7 +35,7 @@ impl Taken {
 pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(), Refused> {
     let taken = match command {
         // Off and stopping stay as they are.
-        Command::Stop(_) | Command::Clear => return Ok(()),
+        Command::Stop(_) | Command::Clear | Command::MotorTemperature(_) => return Ok(()),
         Command::Start(_) | Command::CheckWiring => Taken::OFF,
         Command::Configure(_) => Taken { fault: true, ..Taken::OFF },
         Command::Excite(_) => Taken { modes: &[Mode::Commissioning], ..Taken::OFF },

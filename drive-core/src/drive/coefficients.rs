@@ -11,7 +11,9 @@ use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
     WiringCheck,
 };
-use crate::{Angle, AngleSource, DcLink, FrontEnd, Learning, Motion, Relay, UnitVector};
+use crate::{
+    Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, PowerLimit, Relay, UnitVector,
+};
 
 /// The coefficients of the control step, designed outside the interrupt.
 // In this order: the fields of every step come first and lie together; see the state of the drive.
@@ -90,13 +92,22 @@ pub struct Coefficients {
     pub volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub unlearned: bool,
+    /// Temperatures of the motor, °C, from which on the torque falls and at which there is none, where it has a sensor.
+    pub motor_c: Option<[u8; 2]>,
     /// The watch on sensors that stand still.
     pub travel_watch: TravelWatch,
     /// The measurement of the asymmetry at a start, where the synchronous demodulation tracks.
     pub at_start: Option<AtStart>,
+    /// Limits of dc current and power.
+    pub power: PowerLimit,
 }
 
 impl Coefficients {
+    /// The fault of a motor sensor of which no reading has come.
+    pub(crate) fn motor_unread(&self) -> Option<Fault> {
+        self.motor_c.map(|_| Fault::MotorSensorUnread)
+    }
+
     /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.front_end, &self.current_loop);
@@ -116,7 +127,7 @@ impl Coefficients {
             self.current_lag,
             self.motion.pi.k_c,
             self.motion.speed_limit,
-            self.sequence.i_d,
+            self.voltage_limit.i_d,
             self.sequence.stop_ramp,
         ])
     }
@@ -133,8 +144,6 @@ pub struct Protection {
     pub dc_under: f32,
     /// Largest speed of the rotor, electrical turns per period.
     pub rotor_freq: f32,
-    /// Square of the largest regulated current, A^2.
-    pub current_squared: f32,
     /// Largest torque current, A.
     pub i_q: f32,
 }
@@ -148,8 +157,6 @@ pub struct SequenceSteps {
     pub magnetise: u32,
     /// Verification of the lock.
     pub verify: u32,
-    /// Direct current, A.
-    pub i_d: f32,
     /// A per period.
     pub stop_ramp: f32,
 }

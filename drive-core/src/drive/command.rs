@@ -55,6 +55,9 @@ pub enum Command {
     /// Only with `track_rotor`; within
     /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and approached by no more than 2 % with each command.
     RotorTimeConstant(f32),
+    /// Reading of the motor's temperature sensor, °C, or the fault that it shows; in every state, ten times a second. Without effect
+    /// where the settings have no sensor. A fault, or a motor that is too hot, switches off; a start is refused while it stands.
+    MotorTemperature(Result<f32, Fault>),
     /// Replace all settings. Only while off or in fault.
     Configure(Coefficients),
 }
@@ -123,6 +126,9 @@ pub enum Refused {
     /// A fault is latched; clear it first.
     #[error("fault {code} is latched: {0}", code = .0.code())]
     Fault(Fault),
+    /// This fault stands.
+    #[error("fault {code} stands: {0}", code = .0.code())]
+    Stands(Fault),
     /// The value is outside the allowed range.
     #[error("the value is outside the allowed range {min} to {max}")]
     OutOfRange {

@@ -38,8 +38,7 @@ impl Drive {
             Command::Torque(i_q) => {
                 finite(i_q)?;
                 let current = &mut self.kept.references.current;
-                let largest =
-                    fpu_sqrt::sqrtf(self.c.protection.current_squared - current.d * current.d);
+                let largest = self.c.voltage_limit.beside(current.d);
                 current.q = limited(limited(i_q, largest), self.c.protection.i_q);
                 return Ok(accepted(i_q, current.q));
             }
@@ -85,9 +84,8 @@ impl Drive {
                     return Err(Refused::FluxIsFixed);
                 }
                 let current = &mut self.kept.references.current;
-                let min = 0.2 * self.c.sequence.i_d;
-                let max =
-                    fpu_sqrt::sqrtf(self.c.protection.current_squared - current.q * current.q);
+                let min = 0.2 * self.c.voltage_limit.i_d;
+                let max = self.c.voltage_limit.beside(current.q);
                 if i_d < min {
                     return Err(Refused::OutOfRange { min, max });
                 }
@@ -120,8 +118,10 @@ impl Drive {
                 self.changes = self.changes.wrapping_add(1);
                 return Ok(accepted(tau_r, taken));
             }
+            Command::MotorTemperature(reading) => self.take_motor_temperature(reading),
             Command::Configure(ref coefficients) => {
                 self.c = *coefficients;
+                self.kept.limits.motor_fault = self.c.motor_unread();
                 self.kept.home = None;
                 self.changes = self.changes.wrapping_add(1);
             }
@@ -178,6 +178,9 @@ impl Drive {
     }
 
     pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
+        if let Some(fault) = self.kept.limits.motor_fault {
+            return Err(Refused::Stands(fault));
+        }
         match &job {
             _ if !self.is_charged() => Err(Refused::NotCharged),
             Job::Field(Goal::Learn) if !self.can_learn() => Err(Refused::NeedsInjection),

@@ -75,7 +75,7 @@ impl Coefficients {
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {
-                self.limit_torque(k, step);
+                self.limit_torque(s, k, step);
                 if self.voltage_limit.is_economical() {
                     self.economise(s, k, step);
                 }
@@ -193,10 +193,11 @@ impl Coefficients {
     }
 
     /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
-    fn limit_torque(&self, k: &mut Kept, step: &StepResults) {
+    fn limit_torque(&self, s: &Field, k: &mut Kept, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
         let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
         k.limits.step(self, step.measured.dc_link, step.rotor_freq, (most.q, why));
+        k.limit_power(self, s.indirect.magnetising, s.inverter_drop.volts);
     }
 
     /// Whether the demodulation has a carrier.

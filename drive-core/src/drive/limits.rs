@@ -12,6 +12,8 @@ use crate::{Fault, Measured};
 pub(super) struct Limits {
     pub dc_link: DcLinkState,
     pub voltage: VoltageLimitState,
+    /// Power that the model of the power limit leaves, over 3/2, W.
+    pub power_error: f32,
     /// Present limits, by dc link, voltage and heat together.
     pub now: DcLinkLimits,
     /// Why the torque current is smaller than asked for.
@@ -19,12 +21,22 @@ pub(super) struct Limits {
     /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
     pub too_hot_for: f32,
     pub too_hot: Limiting,
+    /// Share of the squared current that the motor does not bear by its sensor, of 255.
+    pub motor_hot: u8,
+    /// What stands against a start by that sensor.
+    pub motor_fault: Option<Fault>,
 }
 
 impl Limits {
     pub fn start(&mut self, c: &Coefficients) {
         let voltage = c.voltage_limit.start();
-        *self = Self { voltage, now: DcLinkLimits::default(), why: Limiting::None, ..*self };
+        *self = Self {
+            voltage,
+            power_error: 0.0,
+            now: DcLinkLimits::default(),
+            why: Limiting::None,
+            ..*self
+        };
         self.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 
@@ -51,6 +63,12 @@ impl Limits {
 }
 
 impl Kept {
+    /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
+    pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
+        let Limits { power_error, now, .. } = &mut self.limits;
+        c.power.step(c, power_error, now, &self.seen, (magnetising, drop));
+    }
+
     /// Adds the current of the last [`Thermal::EVERY`] periods to the thermal loads, and finds the torque current that heat
     /// sink, motor and inverter do not bear; in every state. `is_energised`: whether a current is driven.
     ///
@@ -62,11 +80,26 @@ impl Kept {
         measured: &Measured,
         is_energised: bool,
     ) -> Result<(), Fault> {
-        let Self { limits, thermal, references, seen, .. } = self;
-        let square = if is_energised { seen.current.length_squared() } else { 0.0 };
-        let borne = c.thermal.step(thermal, square);
+        let square = if is_energised { self.seen.current.length_squared() } else { 0.0 };
+        let borne = c.thermal.step(&mut self.thermal, square);
+        self.judge_heat(c, measured);
+        if is_energised {
+            borne
+        } else {
+            c.dc_link.rest(&mut self.limits.dc_link, Thermal::EVERY);
+            Ok(())
+        }
+    }
+
+    /// Finds the torque current that heat sink, motor and inverter do not bear.
+    #[cold] // in the flash
+    #[inline(never)]
+    fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
+        let Self { limits, thermal, references, .. } = self;
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);
         let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
+        let sensor = (1.0 - f32::from(limits.motor_hot) * (1.0 / 255.0), Limiting::Motor);
+        let loads = if sensor.0 < loads.0 { sensor } else { loads };
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
             let (largest, i_d) = (c.protection.i_q, references.current.d);
@@ -75,12 +108,6 @@ impl Kept {
         } else {
             (0.0, Limiting::None)
         };
-        if is_energised {
-            borne
-        } else {
-            c.dc_link.rest(&mut limits.dc_link, Thermal::EVERY);
-            Ok(())
-        }
     }
 }
 
@@ -88,6 +115,21 @@ impl Drive {
     /// Whether the dc link is charged: a relay that there is has closed.
     pub(super) fn is_charged(&self) -> bool {
         self.c.relay.is_none() || self.kept.relay.closed
+    }
+
+    /// Takes a reading of the motor's sensor: from the first temperature on the squared current falls, to none at the second.
+    #[cold]
+    pub(super) fn take_motor_temperature(&mut self, reading: Result<f32, Fault>) {
+        let Some([from, trip]) = self.c.motor_c.map(|c| c.map(f32::from)) else { return };
+        let limits = &mut self.kept.limits;
+        // A conversion of NaN is 0, but NaN is not below the trip.
+        let hot = |celsius: f32| (255.0 / (trip - from) * (celsius - from)) as u8;
+        limits.motor_hot = reading.map_or(255, hot);
+        let judged = reading.and_then(|celsius| Fault::MotorHot.unless(celsius < trip));
+        limits.motor_fault = judged.err();
+        if let (Err(fault), false) = (judged, self.is_off()) {
+            self.end(fault.into());
+        }
     }
 
     /// Why the torque is smaller than asked for.

@@ -126,8 +126,8 @@ impl Drive {
         });
         let boost = c.volts_per_hertz.map(|turning| turning.boost_a);
         let i_d = match job {
-            Job::Scalar { .. } => boost.unwrap_or(c.sequence.i_d),
-            Job::Field(_) | Job::Excite(_) => c.sequence.i_d,
+            Job::Scalar { .. } => boost.unwrap_or(c.voltage_limit.i_d),
+            Job::Field(_) | Job::Excite(_) => c.voltage_limit.i_d,
         };
         k.start(c, i_d, left.inverter_drop);
         if matches!(job, Job::Field(Goal::Learn)) {

@@ -51,6 +51,8 @@ impl Scalar {
         if k.elapsed.is_multiple_of(u32::from(DIVIDER)) {
             let by_voltage = (f32::INFINITY, Limiting::None);
             k.limits.step(c, measured.dc_link, rotor_freq, by_voltage);
+            // Its voltage has the drop of the inverter in it.
+            k.limit_power(c, k.seen.current.d, 0.0);
             if rotor_freq.abs() > c.protection.rotor_freq {
                 return Err(Fault::OverSpeed.into());
             }

@@ -57,6 +57,10 @@ fn codes_never_change() {
         (51, Fault::WrongReference),
         (52, Fault::SensorSilentA),
         (53, Fault::SensorSilentB),
+        (54, Fault::MotorSensorOpen),
+        (55, Fault::MotorSensorShorted),
+        (56, Fault::MotorHot),
+        (57, Fault::MotorSensorUnread),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

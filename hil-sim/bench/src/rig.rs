@@ -306,6 +306,7 @@ fn words(command: &Command) -> String {
         Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),
         Command::TestVoltage(v) => format!("a test voltage of {} V and {} V (d, q)", v.d, v.q),
         Command::RotorTimeConstant(s) => format!("a rotor time constant of {s} s"),
+        Command::MotorTemperature(reading) => format!("a motor sensor of {reading:?}"),
         Command::Configure(_) => "other settings".into(),
     }
 }

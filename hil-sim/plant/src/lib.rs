@@ -273,6 +273,12 @@ impl Plant {
         self.around.inverter.vdc
     }
 
+    /// Current that inverter and motor have taken from the dc link in the last period of `period_s` seconds, mean, A.
+    pub fn dc_current(&self, period_s: f64) -> f64 {
+        let lost = self.around.inverter.conduction_loss(self.current());
+        (self.around.taken / period_s + lost) / self.dc_link()
+    }
+
     /// Changes the dc-link voltage, V; behind a rectifier, the voltage now and the peak of the rectified mains.
     ///
     /// # Errors

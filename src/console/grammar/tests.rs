@@ -136,7 +136,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
         ("trace 5 on i_q_a above x", "not a number: x (the level)"),
         ("trace 5 on fault now", "too many words, from `now` on"),
-        ("faults 54", "the fault = 54: not a whole number from 1 to 53"),
+        ("faults 58", "the fault = 58: not a whole number from 1 to 57"),
         ("learned 61 00000000", "the index = 61: not a whole number from 0 to 60"),
         ("learned 0 12", "not eight hexadecimal digits: 12"),
         ("learned 0 +1234567", "not eight hexadecimal digits: +1234567"),

@@ -1,7 +1,7 @@
 use super::*;
 
 /// Wrong lines, and what the answer has to name: thing, value, and what is allowed or meant.
-const WRONG: [(&str, &[&str]); 65] = [
+const WRONG: [(&str, &[&str]); 67] = [
     ("stpo", &["stpo", "`stop`"]),
     ("torqe 1", &["torqe", "`torque`"]),
     ("quit", &["quit", "`help`"]),
@@ -57,7 +57,7 @@ const WRONG: [(&str, &[&str]); 65] = [
     ("learned 0 12", &["12", "eight hexadecimal digits"]),
     ("learned 99 00000000", &["index", "99", "0 to 60"]),
     ("learned check 00000000", &["word 0 is missing"]),
-    ("faults 99", &["fault", "99", "1 to 53"]),
+    ("faults 99", &["fault", "99", "1 to 57"]),
     ("faults 24", &["fault", "24", "`docs/faults.md` lists"]),
     ("trace 0", &["records", "0", "1 to 1024"]),
     ("trace 5 0", &["divider", "0", "1 to 1000"]),

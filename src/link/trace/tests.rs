@@ -186,6 +186,7 @@ fn state_and_limit_are_numbers() {
         (Limiting::ResistorHot, 6),
         (Limiting::DcLinkLow, 7),
         (Limiting::RideThrough, 8),
+        (Limiting::Power, 9),
     ] {
         assert_eq!(sampled(State::Torque, limiting).limit, number, "{limiting}");
     }
@@ -250,7 +251,7 @@ const MEANINGS: [(&str, &str); 20] = [
         "limit",
         "why the torque is smaller than asked for: 0 it is not, 1 voltage of the dc link at this speed, 2 hot heat sink, 3 motor, \
          4 inverter at its thermal limit, 5 dc link high, 6 the same with a hot brake resistor, 7 dc link low, 8 the shaft feeds the \
-         dc link",
+         dc link, 9 dc current or power at its limit",
     ),
 ];
 

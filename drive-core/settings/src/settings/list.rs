@@ -11,12 +11,13 @@ use core::f32::consts::SQRT_2;
 
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
+use super::motor_sensor::SensorKind;
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
-use drive_core::{AngleSource, Line, Motor, PERIOD_S};
+use drive_core::{AngleSource, Line, Most, Motor, PERIOD_S};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
@@ -37,6 +38,18 @@ settings! {
         /// inertia of rotor and load; for the speed loop
         "motor.inertia" [motor] inertia: f32, 6: number("kg m2").from_to(1e-7, 1000.0);
     ];
+
+    /// The temperature sensor of the motor, from ground to an input of the board, fed from the reference of the converter.
+    MotorSensor "motor." [motor_sensor] {
+        /// temperature sensor of the motor
+        sensor: SensorKind = SensorKind::None, 122: word();
+        /// resistor between that sensor and the reference of the converter
+        sensor_ohm: f32 = 4700.0, 123: number("ohm").from_to(100.0, 1e6).hardware();
+        /// temperature of the motor, degC, from which on its torque falls, to nothing where it trips
+        sensor_derate_c: u8 = 120, 124: whole().beside(|s| (1.0, f32::from(s.motor_sensor.sensor_trip_c) - 1.0));
+        /// temperature of the motor, degC, that trips
+        sensor_trip_c: u8 = 140, 125: whole().from_to(2.0, 199.0);
+    }
 
     /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
     /// drive from it; see [`rules`](super::rules). Defaults: the dissertation's motor, Table 3.
@@ -178,6 +191,8 @@ settings! {
     Settings "" [] {
         /// The motor.
         motor: Motor = Motor::DEFAULT;
+        /// Its temperature sensor.
+        motor_sensor: MotorSensor = MotorSensor::DEFAULT;
         /// Its nameplate.
         nameplate: Nameplate = Nameplate::DEFAULT;
         /// The timer and the power stage.
@@ -373,6 +388,16 @@ settings! {
         heat_sink_c: f32 = 85.0, 75: number("degC").from_to(0.0, 150.0).hardware();
         /// temperature of the heat sink from which on the current limit falls, to nothing where it trips
         derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
+        /// largest current from the dc link, motoring; 1000 for none
+        ///
+        /// What the copper takes of the direct current is below any limit.
+        dc_motoring_a: f32 = Most::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, Most::NONE.current_a));
+        /// largest current into the dc link, generating; 1000 for none
+        dc_generating_a: f32 = Most::NONE.current_a, 127: number("A").from_to(0.0, Most::NONE.current_a);
+        /// largest power from the dc link, motoring; 1e6 for none
+        motoring_w: f32 = Most::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), Most::NONE.power_w));
+        /// largest power into the dc link, generating; 1e6 for none
+        generating_w: f32 = Most::NONE.power_w, 129: number("W").from_to(0.0, Most::NONE.power_w);
     }
 
     /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).

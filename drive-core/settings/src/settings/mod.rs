@@ -8,6 +8,7 @@ mod declare;
 mod design;
 pub mod entry;
 mod list;
+mod motor_sensor;
 mod ntc;
 mod numbers;
 pub mod rules;
@@ -21,9 +22,11 @@ use drive_core::{AngleSource, Line, PERIOD_S};
 
 pub use list::{
     BrakingSettings, CurrentPlant, FluxSettings, IdentifiedPlant, InjectionSettings, Inverter,
-    Limits, Nameplate, Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings,
-    SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
+    Limits, MotorSensor, Nameplate, Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales,
+    Sequence, Settings, SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode,
+    find,
 };
+pub use motor_sensor::SensorKind;
 
 words! {
     /// Sensors of the phase currents.

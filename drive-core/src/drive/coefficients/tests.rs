@@ -25,7 +25,7 @@ fn limits_and_times_are_those_of_the_settings_in_periods() {
     alone.observer.enabled = false;
     near(alone.build().unwrap().protection.rotor_freq, tracked);
     near(c.freq_per_speed, 2.0 / 6000.0);
-    near(c.protection.current_squared, 3.5 * 3.5);
+    near(c.protection.i_q, 3.5);
     near(c.current_lag, 0.18);
     let s = &c.sequence;
     assert_eq!((s.precharge, s.magnetise, s.verify), (60, 5583, 1800));

@@ -30,7 +30,7 @@ fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
     let off = Drive::new(c);
     let (turns, press, trip) = (c.motion.position_limit, c.protection.i_q, c.protection.trip_a);
     let volts = c.largest_test_v;
-    let least = 0.2 * c.sequence.i_d;
+    let least = 0.2 * c.voltage_limit.i_d;
     let regulator = Regulator { k_c: 25.0, z_c: 0.9, direct: 0.0, filtered: false };
     let current = |amperes| excitation(amperes, regulator, AlphaBeta::ZERO);
     let beyond = |x: f32| if x == 0.0 { -1e-6 } else { x * 1.0001 };
@@ -152,7 +152,7 @@ fn coefficients_that_are_no_numbers_are_found() {
         |c| &mut c.current_lag,
         |c| &mut c.motion.pi.k_c,
         |c| &mut c.motion.speed_limit,
-        |c| &mut c.sequence.i_d,
+        |c| &mut c.voltage_limit.i_d,
         |c| &mut c.sequence.stop_ramp,
     ];
     for place in places {

@@ -2,7 +2,7 @@
 
 use crate::settings::Settings;
 use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
-use drive_core::{ChopperSettings, DcLinkSettings, Relay, periods};
+use drive_core::{ChopperSettings, DcLinkSettings, Most, PowerLimit, Relay, periods};
 
 /// Highest dc link above which a drive trips, in relation to the highest in operation.
 pub const OVER_OF_HIGHEST: f32 = 1.05;
@@ -62,11 +62,25 @@ impl Settings {
         (nominal + MARGIN * nominal, f32::min(self.dc_over_v(), self.highest_dc_link_v()))
     }
 
+    /// Power that the copper takes of the direct current, W.
+    pub(in crate::settings) fn magnetising_w(&self) -> f32 {
+        1.5 * self.motor.r_s * self.i_d() * self.i_d()
+    }
+
+    /// The limits of dc current and power.
+    pub(crate) fn power_limit(&self) -> PowerLimit {
+        let s = &self.limits;
+        PowerLimit {
+            motoring: Most { current_a: s.dc_motoring_a, power_w: s.motoring_w },
+            generating: Most { current_a: s.dc_generating_a, power_w: s.generating_w },
+        }
+    }
+
     /// The precharge relay, which opens where the drive trips.
     pub(crate) fn relay(&self) -> Option<Relay> {
         let (least_v, band_v) = (self.dc_under_v(), self.share_of_dc_link(STEADY_V));
         let time = periods(self.supply.relay_s);
-        (time > 0).then(|| Relay::new(least_v, band_v, time))
+        Relay::new(least_v, band_v, time)
     }
 
     /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and

@@ -1,0 +1,156 @@
+//! The temperature sensor of the motor: the resistance from ground to the input, by the divider with `motor.sensor_ohm`.
+//!
+//! ```text
+//! pt1000   R = 1000 ohm (1 + 3.9083e-3 T - 5.775e-7 T^2)                  IEC 60751, without its cubic term: 0.01 K at -40 degC
+//! kty84    R = 1000 ohm (1 + 6.12e-3 (T-100) + 1.1e-5 (T-100)^2)          KTY84-130, data sheet of NXP: -40 to 200 degC within 0.1 %
+//! ntc-10k  R = 10 kohm exp(3435 K (1/T - 1/T_25))                         B parameter, as that of the heat sink
+//! ```
+//!
+//! Beyond the resistances of -40 and 200 degC the sensor is open or shorted.
+
+use super::value::{Words, words};
+use super::{MotorSensor, Ntc};
+use drive_core::{CONVERTER_CODES, Fault};
+
+/// Coldest and hottest believable motor, °C.
+const COLDEST_C: f32 = -40.0;
+const HOTTEST_C: f32 = 200.0;
+
+words! {
+    /// Temperature sensors of a motor.
+    pub enum SensorKind {
+        /// There is none.
+        None = "none",
+        /// Thermistor of 10 kohm at 25 °C, B 3435 K.
+        Ntc10k = "ntc-10k",
+        /// Platinum, 1000 ohm at 0 °C.
+        Pt1000 = "pt1000",
+        /// Silicon, 1000 ohm at 100 °C.
+        Kty84 = "kty84",
+    }
+}
+
+impl MotorSensor {
+    /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.
+    pub(super) fn limits(&self) -> Option<[u8; 2]> {
+        let limits = [self.sensor_derate_c, self.sensor_trip_c];
+        (self.sensor != SensorKind::None).then_some(limits)
+    }
+
+    /// Temperature at a code of the converter of 12 bits, °C; `None` without a sensor.
+    ///
+    /// # Errors
+    /// [`Fault::MotorSensorOpen`] or [`Fault::MotorSensorShorted`].
+    pub fn celsius(&self, code: u16) -> Option<Result<f32, Fault>> {
+        let (open, shorted) = (Err(Fault::MotorSensorOpen), Err(Fault::MotorSensorShorted));
+        let (zero_c, slope, bend) = match self.sensor {
+            SensorKind::None => return None,
+            SensorKind::Pt1000 => (0.0, 3.9083e-3, -5.775e-7),
+            SensorKind::Kty84 => (100.0, 6.12e-3, 1.1e-5),
+            SensorKind::Ntc10k => {
+                let divider_ohm = self.sensor_ohm;
+                let ntc = Ntc { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm, to_ground: true };
+                let celsius = ntc.celsius(code);
+                let hot = if celsius > HOTTEST_C { shorted } else { Ok(celsius) };
+                return Some(if celsius < COLDEST_C { open } else { hot });
+            }
+        };
+        let (code, all) = (f32::from(code), f32::from(CONVERTER_CODES));
+        let more = self.sensor_ohm * code / (all - code) / 1000.0 - 1.0;
+        let more_at = |celsius: f32| (celsius - zero_c) * (slope + bend * (celsius - zero_c));
+        Some(if more < more_at(COLDEST_C) {
+            shorted
+        } else if more <= more_at(HOTTEST_C) {
+            Ok(zero_c + (libm::sqrtf(slope * slope + 4.0 * bend * more) - slope) / (2.0 * bend))
+        } else {
+            open
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the tables: IEC 60751 for 1000 ohm, KTY84-130 of NXP, and the B parameter, worked out.
+    const TABLES: [(SensorKind, &[(f32, f32)], f32); 3] = [
+        (
+            SensorKind::Pt1000,
+            &[
+                (-40.0, 842.7),
+                (0.0, 1000.0),
+                (25.0, 1097.3),
+                (100.0, 1385.1),
+                (150.0, 1573.3),
+                (199.0, 1754.8),
+            ],
+            0.5,
+        ),
+        (
+            SensorKind::Kty84,
+            &[
+                (-39.0, 363.0),
+                (0.0, 498.0),
+                (25.0, 603.0),
+                (100.0, 1000.0),
+                (150.0, 1334.0),
+                (199.0, 1714.0),
+            ],
+            0.7,
+        ),
+        (
+            SensorKind::Ntc10k,
+            &[
+                (-39.0, 233_200.0),
+                (0.0, 28_700.0),
+                (25.0, 10_000.0),
+                (100.0, 987.0),
+                (150.0, 332.6),
+            ],
+            1.5,
+        ),
+    ];
+
+    #[test]
+    fn the_tables_come_back_over_all_codes() {
+        for (sensor, table, tolerance) in TABLES {
+            for sensor_ohm in [1000.0, 4700.0] {
+                let motor = MotorSensor { sensor, sensor_ohm, ..MotorSensor::DEFAULT };
+                for &(celsius, ohm) in table {
+                    let code =
+                        (f32::from(CONVERTER_CODES) * ohm / (ohm + sensor_ohm)).round() as u16;
+                    let found = motor.celsius(code).unwrap().unwrap();
+                    // A code of the cold thermistor beside 1 kohm is 5 K.
+                    let coarse = if ohm > 20.0 * sensor_ohm { 7.0 } else { tolerance };
+                    assert!((found - celsius).abs() < coarse, "{sensor:?} {celsius}: {found}");
+                }
+                let ntc = sensor == SensorKind::Ntc10k;
+                let (low, high) = (Fault::MotorSensorShorted, Fault::MotorSensorOpen);
+                assert_eq!(motor.celsius(0), Some(Err(low)), "{sensor:?}");
+                assert_eq!(motor.celsius(4095), Some(Err(high)), "{sensor:?}");
+                // One band of believable codes, in which the temperature has one direction.
+                let mut before = f32::NAN;
+                let mut passed = 0;
+                for code in 0..=4095 {
+                    match motor.celsius(code).unwrap() {
+                        Ok(celsius) => {
+                            let rises = celsius > before;
+                            assert!(
+                                passed < 2 && (before.is_nan() || rises != ntc),
+                                "{sensor:?} {code}"
+                            );
+                            (before, passed) = (celsius, 1);
+                        }
+                        Err(fault) if passed == 0 => assert_eq!(fault, low),
+                        Err(fault) => {
+                            assert_eq!(fault, high);
+                            passed = 2;
+                        }
+                    }
+                }
+                assert_eq!(passed, 2);
+            }
+        }
+        assert_eq!(MotorSensor::DEFAULT.celsius(2000), None);
+    }
+}

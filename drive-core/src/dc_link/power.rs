@@ -1,0 +1,109 @@
+//! Limits of the torque current by dc current and power, motoring and generating: once a carrier period.
+//!
+//! Power that motor and switches take from the dc link, over 3/2, with `w` the electrical speed of the rotor, `i_m` the
+//! magnetising current, `u` the voltage lost in the switches and `R_r' = (L_m/L_r)^2 r_r`:
+//!
+//! ```text
+//! measured  p = v_d i_d + v_q i_q + 4/pi u |i|
+//! model     p = a i_q^2 + b i_q + r_s i_d^2 + e      a = r_s + R_r',  b = w i_m L_m^2/L_r
+//! error     e follows what the model leaves of the measured power, 30 ms
+//! motoring  p <=  m    between the two roots
+//! braking   p >= -g    outside of the two roots, on the side of no torque
+//! ```
+//!
+//! The roots follow speed and flux at once, so the torque comes down as the speed comes up; `e` makes them exact where the
+//! limit holds. The energy that the inductances exchange has no mean. Carrier and iron are part of `e`.
+//!
+//! Torque is never reversed. A motoring limit below the losses leaves no motoring torque; the direct current stays. Near
+//! standstill the copper takes all that the shaft gives: where no torque current feeds `g` into the link, none is limited, and
+//! the torque comes back over the speeds next to these. The copper of the direct current counts as taken by half at least.
+
+use core::f32::consts::FRAC_2_PI;
+
+use super::{DcLinkLimits, Limiting};
+use crate::{Coefficients, Telemetry};
+
+/// Share of the newest value in the error of the model.
+const SHARE: f32 = super::STEP_S / 0.03;
+/// How fast generating torque comes back where the copper takes all power: whole at some 0.7 of that speed.
+const OPENS: f32 = 10.0;
+
+/// Largest dc current, A, and power, W, motoring and generating.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Most {
+    /// Current from the link, A.
+    pub current_a: f32,
+    /// Power from it, W.
+    pub power_w: f32,
+}
+
+impl Most {
+    /// More than any inverter has.
+    pub const NONE: Self = Self { current_a: 1000.0, power_w: 1e6 };
+
+    /// Power at this voltage, over 3/2.
+    fn at(&self, dc_link: f32) -> f32 {
+        let by_current = self.current_a * dc_link;
+        (2.0 / 3.0) * if by_current < self.power_w { by_current } else { self.power_w }
+    }
+}
+
+/// The limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PowerLimit {
+    /// Of what motor and switches take from the link.
+    pub motoring: Most,
+    /// Of what they give back.
+    pub generating: Most,
+}
+
+impl PowerLimit {
+    /// Narrows the `limits` of a drive with the coefficients `c` by what the last step has `seen`, with the magnetising current,
+    /// A, and the voltage that the switches lose, V. `error`: the state.
+    #[cold] // in the flash
+    #[inline(never)]
+    pub fn step(
+        &self,
+        c: &Coefficients,
+        error: &mut f32,
+        limits: &mut DcLinkLimits,
+        seen: &Telemetry,
+        (magnetising, drop): (f32, f32),
+    ) {
+        if self.motoring == Most::NONE && self.generating == Most::NONE {
+            return;
+        }
+        let (r_s, a) = (c.voltage_limit.r_s, c.voltage_limit.r_s + c.inverter_drop.rotor);
+        let (i, v, root) = (seen.current, seen.voltage, fpu_sqrt::sqrtf);
+        let emf = c.voltage_limit.emf() * seen.rotor_freq * magnetising;
+        let copper = r_s * i.d * i.d;
+        let lost = 2.0 * FRAC_2_PI * drop * root(i.length_squared());
+        let unexplained = v.d * i.d + v.q * i.q + lost - copper - (a * i.q + emf) * i.q;
+        *error += SHARE * (unexplained - *error);
+        let losses = copper + *error;
+
+        // As if the shaft turned forwards.
+        let b = emf.abs();
+        let room = (self.motoring.at(seen.dc_link) - losses).max(0.0);
+        let both = root(b * b + 4.0 * a * room);
+        let room = (self.generating.at(seen.dc_link) + losses).max(0.5 * copper);
+        let left = b * b - 4.0 * a * room;
+        let back = if left > 0.0 { b - root(left) } else { b - OPENS * left / b.max(1e-3) };
+        // Far beyond, the copper alone takes more than a motoring limit.
+        let back = if back < b + both { back } else { b + both };
+        let (least, most) = ((-0.5 / a) * back, (0.5 / a) * (both - b));
+        let (least, most) = if emf < 0.0 { (-most, -least) } else { (least, most) };
+
+        let DcLinkLimits { i_q, why, .. } = limits;
+        // A link without a supply is fed whatever the limit.
+        if least > i_q.0 {
+            (i_q.0, why.0) = (if least < i_q.1 { least } else { i_q.1 }, Limiting::Power);
+        }
+        if most < i_q.1 {
+            (i_q.1, why.1) = (if most > i_q.0 { most } else { i_q.0 }, Limiting::Power);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
