@@ -20,7 +20,7 @@ use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_settings::{Flux, Ntc};
 
-use crate::strip::{self, TERMINALS};
+use crate::terminals::{ANALOG, TERMINALS};
 use pin::Pin;
 
 /// All boards.
@@ -347,7 +347,7 @@ const fn check(board: &Board) {
             let others = board.strip.pins.split_at(i + 1).1;
             let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
             assert!(free, "a terminal has the pin of another signal");
-            assert!(i >= strip::ANALOG || pin.adc34().is_some(), "a terminal has no converter");
+            assert!(i >= ANALOG || pin.adc34().is_some(), "a terminal has no converter");
         }
         i += 1;
     }

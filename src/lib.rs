@@ -19,6 +19,7 @@ pub mod rotor_tracking;
 pub mod settings;
 pub mod store;
 pub mod strip;
+pub mod terminals;
 
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]

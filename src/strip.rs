@@ -9,8 +9,6 @@ pub mod sequence;
 #[cfg(test)]
 mod tests;
 
-use core::fmt;
-
 use drive_core::io::PERIOD_S;
 use drive_core::{Mode, State, Stop};
 
@@ -21,52 +19,9 @@ use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
 use crate::settings::strip::Reference;
+use crate::terminals::{ANALOG, Lost, Wires};
 use debounce::Debounce;
-use reference::Lost;
 use sequence::{Act, Seen, Sequence};
-
-/// The terminals: first the analog ones, then the contacts, then the outputs.
-#[rustfmt::skip]
-pub const TERMINALS: [&str; 13] = [
-    "REFERENCE", "REFERENCE2", "MOTOR SENSOR",
-    "ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2",
-    "RUN", "FAULT", "BRAKE",
-];
-/// Number of the analog ones, and of the contacts.
-pub const ANALOG: usize = 3;
-/// See [`ANALOG`].
-pub const CONTACTS: usize = 7;
-
-/// Contacts that are closed, a bit each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wires(pub u8);
-
-#[allow(missing_docs)] // the page says what they do
-impl Wires {
-    pub const ENABLE: Self = Self(1);
-    pub const START: Self = Self(1 << 1);
-    pub const STOP: Self = Self(1 << 2);
-    pub const REVERSE: Self = Self(1 << 3);
-    pub const RESET: Self = Self(1 << 4);
-
-    /// Whether all of these are among them.
-    pub const fn has(self, others: Self) -> bool {
-        self.0 & others.0 == others.0
-    }
-
-    /// The number of the preset speed; 0: none.
-    const fn preset(self) -> usize {
-        (self.0 >> 5 & 3) as usize
-    }
-}
-
-impl fmt::Display for Wires {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names = TERMINALS.iter().skip(ANALOG).take(CONTACTS).enumerate();
-        let mut closed = names.filter(|(n, _)| self.0 >> n & 1 == 1);
-        closed.try_for_each(|(_, name)| write!(f, " {name}"))
-    }
-}
 
 /// The pins of the strip. Where the board has none, nothing is closed.
 pub trait Port {

@@ -13,7 +13,8 @@ use super::{StartError, adc, pins};
 use induction_drive::board;
 use induction_drive::boards::pin::Pin;
 use induction_drive::boards::{Level, SELECTED};
-use induction_drive::strip::{self, ANALOG, CONTACTS, Wires};
+use induction_drive::strip;
+use induction_drive::terminals::{ANALOG, CONTACTS, Wires};
 
 /// Pins of the analog inputs, of the contacts, and of the outputs.
 const INPUTS: &[Option<Pin>] = SELECTED.strip.pins.split_at(ANALOG).0;

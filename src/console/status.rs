@@ -16,7 +16,7 @@ use crate::desk::order::Refusal;
 use crate::link::Status;
 use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
-use crate::strip::Wires;
+use crate::terminals::Wires;
 
 impl Console {
     /// Answers with the status line.

@@ -12,7 +12,7 @@ use crate::settings::bus::Commander;
 use crate::settings::keys::Key;
 use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;
-use crate::strip::reference::Lost;
+use crate::terminals::Lost;
 
 /// An order.
 #[derive(Clone, Debug, PartialEq)]

@@ -328,7 +328,7 @@ fn the_manual_lists_the_refusals() {
             "close ENABLE, and STOP where it is used",
         ),
         (
-            Refusal::Reference(crate::strip::reference::Lost::Low),
+            Refusal::Reference(crate::terminals::Lost::Low),
             "the strip's reference was lost",
             "RESET or `clear`, then a new start",
         ),

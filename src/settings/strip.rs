@@ -5,7 +5,7 @@ use drive_settings::value::Words;
 use drive_settings::{SettingsError, words};
 
 use crate::boards::{Board, EXTRA_LOW_V};
-use crate::strip::{TERMINALS, Wires};
+use crate::terminals::{TERMINALS, Wires};
 
 words! {
     /// How START starts.

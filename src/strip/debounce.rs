@@ -1,6 +1,6 @@
 //! From contacts that bounce to wires that are closed or open.
 
-use super::{CONTACTS, Wires};
+use crate::terminals::{CONTACTS, Wires};
 
 /// Looks, a millisecond each, in a row for which an input must be closed to count as closed.
 pub const CLOSES: u8 = 20;

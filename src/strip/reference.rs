@@ -1,12 +1,10 @@
 //! The analog reference: a share of the full speed, or why it is none.
 
-use thiserror::Error;
-
 use crate::board::ADC_FULL_SCALE;
 use crate::boards::Strip;
 use crate::boards::converter::{CODES, REFERENCE_V};
 use crate::settings::strip::Reference;
-use crate::strip::ANALOG;
+use crate::terminals::{ANALOG, Lost};
 
 /// Looks in a row after which a reference counts as lost, a millisecond each; meanwhile the last speed holds.
 pub const LOOKS: u8 = 20;
@@ -17,26 +15,6 @@ const SIGNAL_MA: (f32, f32) = (4.0, 20.0);
 const AGREES: f32 = 0.03;
 /// Codes at the end of the range, where the converter does not see more.
 const END: u16 = ADC_FULL_SCALE - 5;
-
-/// Reason why a reference counts as lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum Lost {
-    /// No code.
-    #[error("its converter does not answer")]
-    Silent,
-    /// Below 3.6 mA.
-    #[error("below 3.6 mA: a broken wire, or no supply")]
-    Low,
-    /// Above 21 mA.
-    #[error("above 21 mA: a short circuit")]
-    High,
-    /// At the end of the converter's range.
-    #[error("at the end of the converter's range")]
-    End,
-    /// Two inputs that should be the same.
-    #[error("the two inputs differ by more than 0.3 V")]
-    Differ,
-}
 
 /// The share of the full speed, 0 to 1, that the codes of the first and the second input mean.
 ///

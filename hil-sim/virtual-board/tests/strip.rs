@@ -61,6 +61,8 @@ impl Panel {
         for at in 0..ms {
             self.wait(1)?;
             if !self.0.chip().tim1.outputs_on() {
+                // Until that is reported.
+                self.wait(5)?;
                 return Ok((at, closed.is_some_and(|closed| at >= closed + 10)));
             }
             if !self.0.terminal_outputs()[2] {

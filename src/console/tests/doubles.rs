@@ -23,7 +23,8 @@ use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::bus::{Baud, Format};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
-use induction_drive::strip::{self, Wires};
+use induction_drive::strip;
+use induction_drive::terminals::Wires;
 
 /// A drive without hardware.
 pub struct FakeDrive {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::settings::bus::Commander;
-use crate::strip::Wires;
+use crate::terminals::Wires;
 
 const ALL_OPEN: Wires = Wires(0);
 

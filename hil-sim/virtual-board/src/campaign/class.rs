@@ -301,7 +301,7 @@ const CLASSES: &[Class] = &[
 
 /// What is judged at the terminal strip, instead of the control.
 const STRIP: &str =
-    "no start and no restart; off after 150 ms by ENABLE, 250 ms by a ramp from 300 rpm";
+    "no start and no restart; off after 150 ms by ENABLE, 600 ms by a ramp from 300 rpm";
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;

@@ -26,7 +26,7 @@ pub enum Fault {
 const SET_UP: [&str; 4] = [
     "angle encoder",
     "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes",
-    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 2000 bus.commands strip",
+    "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip",
     "apply",
 ];
 /// Signal at the beginning, mA: 300 rpm.
@@ -34,11 +34,11 @@ const HALF_MA: f64 = 12.0;
 /// Periods until the settings are in force, and until the speed stands.
 const SETTLING: u64 = 12_000;
 const RISING: u64 = 15_000;
-/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 300 rpm at 2000 rpm/s.
+/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 300 rpm at 1000 rpm/s.
 const COASTED_MS: f64 = 150.0;
-const RAMPED_MS: f64 = 250.0;
+const RAMPED_MS: f64 = 600.0;
 /// Time of a fault, of what comes after it, and longest between two bounces, ms.
-const FAULT_MS: f64 = 300.0;
+const FAULT_MS: f64 = 650.0;
 const BOUNCE_MS: f64 = 15.0;
 
 const WIRES: [&str; 6] = ["ENABLE", "START", "REVERSE", "RESET", "PRESET1", "PRESET2"];
