@@ -191,7 +191,8 @@ fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
             board.send(&[&[0x31, 0xce], &summed(&at)[..], &data[..]].concat());
         }
         while board.loader.as_ref().is_some_and(|loader| !loader.line.is_empty()) {
-            board.run_periods(60)?;
+            // What is said after the loss is heard from its beginning.
+            board.run_periods(1)?;
         }
         if board.resets.last().is_some_and(|(_, cause)| *cause == Reset::Power) {
             return Ok(());
@@ -239,6 +240,7 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
             }
         }
         let in_first_page = at + 257 > operations;
+        println!("{n}: {at} of {operations}: {said:?}");
         match said.as_str() {
             text if text.contains("induction-drive") => started += 1,
             text if text.starts_with("error: the image is damaged") => {
