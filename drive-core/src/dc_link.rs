@@ -21,8 +21,6 @@
 //! sagging mains stays where it is, and `held` gives way below it, so that the torque comes back; in an outage the shaft
 //! holds the link at `held`.
 
-pub mod power;
-
 use core::fmt;
 
 use crate::PERIOD_S;

@@ -65,12 +65,12 @@ pub mod protect;
 mod supply;
 pub mod table;
 
-pub use dc_link::power::{Most, PowerLimit};
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
     Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode, Protection,
     Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
+pub use drive::{Most, PowerLimit};
 pub use fault::Fault;
 pub use flux::AngleSource;
 pub use front_end::shunts::Shunts;

@@ -11,9 +11,7 @@ use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
     WiringCheck,
 };
-use crate::{
-    Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, PowerLimit, Relay, UnitVector,
-};
+use crate::{Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, Relay, UnitVector};
 
 /// The coefficients of the control step, designed outside the interrupt.
 // In this order: the fields of every step come first and lie together; see the state of the drive.
@@ -131,6 +129,29 @@ impl Coefficients {
             self.sequence.stop_ramp,
         ])
     }
+}
+
+/// Largest dc current, A, and power, W, motoring and generating.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Most {
+    /// Current from the link, A.
+    pub current_a: f32,
+    /// Power from it, W.
+    pub power_w: f32,
+}
+
+impl Most {
+    /// More than any inverter has.
+    pub const NONE: Self = Self { current_a: 1000.0, power_w: 1e6 };
+}
+
+/// Limits of dc current and power.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PowerLimit {
+    /// Of what motor and switches take from the link.
+    pub motoring: Most,
+    /// Of what they give back.
+    pub generating: Most,
 }
 
 /// Limits in the units of the control step.

@@ -11,10 +11,9 @@ use core::f32::consts::SQRT_2;
 
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
-use super::motor_sensor::SensorKind;
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
-use super::{CurrentSensors, Flux, PlantSource};
+use super::{CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
 use drive_core::{AngleSource, Line, Most, Motor, PERIOD_S};

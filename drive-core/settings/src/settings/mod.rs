@@ -26,7 +26,6 @@ pub use list::{
     Sequence, Settings, SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode,
     find,
 };
-pub use motor_sensor::SensorKind;
 
 words! {
     /// Sensors of the phase currents.
@@ -46,6 +45,20 @@ words! {
         /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
         /// with it.
         Motor = "motor",
+    }
+}
+
+words! {
+    /// Temperature sensors of a motor.
+    pub enum SensorKind {
+        /// There is none.
+        None = "none",
+        /// Thermistor of 10 kohm at 25 °C, B 3435 K.
+        Ntc10k = "ntc-10k",
+        /// Platinum, 1000 ohm at 0 °C.
+        Pt1000 = "pt1000",
+        /// Silicon, 1000 ohm at 100 °C.
+        Kty84 = "kty84",
     }
 }
 

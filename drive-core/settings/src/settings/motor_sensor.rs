@@ -8,27 +8,12 @@
 //!
 //! Beyond the resistances of -40 and 200 degC the sensor is open or shorted.
 
-use super::value::{Words, words};
-use super::{MotorSensor, Ntc};
+use super::{MotorSensor, Ntc, SensorKind};
 use drive_core::{CONVERTER_CODES, Fault};
 
 /// Coldest and hottest believable motor, °C.
 const COLDEST_C: f32 = -40.0;
 const HOTTEST_C: f32 = 200.0;
-
-words! {
-    /// Temperature sensors of a motor.
-    pub enum SensorKind {
-        /// There is none.
-        None = "none",
-        /// Thermistor of 10 kohm at 25 °C, B 3435 K.
-        Ntc10k = "ntc-10k",
-        /// Platinum, 1000 ohm at 0 °C.
-        Pt1000 = "pt1000",
-        /// Silicon, 1000 ohm at 100 °C.
-        Kty84 = "kty84",
-    }
-}
 
 impl MotorSensor {
     /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.

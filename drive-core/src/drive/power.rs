@@ -20,41 +20,21 @@
 
 use core::f32::consts::FRAC_2_PI;
 
-use super::{DcLinkLimits, Limiting};
-use crate::{Coefficients, Telemetry};
+use super::{Coefficients, Most, PowerLimit, Telemetry};
+use crate::PERIOD_S;
+use crate::dc_link::{DIVIDER, DcLinkLimits, Limiting};
 
 /// Share of the newest value in the error of the model.
-const SHARE: f32 = super::STEP_S / 0.03;
+const SHARE: f32 = DIVIDER as f32 * PERIOD_S / 0.03;
 /// How fast generating torque comes back where the copper takes all power: whole at some 0.7 of that speed.
 const OPENS: f32 = 10.0;
 
-/// Largest dc current, A, and power, W, motoring and generating.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Most {
-    /// Current from the link, A.
-    pub current_a: f32,
-    /// Power from it, W.
-    pub power_w: f32,
-}
-
 impl Most {
-    /// More than any inverter has.
-    pub const NONE: Self = Self { current_a: 1000.0, power_w: 1e6 };
-
     /// Power at this voltage, over 3/2.
     fn at(&self, dc_link: f32) -> f32 {
         let by_current = self.current_a * dc_link;
         (2.0 / 3.0) * if by_current < self.power_w { by_current } else { self.power_w }
     }
-}
-
-/// The limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PowerLimit {
-    /// Of what motor and switches take from the link.
-    pub motoring: Most,
-    /// Of what they give back.
-    pub generating: Most,
 }
 
 impl PowerLimit {

@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use super::*;
 use crate::settings::Settings;
-use crate::{Dq, Motor, PERIOD_S};
+use crate::{Dq, Motor};
 
 const DC_LINK: f32 = 300.0;
 const MAGNETISING: f32 = 1.4;
