@@ -35,7 +35,7 @@ const LARGEST_DIVIDER: u16 = 1000;
 /// retired one.
 pub const COMMANDS: &str = "help status start commission accept learn stop relock torque speed jog position home angle get \
     describe set apply revert save defaults backup learned faults history clear trace stream baud \
-    log echo reboot update board confirm version h ?";
+    log echo reboot board confirm version h ? update";
 
 /// The words of a line.
 struct Words<'a>(SplitAsciiWhitespace<'a>);

@@ -321,11 +321,11 @@ fn a_reboot_loses_nothing_silently_and_waits_for_its_answer() {
 #[test]
 fn an_update_waits_for_what_the_loader_needs() {
     let mut talk = Talk::new();
-    // 450 V at full scale.
-    talk.drive.sample.dc_link = 4095 * 21 / 450;
+    // 0.11 V a code: 21 V, then 19 V.
+    talk.drive.sample.dc_link = 191;
     let charged = "error: the dc link has 21 V, and ST's loader drives a gate: 20 V at most";
     assert_eq!(talk.ask("update gates-off"), charged);
-    talk.drive.sample.dc_link = 4095 * 19 / 450;
+    talk.drive.sample.dc_link = 173;
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
     assert!(talk.ask("update gates-off").starts_with("error: settings that were not saved"));
     assert_eq!(talk.ask("save"), "ok");
