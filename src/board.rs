@@ -326,8 +326,8 @@ pub const STREAM_SHARE: u32 = 80;
 /// Size of the receive queue, which holds one byte less: 22 ms at full rate; the main loop reads a thousand times
 /// as often.
 pub const SERIAL_RECEIVE: usize = 256;
-/// Size of the transmit queue, which holds one byte less: the longest line waits 44 ms at most.
-pub const SERIAL_TRANSMIT: usize = 512;
+/// Size of the transmit queue, which holds one byte less: the longest line waits 39 ms at most.
+pub const SERIAL_TRANSMIT: usize = 448;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
 /// Control periods in the ring for stream, identification and commissioning in the main loop. It keeps one less: 5.2 ms if every

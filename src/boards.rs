@@ -34,8 +34,8 @@ pub const ALL: [&Board; 4] = [
 /// Their names.
 pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name, ALL[3].name];
 /// Their names in a line.
-pub const ALL_NAMES: &str =
-    "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
+#[rustfmt::skip] // `cargo xtask` reads it
+pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {

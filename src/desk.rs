@@ -26,7 +26,7 @@ use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
 
 /// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
 const BUS_SILENT_S: f32 = 1.0;
-/// From the answer to a reset, ms: the transmit queue empties in 44.
+/// From the answer to a reset, ms: the transmit queue empties in 39.
 const REBOOT_MS: u32 = 100;
 /// Time between two readings of the motor's temperature sensor, ms.
 const MOTOR_MS: u32 = 100;
@@ -185,12 +185,7 @@ impl Desk {
 
     /// Tells the drive what the motor's temperature sensor reads, by its code of 12 bits; `None`: the board has no input for it, or its
     /// converter gives none. `now_ms` wraps.
-    pub fn read_motor(
-        &mut self,
-        code: Option<u16>,
-        drive: &mut impl DriveHandle,
-        now_ms: u32,
-    ) {
+    pub fn read_motor(&mut self, code: Option<u16>, drive: &mut impl DriveHandle, now_ms: u32) {
         if now_ms.wrapping_sub(self.motor_ms) < MOTOR_MS {
             return;
         }

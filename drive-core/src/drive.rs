@@ -56,7 +56,7 @@ use crate::supply::RelayState;
 
 use axes::Axes;
 use catching::Residual;
-pub use coefficients::{Catching, Coefficients, Most, PowerLimit, Protection, SequenceSteps};
+pub use coefficients::{Catching, Coefficients, DcLimit, PowerLimit, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::Excite;

@@ -70,7 +70,7 @@ pub use drive::{
     Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode, Protection,
     Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
-pub use drive::{Most, PowerLimit};
+pub use drive::{DcLimit, PowerLimit};
 pub use fault::Fault;
 pub use flux::AngleSource;
 pub use front_end::shunts::Shunts;

@@ -133,14 +133,14 @@ impl Coefficients {
 
 /// Largest dc current, A, and power, W, motoring and generating.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Most {
+pub struct DcLimit {
     /// Current from the link, A.
     pub current_a: f32,
     /// Power from it, W.
     pub power_w: f32,
 }
 
-impl Most {
+impl DcLimit {
     /// More than any inverter has.
     pub const NONE: Self = Self { current_a: 1000.0, power_w: 1e6 };
 }
@@ -149,9 +149,14 @@ impl Most {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLimit {
     /// Of what motor and switches take from the link.
-    pub motoring: Most,
+    pub motoring: DcLimit,
     /// Of what they give back.
-    pub generating: Most,
+    pub generating: DcLimit,
+}
+
+impl PowerLimit {
+    /// None.
+    pub const NONE: Self = Self { motoring: DcLimit::NONE, generating: DcLimit::NONE };
 }
 
 /// Limits in the units of the control step.

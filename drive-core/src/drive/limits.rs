@@ -1,6 +1,6 @@
 //! The chain of limits of the torque current, with the reason of the one that acts.
 
-use super::{Drive, Kept, Phase};
+use super::{Drive, Kept, Phase, PowerLimit};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::drive::coefficients::Coefficients;
@@ -64,9 +64,12 @@ impl Limits {
 
 impl Kept {
     /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
+    #[inline(never)] // inlined, more control code
     pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
-        let Limits { power_error, now, .. } = &mut self.limits;
-        c.power.step(c, power_error, now, &self.seen, (magnetising, drop));
+        if c.power != PowerLimit::NONE {
+            let Limits { power_error, now, .. } = &mut self.limits;
+            c.power.step(c, power_error, now, &self.seen, (magnetising, drop));
+        }
     }
 
     /// Adds the current of the last [`Thermal::EVERY`] periods to the thermal loads, and finds the torque current that heat
@@ -92,8 +95,7 @@ impl Kept {
     }
 
     /// Finds the torque current that heat sink, motor and inverter do not bear.
-    #[cold] // in the flash
-    #[inline(never)]
+    #[inline(never)] // inlined, more control code
     fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
         let Self { limits, thermal, references, .. } = self;
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);

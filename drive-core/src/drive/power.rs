@@ -20,7 +20,7 @@
 
 use core::f32::consts::FRAC_2_PI;
 
-use super::{Coefficients, Most, PowerLimit, Telemetry};
+use super::{Coefficients, DcLimit, PowerLimit, Telemetry};
 use crate::PERIOD_S;
 use crate::dc_link::{DIVIDER, DcLinkLimits, Limiting};
 
@@ -29,7 +29,7 @@ const SHARE: f32 = DIVIDER as f32 * PERIOD_S / 0.03;
 /// How fast generating torque comes back where the copper takes all power: whole at some 0.7 of that speed.
 const OPENS: f32 = 10.0;
 
-impl Most {
+impl DcLimit {
     /// Power at this voltage, over 3/2.
     fn at(&self, dc_link: f32) -> f32 {
         let by_current = self.current_a * dc_link;
@@ -50,9 +50,6 @@ impl PowerLimit {
         seen: &Telemetry,
         (magnetising, drop): (f32, f32),
     ) {
-        if self.motoring == Most::NONE && self.generating == Most::NONE {
-            return;
-        }
         let (r_s, a) = (c.voltage_limit.r_s, c.voltage_limit.r_s + c.inverter_drop.rotor);
         let (i, v, root) = (seen.current, seen.voltage, fpu_sqrt::sqrtf);
         let emf = c.voltage_limit.emf() * seen.rotor_freq * magnetising;

@@ -33,9 +33,9 @@ pub const FLASH: u32 = 0x0800_0000;
 pub const FLASH_SIZE: u32 = 512 * 1024;
 /// The second bank. It begins with the control code's copy.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
-/// The second half of it, which the firmware writes. It goes through the model of the flash, so that half-written words
+/// The last quarter of it, which the firmware writes. It goes through the model of the flash, so that half-written words
 /// can be told from data. No code lies in it.
-pub const STORED: u32 = BANK_2 + FLASH_SIZE / 4;
+pub const STORED: u32 = FLASH + FLASH_SIZE / 8 * 7;
 /// First address of SRAM1 and SRAM2.
 pub const RAM: u32 = 0x2000_0000;
 /// SRAM1 and SRAM2, bytes.

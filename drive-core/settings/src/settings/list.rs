@@ -16,7 +16,7 @@ use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
-use drive_core::{AngleSource, Line, Most, Motor, PERIOD_S};
+use drive_core::{AngleSource, DcLimit, Line, Motor, PERIOD_S};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
@@ -390,13 +390,13 @@ settings! {
         /// largest current from the dc link, motoring; 1000 for none
         ///
         /// What the copper takes of the direct current is below any limit.
-        dc_motoring_a: f32 = Most::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, Most::NONE.current_a));
+        dc_motoring_a: f32 = DcLimit::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, DcLimit::NONE.current_a));
         /// largest current into the dc link, generating; 1000 for none
-        dc_generating_a: f32 = Most::NONE.current_a, 127: number("A").from_to(0.0, Most::NONE.current_a);
+        dc_generating_a: f32 = DcLimit::NONE.current_a, 127: number("A").from_to(0.0, DcLimit::NONE.current_a);
         /// largest power from the dc link, motoring; 1e6 for none
-        motoring_w: f32 = Most::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), Most::NONE.power_w));
+        motoring_w: f32 = DcLimit::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), DcLimit::NONE.power_w));
         /// largest power into the dc link, generating; 1e6 for none
-        generating_w: f32 = Most::NONE.power_w, 129: number("W").from_to(0.0, Most::NONE.power_w);
+        generating_w: f32 = DcLimit::NONE.power_w, 129: number("W").from_to(0.0, DcLimit::NONE.power_w);
     }
 
     /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).

@@ -58,7 +58,8 @@ mod tests {
     use super::*;
 
     /// Of the tables: IEC 60751 for 1000 ohm, KTY84-130 of NXP, and the B parameter, worked out.
-    const TABLES: [(SensorKind, &[(f32, f32)], f32); 3] = [
+    type Table = (SensorKind, &'static [(f32, f32)], f32);
+    const TABLES: [Table; 3] = [
         (
             SensorKind::Pt1000,
             &[
@@ -103,7 +104,7 @@ mod tests {
                 let motor = MotorSensor { sensor, sensor_ohm, ..MotorSensor::DEFAULT };
                 for &(celsius, ohm) in table {
                     let code =
-                        (f32::from(CONVERTER_CODES) * ohm / (ohm + sensor_ohm)).round() as u16;
+                        libm::roundf(f32::from(CONVERTER_CODES) * ohm / (ohm + sensor_ohm)) as u16;
                     let found = motor.celsius(code).unwrap().unwrap();
                     // A code of the cold thermistor beside 1 kohm is 5 K.
                     let coarse = if ohm > 20.0 * sensor_ohm { 7.0 } else { tolerance };

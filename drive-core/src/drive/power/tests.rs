@@ -11,7 +11,7 @@ const MAGNETISING: f32 = 1.4;
 const ASKED: f32 = 50.0;
 
 /// Least and largest torque current at this speed, Hz electrical, where the model leaves `error` W.
-fn limits(hz: f32, motoring: Most, generating: Most, error: f32) -> (f32, f32) {
+fn limits(hz: f32, motoring: DcLimit, generating: DcLimit, error: f32) -> (f32, f32) {
     let (c, limit) = (Settings::default().build().unwrap(), PowerLimit { motoring, generating });
     let mut seen =
         Telemetry { dc_link: DC_LINK, rotor_freq: hz * PERIOD_S, ..Telemetry::default() };
@@ -27,8 +27,8 @@ fn limits(hz: f32, motoring: Most, generating: Most, error: f32) -> (f32, f32) {
     found.i_q
 }
 
-fn watts(power_w: f32) -> Most {
-    Most { current_a: 1000.0, power_w }
+fn watts(power_w: f32) -> DcLimit {
+    DcLimit { current_a: 1000.0, power_w }
 }
 
 /// Power at a torque current, W.
@@ -72,10 +72,10 @@ fn what_is_allowed_keeps_the_limits_and_no_torque_is_reversed() {
 /// A dc current counts as the power at the present voltage, and the smaller of both holds.
 #[test]
 fn current_and_power_hold_together() {
-    let both = |current_a, power_w| limits(50.0, Most { current_a, power_w }, watts(1e6), 0.0).1;
+    let both = |current_a, power_w| limits(50.0, DcLimit { current_a, power_w }, watts(1e6), 0.0).1;
     assert_eq!(both(0.5, 1e6), both(1000.0, 0.5 * DC_LINK));
     assert_eq!(both(0.5, 100.0), both(1000.0, 100.0));
-    let both = |current_a, power_w| limits(50.0, watts(1e6), Most { current_a, power_w }, 0.0).0;
+    let both = |current_a, power_w| limits(50.0, watts(1e6), DcLimit { current_a, power_w }, 0.0).0;
     assert_eq!(both(0.2, 1e6), both(1000.0, 0.2 * DC_LINK));
     assert_eq!(both(0.2, 30.0), both(1000.0, 30.0));
 }

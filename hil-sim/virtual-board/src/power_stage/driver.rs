@@ -142,7 +142,7 @@ mod tests {
             }
         }
         // The chip's resistor wins against the weak ones in the driver, not against 10 kOhm.
-        let [_, ihm08m1, _] = ALL;
+        let [_, ihm08m1, ..] = ALL;
         assert_eq!(ihm08m1.driver.low.level(Some(false)), Some(false));
         // 2.2 V: some parts take it for high.
         assert_eq!(ihm08m1.driver.high.level(Some(true)), None);

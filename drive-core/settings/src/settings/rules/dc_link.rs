@@ -2,7 +2,7 @@
 
 use crate::settings::Settings;
 use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
-use drive_core::{ChopperSettings, DcLinkSettings, Most, PowerLimit, Relay, periods};
+use drive_core::{ChopperSettings, DcLimit, DcLinkSettings, PowerLimit, Relay, periods};
 
 /// Highest dc link above which a drive trips, in relation to the highest in operation.
 pub const OVER_OF_HIGHEST: f32 = 1.05;
@@ -71,8 +71,8 @@ impl Settings {
     pub(crate) fn power_limit(&self) -> PowerLimit {
         let s = &self.limits;
         PowerLimit {
-            motoring: Most { current_a: s.dc_motoring_a, power_w: s.motoring_w },
-            generating: Most { current_a: s.dc_generating_a, power_w: s.generating_w },
+            motoring: DcLimit { current_a: s.dc_motoring_a, power_w: s.motoring_w },
+            generating: DcLimit { current_a: s.dc_generating_a, power_w: s.generating_w },
         }
     }
 
