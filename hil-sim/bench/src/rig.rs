@@ -306,7 +306,10 @@ fn words(command: &Command) -> String {
         Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),
         Command::TestVoltage(v) => format!("a test voltage of {} V and {} V (d, q)", v.d, v.q),
         Command::RotorTimeConstant(s) => format!("a rotor time constant of {s} s"),
-        Command::MotorTemperature(reading) => format!("a motor sensor of {reading:?}"),
+        Command::MotorTemperature(reading) => reading.map_or_else(
+            |fault| format!("a motor sensor that is {fault}"),
+            |c| format!("a motor of {c} degC"),
+        ),
         Command::Configure(_) => "other settings".into(),
     }
 }
