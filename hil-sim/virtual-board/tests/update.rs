@@ -180,6 +180,7 @@ fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
     }
     let flash = &mut board.chip().flash;
     flash.power_loss_at = Some(flash.operations + operation);
+    let resets = board.resets.len();
     board.send(&[0x7f]);
     let mut pages: Vec<_> = pages(bytes).collect();
     pages.rotate_left(1);
@@ -194,7 +195,8 @@ fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
             // What is said after the loss is heard from its beginning.
             board.run_periods(1)?;
         }
-        if board.resets.last().is_some_and(|(_, cause)| *cause == Reset::Power) {
+        // What is left of the first page may reset the chip over and over.
+        if board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power) {
             return Ok(());
         }
     }
