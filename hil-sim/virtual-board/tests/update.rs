@@ -245,7 +245,8 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
         println!("{n}: {at} of {operations}: {said:?}");
         match said.as_str() {
             text if text.contains("induction-drive") => started += 1,
-            text if text.starts_with("error: the image is damaged") => {
+            // Its beginning may have been said while the loss was looked for.
+            text if text.contains(": the image is damaged") => {
                 told += 1;
                 ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's"), "{at}");
                 board.run_periods(60)?;
