@@ -19,8 +19,9 @@ use motor_plant::{
 use crate::around;
 use crate::machine::Machine;
 
-/// Control periods of a millisecond.
-const PERIODS: u32 = board::PWM_HZ / 1000;
+/// Control periods from one pass of the main loop to the next, and passes of a millisecond.
+const PERIODS: u32 = 3;
+const PASSES: u32 = board::PWM_HZ / 1000 / PERIODS;
 /// Longest learning, and the time in which the flux has decayed behind it.
 const LONGEST_LEARNING_MS: u32 = 200_000;
 const REST_MS: u32 = 2000;
@@ -168,8 +169,8 @@ impl HostBoard {
 
     /// A millisecond passes.
     pub fn millisecond(&mut self) {
-        for _ in 0..PERIODS {
-            self.machine.period();
+        for _ in 0..PASSES {
+            (0..PERIODS).for_each(|_| self.machine.period());
             self.front.pass(&mut self.wires, &mut None::<NoBus>, &mut self.machine, self.now_ms);
         }
         self.now_ms = self.now_ms.wrapping_add(1);

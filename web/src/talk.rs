@@ -93,6 +93,16 @@ impl Talk {
         }
     }
 
+    /// With a board that begins to learn its motor. Equal seeds give equal bits.
+    ///
+    /// # Errors
+    /// As [`HostBoard::new`].
+    pub fn learning(seed: u64) -> Result<Self, String> {
+        let mut talk = Self::new(HostBoard::new(seed)?);
+        talk.ask(0, "learn");
+        Ok(talk)
+    }
+
     /// A line of the page for the board; its answer gets this number.
     pub fn ask(&mut self, number: u32, line: &str) {
         self.asks.push_back((By::Page(number), line.replace(['\r', '\n'], " ")));

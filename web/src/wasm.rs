@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 
-use crate::board::HostBoard;
 use crate::talk::Talk;
 
 /// The talk; a line from the page, or texts and frames for it.
@@ -16,10 +15,10 @@ fn with<R: Default>(act: impl FnOnce(&mut Talk) -> R) -> R {
     KEPT.with_borrow_mut(|(talk, ..)| talk.as_mut().map(act).unwrap_or_default())
 }
 
-/// Switches a board on. The settings are constants that tests build.
+/// Switches a board on, which learns its motor. Its settings are constants, of which tests make a board.
 #[unsafe(no_mangle)]
 extern "C" fn init(seed: u32) {
-    KEPT.with_borrow_mut(|kept| kept.0 = HostBoard::new(seed.into()).ok().map(Talk::new));
+    KEPT.with_borrow_mut(|kept| kept.0 = Talk::learning(seed.into()).ok());
 }
 
 /// Place for a line of so many bytes.

@@ -78,6 +78,8 @@ fn the_same_seed_gives_the_bits_of_the_simulator() {
     let plant = plant_settings(&settings);
     let mut theirs = sim_bench::config::plant_settings(&Config::default());
     (theirs.inverter, theirs.measurement) = (plant.inverter, plant.measurement);
+    // How deep a sag would be that there is none of.
+    theirs.dc_link = plant.dc_link;
     // The flux of a direct current of 0.7 A, which is also what no value means.
     assert_eq!(theirs.saliency.psi_n.take(), Some(0.7 * plant.machine.lm));
     assert_eq!(plant, theirs);
