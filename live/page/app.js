@@ -12,7 +12,7 @@ const token = new URLSearchParams(location.search).get('token');
 let socket, number = 0, hello = null, gone = 'connecting', answers = new Map(), listeners = [];
 
 /** A socket to the program that serves this page. A page without its token has drive and motor in a worker, which says and hears the same. */
-function opened() {
+function dial() {
   if (token) return Object.assign(new WebSocket(`ws://${location.host}/ws?token=${token}`), { binaryType: 'arraybuffer' });
   const worker = new Worker(`worker.js${location.search}`);
   worker.onerror = event => lost(`drive and motor do not run here: ${event.message || 'worker.js or drive.wasm is missing'}`);
@@ -32,7 +32,7 @@ function stopDrive() {
   say('stop');
 }
 function connect() {
-  socket = opened();
+  socket = dial();
   socket.onmessage = event => {
     if (event.data instanceof ArrayBuffer) return takeFrames(new DataView(event.data));
     for (const message of JSON.parse(event.data)) heard(message);

@@ -65,7 +65,9 @@ impl Target {
 
     /// Builds the library of a package for a browser; where it lies.
     pub fn browser(&self, package: &str) -> Result<PathBuf> {
-        let mut command = self.with_library("build", "std,panic_abort");
+        // A library that is also one for Rust would not be optimised as a whole.
+        let mut command = self.with_library("rustc", "std,panic_abort");
+        command.args(["--lib", "--crate-type", "cdylib"]);
         command.args(["--profile", "web", "--target", BROWSER, "--package", package]);
         command.arg(paths::option(BROWSER, &[])?).arg("--target-dir").arg(self.target_dir()?);
         run::step("library for a browser", &mut command)?;
