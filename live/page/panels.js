@@ -260,7 +260,7 @@ async function play(lines) {
     for (const line of lines.split('; ')) {
       if (line[0] !== '~') { await tell(line); continue; }
       if (line === '~off' && /^in fault/.test(present)) await tell('clear');
-      else if (line === '~off' && !/^off/.test(present)) await tell('stop');
+      else if (line === '~off' && !/^(off|learning)/.test(present)) await tell('stop');
       // The state is five times a second old.
       for (let n = 0; n < 50; n++) if (await seconds(0.25), present.startsWith(line.slice(1)) || /^in fault/.test(present)) break;
     }

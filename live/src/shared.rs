@@ -130,7 +130,8 @@ impl Shared {
         let Counts { frames, missing, damaged, skipped } = inner.counts;
         let flux = inner.flux.take();
         texts.push(json!({ "tick": [frames, missing, damaged, skipped], "flux": flux }));
-        let bytes = inner.frames.drain(..).flat_map(|frame| drive_web::talk::words(&frame)).collect();
+        let bytes =
+            inner.frames.drain(..).flat_map(|frame| drive_web::talk::words(&frame)).collect();
         (texts, bytes)
     }
 

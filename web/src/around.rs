@@ -13,11 +13,10 @@ use motor_plant::{
 /// | `load locked`, `load free NM`, `load speed RPM` | blocks the shaft, brakes it with a torque, turns it |
 /// | `turn DEG` | turns the motor's flux by an electrical angle, at once: the angle of the drive is wrong by as much |
 /// | `open a`, `b`, `c`, `none` | opens the wire of a phase, or closes all |
-/// | `saliency SHARE` | share of the motor's saliency that is left; 0 is the textbook machine |
+/// | `saliency SHARE` | share of the saliency of the motor, cold, that is left; 0 is the textbook machine |
 /// | `warm PERCENT` | resistances of stator and rotor above those at the start |
 /// | `sensor a FAULT`, `b FAULT` | a current sensor: `none`, `open` (reads no current), `high`, `low` (at an end of the range) |
 /// | `dc VOLT` | voltage of the dc link |
-/// | `heat CODE` | code of the heat sink's thermistor |
 ///
 /// # Errors
 /// In words: what is wrong, and what is allowed.
@@ -26,7 +25,9 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
     let refused = |why: PlantError| why.to_string();
     let number = |word: &str| -> Result<f64, String> {
         let value: Option<f64> = word.parse().ok();
-        value.filter(|value| value.is_finite()).ok_or_else(|| format!("{word}: a number is expected"))
+        value
+            .filter(|value| value.is_finite())
+            .ok_or_else(|| format!("{word}: a number is expected"))
     };
     match words[..] {
         ["load", "locked"] => plant.set_load(Load::Locked).map_err(refused),
@@ -63,12 +64,8 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
             Ok(())
         }
         ["dc", volts] => plant.set_dc_link(number(volts)?).map_err(refused),
-        ["heat", code] => {
-            plant.set_heat_sink(number(code)?.clamp(0.0, 4095.0) as u16);
-            Ok(())
-        }
         _ => Err("load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
-                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT, heat CODE"
+                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT"
             .to_owned()),
     }
 }

@@ -152,7 +152,8 @@ impl HostBoard {
                 match rest.trim().strip_prefix('!') {
                     Some(words) => {
                         let done = around::change(&mut self.machine.plant, words);
-                        let answer = done.map_or_else(|why| format!("error: {why}"), |()| "ok".into());
+                        let answer =
+                            done.map_or_else(|why| format!("error: {why}"), |()| "ok".into());
                         let answer = format!("{tag} {answer}\r\n");
                         self.wires.output.extend(answer.trim_start().bytes());
                     }

@@ -94,8 +94,7 @@ impl Machine {
     pub fn period(&mut self) {
         self.sample = self.plant.sample();
         let before = self.drive.state();
-        let (compare, output) =
-            self.drive.period(&mut self.front_end, &self.sample, &mut |_| {});
+        let (compare, output) = self.drive.period(&mut self.front_end, &self.sample, &mut |_| {});
         if !compare.enabled {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;
@@ -119,9 +118,8 @@ impl Machine {
         self.trace.0.step(&sampled, self.drive.telemetry());
         let streamed = self.periods.checked_rem(self.streamed.0) == Some(0);
         let commissions = self.session.is_running();
-        let observed = self.drive.tracks_rotor()
-            || self.drive.excites()
-            || commissions && state.regulates();
+        let observed =
+            self.drive.tracks_rotor() || self.drive.excites() || commissions && state.regulates();
         if streamed || observed {
             let (period, telemetry) = (self.periods, *self.drive.telemetry());
             let record = Record { period, telemetry, sampled, observed, streamed };

@@ -1,9 +1,11 @@
 //! What page and board say to each other, in the messages that `cargo live` has with its page.
 
 use std::collections::VecDeque;
+use std::fmt;
 
 use drive_core::State;
 use drive_stream::{Frame, MOST_SIGNALS, Piece, Splitter};
+use induction_drive::console::handle::Firmware as _;
 use serde_json::{Value, json};
 
 use crate::board::HostBoard;
@@ -18,7 +20,8 @@ const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 
 pub fn hello(version: Option<&String>, described: &[String]) -> Value {
     let objects: Vec<Value> =
         described.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let signals: Vec<&Value> = objects.iter().filter(|object| object["signal"].is_string()).collect();
+    let signals: Vec<&Value> =
+        objects.iter().filter(|object| object["signal"].is_string()).collect();
     let error = described.last().filter(|line| line.starts_with("error:"));
     let fits = objects.iter().any(|object| object["frame"] == json!(LAYOUT));
     let misfit = match error {
@@ -49,7 +52,7 @@ enum By {
     /// This program, for the state.
     Status,
     /// This program, for the greeting.
-    Hello(Option<String>),
+    Hello,
 }
 
 /// A page's talk with a board in the same program.
@@ -76,10 +79,9 @@ impl Talk {
     /// With a board that has just been switched on.
     pub fn new(mut board: HostBoard) -> Self {
         board.write(b"@0 baud 2000000\n");
-        let hello = ["version", "describe stream"].map(|line| (By::Hello(None), line.to_owned()));
         Self {
             board,
-            asks: hello.into(),
+            asks: VecDeque::from([(By::Hello, "describe stream".to_owned())]),
             lines: Vec::new(),
             tag: 0,
             awaited: false,
@@ -167,11 +169,9 @@ impl Talk {
             self.texts.push(json!({ "line": line }));
             return;
         }
-        let tagged = line.strip_prefix('@').and_then(|rest| rest.split_once(' '));
-        let own = format!("{:x}", self.tag);
-        match tagged {
+        match line.strip_prefix('@').and_then(|rest| rest.split_once(' ')) {
             None => self.lines.push(line.to_owned()),
-            Some((tag, rest)) if self.awaited && tag == own => {
+            Some((tag, rest)) if self.awaited && tag == format!("{:x}", self.tag) => {
                 let mut lines = std::mem::take(&mut self.lines);
                 lines.push(rest.to_owned());
                 self.answered(lines);
@@ -195,12 +195,10 @@ impl Talk {
                 self.texts.push(json!({ "id": number, "lines": lines, "loops": loops }));
             }
             By::Status => self.texts.push(json!({ "status": lines.last() })),
-            By::Hello(version) => match (version, self.asks.front_mut()) {
-                (None, Some((By::Hello(version), _))) => *version = lines.last().cloned(),
-                (version, _) => {
-                    self.texts.push(hello(version.as_ref(), &lines));
-                }
-            },
+            By::Hello => {
+                let version = fmt::from_fn(|f| self.board.machine.version(f)).to_string();
+                self.texts.push(hello(Some(&version), &lines));
+            }
         }
     }
 

@@ -31,7 +31,10 @@ pub fn pages() -> Result<()> {
     let options = "--ignored --nocapture --test-threads=1";
     let mut test =
         run::cargo(&format!("test --release --package drive-live --test page -- {options}"));
-    run::step("pages in Chromium", test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web))?;
+    run::step(
+        "pages in Chromium",
+        test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web),
+    )?;
     println!("\npictures: {}", folder.display());
     Ok(())
 }
