@@ -65,7 +65,7 @@ fn serve(folder: &Path, mut stream: TcpStream) {
 
 /// Presses the button of the guide or of the motor that does this.
 fn play(page: &mut Page<'_>, lines: &str) {
-    page.value(&format!("document.querySelector('[data-play=\"{lines}\"]').click()"));
+    page.value(&format!("document.querySelector('[data-play^=\"{lines}\"]').click()"));
 }
 
 fn number(page: &mut Page<'_>, id: &str, condition: &str) {
@@ -129,7 +129,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     );
     state(&mut page, "in fault");
     pictures(&mut page, &folder, "web-fault");
-    play(&mut page, "~off; start torque; ~regulating; torque 2");
+    play(&mut page, "~off; !open none");
     state(&mut page, "regulating torque");
     play(&mut page, "!open b");
     state(&mut page, "in fault");

@@ -73,6 +73,8 @@ pub struct Talk {
     counts: [u32; 4],
     next: Option<u16>,
     since_status_ms: u32,
+    /// Whether the drive is on its way to its first learning.
+    begins: bool,
 }
 
 impl Talk {
@@ -92,6 +94,7 @@ impl Talk {
             counts: [0; 4],
             next: None,
             since_status_ms: 0,
+            begins: false,
         }
     }
 
@@ -102,6 +105,7 @@ impl Talk {
     pub fn learning(seed: u64) -> Result<Self, String> {
         let mut talk = Self::new(HostBoard::new(seed)?);
         talk.ask(0, "learn");
+        talk.begins = true;
         Ok(talk)
     }
 
@@ -112,6 +116,7 @@ impl Talk {
 
     /// Stops the drive, past everything that waits.
     pub fn stop(&mut self) {
+        self.begins = false;
         self.texts.push(json!({ "stopped": "by the page" }));
         self.board.write(b"@0 stop\n");
         // It has cut a list short, whose end does not come.
@@ -122,7 +127,7 @@ impl Talk {
 
     /// Whether the drive does what nobody wants to wait for.
     pub fn hurries(&self) -> bool {
-        self.board.machine.drive().state() == State::Learning
+        self.begins || self.board.machine.drive().state() == State::Learning
     }
 
     /// So many milliseconds pass.
@@ -166,6 +171,8 @@ impl Talk {
 
     fn hear(&mut self, line: &str) {
         if line.starts_with("* ") {
+            self.begins &=
+                !["* off", "* fault", "* stopped"].iter().any(|end| line.starts_with(end));
             self.texts.push(json!({ "line": line }));
             return;
         }
