@@ -5,6 +5,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use drive_live::shared::Shared;
 use drive_web::talk::Talk;
 
 use crate::browser::{pictures, state};
@@ -151,4 +152,23 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     assert_eq!(page.value("measured[1]"), fingerprint.as_str());
     assert!(first < FIRST_PICTURE_MS, "{first} ms");
     assert!(faster > FASTER, "{faster}");
+}
+
+/// The same board behind `cargo live --simulated`, in real time.
+#[test]
+fn the_simulated_board_starts_holds_torque_and_reports_an_open_wire() {
+    let (shared, _asks) = Shared::new();
+    let mut link = drive_live::simulated::connect(&shared, 1).unwrap();
+    link.begin();
+    let mut ask = |line: &str| link.ask(line, |_| ()).unwrap().lines.pop().unwrap();
+    assert!(ask("version").contains("simulated"));
+    for (line, wanted) in [("start torque", "regulating torque"), ("!open b", "in fault")] {
+        let answer = ask(line);
+        assert!(answer.starts_with("ok"), "{line}: {answer}");
+        let began = std::time::Instant::now();
+        while !ask("status").starts_with(wanted) {
+            assert!(began.elapsed() < PATIENCE, "{wanted}: {}", ask("status"));
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
 }

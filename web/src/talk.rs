@@ -127,7 +127,8 @@ impl Talk {
 
     /// Whether the drive does what nobody wants to wait for.
     pub fn hurries(&self) -> bool {
-        self.begins || self.board.machine.drive().state() == State::Learning
+        // The page has its first picture first.
+        self.begins && self.counts[0] > 0 || self.board.machine.drive().state() == State::Learning
     }
 
     /// So many milliseconds pass.
