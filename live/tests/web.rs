@@ -110,6 +110,9 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     std::thread::sleep(Duration::from_secs(4));
     state(&mut page, "regulating torque");
     pictures(&mut page, &folder, "web");
+    page.value("$('around').scrollIntoView({ block: 'end' })");
+    pictures(&mut page, &folder, "web-motor");
+    page.value("scrollTo(0, 0)");
 
     page.value("turn(1); turn(1)");
     play(&mut page, "~off; !load free 0; start speed; ~regulating; speed 150");
