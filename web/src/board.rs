@@ -12,6 +12,8 @@ use induction_drive::front::Front;
 use induction_drive::modbus;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::bus::{Baud, Format};
+use induction_drive::strip;
+use induction_drive::terminals;
 use motor_plant::{
     InverterSettings, Load, MeasurementSettings, MechanicsSettings, Plant, PlantSettings,
 };
@@ -44,6 +46,19 @@ pub struct HostBoard {
 struct Wires {
     input: VecDeque<u8>,
     output: Vec<u8>,
+}
+
+/// No terminal strip.
+struct NoStrip;
+
+impl strip::Port for NoStrip {
+    fn look(&mut self) -> terminals::Wires {
+        terminals::Wires::default()
+    }
+    fn codes(&self) -> [Option<u16>; terminals::ANALOG] {
+        [None; terminals::ANALOG]
+    }
+    fn show(&mut self, _: [bool; 3]) {}
 }
 
 impl Port for Wires {
@@ -172,7 +187,8 @@ impl HostBoard {
     pub fn millisecond(&mut self) {
         for _ in 0..PASSES {
             (0..PERIODS).for_each(|_| self.machine.period());
-            self.front.pass(&mut self.wires, &mut None::<NoBus>, &mut self.machine, self.now_ms);
+            let (port, drive) = (&mut self.wires, &mut self.machine);
+            self.front.pass(port, &mut None::<NoBus>, &mut NoStrip, drive, self.now_ms);
         }
         self.now_ms = self.now_ms.wrapping_add(1);
         if self.machine.resets {

@@ -190,7 +190,7 @@ impl DriveHandle for Machine {
         self.saved = *settings;
         Ok(())
     }
-    fn reboot(&mut self) {
+    fn reboot(&mut self, _: bool) {
         self.resets = true;
     }
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
