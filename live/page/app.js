@@ -11,6 +11,13 @@ const make = (tag, attributes = {}, ...children) => {
 const token = new URLSearchParams(location.search).get('token');
 let socket, number = 0, hello = null, gone = 'connecting', answers = new Map(), listeners = [];
 
+/** A socket to the program that serves this page. A page without its token has drive and motor in a worker, which says and hears the same. */
+function dial() {
+  if (token) return Object.assign(new WebSocket(`ws://${location.host}/ws?token=${token}`), { binaryType: 'arraybuffer' });
+  const worker = new Worker(`worker.js${location.search}`);
+  worker.onerror = event => lost(`drive and motor do not run here: ${event.message || 'worker.js or drive.wasm is missing'}`);
+  return Object.assign(worker, { readyState: 1, send: text => worker.postMessage(text), close: () => { worker.terminate(); worker.onclose(); } });
+}
 /** Sends a line to the console; its lines, or an error with the text of the refusal. */
 function ask(line) { return request({ ask: [++number, line] }); }
 function request(message) {
@@ -25,8 +32,7 @@ function stopDrive() {
   say('stop');
 }
 function connect() {
-  socket = new WebSocket(`ws://${location.host}/ws?token=${token}`);
-  socket.binaryType = 'arraybuffer';
+  socket = dial();
   socket.onmessage = event => {
     if (event.data instanceof ArrayBuffer) return takeFrames(new DataView(event.data));
     for (const message of JSON.parse(event.data)) heard(message);
@@ -59,6 +65,7 @@ function heard(message) {
 function greet(now) {
   const fresh = !hello || hello.version !== now.version;
   hello = now; gone = '';
+  document.body.classList.toggle('is-simulated', /simulated/.test(now.version));
   $('who').textContent = `firmware ${now.version}; page ${now.program}`;
   alarm('fit', now.misfit ? [now.misfit] : []);
   alarm('gone', []);
@@ -212,6 +219,7 @@ function tick({ tick: [count, missing, damaged, skipped], flux }) {
 /** Draws the newest part, all samples of it: uPlot draws the least and the largest of those at one pixel. */
 function draw() {
   if (paused || !times.length) return;
+  if (!shown) performance.mark('first picture');
   shown = times.at(-1);
   const begin = shown - +$('window').value;
   let from = times.length - 1;

@@ -1,3 +1,4 @@
+'use strict';
 // The views of settings, loops, trace, set-up and console.
 
 // --- views ---------------------------------------------------------------------------------------
@@ -251,6 +252,35 @@ function guide(step) {
 $('steps').prepend(guide(BOARD));
 $('steps').append(...STEPS.map(guide));
 $('steps').firstChild.append(make('p', { id: 'reading', className: 'hint' }));
+
+// --- a simulated motor ----------------------------------------------------------------------------
+/** Lines for drive and motor, one after the other. `~off` switches off first, `~STATE` waits for a state. */
+async function play(lines) {
+  try {
+    for (const line of lines.split('; ')) {
+      if (line[0] !== '~') { await tell(line); continue; }
+      if (line === '~off' && /^in fault/.test(present)) await tell('clear');
+      else if (line === '~off' && !/^(off|learning)/.test(present)) await tell('stop');
+      // The state is five times a second old.
+      for (let n = 0; n < 50; n++) if (await seconds(0.25), present.startsWith(line.slice(1)) || /^in fault/.test(present)) break;
+    }
+  } catch { /* told already */ }
+}
+document.querySelectorAll('[data-play]').forEach(button => { button.onclick = () => play(button.dataset.play); });
+document.querySelectorAll('[data-line]').forEach(field => { field.onchange = () => tell(`${field.dataset.line} ${field.value}`).catch(quiet); });
+$('around').onsubmit = event => event.preventDefault();
+document.querySelectorAll('.repair').forEach(button => { button.onclick = () => { $('around').reset(); document.querySelectorAll('[data-repair]').forEach(field => field.onchange()); }; });
+const minutes = [...document.querySelectorAll('[data-step]')];
+let minute = 0;
+function turn(by) {
+  minute += by;
+  minutes.forEach((step, n) => { step.hidden = n !== minute; });
+  $('step-of').textContent = `${minute + 1} of ${minutes.length}`;
+  [$('back').disabled, $('next').disabled] = [minute === 0, minute === minutes.length - 1];
+}
+$('back').onclick = () => turn(-1);
+$('next').onclick = () => turn(1);
+turn(0);
 
 // --- console -------------------------------------------------------------------------------------
 const past = [];

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
+use drive_web::{loops, talk};
 use hil_sim::console::link::{Answer, Link, LinkError};
-use serde_json::{Value, json};
+use serde_json::json;
 
-use crate::loops;
 use crate::shared::{Ask, Shared};
 
 /// From one question about the drive's state to the next.
@@ -21,8 +21,6 @@ const ALIVE_S: f64 = 0.4;
 const RETRY: Duration = Duration::from_secs(1);
 /// Longest line that the console takes.
 const LONGEST: usize = 120;
-/// Layout of a frame that this program understands.
-const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
 
 /// A line of the page that may go to the console.
 ///
@@ -139,36 +137,10 @@ fn hello(shared: &Shared, link: &mut Link) {
     let mut ask = |line: &str| link.ask(line, |_| ());
     match (ask("version"), ask("describe stream")) {
         (Ok(version), Ok(described)) => {
-            let objects: Vec<Value> = described
-                .contents()
-                .iter()
-                .filter_map(|line| serde_json::from_str(line).ok())
-                .collect();
-            let signals: Vec<&Value> =
-                objects.iter().filter(|object| object["signal"].is_string()).collect();
-            shared.tell(json!({ "hello": {
-                "version": version.lines.last(),
-                "program": env!("CARGO_PKG_VERSION"),
-                "signals": signals,
-                "misfit": misfit(&described, &objects),
-            }}));
+            shared.tell(talk::hello(version.lines.last(), &described.lines));
         }
         (Err(why), _) | (_, Err(why)) => {
             shared.tell(json!({ "gone": format!("the drive does not answer: {why}") }));
         }
     }
-}
-
-/// Why firmware and page do not fit each other, in words.
-fn misfit(described: &Answer, objects: &[Value]) -> Option<String> {
-    if let Some(error) = described.error() {
-        return Some(format!(
-            "This firmware is older than the page: it has no live curves ({error}). All else works as far as the firmware \
-             knows it. To update it: cargo xtask flash."
-        ));
-    }
-    let layout = objects.iter().find(|object| object["frame"].is_array());
-    let fits = layout.is_some_and(|layout| layout["frame"] == json!(LAYOUT));
-    let newer = "This firmware sends its curves in a layout that the page does not know. To update the page: git pull.";
-    (!fits).then(|| newer.to_owned())
 }

@@ -30,6 +30,13 @@ struct Arguments {
     /// Prints the address and opens no browser
     #[arg(long)]
     no_browser: bool,
+    /// A simulated motor and the firmware's drive in this program, in place of the virtual board: no emulator, no
+    /// pseudo-terminals. So it is where there are none
+    #[arg(long)]
+    simulated: bool,
+    /// Seed of its noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     /// Options of the virtual board, as of `cargo sim board`
     #[arg(last = true, value_name = "OPTION")]
     board: Vec<String>,
@@ -56,22 +63,27 @@ async fn main() -> ExitCode {
 }
 
 async fn run(arguments: Arguments) -> Result<()> {
-    if arguments.port.is_some() && !arguments.board.is_empty() {
-        bail!("--port names a real board: it has no options of the virtual one");
+    if (arguments.port.is_some() || arguments.simulated) && !arguments.board.is_empty() {
+        bail!("options behind `--` are those of the virtual board: not with --port or --simulated");
     }
     let address = ("127.0.0.1", arguments.listen);
     let listener = TcpListener::bind(address).await;
     let listener = listener.with_context(|| format!("--listen {}: 127.0.0.1", arguments.listen))?;
     let (shared, asks) = Shared::new();
     let own = arguments.port.is_none();
-    let board = own.then(|| VirtualBoard::start(&arguments.board, &shared)).transpose()?;
+    let simulated = own && (arguments.simulated || cfg!(not(unix)));
+    let emulated = own && !simulated;
+    let board = emulated.then(|| VirtualBoard::start(&arguments.board, &shared)).transpose()?;
     let port = arguments.port.or_else(|| board.as_ref().map(|board| board.port.clone()));
-    let port = port.context("no port")?;
-    let (baud, real) = (arguments.baud, !own);
+    let port = port.unwrap_or_else(|| "a simulated motor".to_owned());
+    let (baud, real, seed) = (arguments.baud, !own, arguments.seed);
     let used = port.clone();
     let worker = shared.clone();
     std::thread::spawn(move || {
-        drive::run(&worker, &asks, |shared| connect(shared, &used, baud, real));
+        drive::run(&worker, &asks, |shared| match simulated {
+            true => drive_live::simulated::connect(shared, seed),
+            false => connect(shared, &used, baud, real),
+        });
     });
     let watcher = shared.clone();
     std::thread::spawn(move || drive::watch(&watcher));

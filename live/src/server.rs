@@ -99,14 +99,18 @@ async fn guard(
 
 /// The whole page in one document, so that it needs nothing else.
 async fn page() -> Response {
+    let style = |text: &str| format!("<style>{text}</style>");
+    let script = |text: &str| format!("<script>{text}</script>");
     let mut page = include_str!("../page/index.html").to_owned();
-    for (place, text) in [
-        ("/*uplot.css*/", include_str!("../page/uplot/uPlot.min.css")),
-        ("/*style.css*/", include_str!("../page/style.css")),
-        ("/*uplot.js*/", include_str!("../page/uplot/uPlot.iife.min.js")),
-        ("/*app.js*/", concat!(include_str!("../page/app.js"), include_str!("../page/panels.js"))),
+    for (name, text) in [
+        ("uplot/uPlot.min.css", style(include_str!("../page/uplot/uPlot.min.css"))),
+        ("style.css", style(include_str!("../page/style.css"))),
+        ("uplot/uPlot.iife.min.js", script(include_str!("../page/uplot/uPlot.iife.min.js"))),
+        ("app.js", script(include_str!("../page/app.js"))),
+        ("panels.js", script(include_str!("../page/panels.js"))),
     ] {
-        page = page.replace(place, text);
+        page = page.replace(&format!("<link rel=\"stylesheet\" href=\"{name}\">"), &text);
+        page = page.replace(&format!("<script src=\"{name}\"></script>"), &text);
     }
     let policy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                   connect-src 'self'; img-src data:; frame-ancestors 'none'";

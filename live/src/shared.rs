@@ -130,13 +130,8 @@ impl Shared {
         let Counts { frames, missing, damaged, skipped } = inner.counts;
         let flux = inner.flux.take();
         texts.push(json!({ "tick": [frames, missing, damaged, skipped], "flux": flux }));
-        let words = |frame: Frame| {
-            let head = [frame.period, frame.sequence.into()];
-            let mut values = [f32::NAN; drive_stream::MOST_SIGNALS];
-            values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
-            head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
-        };
-        let bytes = inner.frames.drain(..).flat_map(words).collect();
+        let bytes =
+            inner.frames.drain(..).flat_map(|frame| drive_web::talk::words(&frame)).collect();
         (texts, bytes)
     }
 

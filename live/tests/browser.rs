@@ -64,7 +64,7 @@ impl Drop for Live {
     }
 }
 
-fn state(page: &mut Page<'_>, wanted: &str) {
+pub fn state(page: &mut Page<'_>, wanted: &str) {
     page.until(&format!("$('state').textContent.startsWith('{wanted}')"), PATIENCE);
 }
 
@@ -129,7 +129,7 @@ fn waits(page: &mut Page<'_>, id: &str, reason: &str) {
     assert_eq!(waits, true, "{id}: {reason}");
 }
 
-fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
+pub fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
     for (width, dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
         page.shape(width, 900, dark);
         std::thread::sleep(Duration::from_millis(700));

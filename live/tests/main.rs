@@ -4,3 +4,4 @@ mod browser;
 mod chromium;
 mod report_pages;
 mod server;
+mod web;

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use drive_live::shared::Shared;
-use drive_live::{drive, loops, server};
+use drive_live::{drive, server};
 use drive_stream::{Frame, LONGEST};
+use drive_web::loops;
 use hil_sim::console::link::Link;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest as _;

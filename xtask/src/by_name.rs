@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::{board, image, run, toolchain};
+use crate::{board, image, run, toolchain, web};
 
 /// Pages, by the arguments of `cargo sim run` that make them.
 const PAGES: [&str; 4] =
@@ -26,12 +26,15 @@ pub fn pages() -> Result<()> {
     if session.is_file() {
         fs::copy(session, folder.join("board.html"))?;
     }
-    let elf = image::build()?;
+    let (elf, web) = (image::build()?, web::build()?);
     // One after the other: the virtual board keeps pace with the clock.
     let options = "--ignored --nocapture --test-threads=1";
     let mut test =
         run::cargo(&format!("test --release --package drive-live --test page -- {options}"));
-    run::step("pages in Chromium", test.env("PAGES", &folder).env("LIVE_ELF", elf))?;
+    run::step(
+        "pages in Chromium",
+        test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web),
+    )?;
     println!("\npictures: {}", folder.display());
     Ok(())
 }

@@ -23,6 +23,7 @@ mod stack;
 mod times;
 mod toolchain;
 mod tools;
+mod web;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -87,6 +88,8 @@ enum Task {
     /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
     /// the text of a plot is too small. Drives the live page on the virtual board
     Pages,
+    /// Builds the drive in a browser, firmware and motor on the live page: a folder of static files
+    Web,
     /// Long proofs in shards, which a later call continues. Lists them, or does one
     Prove {
         /// Name of the proof
@@ -140,6 +143,7 @@ fn run(task: Task) -> Result<()> {
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book(),
         Task::Pages => by_name::pages(),
+        Task::Web => web::build().map(drop),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }

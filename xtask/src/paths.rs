@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::run::{self, TARGET};
+use crate::run;
 
 /// Directories of this machine, and their short names in the image. Where several fit, the last counts.
 fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
@@ -29,15 +29,15 @@ fn cargo_home() -> Result<PathBuf> {
     }
 }
 
-/// An option of cargo that makes the compiler write the short names, and gives it one more flag. It adds
+/// An option of cargo that makes the compiler for a target write the short names, and gives it more flags. It adds
 /// to the flags of the target in `.cargo/config.toml`; the variables of the environment would replace them.
-pub fn option(flag: String) -> Result<String> {
-    let mut flags = vec![flag];
+pub fn option(target: &str, more: &[&str]) -> Result<String> {
+    let mut flags: Vec<String> = more.iter().map(|&flag| flag.to_owned()).collect();
     for (long, short) in short_names()? {
         flags.push(format!("--remap-path-prefix={}={short}", long.display()));
     }
     // The debug format of a list of strings is TOML.
-    Ok(format!("--config=target.{TARGET}.rustflags={flags:?}"))
+    Ok(format!("--config=target.{target}.rustflags={flags:?}"))
 }
 
 /// Fails if an image contains a path of this machine.

@@ -11,6 +11,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 /// The microcontroller: Cortex-M4 with a single-precision floating-point unit.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// WebAssembly.
+pub const BROWSER: &str = "wasm32-unknown-unknown";
 /// Profile of the image that is flashed.
 pub const PROFILE: &str = "firmware";
 

@@ -11,7 +11,7 @@ use std::process::Command;
 use anyhow::{Result, bail, ensure};
 
 use crate::paths;
-use crate::run::{self, PROFILE, TARGET};
+use crate::run::{self, BROWSER, PROFILE, TARGET};
 
 /// Debian's compiler, cargo, sources of the core library, lints and linker; cmake for the virtual board.
 const DEBIAN_PACKAGES: &str = "rustc-web cargo-web rust-web-src rust-web-clippy lld cmake";
@@ -27,18 +27,24 @@ pub enum Target {
 impl Target {
     /// A cargo command for the microcontroller, for any workspace and profile.
     pub fn bare(&self, subcommand: &str) -> Command {
+        self.with_library(subcommand, "core")
+    }
+
+    /// A cargo command for any target that has no operating system, with these crates of the standard library.
+    fn with_library(&self, subcommand: &str, library: &str) -> Command {
         let mut command = run::cargo(subcommand);
         if let Self::Debian = self {
             command = run::command("/usr/bin/cargo");
             let path = std::env::var("PATH").unwrap_or_default();
             command
-                .args([subcommand, "-Zbuild-std=core"])
+                .args([subcommand, &format!("-Zbuild-std={library}")])
                 // A stable compiler builds the core library only with this.
                 .env("RUSTC_BOOTSTRAP", "1")
                 // Debian's programs before those of rustup.
                 .env("PATH", format!("/usr/bin:{path}"))
                 .env("RUSTC", "/usr/bin/rustc")
-                .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+                .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld")
+                .env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld");
             for name in ["LD_LIBRARY_PATH", "RUSTUP_TOOLCHAIN", "CARGO", "RUSTDOC"] {
                 command.env_remove(name);
             }
@@ -52,9 +58,21 @@ impl Target {
     pub fn cargo(&self, subcommand: &str) -> Result<Command> {
         let mut command = self.bare(subcommand);
         let map = format!("-Clink-arg=-Map={}", self.image()?.with_extension("map").display());
-        command.args(["--profile", PROFILE, "--target", TARGET, &paths::option(map)?]);
+        command.args(["--profile", PROFILE, "--target", TARGET, &paths::option(TARGET, &[&map])?]);
         command.arg("--target-dir").arg(self.target_dir()?);
         Ok(command)
+    }
+
+    /// Builds the library of a package for a browser; where it lies.
+    pub fn browser(&self, package: &str) -> Result<PathBuf> {
+        // A library that is also one for Rust would not be optimised as a whole.
+        let mut command = self.with_library("rustc", "std,panic_abort");
+        command.args(["--lib", "--crate-type", "cdylib"]);
+        command.args(["--profile", "web", "--target", BROWSER, "--package", package]);
+        command.arg(paths::option(BROWSER, &[])?).arg("--target-dir").arg(self.target_dir()?);
+        run::step("library for a browser", &mut command)?;
+        let name = package.replace('-', "_") + ".wasm";
+        Ok(self.target_dir()?.join(BROWSER).join("web").join(name))
     }
 
     /// The image that this compiler builds; the linker's map lies beside it.
@@ -73,15 +91,20 @@ impl Target {
 
 /// Finds or gets a compiler for the microcontroller.
 pub fn for_target() -> Result<Target> {
-    let rustup = format!("rustup target add {TARGET}");
+    compiler(TARGET)
+}
+
+/// Finds or gets a compiler for a target: [`TARGET`] or [`BROWSER`].
+pub fn compiler(target: &str) -> Result<Target> {
+    let (has_target, rustup) = (|| has(target), format!("rustup target add {target}"));
     if has_target() || rustup_may_install() {
         provide("the target", has_target, &rustup, "")?;
         return Ok(Target::InUse);
     }
-    println!("\nThe toolchain in use has no {TARGET}, so Debian's compiler builds for it.");
+    println!("\nThe toolchain in use has no {target}, so Debian's compiler builds for it.");
     let there =
         || run::said(run::command("dpkg").arg("--status").args(DEBIAN_PACKAGES.split(' '))).is_ok();
-    provide(&format!("a compiler for {TARGET}"), there, &rustup, DEBIAN_PACKAGES)?;
+    provide(&format!("a compiler for {target}"), there, &rustup, DEBIAN_PACKAGES)?;
     Ok(Target::Debian)
 }
 
@@ -136,9 +159,9 @@ fn rustup_may_install() -> bool {
     std::env::var("RUSTUP_AUTO_INSTALL").as_deref() != Ok("0") && answers("rustup")
 }
 
-/// Whether the toolchain in use has the core library of the target.
-fn has_target() -> bool {
-    let library = run::output("rustc", &["--print", "target-libdir", "--target", TARGET]);
+/// Whether the toolchain in use has the core library of a target.
+fn has(target: &str) -> bool {
+    let library = run::output("rustc", &["--print", "target-libdir", "--target", target]);
     let entries = library.ok().and_then(|dir| Path::new(&dir).read_dir().ok());
     let mut files = entries.into_iter().flatten().flatten();
     files.any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))

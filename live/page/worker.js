@@ -1,0 +1,38 @@
+'use strict';
+// The firmware's drive and console and a simulated motor, as WebAssembly. To the page it is what `cargo live` is, message for message.
+const TICK_MS = 40;
+let wasm, last, queue = [];
+const bytes = (place, length) => new Uint8Array(wasm.memory.buffer, place, length);
+
+/** A message of the page. */
+function take(said) {
+  const message = JSON.parse(said);
+  if (message === 'stop') wasm.stop();
+  if (!message.ask) return;
+  const [number, line] = message.ask, text = new TextEncoder().encode(line);
+  bytes(wasm.line(text.length), text.length).set(text);
+  wasm.ask(number);
+}
+onmessage = ({ data }) => wasm ? take(data) : queue.push(data);
+
+/** Time passes as by the clock; faster while the drive learns. A page that slept does not make up for it. */
+function tick() {
+  const now = performance.now();
+  let hurries = wasm.advance(Math.round(Math.min(now - last, 5 * TICK_MS)));
+  while (hurries && performance.now() - now < TICK_MS) hurries = wasm.advance(100);
+  last = now;
+  wasm.take();
+  postMessage(new TextDecoder().decode(bytes(wasm.place(0), wasm.length(0))));
+  const frames = bytes(wasm.place(1), wasm.length(1)).slice().buffer;
+  if (frames.byteLength) postMessage(frames, [frames]);
+  setTimeout(tick, hurries ? 0 : TICK_MS);
+}
+
+(async () => {
+  const { instance } = await WebAssembly.instantiate(await (await fetch('drive.wasm')).arrayBuffer(), {});
+  wasm = instance.exports;
+  wasm.init(+new URLSearchParams(location.search).get('seed') || 1);
+  last = performance.now();
+  queue.forEach(take);
+  tick();
+})();

@@ -1,0 +1,177 @@
+//! The drive in a browser, from a server that knows nothing but files.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use drive_live::shared::Shared;
+use drive_web::talk::Talk;
+
+use crate::browser::{pictures, state};
+use crate::chromium::{Browser, Page};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+/// First picture, ms behind the beginning of the load.
+const FIRST_PICTURE_MS: f64 = 700.0;
+/// Least speed, of the clock's, and the simulated time that is measured, ms, in parts of which the fastest counts: the computer
+/// has other things to do.
+const FASTER: f64 = 60.0;
+const MEASURED_MS: u32 = 20_000;
+const PART_MS: u32 = 200;
+/// The outputs are on from here on, ms.
+const ON_MS: u32 = 5000;
+
+/// Serves the files of a folder; its address.
+fn served(folder: PathBuf) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}/", listener.local_addr().unwrap());
+    std::thread::spawn(move || {
+        for stream in listener.incoming().map_while(Result::ok) {
+            let folder = folder.clone();
+            std::thread::spawn(move || serve(&folder, stream));
+        }
+    });
+    address
+}
+
+fn serve(folder: &Path, mut stream: TcpStream) {
+    let mut request = String::new();
+    let mut reader = BufReader::new(stream.try_clone().unwrap());
+    let _ = reader.read_line(&mut request);
+    let mut head = String::new();
+    while reader.read_line(&mut head).is_ok_and(|read| read > 2) {
+        head.clear();
+    }
+    let path = request.split_whitespace().nth(1).unwrap_or("/");
+    let name = path.split('?').next().unwrap().trim_start_matches('/');
+    let name = if name.is_empty() { "index.html" } else { name };
+    let Ok(bytes) = std::fs::read(folder.join(name)) else {
+        let _ =
+            stream.write_all(b"HTTP/1.1 404 \r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+        return;
+    };
+    let kind = match name.rsplit_once('.').map(|(_, ending)| ending) {
+        Some("html") => "text/html",
+        Some("css") => "text/css",
+        Some("js") => "text/javascript",
+        _ => "application/octet-stream",
+    };
+    let length = bytes.len();
+    let head = format!(
+        "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+    );
+    let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&bytes));
+}
+
+/// Presses the button of the guide or of the motor that does this.
+fn play(page: &mut Page<'_>, lines: &str) {
+    page.value(&format!("document.querySelector('[data-play^=\"{lines}\"]').click()"));
+}
+
+fn number(page: &mut Page<'_>, id: &str, condition: &str) {
+    page.until(&format!("parseFloat($('{id}').textContent) {condition}"), PATIENCE);
+}
+
+#[test]
+#[ignore = "needs Chromium and the folder of cargo xtask web; cargo xtask pages runs it"]
+fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+    let folder = target.join("pages");
+    let web = std::env::var_os("WEB").map_or_else(|| target.join("web"), PathBuf::from);
+    std::fs::create_dir_all(&folder).unwrap();
+    let address = served(web);
+    let mut browser = Browser::start(&folder.join("profile-web"), &folder);
+
+    // The best of three, likewise.
+    let mut first = f64::INFINITY;
+    for _ in 0..3 {
+        let mut page = browser.open(&address);
+        let picture = "performance.getEntriesByName('first picture')[0]";
+        page.until(&format!("!!{picture}"), PATIENCE);
+        first = first.min(page.number(&format!("{picture}.startTime")));
+        page.close();
+    }
+    println!("first picture {first:.0} ms behind the beginning of the load");
+
+    let mut page = browser.open(&address);
+    page.until("/[*] learned: slope/.test($('log').textContent)", PATIENCE);
+    state(&mut page, "off");
+    assert_eq!(page.value("!!$('guide').offsetParent && document.title"), "induction-drive");
+
+    play(&mut page, "~off; !load locked; start torque; ~regulating; torque 2");
+    state(&mut page, "regulating torque");
+    number(&mut page, "torque", "> 0.5");
+    number(&mut page, "speed", "< 3");
+    page.until(
+        "Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 15",
+        PATIENCE,
+    );
+    std::thread::sleep(Duration::from_secs(4));
+    state(&mut page, "regulating torque");
+    pictures(&mut page, &folder, "web");
+    page.value("$('around').scrollIntoView({ block: 'end' })");
+    pictures(&mut page, &folder, "web-motor");
+    page.value("scrollTo(0, 0)");
+
+    page.value("turn(1); turn(1)");
+    play(&mut page, "~off; !load free 0; start speed; ~regulating; speed 150");
+    number(&mut page, "speed", "> 140");
+    play(&mut page, "speed -150");
+    number(&mut page, "speed", "< -140");
+    state(&mut page, "regulating speed");
+    page.until(
+        "Math.abs(parseFloat($('flux-text').textContent.split('apart ')[1])) < 20",
+        PATIENCE,
+    );
+
+    page.value("turn(1)");
+    play(&mut page, "!turn 150");
+    page.until(
+        "/Fault 2\\d/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1",
+        PATIENCE,
+    );
+    state(&mut page, "in fault");
+    pictures(&mut page, &folder, "web-fault");
+    play(&mut page, "~off; !open none");
+    state(&mut page, "regulating torque");
+    play(&mut page, "!open b");
+    state(&mut page, "in fault");
+
+    // As fast as it can, and the bits of the same steps here.
+    page.value(&format!(
+        "fetch('drive.wasm').then(file => file.arrayBuffer()).then(bytes => WebAssembly.instantiate(bytes, {{}})).then(({{ instance: {{ exports: own }} }}) => {{
+            own.init(7); let least = 1e9;
+            for (let passed = 0; passed < {MEASURED_MS}; passed += {PART_MS}) {{
+                const began = performance.now(); own.advance({PART_MS}); if (passed > {ON_MS}) least = Math.min(least, performance.now() - began); }}
+            globalThis.measured = [{PART_MS} / least, BigInt.asUintN(64, own.fingerprint()).toString()]; }}); 0"
+    ));
+    page.until("!!globalThis.measured", PATIENCE);
+    let faster = page.number("measured[0]");
+    println!("{faster:.0} times as fast as the clock");
+    let mut here = Talk::learning(7).unwrap();
+    here.advance(MEASURED_MS);
+    let fingerprint = here.board.machine.fingerprint.to_string();
+    assert_eq!(page.value("measured[1]"), fingerprint.as_str());
+    assert!(first < FIRST_PICTURE_MS, "{first} ms");
+    assert!(faster > FASTER, "{faster}");
+}
+
+/// The same board behind `cargo live --simulated`, in real time.
+#[test]
+fn the_simulated_board_starts_holds_torque_and_reports_an_open_wire() {
+    let (shared, _asks) = Shared::new();
+    let mut link = drive_live::simulated::connect(&shared, 1).unwrap();
+    link.begin();
+    let mut ask = |line: &str| link.ask(line, |_| ()).unwrap().lines.pop().unwrap();
+    assert!(ask("version").contains("simulated"));
+    for (line, wanted) in [("start torque", "regulating torque"), ("!open b", "in fault")] {
+        let answer = ask(line);
+        assert!(answer.starts_with("ok"), "{line}: {answer}");
+        let began = std::time::Instant::now();
+        while !ask("status").starts_with(wanted) {
+            assert!(began.elapsed() < PATIENCE, "{wanted}: {}", ask("status"));
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+}

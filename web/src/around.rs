@@ -1,0 +1,79 @@
+//! What changes around the drive while it runs: load, motor, wires and sensors.
+
+use std::f64::consts::TAU;
+
+use motor_plant::{
+    Channel, CurrentFault, Load, MachineSettings, Plant, PlantError, SaliencySettings,
+};
+
+/// Changes the plant as these words say.
+///
+/// | words | effect |
+/// |---|---|
+/// | `load locked`, `load free NM`, `load speed RPM` | blocks the shaft, brakes it with a torque, turns it |
+/// | `turn DEG` | turns the motor's flux by an electrical angle, at once: the angle of the drive is wrong by as much |
+/// | `open a`, `b`, `c`, `none` | opens the wire of a phase, or closes all |
+/// | `saliency SHARE` | share of the saliency of the motor, cold, that is left; 0 is the textbook machine |
+/// | `warm PERCENT` | resistances of stator and rotor above those at the start |
+/// | `sensor a FAULT`, `b FAULT` | a current sensor: `none`, `open` (reads no current), `high`, `low` (at an end of the range) |
+/// | `dc VOLT` | voltage of the dc link |
+///
+/// # Errors
+/// In words: what is wrong, and what is allowed.
+pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let refused = |why: PlantError| why.to_string();
+    let number = |word: &str| -> Result<f64, String> {
+        let value: Option<f64> = word.parse().ok();
+        value
+            .filter(|value| value.is_finite())
+            .ok_or_else(|| format!("{word}: a number is expected"))
+    };
+    match words[..] {
+        ["load", "locked"] => plant.set_load(Load::Locked).map_err(refused),
+        ["load", "free", nm] => plant.set_load(Load::Free { torque: number(nm)? }).map_err(refused),
+        ["load", "speed", rpm] => {
+            plant.set_load(Load::Speed { speed: number(rpm)? * TAU / 60.0 }).map_err(refused)
+        }
+        ["turn", degrees] => {
+            plant.turn_rotor_flux(number(degrees)?.to_radians());
+            Ok(())
+        }
+        ["open", phase] => {
+            let phases = [("none", None), ("a", Some(0)), ("b", Some(1)), ("c", Some(2))];
+            plant.set_open_phase(named(phase, &phases)?).map_err(refused)
+        }
+        ["saliency", share] => {
+            let (share, own) = (number(share)?, SaliencySettings::DEFAULT);
+            let s = SaliencySettings { a_psi: share * own.a_psi, b1: share * own.b1, ..own };
+            plant.set_saliency(&MachineSettings::DEFAULT, &s).map_err(refused)
+        }
+        ["warm", percent] => {
+            let (own, factor) = (MachineSettings::DEFAULT, 1.0 + number(percent)? / 100.0);
+            plant.set_resistances(own.rs * factor, own.rr * factor).map_err(refused)
+        }
+        ["sensor", channel, fault] => {
+            let channel = named(channel, &[("a", Channel::A), ("b", Channel::B)])?;
+            let faults = [
+                ("none", CurrentFault::None),
+                ("open", CurrentFault::Open),
+                ("high", CurrentFault::SaturatedHigh),
+                ("low", CurrentFault::SaturatedLow),
+            ];
+            plant.set_current_fault(channel, named(fault, &faults)?);
+            Ok(())
+        }
+        ["dc", volts] => plant.set_dc_link(number(volts)?).map_err(refused),
+        _ => Err("load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
+                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT"
+            .to_owned()),
+    }
+}
+
+/// The value of a word.
+fn named<T: Copy>(word: &str, of: &[(&str, T)]) -> Result<T, String> {
+    of.iter().find(|(name, _)| *name == word).map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<&str> = of.iter().map(|(name, _)| *name).collect();
+        format!("{word}: allowed is {}", names.join(", "))
+    })
+}

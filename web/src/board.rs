@@ -1,0 +1,202 @@
+//! A board without hardware: the firmware's front, its drive and a simulated motor, behind the bytes of a serial port.
+//!
+//! Lines that begin with `!` are for the motor and what is around it ([`Around`]); all others go to the console.
+
+use std::collections::VecDeque;
+
+use drive_core::{Line, State};
+use drive_settings::SettingsError;
+use induction_drive::board;
+use induction_drive::console::handle::Port;
+use induction_drive::front::Front;
+use induction_drive::modbus;
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::bus::{Baud, Format};
+use induction_drive::strip;
+use induction_drive::terminals;
+use motor_plant::{
+    InverterSettings, Load, MeasurementSettings, MechanicsSettings, Plant, PlantSettings,
+};
+
+use crate::around;
+use crate::machine::Machine;
+
+/// Control periods from one pass of the main loop to the next, and passes of a millisecond.
+const PERIODS: u32 = 3;
+const PASSES: u32 = board::PWM_HZ / 1000 / PERIODS;
+/// Longest learning, and the time in which the flux has decayed behind it.
+const LONGEST_LEARNING_MS: u32 = 200_000;
+const REST_MS: u32 = 2000;
+/// Temperature of the heat sink, degrees Celsius.
+const HEAT_SINK_C: f32 = 25.0;
+
+/// See the head of the module.
+pub struct HostBoard {
+    front: Front,
+    /// Drive and motor.
+    pub machine: Machine,
+    wires: Wires,
+    /// A line that is coming in.
+    line: Vec<u8>,
+    now_ms: u32,
+}
+
+/// The serial port: bytes to the console and from it.
+#[derive(Default)]
+struct Wires {
+    input: VecDeque<u8>,
+    output: Vec<u8>,
+}
+
+/// No terminal strip.
+struct NoStrip;
+
+impl strip::Port for NoStrip {
+    fn look(&mut self) -> terminals::Wires {
+        terminals::Wires::default()
+    }
+    fn codes(&self) -> [Option<u16>; terminals::ANALOG] {
+        [None; terminals::ANALOG]
+    }
+    fn show(&mut self, _: [bool; 3]) {}
+}
+
+impl Port for Wires {
+    fn read(&mut self) -> Option<u8> {
+        self.input.pop_front()
+    }
+    fn take_damage(&mut self) -> bool {
+        false
+    }
+    fn write(&mut self, bytes: &[u8]) -> bool {
+        self.output.extend(bytes);
+        true
+    }
+    fn change_rate(&mut self, _: u32) -> bool {
+        true
+    }
+}
+
+/// There is no field bus.
+enum NoBus {}
+
+impl modbus::Port for NoBus {
+    fn set_line(&mut self, _: Baud, _: Format) {}
+    fn receive(&mut self) -> Option<modbus::Frame> {
+        None
+    }
+    fn send(&mut self, _: &modbus::Frame) {}
+    fn set_busy(&mut self, _: Option<u8>) {}
+}
+
+/// The plant that `cargo sim` simulates by default, with the converters and the timer of the reference board, as the virtual board
+/// has it.
+pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
+    let (scales, own) = (&settings.drive.scales, MeasurementSettings::DEFAULT);
+    let dead_time_s = board::dead_time(settings.drive.inverter.dead_time_s).1;
+    PlantSettings {
+        mechanics: MechanicsSettings { load: Load::Locked, ..MechanicsSettings::DEFAULT },
+        inverter: InverterSettings {
+            timer_top: board::PWM_TOP,
+            dead_time_us: f64::from(dead_time_s) * 1e6,
+            ..InverterSettings::DEFAULT
+        },
+        measurement: MeasurementSettings {
+            lsb_a: own.lsb_a * f64::from(scales.current_a.gain / Line::CHANNEL_A.gain),
+            heat_sink_code: scales.ntc.code(HEAT_SINK_C),
+            ..own
+        },
+        ..PlantSettings::DEFAULT
+    }
+}
+
+/// The settings of the reference board, whose bench steps were done.
+pub fn settings() -> FirmwareSettings {
+    let mut settings = FirmwareSettings::of_the_board();
+    settings.confirm_board();
+    settings
+}
+
+impl HostBoard {
+    /// A board that has just been switched on; the shaft is locked. Equal seeds give equal boards, to the bit.
+    ///
+    /// # Errors
+    /// In words: the plant or the drive refuses its settings.
+    pub fn new(seed: u64) -> Result<Self, String> {
+        let settings = settings();
+        let plant = Plant::new(&plant_settings(&settings), seed).map_err(|why| why.to_string())?;
+        Self::on(plant, &settings).map_err(|why| why.to_string())
+    }
+
+    fn on(plant: Plant, settings: &FirmwareSettings) -> Result<Self, SettingsError> {
+        let (front, machine) = (Front::new(*settings), Machine::new(plant, settings)?);
+        let mut board =
+            Self { front, machine, wires: Wires::default(), line: Vec::new(), now_ms: 0 };
+        board.front.console.greet(&board.machine);
+        Ok(board)
+    }
+
+    /// Lets the drive learn its motor, as fast as it can, and save that. The shaft must be locked.
+    ///
+    /// # Errors
+    /// In words: what the board has said.
+    pub fn learn(&mut self) -> Result<(), String> {
+        self.write(b"learn\n");
+        for _ in 0..LONGEST_LEARNING_MS {
+            self.millisecond();
+            if self.front.desk.learned().is_some() && self.machine.drive().state() == State::Off {
+                self.write(b"save\n");
+                (0..REST_MS).for_each(|_| self.millisecond());
+                return Ok(());
+            }
+        }
+        Err(String::from_utf8_lossy(&self.read()).into_owned())
+    }
+
+    /// Takes bytes of the port.
+    pub fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.line.push(*byte);
+            if *byte == b'\n' {
+                let line = std::mem::take(&mut self.line);
+                let text = String::from_utf8_lossy(&line);
+                let (tag, rest) = match text.split_once(' ') {
+                    Some((tag, rest)) if tag.starts_with('@') => (tag, rest),
+                    _ => ("", &*text),
+                };
+                match rest.trim().strip_prefix('!') {
+                    Some(words) => {
+                        let done = around::change(&mut self.machine.plant, words);
+                        let answer =
+                            done.map_or_else(|why| format!("error: {why}"), |()| "ok".into());
+                        let answer = format!("{tag} {answer}\r\n");
+                        self.wires.output.extend(answer.trim_start().bytes());
+                    }
+                    None => self.wires.input.extend(line),
+                }
+            }
+        }
+    }
+
+    /// The bytes of the port since the last call.
+    pub fn read(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.wires.output)
+    }
+
+    /// A millisecond passes.
+    pub fn millisecond(&mut self) {
+        for _ in 0..PASSES {
+            (0..PERIODS).for_each(|_| self.machine.period());
+            let (port, drive) = (&mut self.wires, &mut self.machine);
+            self.front.pass(port, &mut None::<NoBus>, &mut NoStrip, drive, self.now_ms);
+        }
+        self.now_ms = self.now_ms.wrapping_add(1);
+        if self.machine.resets {
+            let (plant, saved) = (self.machine.plant.clone(), self.machine.saved);
+            // The settings were in force when they were saved.
+            if let Ok(board) = Self::on(plant, &saved) {
+                *self = board;
+            }
+        }
+    }
+}

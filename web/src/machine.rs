@@ -1,0 +1,236 @@
+//! The drive on a simulated motor, as the main loop of the firmware sees it: the counterpart of its supervisor and its control
+//! interrupt.
+
+use std::collections::VecDeque;
+use std::fmt::{self, Write};
+
+use drive_commission::Commissioning;
+use drive_core::io::PERIOD_S;
+use drive_core::learned::Learned;
+use drive_core::{
+    Accepted, Coefficients, Command, Compare, Drive, FrontEndState, Hardware, Sample, State,
+};
+use drive_settings::SettingsError;
+use induction_drive::board::TRACE_RECORDS;
+use induction_drive::commissioning::Session;
+use induction_drive::console::grammar::Level;
+use induction_drive::console::handle::Firmware;
+use induction_drive::desk::handle::{CommandError, DriveHandle};
+use induction_drive::link::Status;
+use induction_drive::link::ring::Record;
+use induction_drive::link::trace::{self, Plan, Recorder, Sampled, Trace};
+use induction_drive::rotor_tracking::{Report, Tracking};
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::{FlashError, history::History};
+use motor_plant::Plant;
+
+/// See the head of the module.
+pub struct Machine {
+    /// The motor with everything around it.
+    pub plant: Plant,
+    drive: Drive,
+    front_end: FrontEndState,
+    /// Compare values on their way: computed in the last period, in force in this one.
+    pending: Compare,
+    sample: Sample,
+    periods: u32,
+    /// Periods from one record of the stream to the next, 0 is none; records that were not fetched.
+    streamed: (u32, VecDeque<Record>),
+    trace: (Recorder<'static, TRACE_RECORDS>, trace::Reader<'static, TRACE_RECORDS>),
+    session: Session,
+    tracking: Option<Tracking>,
+    /// The result of a learning that was not fetched.
+    found: Option<Learned>,
+    history: History,
+    /// What a reset begins with.
+    pub saved: FirmwareSettings,
+    /// Whether a reset was asked for.
+    pub resets: bool,
+    /// FNV-1a over the compare values and the currents of all periods.
+    pub fingerprint: u64,
+}
+
+impl Machine {
+    /// The drive with these settings, off. Memory of a trace stays taken until the program ends.
+    ///
+    /// # Errors
+    /// The settings make no drive.
+    pub fn new(plant: Plant, settings: &FirmwareSettings) -> Result<Self, SettingsError> {
+        let drive = Drive::new(settings.build()?);
+        let memory: &Trace<TRACE_RECORDS> = Box::leak(Box::new(Trace::new()));
+        let Some(trace) = memory.take() else { unreachable!("it is new") };
+        Ok(Self {
+            plant,
+            drive,
+            front_end: FrontEndState::default(),
+            pending: Compare::OFF,
+            sample: Sample::default(),
+            periods: 0,
+            streamed: (0, VecDeque::new()),
+            trace,
+            session: Session::new(&settings.drive),
+            tracking: Tracking::new(&settings.drive),
+            found: None,
+            history: History::default(),
+            saved: *settings,
+            resets: false,
+            fingerprint: 0xcbf2_9ce4_8422_2325,
+        })
+    }
+
+    /// The drive.
+    pub fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// Flux angle of the drive, that of the motor, turns, and flux of the motor, Wb.
+    pub fn flux(&self) -> [f64; 3] {
+        let turns = self.plant.rotor_flux_angle() / std::f64::consts::TAU;
+        let own = self.drive.telemetry().phi.to_turns();
+        [own.into(), turns.rem_euclid(1.0), self.plant.rotor_flux().norm()]
+    }
+
+    /// One control period, with all that its interrupt does and all that waits for it.
+    pub fn period(&mut self) {
+        self.sample = self.plant.sample();
+        let before = self.drive.state();
+        let (compare, output) = self.drive.period(&mut self.front_end, &self.sample, &mut |_| {});
+        if !compare.enabled {
+            // Off is off at once, not at the end of the period.
+            self.pending = Compare::OFF;
+        }
+        self.plant.set_chopper(output.chopper.into());
+        self.plant.set_relay(output.relay);
+        self.plant.advance(&self.pending, PERIOD_S.into());
+        self.pending = compare;
+        self.periods = self.periods.wrapping_add(1);
+        let (current, Compare { a, b, c, .. }) = (self.plant.current(), compare);
+        let duties = u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32;
+        for word in [duties, current.re.to_bits(), current.im.to_bits()] {
+            self.fingerprint = (self.fingerprint ^ word).wrapping_mul(0x0100_0000_01b3);
+        }
+
+        let state = self.drive.state();
+        if before == State::Learning && state != before {
+            self.found = self.drive.learned().copied();
+        }
+        let sampled = Sampled::new(&self.sample, state, self.drive.limiting());
+        self.trace.0.step(&sampled, self.drive.telemetry());
+        let streamed = self.periods.checked_rem(self.streamed.0) == Some(0);
+        let commissions = self.session.is_running();
+        let observed =
+            self.drive.tracks_rotor() || self.drive.excites() || commissions && state.regulates();
+        if streamed || observed {
+            let (period, telemetry) = (self.periods, *self.drive.telemetry());
+            let record = Record { period, telemetry, sampled, observed, streamed };
+            if streamed {
+                self.streamed.1.push_back(record);
+            }
+            if observed && commissions {
+                self.session.take(&record);
+            } else if observed {
+                self.track(&record);
+            }
+        }
+        if commissions
+            && let Some(command) = self.session.poll(&self.drive.excited(), Commissioning::design)
+            && let Err(why) = self.drive.command(&command)
+        {
+            self.session.refused(Some(why));
+        }
+    }
+
+    fn track(&mut self, record: &Record) {
+        let Some(tracking) = &mut self.tracking else { return };
+        // Refused when the drive has just stopped.
+        if let Some(tau_r) = tracking.take(record)
+            && let Ok(accepted) = self.drive.command(&Command::RotorTimeConstant(tau_r))
+        {
+            tracking.taken(tau_r, accepted);
+        }
+    }
+}
+
+impl DriveHandle for Machine {
+    fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
+        self.drive.command(&command).map_err(CommandError::Refused)
+    }
+    fn no_control(&self) -> CommandError {
+        CommandError::NoAnswer
+    }
+    fn status(&self) -> Option<Status> {
+        Some(Status {
+            periods: self.periods,
+            state: self.drive.state(),
+            sample: self.sample,
+            telemetry: *self.drive.telemetry(),
+            hardware: Hardware::empty(),
+            learning: self.drive.learning_progress(),
+            limiting: self.drive.limiting(),
+            room: self.drive.room(),
+            stator_resistance: self.drive.stator_resistance(),
+            excited: self.drive.excited(),
+            ..Status::default()
+        })
+    }
+    fn is_off(&self) -> bool {
+        self.drive.is_off()
+    }
+    fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
+        settings.build()
+    }
+    fn configured(&mut self, settings: &FirmwareSettings) {
+        self.tracking = Tracking::new(&settings.drive);
+        self.session.configured(&settings.drive);
+    }
+    fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
+        self.saved = *settings;
+        Ok(())
+    }
+    fn reboot(&mut self, _: bool) {
+        self.resets = true;
+    }
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        self.found.take().iter().for_each(show);
+    }
+}
+
+impl Firmware for Machine {
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
+    }
+    fn history(&self) -> &History {
+        &self.history
+    }
+    fn begin_trace(&mut self, plan: &Plan) -> bool {
+        self.trace.1.begin(plan)
+    }
+    fn cancel_trace(&mut self) {
+        self.trace.1.cancel();
+    }
+    fn tracing(&self) -> bool {
+        self.trace.1.recording()
+    }
+    fn traced(&self, i: u16) -> Option<(i16, trace::Record)> {
+        self.trace.1.get(i)
+    }
+    fn stream(&mut self, divider: u16) {
+        self.streamed = (divider.into(), VecDeque::new());
+    }
+    fn sampled(&mut self) -> Option<Record> {
+        self.streamed.1.pop_front()
+    }
+    fn set_log_level(&mut self, _: Level) {}
+    fn stack(&self) -> (usize, usize) {
+        (0, 0)
+    }
+    fn version(&self, to: &mut dyn Write) -> fmt::Result {
+        to.write_str(concat!(env!("CARGO_PKG_VERSION"), ", simulated motor"))
+    }
+    fn last_run(&self, to: &mut dyn Write) -> fmt::Result {
+        to.write_str("simulated")
+    }
+}

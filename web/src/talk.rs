@@ -1,0 +1,220 @@
+//! What page and board say to each other, in the messages that `cargo live` has with its page.
+
+use std::collections::VecDeque;
+use std::fmt;
+
+use drive_core::State;
+use drive_stream::{Frame, MOST_SIGNALS, Piece, Splitter};
+use induction_drive::console::handle::Firmware as _;
+use serde_json::{Value, json};
+
+use crate::board::HostBoard;
+use crate::loops;
+
+/// From one question about the drive's state to the next, ms.
+const STATUS_MS: u32 = 200;
+/// Layout of a frame that the page understands.
+const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
+
+/// The greeting of the page: who the drive is, and whether the page fits it, by its answers to `version` and `describe stream`.
+pub fn hello(version: Option<&String>, described: &[String]) -> Value {
+    let objects: Vec<Value> =
+        described.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let signals: Vec<&Value> =
+        objects.iter().filter(|object| object["signal"].is_string()).collect();
+    let error = described.last().filter(|line| line.starts_with("error:"));
+    let fits = objects.iter().any(|object| object["frame"] == json!(LAYOUT));
+    let misfit = match error {
+        Some(error) => Some(format!(
+            "This firmware is older than the page: it has no live curves ({error}). All else works as far as the firmware \
+             knows it. To update it: cargo xtask flash."
+        )),
+        None => (!fits).then(|| {
+            "This firmware sends its curves in a layout that the page does not know. To update the page: git pull.".to_owned()
+        }),
+    };
+    let program = env!("CARGO_PKG_VERSION");
+    json!({ "hello": { "version": version, "program": program, "signals": signals, "misfit": misfit } })
+}
+
+/// Ten little-endian words of a frame: period, sequence number, values.
+pub fn words(frame: &Frame) -> impl Iterator<Item = u8> + use<> {
+    let mut values = [f32::NAN; MOST_SIGNALS];
+    values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
+    let head = [frame.period, frame.sequence.into()];
+    head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
+}
+
+/// Who asks the drive.
+enum By {
+    /// The page, with a number for the answer.
+    Page(u32),
+    /// This program, for the state.
+    Status,
+    /// This program, for the greeting.
+    Hello,
+}
+
+/// A page's talk with a board in the same program.
+pub struct Talk {
+    /// The board.
+    pub board: HostBoard,
+    /// Questions, of which the first was sent; the lines of its answer so far.
+    asks: VecDeque<(By, String)>,
+    lines: Vec<String>,
+    /// Number of the question that was sent last, and whether it is not answered yet.
+    tag: u32,
+    awaited: bool,
+    splitter: Splitter,
+    line: Vec<u8>,
+    /// For the page.
+    texts: Vec<Value>,
+    frames: Vec<u8>,
+    counts: [u32; 4],
+    next: Option<u16>,
+    since_status_ms: u32,
+    /// Whether the drive is on its way to its first learning.
+    begins: bool,
+}
+
+impl Talk {
+    /// With a board that has just been switched on.
+    pub fn new(mut board: HostBoard) -> Self {
+        board.write(b"@0 baud 2000000\n");
+        Self {
+            board,
+            asks: VecDeque::from([(By::Hello, "describe stream".to_owned())]),
+            lines: Vec::new(),
+            tag: 0,
+            awaited: false,
+            splitter: Splitter::new(),
+            line: Vec::new(),
+            texts: Vec::new(),
+            frames: Vec::new(),
+            counts: [0; 4],
+            next: None,
+            since_status_ms: 0,
+            begins: false,
+        }
+    }
+
+    /// With a board that begins to learn its motor. Equal seeds give equal bits.
+    ///
+    /// # Errors
+    /// As [`HostBoard::new`].
+    pub fn learning(seed: u64) -> Result<Self, String> {
+        let mut talk = Self::new(HostBoard::new(seed)?);
+        talk.ask(0, "learn");
+        talk.begins = true;
+        Ok(talk)
+    }
+
+    /// A line of the page for the board; its answer gets this number.
+    pub fn ask(&mut self, number: u32, line: &str) {
+        self.asks.push_back((By::Page(number), line.replace(['\r', '\n'], " ")));
+    }
+
+    /// Stops the drive, past everything that waits.
+    pub fn stop(&mut self) {
+        self.begins = false;
+        self.texts.push(json!({ "stopped": "by the page" }));
+        self.board.write(b"@0 stop\n");
+        // It has cut a list short, whose end does not come.
+        if self.awaited {
+            self.answered(vec!["error: cut short by the stop".to_owned()]);
+        }
+    }
+
+    /// Whether the drive does what nobody wants to wait for.
+    pub fn hurries(&self) -> bool {
+        // The page has its first picture first.
+        self.begins && self.counts[0] > 0 || self.board.machine.drive().state() == State::Learning
+    }
+
+    /// So many milliseconds pass.
+    pub fn advance(&mut self, ms: u32) {
+        for _ in 0..ms {
+            self.since_status_ms += 1;
+            if !self.awaited {
+                if self.asks.is_empty() && self.since_status_ms >= STATUS_MS {
+                    self.asks.push_back((By::Status, "status".to_owned()));
+                    self.since_status_ms = 0;
+                }
+                if let Some((_, line)) = self.asks.front() {
+                    self.tag = self.tag % 0xffff + 1;
+                    self.awaited = true;
+                    self.board.write(format!("@{:x} {line}\n", self.tag).as_bytes());
+                }
+            }
+            self.board.millisecond();
+            for byte in self.board.read() {
+                match self.splitter.push(byte) {
+                    Piece::Text(b'\n') => {
+                        let line = std::mem::take(&mut self.line);
+                        self.hear(String::from_utf8_lossy(&line).trim_end());
+                    }
+                    Piece::Text(byte) => self.line.push(byte),
+                    Piece::Frame(frame) => self.frame(&frame),
+                    Piece::Damaged => self.counts[2] += 1,
+                    Piece::Nothing => {}
+                }
+            }
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame) {
+        let missing = frame.sequence.wrapping_sub(self.next.unwrap_or(frame.sequence));
+        self.counts[0] += 1;
+        self.counts[1] += u32::from(missing);
+        self.next = Some(frame.sequence.wrapping_add(1));
+        self.frames.extend(words(frame));
+    }
+
+    fn hear(&mut self, line: &str) {
+        if line.starts_with("* ") {
+            self.begins &=
+                !["* off", "* fault", "* stopped"].iter().any(|end| line.starts_with(end));
+            self.texts.push(json!({ "line": line }));
+            return;
+        }
+        match line.strip_prefix('@').and_then(|rest| rest.split_once(' ')) {
+            None => self.lines.push(line.to_owned()),
+            Some((tag, rest)) if self.awaited && tag == format!("{:x}", self.tag) => {
+                let mut lines = std::mem::take(&mut self.lines);
+                lines.push(rest.to_owned());
+                self.answered(lines);
+            }
+            // The answer to a stop, or to a question that it has cut short.
+            Some((_, rest)) => self.texts.push(json!({ "line": rest })),
+        }
+    }
+
+    fn answered(&mut self, lines: Vec<String>) {
+        self.awaited = false;
+        self.lines.clear();
+        let Some((by, line)) = self.asks.pop_front() else { return };
+        match by {
+            By::Page(number) => {
+                let loops = (line == "describe").then(|| loops::of(&lines));
+                if line.starts_with("stream ") {
+                    self.frames.clear();
+                    (self.counts, self.next) = ([0; 4], None);
+                }
+                self.texts.push(json!({ "id": number, "lines": lines, "loops": loops }));
+            }
+            By::Status => self.texts.push(json!({ "status": lines.last() })),
+            By::Hello => {
+                let version = fmt::from_fn(|f| self.board.machine.version(f)).to_string();
+                self.texts.push(hello(Some(&version), &lines));
+            }
+        }
+    }
+
+    /// What there is for the page: messages as JSON, and [`words`] of frames. The messages first: the answer to a new stream tells
+    /// what its frames are.
+    pub fn take(&mut self) -> (String, Vec<u8>) {
+        let mut texts = std::mem::take(&mut self.texts);
+        texts.push(json!({ "tick": self.counts, "flux": self.board.machine.flux() }));
+        (Value::from(texts).to_string(), std::mem::take(&mut self.frames))
+    }
+}

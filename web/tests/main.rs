@@ -1,0 +1,120 @@
+//! The board without hardware: it talks as the firmware does, learns, holds torque at rest, and computes the bits of the simulator.
+
+use drive_core::{Command, Drive, Mode};
+use drive_web::board::{HostBoard, plant_settings, settings};
+use drive_web::talk::Talk;
+use motor_plant::Plant;
+use serde_json::Value;
+use sim_bench::Config;
+use sim_bench::rig::Rig;
+
+/// Longest wait for an answer or an announcement, ms.
+const PATIENCE_MS: u32 = 200_000;
+
+struct Session {
+    talk: Talk,
+    number: u32,
+    said: Vec<Value>,
+    frames: Vec<u8>,
+}
+
+impl Session {
+    fn new(seed: u64) -> Self {
+        let talk = Talk::new(HostBoard::new(seed).unwrap());
+        Self { talk, number: 0, said: Vec::new(), frames: Vec::new() }
+    }
+
+    fn pass(&mut self, ms: u32) {
+        self.talk.advance(ms);
+        let (texts, frames) = self.talk.take();
+        let texts: Vec<Value> = serde_json::from_str(&texts).unwrap();
+        self.said.extend(texts);
+        self.frames.extend(frames);
+    }
+
+    /// Waits for a message for which this holds.
+    fn until<T>(&mut self, what: &str, found: impl Fn(&Value) -> Option<T>) -> T {
+        for _ in 0..PATIENCE_MS / 10 {
+            let found = self.said.iter().enumerate().find_map(|(n, said)| Some((n, found(said)?)));
+            if let Some((n, value)) = found {
+                self.said.drain(..=n);
+                return value;
+            }
+            self.pass(10);
+        }
+        panic!("{what}: {:#?}", self.said.iter().rev().take(20).collect::<Vec<_>>())
+    }
+
+    fn announced(&mut self, beginning: &str) {
+        let beginning = format!("* {beginning}");
+        self.until(&beginning, |said| said["line"].as_str()?.starts_with(&beginning).then_some(()));
+    }
+
+    fn ask(&mut self, line: &str) -> Vec<String> {
+        self.number += 1;
+        let number = self.number;
+        self.talk.ask(number, line);
+        self.until(line, |said| {
+            let lines = said["lines"].as_array().filter(|_| said["id"] == number)?;
+            Some(lines.iter().map(|line| line.as_str().unwrap().to_owned()).collect())
+        })
+    }
+
+    fn learned(seed: u64) -> Self {
+        let mut session = Self::new(seed);
+        session.until("hello", |said| said["hello"]["signals"].as_array().map(|_| ()));
+        let answer = session.ask("learn").pop().unwrap();
+        assert!(answer.starts_with("ok"), "{answer}");
+        session.announced("learned: ");
+        session.announced("off");
+        session
+    }
+}
+
+/// The plant is that of the simulator, which has the same drive: the same seed gives the same bits.
+#[test]
+fn the_same_seed_gives_the_bits_of_the_simulator() {
+    let settings = settings();
+    let plant = plant_settings(&settings);
+    let mut theirs = sim_bench::config::plant_settings(&Config::default());
+    (theirs.inverter, theirs.measurement) = (plant.inverter, plant.measurement);
+    // How deep a sag would be that there is none of.
+    theirs.dc_link = plant.dc_link;
+    // The flux of a direct current of 0.7 A, which is also what no value means.
+    assert_eq!(theirs.saliency.psi_n.take(), Some(0.7 * plant.machine.lm));
+    assert_eq!(plant, theirs);
+    let mut board = HostBoard::new(7).unwrap();
+    let drive = Drive::new(settings.build().unwrap());
+    let mut rig = Rig::of(Plant::new(&plant, 7).unwrap(), drive);
+    let start = Command::Start(Mode::Learning);
+    rig.command(&start).unwrap();
+    induction_drive::desk::handle::DriveHandle::command(&mut board.machine, start).unwrap();
+    for _ in 0..60_000 {
+        rig.step();
+        board.machine.period();
+    }
+    assert!(rig.plant.current().norm() > 0.1);
+    assert_eq!(rig.plant.current(), board.machine.plant.current());
+    assert_eq!(rig.drive.telemetry(), board.machine.drive().telemetry());
+}
+
+#[test]
+fn a_learned_drive_holds_torque_at_rest_and_reports_a_wrong_angle() {
+    let mut session = Session::learned(1);
+    let answer = session.ask("start torque").pop().unwrap();
+    assert!(answer.starts_with("ok"), "{answer}");
+    session.announced("running: torque");
+    session.ask("torque 2");
+    session.pass(1000);
+    let [_, _, flux] = session.talk.board.machine.flux();
+    let torque = session.talk.board.machine.plant.torque();
+    println!("{}", session.ask("status")[0]);
+    assert!(flux > 0.1 && torque > 0.5, "{flux} Wb, {torque} Nm");
+    let status = session.ask("status").pop().unwrap();
+    assert!(status.starts_with("regulating torque"), "{status}");
+    let shown = status.split("torque ").nth(2).or(status.split("torque ").nth(1)).unwrap();
+    assert!(shown.contains("Nm"), "{status}");
+    assert_eq!(session.ask("!turn 150"), ["ok"]);
+    session.announced("fault ");
+    println!("{}", session.ask("faults").join("\n"));
+}
