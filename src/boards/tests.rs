@@ -62,6 +62,7 @@ fn section(board: &Board) -> String {
         board.pulls,
         if board.analog_only.is_empty() { "none".to_owned() } else { list(board.analog_only) },
     );
+    let mut rows: Vec<(String, [String; 2])> = Vec::new();
     for (item, value) in values {
         let source = sources.iter().find(|(name, _)| *name == item).and_then(|(_, source)| *source);
         let source = match source {
@@ -69,7 +70,16 @@ fn section(board: &Board) -> String {
             Some(Source::Assumed(step)) => format!("**assumed**; bench: {step}"),
             None => panic!("{item}"),
         };
-        writeln!(text, "| {item} | {value} | {source} |").unwrap();
+        match rows.last_mut() {
+            // Sensors that are alike share a row.
+            Some((items, before)) if before[..] == [value.clone(), source.clone()] => {
+                *items += &item.replace("scale of current", ",");
+            }
+            _ => rows.push((item.to_owned(), [value, source])),
+        }
+    }
+    for (items, [value, source]) in rows {
+        writeln!(text, "| {} | {value} | {source} |", items.replace(" ,", ",")).unwrap();
     }
     text
 }
