@@ -1,7 +1,7 @@
 //! The terminal strip: wires to a panel or a PLC as a front end of the desk, beside console and field bus.
 //!
 //! Shapes: [`Port`] is what the pins show; the [`Debounce`] makes [`Wires`] of it, once a millisecond; [`Desk::hold`] says whether they
-//! let the drive run; the [`Sequence`] makes starts and stops of START; a [`reference`] is a speed. Nothing here waits.
+//! let the drive run; the [`Sequence`] makes starts and stops of START; a [reference](mod@reference) is a speed. Nothing here waits.
 
 pub mod debounce;
 pub mod reference;

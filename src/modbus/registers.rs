@@ -28,7 +28,7 @@ pub const FREQUENCY: u16 = 0x2001;
 pub const RESET: u16 = 0x2002;
 /// The control word of CiA 402.
 pub const CONTROL: u16 = 0x6040;
-/// The signals of a trace, up to [`SIGNALS_END`]: two registers each, by its number for life.
+/// The signals of a trace: two registers each, by its number for life.
 pub const SIGNALS: u16 = 0x3000;
 const SIGNALS_END: u16 = 0x3200;
 /// The settings, up to [`STAGED`]: two registers each, by its number for life.

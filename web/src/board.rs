@@ -1,6 +1,6 @@
 //! A board without hardware: the firmware's front, its drive and a simulated motor, behind the bytes of a serial port.
 //!
-//! Lines that begin with `!` are for the motor and what is around it ([`Around`]); all others go to the console.
+//! Lines that begin with `!` are for the motor and what is around it; all others go to the console.
 
 use std::collections::VecDeque;
 

@@ -44,8 +44,8 @@ settings! {
         sensor: SensorKind = SensorKind::None, 122: word();
         /// resistor between that sensor and the reference of the converter
         sensor_ohm: f32 = 4700.0, 123: number("ohm").from_to(100.0, 1e6).hardware();
-        /// temperature of the motor, degC, from which on its torque falls, to nothing where it trips
-        sensor_derate_c: u8 = 120, 124: whole().beside(|s| (1.0, f32::from(s.motor_sensor.sensor_trip_c) - 1.0));
+        /// band below `motor.sensor_trip_c`, K, in which the torque falls to nothing
+        sensor_band_k: u8 = 20, 124: whole().from_to(1.0, 100.0);
         /// temperature of the motor, degC, that trips
         sensor_trip_c: u8 = 140, 125: whole().from_to(2.0, 199.0);
     }

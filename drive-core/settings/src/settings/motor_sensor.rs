@@ -18,7 +18,8 @@ const HOTTEST_C: f32 = 200.0;
 impl MotorSensor {
     /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.
     pub(super) fn limits(&self) -> Option<[u8; 2]> {
-        let limits = [self.sensor_derate_c, self.sensor_trip_c];
+        let from = self.sensor_trip_c.saturating_sub(self.sensor_band_k);
+        let limits = [from, self.sensor_trip_c];
         (self.sensor != SensorKind::None).then_some(limits)
     }
 
