@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 33] = [
+const ELSEWHERE: [(&str, &str); 35] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -20,6 +20,7 @@ const ELSEWHERE: [(&str, &str); 33] = [
     ("cargo run -p induction-drive-core", "compiled by `cargo xtask test`; run by a person"),
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
+    ("cargo sim update", "needs a port; a test of the virtual board updates it"),
     ("cargo sim first-light", "needs a port; a test of the virtual board walks through it"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
     ("cargo sim completion", "prints a script"),
@@ -43,6 +44,7 @@ const ELSEWHERE: [(&str, &str); 33] = [
     ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
     ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
     ("cargo flash", "named to be avoided"),
+    ("cargo build", "named to be avoided: `cargo firmware` puts the check sum in"),
 ];
 
 /// Documents whose Rust is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
