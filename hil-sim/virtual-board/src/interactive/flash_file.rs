@@ -126,7 +126,7 @@ mod tests {
     fn other_files_are_refused_and_left_alone() {
         let path = path("other");
         for (bytes, said) in [
-            (vec![1, 2, 3], "3 bytes; the flash of this board takes 133136"),
+            (vec![1, 2, 3], "3 bytes; the flash of this board takes 66576"),
             (vec![0; MARK.len() + BANK + TORN], "not a file that --flash has written"),
         ] {
             fs::write(&path, &bytes).unwrap();
