@@ -255,7 +255,8 @@ fn one_set_counts(scene: &mut Scene) -> Result<()> {
 fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     let board = &mut scene.board;
     let reset = board.resets.last().map(|reset| reset.1).context("no reset")?;
-    board.run_periods(100)?;
+    // The check sum of the image takes 39 ms.
+    board.run_periods(400)?;
     let log = board.take_log()?;
     let cause = reset.to_string();
     ensure!(log.iter().any(|line| line.contains(&cause)), "no {cause:?} in the log {log:?}");

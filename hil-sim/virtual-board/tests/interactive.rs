@@ -272,7 +272,7 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&run(&["--script", "none.txt"]), 2, &["none.txt"]);
     std::fs::write(folder.join("none.bin"), "nothing").unwrap();
     let flash = folder.join("none.bin").display().to_string();
-    refused(&run(&["--flash", &flash]), 2, &["none.bin", "7 bytes", "133136"]);
+    refused(&run(&["--flash", &flash]), 2, &["none.bin", "7 bytes", "66576"]);
     refused(&run(&["--lenient"]), 2, &["--script"]);
     refused(&run(&["--log", "loud"]), 2, &["loud", "warn"]);
     let script = folder.join("bad.txt");
