@@ -190,7 +190,7 @@ impl Desk {
             return;
         }
         let sensor = self.settings.in_force().drive.motor_sensor;
-        self.motor = code.and_then(|code| sensor.celsius(code));
+        self.motor = sensor.celsius(code);
         self.motor_ms = now_ms;
         if let Some(reading) = self.motor {
             // It is taken in every state; without an answer there is no control.

@@ -1,7 +1,7 @@
 //! Procedure: the temperature sensor of the motor, at rest, at speed and off.
 
 use crate::common::config;
-use drive_core::{Command, Fault, Limiting, Mode, Refused, State};
+use drive_core::{Command, Fault, Limiting, Mode, Refused, State, Stop};
 use drive_settings::SensorKind;
 use hil_sim::Config;
 use hil_sim::rig::Rig;
@@ -112,4 +112,14 @@ fn the_torque_falls_with_the_temperature() {
         let why = if share < 1.0 { Limiting::Motor } else { Limiting::None };
         assert_eq!((rig.drive.state(), rig.drive.limiting()), (State::Torque, why), "{celsius}");
     }
+    // Settings without a sensor take the limit away.
+    rig.command(&Command::Stop(Stop::Coast)).unwrap();
+    rig.run(1.0, |_| {});
+    let mut without = sensed();
+    without.drive.motor_sensor.sensor = SensorKind::None;
+    rig.command(&Command::Configure(without.drive.build().unwrap())).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    rig.command(&Command::Torque(3.4)).unwrap();
+    rig.run(1.0, |_| {});
+    assert_eq!((rig.drive.state(), rig.drive.limiting()), (State::Torque, Limiting::None));
 }

@@ -439,8 +439,10 @@ fn the_motor_sensor_is_read_and_shown() {
         talk.poll();
     }
     assert_eq!(talk.drive.commands.len(), 2 + 9);
-    for (code, fault) in [(4095, "fault 54 stands"), (0, "fault 55 stands")] {
-        talk.strip.codes[2] = Some(code);
+    for (code, fault) in
+        [(Some(4095), "fault 54 stands"), (Some(0), "fault 55 stands"), (None, "fault 57 stands")]
+    {
+        talk.strip.codes[2] = code;
         talk.now_ms += 100;
         talk.poll();
         let refused = talk.ask("start");

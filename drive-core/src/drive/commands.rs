@@ -121,7 +121,8 @@ impl Drive {
             Command::MotorTemperature(reading) => self.take_motor_temperature(reading),
             Command::Configure(ref coefficients) => {
                 self.c = *coefficients;
-                self.kept.limits.motor_fault = self.c.motor_unread();
+                let limits = &mut self.kept.limits;
+                (limits.motor_hot, limits.motor_fault) = (0, self.c.motor_unread());
                 self.kept.home = None;
                 self.changes = self.changes.wrapping_add(1);
             }

@@ -23,34 +23,41 @@ impl MotorSensor {
         (self.sensor != SensorKind::None).then_some(limits)
     }
 
-    /// Temperature at a code of the converter of 12 bits, °C; `None` without a sensor.
+    /// Temperature at a code of the converter of 12 bits, °C; `None` without a sensor. A converter that gives no code is no sensor
+    /// that can be believed.
     ///
     /// # Errors
-    /// [`Fault::MotorSensorOpen`] or [`Fault::MotorSensorShorted`].
-    pub fn celsius(&self, code: u16) -> Option<Result<f32, Fault>> {
+    /// [`Fault::MotorSensorOpen`], [`Fault::MotorSensorShorted`] or [`Fault::MotorSensorUnread`].
+    pub fn celsius(&self, code: Option<u16>) -> Option<Result<f32, Fault>> {
+        if self.sensor == SensorKind::None {
+            return None;
+        }
+        Some(code.map_or(Err(Fault::MotorSensorUnread), |code| self.at(code)))
+    }
+
+    fn at(&self, code: u16) -> Result<f32, Fault> {
         let (open, shorted) = (Err(Fault::MotorSensorOpen), Err(Fault::MotorSensorShorted));
         let (zero_c, slope, bend) = match self.sensor {
-            SensorKind::None => return None,
-            SensorKind::Pt1000 => (0.0, 3.9083e-3, -5.775e-7),
+            SensorKind::None | SensorKind::Pt1000 => (0.0, 3.9083e-3, -5.775e-7),
             SensorKind::Kty84 => (100.0, 6.12e-3, 1.1e-5),
             SensorKind::Ntc10k => {
                 let divider_ohm = self.sensor_ohm;
                 let ntc = Ntc { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm, to_ground: true };
                 let celsius = ntc.celsius(code);
                 let hot = if celsius > HOTTEST_C { shorted } else { Ok(celsius) };
-                return Some(if celsius < COLDEST_C { open } else { hot });
+                return if celsius < COLDEST_C { open } else { hot };
             }
         };
         let (code, all) = (f32::from(code), f32::from(CONVERTER_CODES));
         let more = self.sensor_ohm * code / (all - code) / 1000.0 - 1.0;
         let more_at = |celsius: f32| (celsius - zero_c) * (slope + bend * (celsius - zero_c));
-        Some(if more < more_at(COLDEST_C) {
+        if more < more_at(COLDEST_C) {
             shorted
         } else if more <= more_at(HOTTEST_C) {
             Ok(zero_c + (libm::sqrtf(slope * slope + 4.0 * bend * more) - slope) / (2.0 * bend))
         } else {
             open
-        })
+        }
     }
 }
 
@@ -58,8 +65,9 @@ impl MotorSensor {
 mod tests {
     use super::*;
 
-    /// Of the tables: IEC 60751 for 1000 ohm, KTY84-130 of NXP, and the B parameter, worked out.
+    /// A sensor, resistances at temperatures, °C and ohm, and the tolerance, K.
     type Table = (SensorKind, &'static [(f32, f32)], f32);
+    /// IEC 60751 for 1000 ohm, the data sheet of KTY84-130, and the formula of the B parameter.
     const TABLES: [Table; 3] = [
         (
             SensorKind::Pt1000,
@@ -106,20 +114,21 @@ mod tests {
                 for &(celsius, ohm) in table {
                     let code =
                         libm::roundf(f32::from(CONVERTER_CODES) * ohm / (ohm + sensor_ohm)) as u16;
-                    let found = motor.celsius(code).unwrap().unwrap();
+                    let found = motor.celsius(Some(code)).unwrap().unwrap();
                     // A code of the cold thermistor beside 1 kohm is 5 K.
                     let coarse = if ohm > 20.0 * sensor_ohm { 7.0 } else { tolerance };
                     assert!((found - celsius).abs() < coarse, "{sensor:?} {celsius}: {found}");
                 }
+                assert_eq!(motor.celsius(None), Some(Err(Fault::MotorSensorUnread)), "{sensor:?}");
                 let ntc = sensor == SensorKind::Ntc10k;
                 let (low, high) = (Fault::MotorSensorShorted, Fault::MotorSensorOpen);
-                assert_eq!(motor.celsius(0), Some(Err(low)), "{sensor:?}");
-                assert_eq!(motor.celsius(4095), Some(Err(high)), "{sensor:?}");
+                assert_eq!(motor.celsius(Some(0)), Some(Err(low)), "{sensor:?}");
+                assert_eq!(motor.celsius(Some(4095)), Some(Err(high)), "{sensor:?}");
                 // One band of believable codes, in which the temperature has one direction.
                 let mut before = f32::NAN;
                 let mut passed = 0;
                 for code in 0..=4095 {
-                    match motor.celsius(code).unwrap() {
+                    match motor.celsius(Some(code)).unwrap() {
                         Ok(celsius) => {
                             let rises = celsius > before;
                             assert!(
@@ -138,6 +147,7 @@ mod tests {
                 assert_eq!(passed, 2);
             }
         }
-        assert_eq!(MotorSensor::DEFAULT.celsius(2000), None);
+        assert_eq!(MotorSensor::DEFAULT.celsius(Some(2000)), None);
+        assert_eq!(MotorSensor::DEFAULT.celsius(None), None);
     }
 }
