@@ -34,8 +34,8 @@ pub const ALL: [&Board; 4] = [
 /// Their names.
 pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name, ALL[3].name];
 /// Their names in a line.
-#[rustfmt::skip] // `cargo xtask` reads it
-pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
+pub const ALL_NAMES: &str =
+    "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3 nucleo-g474re-ipmm10b";
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {
@@ -237,12 +237,15 @@ pub struct Rs485 {
     pub driver: Pin,
 }
 
+/// A pin for each of the [`TERMINALS`] that a board has.
+pub type TerminalPins = [Option<Pin>; TERMINALS.len()];
+
 /// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open one to the other level than a closed one
 /// has. Outputs are high where they are active, and are to be pulled down: they float in reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Strip {
     /// Pins in the order of [`TERMINALS`]; analog ones are at ADC3 or ADC4.
-    pub pins: [Option<Pin>; TERMINALS.len()],
+    pub pins: TerminalPins,
     /// The level at a closed contact.
     pub closed_at: Level,
     /// Voltage at the pins of the references at 10 V, and at 20 mA, V.
@@ -254,7 +257,7 @@ impl Strip {
     pub const NONE: Self = Self::of([None; TERMINALS.len()]);
 
     /// Contacts to ground, and 150 ohm for the current loop.
-    pub const fn of(pins: [Option<Pin>; TERMINALS.len()]) -> Self {
+    pub const fn of(pins: TerminalPins) -> Self {
         Self { pins, closed_at: Level::Low, full_v: 3.0 }
     }
 }

@@ -19,6 +19,9 @@ pub const HEAT_SINK: Pin = pc(2);
 /// The port of the field bus: three pins beside each other on CN7, which the boards here do not use.
 pub const BUS: Rs485 = Rs485 { transmit: pc(10), receive: pc(11), driver: pc(12) };
 
+/// Bench step of a shunt.
+pub const SHUNT_STEP: &str =
+    "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
 /// Bench step of a thermistor.
 pub const NTC_STEP: &str = "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink";
 

@@ -8,9 +8,6 @@ use drive_settings::Flux;
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
 
-const SHUNTS: &str =
-    "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
-
 /// The board.
 pub const BOARD: Board = Board {
     name: "nucleo-g474re-ihm023v3",
@@ -31,7 +28,7 @@ pub const BOARD: Board = Board {
     ),
     dead_time_max_s: 6e-6,
     // Shunt, ohm, and gain of its amplifier: 0.255 V/A. A current into the motor lowers the output.
-    currents: morpho::shunts(assumed(-0.15 * 1.7, SHUNTS), 1.7),
+    currents: morpho::shunts(assumed(-0.15 * 1.7, morpho::SHUNT_STEP), 1.7),
     current_delay_s: morpho::CURRENT_DELAY_S,
     // 0.0075 V/V.
     dc_link: morpho::dc_link(assumed(

@@ -7,14 +7,14 @@
 use drive_settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::pin::{Pin, pa, pb, pc};
-use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
+use super::pin::{pa, pb, pc};
+use super::{Board, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read};
 
 /// The port of NuttX to this board, which has turned motors: polarity, gain, sign and divider.
 const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
 
 #[rustfmt::skip] // All that the board leaves free beside PB4, PB6 and PB8: REFERENCE and the motor's sensor; ENABLE, START, STOP, RESET.
-const TERMINALS: [Option<Pin>; 13] = [
+const TERMINALS: TerminalPins = [
     Some(pb(12)), None, Some(pb(13)),
     Some(pb(5)), Some(pb(7)), Some(pb(9)), None, Some(pc(7)), None, None,
     None, None, None,

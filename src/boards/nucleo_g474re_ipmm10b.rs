@@ -34,13 +34,7 @@ pub const BOARD: Board = Board {
     ),
     dead_time_max_s: 6e-6,
     // Shunts of 0.08 ohm and a gain of 2.1 around half the supply (UM2702, page 16). A current into the motor lowers the output.
-    currents: morpho::shunts(
-        assumed(
-            -0.08 * 2.1,
-            "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
-        ),
-        1.65,
-    ),
+    currents: morpho::shunts(assumed(-0.08 * 2.1, morpho::SHUNT_STEP), 1.65),
     current_delay_s: morpho::CURRENT_DELAY_S,
     dc_link: morpho::dc_link(assumed(
         REFERENCE_V / CODES as f32 / 0.0075,

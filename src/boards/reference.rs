@@ -4,11 +4,13 @@ use drive_core::Line;
 use drive_settings::Flux;
 
 use super::converter::calibrated;
-use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Board, Currents, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
+use super::pin::{pa, pb, pc};
+use super::{
+    Analog, Board, Currents, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read,
+};
 
 #[rustfmt::skip] // References at a converter each, and the motor's sensor; contacts; outputs.
-const TERMINALS: [Option<Pin>; 13] = [
+const TERMINALS: TerminalPins = [
     Some(pb(12)), Some(pb(13)), Some(pb(14)),
     Some(pb(5)), Some(pb(7)), Some(pb(9)), Some(pb(10)), Some(pb(11)), Some(pc(4)), Some(pc(5)),
     Some(pc(7)), Some(pc(9)), Some(pa(12)),

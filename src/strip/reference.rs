@@ -14,7 +14,7 @@ const SIGNAL_MA: (f32, f32) = (4.0, 20.0);
 /// Largest difference of two redundant inputs, share of 10 V.
 const AGREES: f32 = 0.03;
 /// Codes at the end of the range, where the converter does not see more.
-const END: u16 = ADC_FULL_SCALE - 5;
+const RANGE_END: u16 = ADC_FULL_SCALE - 5;
 
 /// The share of the full speed, 0 to 1, that the codes of the first and the second input mean.
 ///
@@ -43,7 +43,7 @@ pub fn share(
         None => code,
     };
     match of(other) {
-        _ if code.max(other) >= END => Err(Lost::End),
+        _ if code.max(other) >= RANGE_END => Err(Lost::End),
         other if (share - other).abs() > AGREES => Err(Lost::Differ),
         other => Ok(share.min(other).min(1.0)),
     }

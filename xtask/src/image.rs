@@ -21,9 +21,8 @@ pub const REFERENCE: &str = "reference";
 /// The names of the boards, which `src/boards.rs` lists.
 pub fn boards() -> Result<Vec<String>> {
     let source = sources::read("src/boards.rs")?;
-    let (_, list) =
-        source.split_once("ALL_NAMES: &str = \"").context("src/boards.rs: ALL_NAMES")?;
-    let list = list.split('"').next().unwrap_or_default();
+    let (_, list) = source.split_once("ALL_NAMES: &str =").context("src/boards.rs: ALL_NAMES")?;
+    let list = list.split('"').nth(1).unwrap_or_default();
     Ok(list.split_whitespace().map(str::to_owned).collect())
 }
 

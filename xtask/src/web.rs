@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result};
 use crate::{paths, run, toolchain};
 
 /// Largest folder, bytes.
-const LARGEST: u64 = 700_000;
+const FOLDER_BYTES: u64 = 700_000;
 
 /// Builds the folder; fails if it is too large, or names a directory of this machine.
 pub fn build() -> Result<PathBuf> {
@@ -31,7 +31,7 @@ pub fn build() -> Result<PathBuf> {
     for (from, to) in files {
         bytes += fs::copy(&from, to).with_context(|| from.display().to_string())?;
     }
-    run::limit("drive in a browser", bytes, LARGEST, "bytes")?;
+    run::limit("drive in a browser", bytes, FOLDER_BYTES, "bytes")?;
     println!("{}: put it on any server of static files", folder.display());
     Ok(folder)
 }

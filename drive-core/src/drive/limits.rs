@@ -64,7 +64,7 @@ impl Limits {
 
 impl Kept {
     /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
-    #[inline(never)] // inlined, more control code
+    #[inline(never)] // inlined, 32 bytes more of control code
     pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
         if c.power != PowerLimit::NONE {
             let Limits { power_error, now, .. } = &mut self.limits;
@@ -95,7 +95,7 @@ impl Kept {
     }
 
     /// Finds the torque current that heat sink, motor and inverter do not bear.
-    #[inline(never)] // inlined, more control code
+    #[inline(never)] // inlined in two places, 328 bytes more of control code
     fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
         let Self { limits, thermal, references, .. } = self;
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);

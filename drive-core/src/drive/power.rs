@@ -25,9 +25,9 @@ use crate::PERIOD_S;
 use crate::dc_link::{DIVIDER, DcLinkLimits, Limiting};
 
 /// Share of the newest value in the error of the model.
-const SHARE: f32 = DIVIDER as f32 * PERIOD_S / 0.03;
+const ERROR_SHARE: f32 = DIVIDER as f32 * PERIOD_S / 0.03;
 /// How fast generating torque comes back where the copper takes all power: whole at some 0.7 of that speed.
-const OPENS: f32 = 10.0;
+const REOPENING: f32 = 10.0;
 
 impl DcLimit {
     /// Power at this voltage, over 3/2.
@@ -56,7 +56,7 @@ impl PowerLimit {
         let copper = r_s * i.d * i.d;
         let lost = 2.0 * FRAC_2_PI * drop * root(i.length_squared());
         let unexplained = v.d * i.d + v.q * i.q + lost - copper - (a * i.q + emf) * i.q;
-        *error += SHARE * (unexplained - *error);
+        *error += ERROR_SHARE * (unexplained - *error);
         let losses = copper + *error;
 
         // As if the shaft turned forwards.
@@ -65,7 +65,7 @@ impl PowerLimit {
         let both = root(b * b + 4.0 * a * room);
         let room = (self.generating.at(seen.dc_link) + losses).max(0.5 * copper);
         let left = b * b - 4.0 * a * room;
-        let back = if left > 0.0 { b - root(left) } else { b - OPENS * left / b.max(1e-3) };
+        let back = if left > 0.0 { b - root(left) } else { b - REOPENING * left / b.max(1e-3) };
         // Far beyond, the copper alone takes more than a motoring limit.
         let back = if back < b + both { back } else { b + both };
         let (least, most) = ((-0.5 / a) * back, (0.5 / a) * (both - b));

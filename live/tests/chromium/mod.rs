@@ -75,7 +75,9 @@ impl Browser {
         let session = self.call(&Value::Null, "Target.attachToTarget", attach)["sessionId"].clone();
         let mut page = Page { browser: self, target, session };
         page.call("Page.bringToFront", json!({}));
-        page.until("document.readyState == 'complete'", Duration::from_secs(20));
+        // The empty page before it is complete, too.
+        let loaded = "location.href != 'about:blank' && document.readyState == 'complete'";
+        page.until(loaded, Duration::from_secs(20));
         page
     }
 }

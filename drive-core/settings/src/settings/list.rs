@@ -389,7 +389,7 @@ settings! {
         derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
         /// largest current from the dc link, motoring; 1000 for none
         ///
-        /// What the copper takes of the direct current is below any limit.
+        /// A limit lies above the copper losses of the direct current.
         dc_motoring_a: f32 = DcLimit::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, DcLimit::NONE.current_a));
         /// largest current into the dc link, generating; 1000 for none
         dc_generating_a: f32 = DcLimit::NONE.current_a, 127: number("A").from_to(0.0, DcLimit::NONE.current_a);

@@ -35,6 +35,10 @@ const LIN: Input = Input {
     thresholds: L639X,
 };
 
+/// An active-high TTL input with the external pull-down of 10 kOhm that the documentation asks for.
+const PULLED_DOWN: Input =
+    Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
+
 /// Amplifiers of shunts, without their scale.
 const AMPLIFIERS: Shunts = Shunts {
     volts_per_a: 0.0,
@@ -55,11 +59,7 @@ const AMPLIFIERS: Shunts = Shunts {
 /// inputs active high with external pull-downs of 10 kOhm, as the documentation asks for, without interlock.
 pub const REFERENCE: PowerStage = PowerStage {
     name: "reference",
-    driver: {
-        let input =
-            Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
-        Driver { high: input, low: input, interlock: false, dead_time_s: 0.0 }
-    },
+    driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: false, dead_time_s: 0.0 },
     // 2.2 us (section 3.9). A microsecond, less the rounding to counts.
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
     // Those of a drive for 230 V (assumed).
@@ -130,11 +130,7 @@ const IHM023V3: PowerStage = PowerStage {
 /// else is assumed.
 const IPMM10B: PowerStage = PowerStage {
     name: "nucleo-g474re-ipmm10b",
-    driver: {
-        let input =
-            Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
-        Driver { high: input, low: input, interlock: true, dead_time_s: 0.0 }
-    },
+    driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: true, dead_time_s: 0.0 },
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
     dc_link_pin: DIVIDER,
