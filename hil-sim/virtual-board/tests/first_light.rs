@@ -502,19 +502,16 @@ fn whole(stage: &'static PowerStage, counting: Counting, skip: bool) -> Result<P
 }
 
 #[test]
-#[ignore = "minutes; not seen to its end since the shaft is brought to rest before the commissioning"]
 fn every_step_on_the_reference_board() -> Result<()> {
     whole(&REFERENCE, Counting { cycles: true, every_instruction: false }, true).map(|_| ())
 }
 
 #[test]
-#[ignore = "minutes; not seen to its end since the shaft is brought to rest before the commissioning"]
 fn every_step_with_shunts_at_low_voltage() -> Result<()> {
     whole(ALL[1], Counting::default(), true).map(|_| ())
 }
 
 #[test]
-#[ignore = "minutes; not seen to its end since the shaft is brought to rest before the commissioning"]
 fn every_step_with_shunts_at_high_voltage() -> Result<()> {
     whole(ALL[2], Counting::default(), true).map(|_| ())
 }

@@ -19,8 +19,7 @@ impl MotorSensor {
     /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.
     pub(super) fn limits(&self) -> Option<[u8; 2]> {
         let from = self.sensor_trip_c.saturating_sub(self.sensor_band_k);
-        let limits = [from, self.sensor_trip_c];
-        (self.sensor != SensorKind::None).then_some(limits)
+        (self.sensor != SensorKind::None).then_some([from, self.sensor_trip_c])
     }
 
     /// Temperature at a code of the converter of 12 bits, °C; `None` without a sensor. A converter that gives no code is no sensor
@@ -29,10 +28,8 @@ impl MotorSensor {
     /// # Errors
     /// [`Fault::MotorSensorOpen`], [`Fault::MotorSensorShorted`] or [`Fault::MotorSensorUnread`].
     pub fn celsius(&self, code: Option<u16>) -> Option<Result<f32, Fault>> {
-        if self.sensor == SensorKind::None {
-            return None;
-        }
-        Some(code.map_or(Err(Fault::MotorSensorUnread), |code| self.at(code)))
+        let reading = || code.map_or(Err(Fault::MotorSensorUnread), |code| self.at(code));
+        (self.sensor != SensorKind::None).then(reading)
     }
 
     fn at(&self, code: u16) -> Result<f32, Fault> {
