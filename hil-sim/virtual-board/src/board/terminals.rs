@@ -48,13 +48,18 @@ impl Board {
 
     /// Gives the reference, and the second one where there is one, a current, mA; a tenth of a volt in its place is 0.2 mA.
     pub fn set_reference(&mut self, ma: [f64; 2]) {
-        for (pin, ma) in self.terminals(2).zip(ma) {
-            let code = (ma / 20.0 * FULL_V / REFERENCE_V * CODES).clamp(0.0, CODES - 1.0) as u16;
-            let Some(pin) = pin else { continue };
-            for (converter, channel) in (0..2).flat_map(|n| (1..19).map(move |c| (n, c))) {
-                if pins::analog(2 + converter, channel) == Some(pin) {
-                    self.chip().slow_adc.inputs[converter][channel as usize] = code;
-                }
+        ma.into_iter()
+            .enumerate()
+            .for_each(|(n, ma)| self.set_analog(n, ma / 20.0 * FULL_V / REFERENCE_V));
+    }
+
+    /// Gives an analog input a voltage, as a share of the converter's reference: first and second reference, sensor of the motor.
+    pub fn set_analog(&mut self, input: usize, share: f64) {
+        let code = (share * CODES).clamp(0.0, CODES - 1.0) as u16;
+        let Some(pin) = self.terminals(2).nth(input).flatten() else { return };
+        for (converter, channel) in (0..2).flat_map(|n| (1..19).map(move |c| (n, c))) {
+            if pins::analog(2 + converter, channel) == Some(pin) {
+                self.chip().slow_adc.inputs[converter][channel as usize] = code;
             }
         }
     }

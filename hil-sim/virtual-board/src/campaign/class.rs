@@ -297,11 +297,12 @@ const CLASSES: &[Class] = &[
     off("strip wire shorted", STRIP, Run::Strip(Fault::Shorted)),
     off("strip input chatters", STRIP, Run::Strip(Fault::Chatters)),
     off("strip reference jumps", STRIP, Run::Strip(Fault::Reference)),
+    off("motor sensor open or shorted", STRIP, Run::Strip(Fault::Sensor)),
 ];
 
 /// What is judged at the terminal strip, instead of the control.
 const STRIP: &str =
-    "no start and no restart; off after 150 ms by ENABLE, 600 ms by a ramp from 300 rpm";
+    "no start and no restart; off after 150 ms by ENABLE or sensor, 600 ms by a ramp from 300 rpm";
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;

@@ -20,17 +20,22 @@ pub enum Fault {
     Chatters,
     /// The reference is another at once.
     Reference,
+    /// The temperature sensor of the motor is open or shorted.
+    Sensor,
 }
 
 /// A strip that commands, with all its inputs.
 const SET_UP: [&str; 4] = [
     "angle encoder",
-    "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes",
+    "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes motor.sensor pt1000",
     "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip",
     "apply",
 ];
 /// Signal at the beginning, mA: 300 rpm.
 const HALF_MA: f64 = 12.0;
+/// Analog input of the motor's sensor, and the sensor at 25 degC: 1097 ohm at the divider's 4700 ohm.
+const SENSOR: usize = 2;
+const WARM: f64 = 1097.0 / (1097.0 + 4700.0);
 /// Periods until the settings are in force, and until the speed stands.
 const SETTLING: u64 = 12_000;
 const RISING: u64 = 15_000;
@@ -51,6 +56,7 @@ impl Scene {
             let board = &mut self.board;
             board.plant.set_load(Load::Free { torque: 0.0 })?;
             board.set_reference([HALF_MA; 2]);
+            board.set_analog(SENSOR, WARM);
             board.set_contact("ENABLE", true)?;
             for line in SET_UP {
                 board.type_line(line);
@@ -118,6 +124,7 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
     let (started, off) = watch(board, |board, ms| {
         match fault {
             Fault::Reference => board.set_reference([ma; 2]),
+            Fault::Sensor => board.set_analog(SENSOR, f64::from(u8::from(ma > HALF_MA))),
             Fault::Open => board.set_contact(wire, false)?,
             Fault::Shorted => board.set_contact(wire, true)?,
             Fault::Chatters if ms >= next => {
@@ -132,13 +139,16 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
     let mended = !(wire == "START" && fault == Fault::Open);
     let (again, _) = watch(board, |board, _| {
         board.set_reference([HALF_MA; 2]);
+        board.set_analog(SENSOR, WARM);
         board.set_contact("ENABLE", true)?;
         board.set_contact(wire, (closed || early) && mended)
     })?;
-    let lost = fault == Fault::Reference && !(3.6..=21.0).contains(&ma);
+    let sensor = fault == Fault::Sensor;
+    let lost = sensor || fault == Fault::Reference && !(3.6..=21.0).contains(&ma);
     let breaks = matches!(fault, Fault::Open | Fault::Chatters) && closed;
     let bound = match wire {
         _ if !turns || !(lost || breaks) => None,
+        _ if sensor => Some(COASTED_MS),
         "ENABLE" if breaks => Some(COASTED_MS),
         _ => Some(RAMPED_MS),
     };
