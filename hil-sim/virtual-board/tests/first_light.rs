@@ -480,16 +480,12 @@ fn walk<'a>(table: &'a Table, lab: &Lab, options: Light) -> Result<Walk<'a, Lab,
     Walk::new(table, (lab.clone(), lab.clone()), options, Arc::default())
 }
 
-/// A fresh board with nothing connected, and its first walk.
-fn fresh(stage: &'static PowerStage, counting: Counting) -> Result<Lab> {
-    Lab::new(stage, D::None, false, false, counting)
-}
-
 /// Every step of the table; learning and trace are left out where that is wanted.
-fn whole(stage: &'static PowerStage, counting: Counting, skip: bool) -> Result<PathBuf> {
+fn whole(skip: bool) -> Result<PathBuf> {
     let table = Table::read()?;
-    let file = folder(&format!("first-light-{}-{skip}", stage.name)).join("evidence.toml");
-    let lab = fresh(stage, counting)?;
+    let file = folder(&format!("first-light-{skip}")).join("evidence.toml");
+    let counting = Counting { cycles: true, every_instruction: false };
+    let lab = Lab::new(&REFERENCE, D::None, false, false, counting)?;
     walk(&table, &lab, Light { skip_learning: skip, ..options(&file) })?.run()?;
     let evidence = Evidence::open(&file)?.context("a file")?;
     ensure!(table.next(&evidence)?.is_none());
@@ -503,17 +499,28 @@ fn whole(stage: &'static PowerStage, counting: Counting, skip: bool) -> Result<P
 
 #[test]
 fn every_step_on_the_reference_board() -> Result<()> {
-    whole(&REFERENCE, Counting { cycles: true, every_instruction: false }, true).map(|_| ())
+    whole(true).map(|_| ())
+}
+
+/// From the step that connects the power stage: those before it are of the controller, which is that of the reference board.
+fn every_step_of_the_power_stage(stage: &'static PowerStage) -> Result<()> {
+    let begun = Begun::at(stage, "noise", D::None)?;
+    walk(&begun.table, &begun.lab, options(&begun.file))?.run()?;
+    let evidence = Evidence::open(&begun.file)?.context("a file")?;
+    ensure!(begun.table.next(&evidence)?.is_none());
+    ensure!(evidence.verdict("commission") == Some(Verdict::Passed));
+    ensure!(!begun.lab.bench().board.gates().any_on());
+    Ok(())
 }
 
 #[test]
 fn every_step_with_shunts_at_low_voltage() -> Result<()> {
-    whole(ALL[1], Counting::default(), true).map(|_| ())
+    every_step_of_the_power_stage(ALL[1])
 }
 
 #[test]
 fn every_step_with_shunts_at_high_voltage() -> Result<()> {
-    whole(ALL[2], Counting::default(), true).map(|_| ())
+    every_step_of_the_power_stage(ALL[2])
 }
 
 /// With learning and trace, which take minutes; writes the contributed file of the emulated board.
@@ -522,7 +529,7 @@ fn every_step_with_shunts_at_high_voltage() -> Result<()> {
 fn the_evidence_of_the_emulated_board() -> Result<()> {
     // A file that a run has left unfinished is gone on with, by a confirmed board.
     let file = match std::env::var_os("UNFINISHED") {
-        None => whole(&REFERENCE, Counting { cycles: true, every_instruction: false }, false)?,
+        None => whole(false)?,
         Some(file) => {
             let lab = Lab::new(&REFERENCE, D::None, true, true, Counting::default())?;
             let light = Light { skip_learning: false, ..options(Path::new(&file)) };
@@ -544,13 +551,13 @@ struct Begun {
 }
 
 impl Begun {
-    fn at(step: &str, defect: Defect) -> Result<Self> {
+    fn at(stage: &'static PowerStage, step: &str, defect: Defect) -> Result<Self> {
         let table = Table::read()?;
         let place = |name: &str| table.steps().position(|(_, step)| step.name == name);
         let [first, connected, confirmed] = [step, "noise", "low-voltage"].map(place);
         let (connected, confirmed) = (first >= connected, first >= confirmed);
-        let lab = Lab::new(&REFERENCE, defect, connected, confirmed, Counting::default())?;
-        let file = folder(&format!("first-light-{defect:?}")).join("evidence.toml");
+        let lab = Lab::new(stage, defect, connected, confirmed, Counting::default())?;
+        let file = folder(&format!("first-light-{}-{defect:?}", stage.name)).join("evidence.toml");
         let mut evidence = walk(&table, &lab, options(&file))?.evidence().clone();
         let before = table.steps().take(first.context("a step")?);
         evidence.steps.extend(before.map(|(_, step)| Record::new(&step.name, Verdict::Passed)));
@@ -590,7 +597,7 @@ fn every_defect_is_stopped_at_its_step() -> Result<()> {
         (D::PhasesExchanged, "low-voltage", "forwards"),
     ];
     let one = |(defect, first, expected): (Defect, &str, &str)| -> Result<()> {
-        let begun = Begun::at(first, defect).with_context(|| format!("{defect:?}"))?;
+        let begun = Begun::at(&REFERENCE, first, defect).with_context(|| format!("{defect:?}"))?;
         let last = begun.stops().with_context(|| format!("{defect:?}"))?;
         println!("STOPPED {defect:?} at {}: {}", last.name, last.why);
         ensure!(last.name == expected && last.verdict == Verdict::Stopped, "{defect:?}: {last:?}");
@@ -664,7 +671,7 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
 /// Ctrl-C while a line is being answered: `stop` is sent, and the step counts as interrupted.
 #[test]
 fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
-    let begun = Begun::at("noise", D::None)?;
+    let begun = Begun::at(&REFERENCE, "noise", D::None)?;
     let interrupted = Arc::new(AtomicBool::new(true));
     let bench = (begun.lab.clone(), begun.lab.clone());
     ensure!(Walk::new(&begun.table, bench, options(&begun.file), interrupted)?.run().is_err());
@@ -677,7 +684,7 @@ fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
 /// The image of another board, and another build than that of the evidence, are refused before anything is done.
 #[test]
 fn another_image_is_refused() -> Result<()> {
-    let begun = Begun::at("noise", D::None)?;
+    let begun = Begun::at(&REFERENCE, "noise", D::None)?;
     let refused = |options: Light, text: &str| {
         let why = walk(&begun.table, &begun.lab, options).err().context("refused")?.to_string();
         ensure!(why.contains(text), "{why}");
@@ -698,7 +705,7 @@ fn a_lost_port_and_a_lost_person_stop_the_drive_and_the_walk_goes_on() -> Result
     for (defect, verdict) in
         [(D::PortLost, Verdict::Stopped), (D::PersonGone, Verdict::Interrupted)]
     {
-        let begun = Begun::at("turn-at-nominal", defect)?;
+        let begun = Begun::at(&REFERENCE, "turn-at-nominal", defect)?;
         let last = begun.stops()?;
         ensure!(last.name == "turn-at-nominal" && last.verdict == verdict, "{last:?}");
         let stopped = begun.lab.bench().sent.iter().any(|line| line == "stop");
