@@ -119,7 +119,7 @@ fn values_after_the_learning_do_not_act_while_it_lasts() {
     let error = Config::load(None, None, &["after.plant=g".to_owned()]).unwrap_err().to_string();
     assert!(error.contains("after.plant"), "{error}");
     let error = Config::load(None, None, &["after.motor.r_r=-1".to_owned()]).unwrap_err();
-    let text = "after.motor.r_r = -1: out of range; allowed: 0.001 to 1000 ohm";
+    let text = "after.motor.r_r = -1: out of range; allowed: 0.0001 to 1000 ohm";
     assert_eq!(error.to_string(), text);
 }
 

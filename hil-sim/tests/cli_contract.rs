@@ -117,7 +117,7 @@ fn user_errors_say_what_is_allowed_and_write_nothing() {
             &["run", "filters", "--set", "motor.r_x=5"],
             &["`motor.r_x`", "did you mean `motor.r_r`?"],
         ),
-        (&["run", "filters", "--set", "motor.r_s=-1"], &["motor.r_s = -1", "0.001 to 1000 ohm"]),
+        (&["run", "filters", "--set", "motor.r_s=-1"], &["motor.r_s = -1", "0.0001 to 1000 ohm"]),
         (
             &["run", "filters", "--set", "motor.r_s=inf"],
             &["motor.r_s = inf", "not a finite number"],

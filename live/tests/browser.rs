@@ -355,7 +355,7 @@ fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
         page.value(&format!("(i => {{ i.value = '{value}'; i.dispatchEvent(new Event('change')); }})(document.querySelector('#settings [aria-label=\"motor.r_s\"]'))"));
     };
     change(page, "-1");
-    page.until("/allowed is 0.001 to 1000 ohm/.test($('settings-said').textContent)", PATIENCE);
+    page.until("/allowed is 0.0001 to 1000 ohm/.test($('settings-said').textContent)", PATIENCE);
     change(page, "5.5");
     page.until("settings.find(s => s.name == 'motor.r_s').staged", PATIENCE);
     page.value("document.querySelector('[data-ask=apply]').click()");

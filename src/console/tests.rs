@@ -107,7 +107,7 @@ fn a_session() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
     assert_eq!(talk.ask("apply"), "ok");
-    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.5 ohm (0.001 to 1000)"));
+    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.5 ohm (0.0001 to 1000)"));
     let source = "; source of the flux angle";
     let words = "(one of: encoder injection)";
     assert_eq!(talk.ask("get angle_source"), format!("angle_source = injection {words}{source}"));
@@ -140,7 +140,7 @@ fn a_session() {
     assert_eq!(talk.ask("faults"), "none latched; last run: power-on");
     assert_eq!(talk.ask("defaults"), "ok: staged");
     assert_eq!(talk.ask("apply"), "ok");
-    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
+    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.0001 to 1000)"));
 }
 
 fn in_force(setting: &str) -> String {
@@ -306,7 +306,7 @@ fn without_a_control_interrupt_nothing_is_promised() {
     for line in ["start", "torque 1", "set motor.r_s 5.5", "status"] {
         assert_eq!(talk.ask(line), "error: the control does not run: a test");
     }
-    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
+    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.0001 to 1000)"));
 }
 
 #[test]

@@ -384,7 +384,7 @@ fn settings_out_of_range_are_refused_by_name() {
             |s| s.speed.phase_margin_deg = 80.0,
             "speed.phase_margin_deg = 80: allowed is 45 to 70 deg",
         ),
-        (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000 ohm"),
+        (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.0001 to 1000 ohm"),
         (|s| s.motor.l_m = 0.0, "motor.l_m = 0"),
         (|s| s.limits.trip_a = Some(5.0), "limits.trip_a = 5"),
         (

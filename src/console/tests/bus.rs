@@ -187,7 +187,7 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     assert_eq!((both.set("motor.r_s", 5.5), both.read(0x4fff)), (0, 1));
     assert_eq!(
         both.talk.ask("get motor.r_s"),
-        "motor.r_s = 5.5 ohm (0.001 to 1000); staged, in force: 5.4; stator resistance of a phase"
+        "motor.r_s = 5.5 ohm (0.0001 to 1000); staged, in force: 5.4; stator resistance of a phase"
     );
     // Out of range, no number, no whole number, no such word, of the board; nothing of it is staged.
     for (name, value) in [

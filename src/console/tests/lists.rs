@@ -9,7 +9,7 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let all = talk.say("get\n");
     assert_eq!(all.len(), keys::COUNT + 1);
     let motor = talk.say("get motor\n");
-    assert_eq!((motor.len(), motor[0].as_str()), (11 + 1, "motor.r_s = 5.4 ohm (0.001 to 1000)"));
+    assert_eq!((motor.len(), motor[0].as_str()), (11 + 1, "motor.r_s = 5.4 ohm (0.0001 to 1000)"));
     // Nothing leaves, and meanwhile a line comes.
     talk.port.room = 0;
     talk.port.sent.extend(b"get\n");

@@ -14,8 +14,8 @@ fn shown(talk: &Talk, name: &str) -> (String, String) {
 #[test]
 fn settings_out_of_range_are_refused_with_the_range() {
     let mut talk = Talk::new();
-    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000 ohm");
-    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
+    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.0001 to 1000 ohm");
+    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.0001 to 1000)"));
     assert!(talk.drive.commands.is_empty() && !talk.front.desk.settings().is_staged());
 }
 
@@ -23,7 +23,7 @@ fn settings_out_of_range_are_refused_with_the_range() {
 fn a_value_that_is_none_is_refused_with_what_is_allowed() {
     let mut talk = Talk::new();
     for (line, answer) in [
-        ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number; allowed is 0.001 to 1000 ohm"),
+        ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number; allowed is 0.0001 to 1000 ohm"),
         (
             "set motor.pole_pairs 2.5",
             "motor.pole_pairs = 2.5: not a whole number from 0 to 50; allowed is 1 to 50",
@@ -46,7 +46,7 @@ fn staged_values_are_marked_and_designed_for_once() {
     assert_eq!(talk.ask("set motor.r_s 5.5 motor.r_r 1.2"), "ok: staged");
     assert_eq!(talk.ask("set motor.inertia 0.02"), "ok: staged");
     assert!(talk.drive.commands.is_empty(), "nothing is given to the drive");
-    let get = "motor.r_s = 5.5 ohm (0.001 to 1000); staged, in force: 5.4";
+    let get = "motor.r_s = 5.5 ohm (0.0001 to 1000); staged, in force: 5.4";
     assert_eq!(talk.ask("get motor.r_s"), in_force(get));
     assert_eq!(talk.say("get motor.r_s\n").len(), 1);
     assert!(talk.ask("status").ends_with("; 3 staged"));

@@ -23,17 +23,17 @@ pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
 settings! {
     => [
         /// stator resistance of a phase
-        "motor.r_s" [motor] r_s: f32, 0: number("ohm").from_to(0.001, 1000.0).learned();
+        "motor.r_s" [motor] r_s: f32, 0: number("ohm").from_to(1e-4, 1000.0).learned();
         /// rotor resistance, referred to the stator
-        "motor.r_r" [motor] r_r: f32, 1: number("ohm").from_to(0.001, 1000.0).learned();
+        "motor.r_r" [motor] r_r: f32, 1: number("ohm").from_to(1e-4, 1000.0).learned();
         /// leakage inductance of the stator
-        "motor.l_ls" [motor] l_ls: f32, 2: number("H").from_to(1e-6, 10.0).learned();
+        "motor.l_ls" [motor] l_ls: f32, 2: number("H").from_to(1e-7, 10.0).learned();
         /// leakage inductance of the rotor, referred to the stator
-        "motor.l_lr" [motor] l_lr: f32, 3: number("H").from_to(1e-6, 10.0).learned();
+        "motor.l_lr" [motor] l_lr: f32, 3: number("H").from_to(1e-7, 10.0).learned();
         /// magnetising inductance
-        "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-5, 100.0).learned();
+        "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-6, 100.0).learned();
         /// pairs of poles
-        "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 50.0).learned();
+        "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 6.0).learned();
         /// inertia of rotor and load; for the speed loop
         "motor.inertia" [motor] inertia: f32, 6: number("kg m2").from_to(1e-7, 1000.0);
     ];
@@ -54,15 +54,15 @@ settings! {
     /// drive from it; see [`rules`](super::rules). Defaults: the dissertation's motor, Table 3.
     Nameplate "nameplate." [nameplate] {
         /// rated power at the shaft
-        power_w: f32 = 1100.0, 7: number("W").from_to(1.0, 1e6);
+        power_w: f32 = 1100.0, 7: number("W").from_to(50.0, 30_000.0);
         /// rated voltage between lines, rms
-        voltage_v: f32 = 380.0, 8: number("V").from_to(5.0, 1000.0);
+        voltage_v: f32 = 380.0, 8: number("V").from_to(24.0, 690.0);
         /// rated current of a line, rms; the rules take their currents from it
-        current_a: f32 = 2.56, 9: number("A").from_to(0.01, 1000.0);
+        current_a: f32 = 2.56, 9: number("A").from_to(0.05, 1000.0);
         /// rated frequency
-        frequency_hz: f32 = 60.0, 10: number("Hz").from_to(5.0, 400.0);
+        frequency_hz: f32 = 60.0, 10: number("Hz").from_to(25.0, 400.0);
         /// rated speed of the shaft
-        speed_rpm: f32 = 1720.0, 11: number("rpm").from_to(1.0, 24_000.0);
+        speed_rpm: f32 = 1720.0, 11: number("rpm").from_to(150.0, 24_000.0);
     }
 
     /// The timer and the power stage. Defaults: section 3.9; 220 V rectified.
@@ -92,7 +92,7 @@ settings! {
         current_a: Line = Line::CHANNEL_A => [
             /// current a per code; negative if a current into the motor lowers the code
             "scales.current_a.gain" [scales.current_a] gain: f32, 17: number("A")
-                .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 1.0)).learned().hardware();
+                .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 2.5)).learned().hardware();
             /// current a at code 0
             "scales.current_a.offset" [scales.current_a] offset: f32, 18: number("A")
                 .beside(|s| s.offset_range(s.scales.current_a)).learned().hardware();
@@ -101,7 +101,7 @@ settings! {
         current_b: Line = Line::CHANNEL_B => [
             /// current b per code
             "scales.current_b.gain" [scales.current_b] gain: f32, 19: number("A")
-                .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 1.0)).learned().hardware();
+                .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 2.5)).learned().hardware();
             /// current b at code 0
             "scales.current_b.offset" [scales.current_b] offset: f32, 20: number("A")
                 .beside(|s| s.offset_range(s.scales.current_b)).learned().hardware();
@@ -110,10 +110,10 @@ settings! {
         current_c: Line = Line::CHANNEL_B => [
             /// current c per code; with three shunts
             "scales.current_c.gain" [scales.current_c] gain: f32, 21: number("A")
-                .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 1.0)).learned().hardware();
+                .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 2.5)).learned().hardware();
             /// current c at code 0
             "scales.current_c.offset" [scales.current_c] offset: f32, 22: number("A").beside(|s| match s.scales.sensors {
-                CurrentSensors::InLine => (-1000.0, 1000.0),
+                CurrentSensors::InLine => (-1e4, 1e4),
                 CurrentSensors::LowSide => s.offset_range(s.scales.current_c),
             }).learned().hardware();
         ];
@@ -205,11 +205,11 @@ settings! {
             /// plant that the current controllers are designed for
             "current_plant" [current_plant] source: PlantSource, 38: word();
             /// identified plant k/(z - p) of the direct axis
-            "current_plant.d.k" [current_plant.d] k: Option<f32>, 39: auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 10.0);
+            "current_plant.d.k" [current_plant.d] k: Option<f32>, 39: auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 1000.0);
             /// its pole
             "current_plant.d.p" [current_plant.d] p: Option<f32>, 40: auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
             /// identified plant k/(z - p) of the quadrature axis
-            "current_plant.q.k" [current_plant.q] k: Option<f32>, 41: auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 10.0);
+            "current_plant.q.k" [current_plant.q] k: Option<f32>, 41: auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 1000.0);
             /// its pole
             "current_plant.q.p" [current_plant.q] p: Option<f32>, 42: auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
         ];
@@ -366,7 +366,7 @@ settings! {
         dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
         /// speed of the shaft that trips
         speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
-            .from_to(1.0, 20_000.0);
+            .from_to(1.0, 30_000.0);
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop

@@ -122,12 +122,13 @@ fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), Tunin
 }
 
 /// The error of a loop that crosses unit gain on the motor's plant below the zero of its controller, where the rule does not
-/// apply, or nowhere (not a number): the identified plant does not belong to this motor.
+/// apply, or nowhere (not a number): the identified plant does not belong to this motor, or the time constant of its leakage is
+/// below some 4.5 periods.
 fn no_crossover(crossover_hz: f64, z_c: f64, period_s: f64) -> TuningError {
     // Fictitious frequency of the zero.
     let zero_hz = 2.0 / period_s * (1.0 - z_c) / (1.0 + z_c) / TAU;
-    let name =
-        "crossover in Hz on the motor's plant (does the identified plant belong to this motor?)";
+    let name = "crossover in Hz on the motor's plant (sigma L_s/(r_s + r_r) is too short for this control rate, or the identified plant \
+                is another motor's)";
     TuningError { name, value: crossover_hz, min: zero_hz, max: 0.5 / period_s }
 }
 

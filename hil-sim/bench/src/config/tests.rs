@@ -62,14 +62,14 @@ fn errors_name_the_key_the_value_and_the_range() {
     let text = |assignment: &str| {
         Config::load(None, None, &[assignment.to_owned()]).unwrap_err().to_string()
     };
-    assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.001 to 1000 ohm");
+    assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.0001 to 1000 ohm");
     assert_eq!(
         text("motor.r_s=nan"),
-        "motor.r_s = NaN: not a finite number; allowed: 0.001 to 1000 ohm"
+        "motor.r_s = NaN: not a finite number; allowed: 0.0001 to 1000 ohm"
     );
     assert_eq!(
         text("motor.r_s=a lot"),
-        "motor.r_s = a lot: not a number; allowed: 0.001 to 1000 ohm"
+        "motor.r_s = a lot: not a number; allowed: 0.0001 to 1000 ohm"
     );
     assert_eq!(
         text("motor.pole_pairs=1.5"),
