@@ -55,7 +55,7 @@ const CASES: [(&str, &[&str]); 54] = [
     ("run torque-steps --set motor.r_s=", &["motor.r_s = ", "not a number", "0.0001 to 1000 ohm"]),
     ("run torque-steps --set motor.r_s=5,4", &["motor.r_s = 5,4", "not a number"]),
     ("run torque-steps --set motor.r_s=nan", &["motor.r_s = NaN", "not a finite number"]),
-    ("run torque-steps --set motor.pole_pairs=1.5", &["motor.pole_pairs = 1.5", "not a whole number", "1 to 50"]),
+    ("run torque-steps --set motor.pole_pairs=1.5", &["motor.pole_pairs = 1.5", "not a whole number", "1 to 6"]),
     ("run torque-steps --set load.mode=sideways", &["load.mode = sideways", "locked, free, speed"]),
     ("run torque-steps --set inverter.switched=maybe", &["inverter.switched = maybe", "yes, no"]),
     ("run torque-steps --set injection.demodulator=x", &["injection.demodulator = x", "synchronous"]),

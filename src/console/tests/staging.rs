@@ -26,7 +26,7 @@ fn a_value_that_is_none_is_refused_with_what_is_allowed() {
         ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number; allowed is 0.0001 to 1000 ohm"),
         (
             "set motor.pole_pairs 2.5",
-            "motor.pole_pairs = 2.5: not a whole number from 0 to 50; allowed is 1 to 50",
+            "motor.pole_pairs = 2.5: not a whole number from 0 to 6; allowed is 1 to 6",
         ),
         ("set angle_source guess", "angle_source = guess: not one of: encoder injection"),
         (

@@ -73,7 +73,7 @@ fn errors_name_the_key_the_value_and_the_range() {
     );
     assert_eq!(
         text("motor.pole_pairs=1.5"),
-        "motor.pole_pairs = 1.5: not a whole number; allowed: 1 to 50"
+        "motor.pole_pairs = 1.5: not a whole number; allowed: 1 to 6"
     );
     assert_eq!(
         text("angle_source=resolver"),

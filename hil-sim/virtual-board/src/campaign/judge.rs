@@ -68,6 +68,16 @@ pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Res
     Ok(outcome)
 }
 
+/// Goes on for some periods that nobody looks at.
+///
+/// # Errors
+/// An error of the emulator.
+pub fn wait(board: &mut Board, periods: u64) -> Result<()> {
+    board.run_periods(periods)?;
+    while board.next_period().is_some() {}
+    Ok(())
+}
+
 /// Between the flux and where the drive believes it, degrees.
 fn angle_error(board: &Board) -> f64 {
     let believed = f64::from(board.telemetry().phi.to_turns());
@@ -114,8 +124,7 @@ pub fn greeting(board: &mut Board) -> Result<String> {
     let resets = board.resets.len();
     let mut heard = String::new();
     for _ in 0..START / 100 {
-        board.run_periods(100)?;
-        while board.next_period().is_some() {}
+        wait(board, 100)?;
         heard += &board.take_console();
         ensure!(board.resets.len() == resets, "reset while it starts: {:?}", board.resets);
         if heard.contains("last run: ") && heard.ends_with('\n') {

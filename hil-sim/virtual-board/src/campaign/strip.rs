@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use hil_sim::plant::Load;
 use rand::{Rng, RngExt};
 
-use super::judge::Outcome;
+use super::judge::{Outcome, wait};
 use super::scene::Scene;
 use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
@@ -74,12 +74,6 @@ impl Scene {
     }
 }
 
-fn wait(board: &mut Board, periods: u64) -> Result<()> {
-    board.run_periods(periods)?;
-    while board.next_period().is_some() {}
-    Ok(())
-}
-
 /// The time in which the outputs are watched for a fault: whether they came on, and when they went off, ms.
 fn watch(
     board: &mut Board,
@@ -143,20 +137,18 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
         board.set_contact("ENABLE", true)?;
         board.set_contact(wire, (closed || early) && mended)
     })?;
-    let sensor = fault == Fault::Sensor;
-    let lost = sensor || fault == Fault::Reference && !(3.6..=21.0).contains(&ma);
+    let lost = fault == Fault::Sensor || fault == Fault::Reference && !(3.6..=21.0).contains(&ma);
     let breaks = matches!(fault, Fault::Open | Fault::Chatters) && closed;
     let bound = match wire {
         _ if !turns || !(lost || breaks) => None,
-        _ if sensor => Some(COASTED_MS),
+        _ if fault == Fault::Sensor => Some(COASTED_MS),
         "ENABLE" if breaks => Some(COASTED_MS),
         _ => Some(RAMPED_MS),
     };
     let what = format!("{wire}, {ma:.1} mA, {}", if turns { "turning" } else { "off" });
     ensure!(!started && !again, "{what}: the outputs came on");
     // What is not to stop goes on.
-    let on = board.chip().tim1.outputs_on();
-    ensure!(on == (turns && bound.is_none()), "{what}: outputs {on}");
+    ensure!(board.chip().tim1.outputs_on() == (turns && bound.is_none()), "{what}: the outputs");
     let late = bound.is_some_and(|bound| off.is_none_or(|ms| ms > bound));
     let fault_is_told = board.terminal_outputs()[1] == (lost && turns);
     ensure!(fault_is_told, "{what}: FAULT is {:?}", board.terminal_outputs());
