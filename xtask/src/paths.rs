@@ -14,12 +14,14 @@ use crate::run;
 /// Directories of this machine, and their short names in the image. Where several fit, the last counts.
 fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut names = vec![(run::root().to_owned(), "."), (run::target_dir()?, "target")];
-    // One directory for each registry, with a directory for each package. It exists, since this program
-    // has dependencies too.
-    for registry in cargo_home()?.join("registry/src").read_dir().into_iter().flatten().flatten() {
-        names.push((registry.path(), ""));
-    }
+    names.extend(registries()?.into_iter().map(|registry| (registry, "")));
     Ok(names)
+}
+
+/// One directory for each registry, with a directory for each package. It exists, since this program has dependencies too.
+pub fn registries() -> Result<Vec<PathBuf>> {
+    let entries = cargo_home()?.join("registry/src").read_dir().into_iter().flatten().flatten();
+    Ok(entries.map(|registry| registry.path()).collect())
 }
 
 fn cargo_home() -> Result<PathBuf> {

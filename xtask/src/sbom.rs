@@ -1,0 +1,211 @@
+//! The crates in a program, as CycloneDX JSON: what cargo builds for one target with that target's features.
+//!
+//! Own code beside cargo-cyclonedx 0.5, which joins the features of all targets and tests, and writes a new number each time.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::{run, sources};
+
+/// What `Cargo.lock` has of a crate.
+#[derive(Deserialize)]
+struct Locked {
+    name: String,
+    version: String,
+    checksum: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Lock {
+    package: Vec<Locked>,
+}
+
+/// A crate by name and version, and its licence as SPDX.
+type Crates = BTreeMap<(String, String), String>;
+
+/// The crates of a program.
+pub struct Sbom {
+    /// In the program, its own package among them.
+    inside: Crates,
+    /// With those that run while it is built: macros, build scripts and what they need.
+    all: Crates,
+    lock: Vec<Locked>,
+}
+
+impl Sbom {
+    /// The crates of a package's program for a target.
+    pub fn new(package: &str, target: &str) -> Result<Self> {
+        let tree = |edges| {
+            let words = format!(
+                "tree --locked --package {package} --target {target} --edges {edges} --prefix none \
+                 --no-dedupe --format {{p}}|{{l}}"
+            );
+            crates(&run::said(&mut run::cargo(&words))?)
+        };
+        let (all, inside) = (tree("no-dev")?, tree("no-dev,no-build,no-proc-macro")?);
+        let Lock { package: lock } = toml::from_str(&sources::read("Cargo.lock")?)?;
+        Ok(Self { inside, all, lock })
+    }
+
+    /// Names with versions of the crates of others that are in the program.
+    pub fn of_others(&self) -> impl Iterator<Item = String> {
+        let others = self.lock.iter().filter(|one| one.checksum.is_some());
+        others.filter(|one| self.has(one)).map(|one| format!("{}-{}", one.name, one.version))
+    }
+
+    fn has(&self, one: &Locked) -> bool {
+        self.inside.contains_key(&(one.name.clone(), one.version.clone()))
+    }
+
+    /// Fails if the debug information of an image names sources of a crate that is not listed, or no crate of others.
+    pub fn check(&self, image: &[u8]) -> Result<()> {
+        let is_named = |one: &&Locked| {
+            let path = format!("\0{}-{}/src/", one.name, one.version);
+            one.checksum.is_some() && image.windows(path.len()).any(|part| part == path.as_bytes())
+        };
+        let (listed, others): (Vec<_>, Vec<_>) =
+            self.lock.iter().filter(is_named).partition(|one| self.has(one));
+        let others: Vec<_> = others.iter().map(|one| &one.name).collect();
+        ensure!(others.is_empty(), "in the image, and not in its list of crates: {others:?}");
+        ensure!(!listed.is_empty(), "the image has no debug information of crates");
+        Ok(())
+    }
+
+    /// The document for a package's program of this kind, built by this compiler. The same crates give the same text.
+    pub fn document(&self, package: &str, kind: &str, compiler: &str) -> Result<String> {
+        let of_package = |(name, _): &(String, String)| name == package;
+        let (_, version) = self.inside.keys().find(|one| of_package(one)).context("no package")?;
+        let library = "Rust standard library";
+        let mut components =
+            vec![json!({ "type": "library", "name": library, "version": compiler })];
+        let crates = self.all.iter().filter(|(one, _)| !of_package(one));
+        components.extend(crates.map(|(one, licence)| self.component(one, licence)));
+        let document = json!({
+            "bomFormat": "CycloneDX",
+            "specVersion": "1.6",
+            "version": 1,
+            "metadata": { "component": { "type": kind, "name": package, "version": version } },
+            "components": components,
+        });
+        Ok(serde_json::to_string_pretty(&document)? + "\n")
+    }
+
+    fn component(&self, one: &(String, String), licence: &str) -> Value {
+        let (name, version) = one;
+        let purl = format!("pkg:cargo/{name}@{version}");
+        let scope = if self.inside.contains_key(one) { "required" } else { "excluded" };
+        let mut component = json!({
+            "type": "library", "bom-ref": purl, "purl": purl, "name": name, "version": version, "scope": scope,
+            "licenses": [{ "expression": licence }],
+        });
+        let locked = self.lock.iter().find(|has| (&has.name, &has.version) == (name, version));
+        if let Some(sum) = locked.and_then(|locked| locked.checksum.as_deref()) {
+            component["hashes"] = json!([{ "alg": "SHA-256", "content": sum }]);
+        }
+        component
+    }
+}
+
+/// The crates of `cargo tree`, one a line: `NAME vVERSION (path or kind)|LICENCE`.
+fn crates(tree: &str) -> Result<Crates> {
+    let lines = tree.lines().map(|line| {
+        let (of, licence) = line.split_once('|')?;
+        let (name, version) = of.split_once(" v")?;
+        let version = version.split(' ').next()?;
+        // The older way to write a choice.
+        Some(((name.to_owned(), version.to_owned()), licence.replace('/', " OR ")))
+    });
+    lines.collect::<Option<_>>().with_context(|| format!("cargo tree: {tree}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    fn fixture() -> Sbom {
+        let inside = crates("drive v0.2.0 (/a/folder)|MIT\naz v1.3.0|MIT/Apache-2.0").unwrap();
+        let build = crates("syn v3.0.1 (proc-macro)|MIT\naz v1.3.0|MIT/Apache-2.0").unwrap();
+        let all = inside.clone().into_iter().chain(build).collect();
+        let Lock { package: lock } = toml::from_str(
+            r#"
+            package = [{ name = "az", version = "1.3.0", checksum = "ab" }, { name = "az", version = "2.0.0", checksum = "cd" },
+            { name = "drive", version = "0.2.0" }, { name = "syn", version = "3.0.1", checksum = "ef" }]
+            "#,
+        )
+        .unwrap();
+        Sbom { inside, all, lock }
+    }
+
+    #[test]
+    fn the_document_lists_each_crate_with_licence_and_check_sum() {
+        let text = fixture().document("drive", "firmware", "rustc 1").unwrap();
+        let document: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(document["metadata"]["component"]["version"], "0.2.0");
+        let [library, az, syn] = document["components"].as_array().unwrap().as_slice() else {
+            panic!("{text}");
+        };
+        assert_eq!(library["version"], "rustc 1");
+        assert_eq!(az["purl"], "pkg:cargo/az@1.3.0");
+        assert_eq!(az["licenses"][0]["expression"], "MIT OR Apache-2.0");
+        assert_eq!((&az["hashes"][0]["content"], &az["scope"]), (&json!("ab"), &json!("required")));
+        assert_eq!(syn["scope"], "excluded");
+    }
+
+    #[test]
+    fn a_crate_of_the_image_that_is_not_listed_fails() {
+        let check = |image: &[u8]| fixture().check(image).map_err(|error| error.to_string());
+        assert_eq!(check(b"\0az-1.3.0/src/lib.rs\0"), Ok(()));
+        let unlisted = "in the image, and not in its list of crates: [\"az\"]".to_owned();
+        assert_eq!(check(b"\0az-1.3.0/src/lib.rs\0az-2.0.0/src/lib.rs\0"), Err(unlisted));
+        assert!(check(b"\0xaz-2.0.0/src/lib.rs\0").is_err());
+        assert_eq!(fixture().of_others().collect::<Vec<_>>(), ["az-1.3.0"]);
+    }
+
+    /// What cargo resolves for the image by its other command.
+    #[test]
+    fn the_crates_of_the_image_are_those_that_cargo_resolves() {
+        let sbom = Sbom::new("induction-drive", run::TARGET).unwrap();
+        let words =
+            format!("metadata --locked --format-version 1 --filter-platform {}", run::TARGET);
+        let metadata: Value =
+            serde_json::from_str(&run::said(&mut run::cargo(&words)).unwrap()).unwrap();
+        let list = |value: &Value| value.as_array().unwrap().clone();
+        let nodes: BTreeMap<_, _> = list(&metadata["resolve"]["nodes"])
+            .into_iter()
+            .map(|node| (node["id"].to_string(), node))
+            .collect();
+        let packages = list(&metadata["packages"]);
+        let of = |id: &str| packages.iter().find(|one| one["id"].to_string() == id).unwrap();
+        let is_macro = |id: &str| {
+            list(&of(id)["targets"]).iter().any(|target| target["kind"][0] == "proc-macro")
+        };
+        let mut found = BTreeSet::new();
+        let mut open: Vec<String> =
+            nodes.keys().filter(|id| of(id)["name"] == "induction-drive").cloned().collect();
+        while let Some(id) = open.pop() {
+            if is_macro(&id) || !found.insert(id.clone()) {
+                continue;
+            }
+            for dependency in list(&nodes[&id]["deps"]) {
+                if list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"].is_null()) {
+                    open.push(dependency["pkg"].to_string());
+                }
+            }
+        }
+        let name = |id: &String| {
+            let text = |key: &str| of(id)[key].as_str().unwrap().to_owned();
+            (text("name"), text("version"))
+        };
+        let found: BTreeSet<_> = found.iter().map(name).collect();
+        let ours: BTreeSet<_> = sbom.inside.keys().cloned().collect();
+        assert_eq!(ours.difference(&found).next(), None);
+        // That command joins the features of all targets: rand_core's random numbers of the system are those of the host.
+        let more: Vec<_> = found.difference(&ours).map(|(name, _)| name).collect();
+        assert_eq!(more, ["getrandom"]);
+    }
+}
