@@ -7,11 +7,13 @@ use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
+use glob::glob;
 use sha2::{Digest, Sha256};
 use walkdir::WalkDir;
 
 use crate::sbom::Sbom;
-use crate::{image, paths, run, toolchain, tools, web};
+use crate::toolchain::{self, Target};
+use crate::{image, paths, run, tools, web};
 
 /// The file of the check sums, in the form of `sha256sum`.
 const SUMS: &str = "SHA256SUMS";
@@ -19,112 +21,99 @@ const SUMS: &str = "SHA256SUMS";
 const PROGRAMS: [&str; 2] = ["hil-sim", "drive-live"];
 /// Their profile.
 const PROFILE: &str = "shipped";
-/// Texts of the repository, and where they are put.
-const TEXTS: [(&str, &str); 8] = [
-    ("docs/settings.md", "description"),
-    ("docs/modbus.md", "description"),
-    ("docs/faults.md", "description"),
-    ("tests/numbers.txt", "description"),
-    ("CHANGELOG.md", ""),
-    ("SECURITY.md", ""),
-    ("LICENSE-APACHE", "licences"),
-    ("LICENSE-MIT", "licences"),
+/// Texts of the repository by the folder that they are put into.
+const TEXTS: [(&str, &str); 3] = [
+    ("description", "docs/settings.md docs/modbus.md docs/faults.md tests/numbers.txt"),
+    ("licences", "LICENSE-APACHE LICENSE-MIT"),
+    ("", "CHANGELOG.md SECURITY.md"),
 ];
-/// How the name of a file with a licence begins.
-const LICENCES: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
+/// Names of files with a licence.
+const LICENCES: [&str; 5] = ["LICEN*", "[lL]icen*", "UNLICENSE*", "COPYING*", "NOTICE*"];
 
 /// What is built, and where to.
 #[derive(Args)]
 pub struct Dist {
-    /// A new folder [default: target/dist, which is emptied]
+    /// A folder to copy it to from target/dist
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// The programs for this machine alone, with what belongs to them
     #[arg(long)]
     programs: bool,
-    /// A folder with wheels of this version, which are taken in
-    #[arg(long, value_name = "DIR")]
-    wheels: Option<PathBuf>,
-    /// Builds again in a clone elsewhere; fails if a file differs
-    #[arg(long, conflicts_with_all = ["out", "programs", "wheels"])]
+    /// Builds all again in a clone elsewhere; fails if a file differs
+    #[arg(long, conflicts_with = "programs")]
     twice: bool,
 }
 
-/// Makes the folder, by default `target/dist`.
+/// Makes the folder `target/dist`. Wheels of this version in `target/wheels` are taken in.
 pub fn dist(options: &Dist) -> Result<()> {
-    let folder = build(options)?;
-    if options.twice { same_elsewhere(&folder) } else { Ok(()) }
-}
-
-fn build(options: &Dist) -> Result<PathBuf> {
-    let folder = match &options.out {
-        Some(folder) => std::path::absolute(folder)?,
-        None => run::target_dir()?.join("dist"),
-    };
-    if options.out.is_none() && folder.is_dir() {
-        fs::remove_dir_all(&folder)?;
-    }
-    let is_new = !folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-    ensure!(is_new, "{} is not empty", folder.display());
-    let rustc = run::output("rustc", &["--version"])?;
+    let folder = run::folder("dist")?;
+    fs::remove_dir_all(&folder)?;
     let host = run::output("rustc", &["--print", "host-tuple"])?;
-    let mut lists = Vec::new();
-
-    let mut command = run::cargo("build --locked --profile");
-    command.args([PROFILE, &paths::option(&host, &[])?]);
-    command.args(PROGRAMS.map(|name| format!("--package={name}")));
-    // Increments, which two packages of the profile are built by, leave traces.
-    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
-    run::step("programs", command.env_remove("CARGO_ENCODED_RUSTFLAGS"))?;
-    for name in PROGRAMS {
-        let program = run::target_dir()?.join(PROFILE).join(format!("{name}{EXE_SUFFIX}"));
-        paths::check(&fs::read(&program)?).with_context(|| name.to_owned())?;
-        copy(&program, &folder.join("programs").join(&host))?;
-        lists.push((Sbom::new(name, &host)?, name, "application", rustc.clone()));
-    }
+    let mut built: Vec<_> = PROGRAMS.map(|name| (name, &*host, Target::InUse)).into();
+    programs(&host, &folder.join("programs").join(&host))?;
     if !options.programs {
         let target = toolchain::for_target()?;
-        let list = Sbom::new("induction-drive", run::TARGET)?;
         // The reference board last: the others leave their image at its path.
         for board in image::boards()?.iter().rev() {
             let elf = image::build_for(&target, board)?;
-            list.check(&fs::read(&elf)?)?;
             for (from, to) in [("", "elf"), ("bin", "bin"), ("hex", "hex")] {
                 let to = folder.join("firmware").join(format!("{board}.{to}"));
-                write(&to, &fs::read(elf.with_extension(from))?)?;
+                copy_as(&elf.with_extension(from), &to)?;
             }
         }
-        lists.push((list, "induction-drive", "firmware", target.version()?));
-        let browser = toolchain::compiler(run::BROWSER)?.version()?;
-        lists.push((Sbom::new("drive-web", run::BROWSER)?, "drive-web", "application", browser));
+        built.push(("induction-drive", run::TARGET, target));
+        built.push(("drive-web", run::BROWSER, toolchain::compiler(run::BROWSER)?));
         copy(&web::build()?, &folder.join("web"))?;
         copy(&tools::book()?, &folder.join("book"))?;
     }
-    if let Some(wheels) = &options.wheels {
-        copy(wheels, &folder.join("wheels"))?;
+    let wheels = run::target_dir()?.join(concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "-*.whl"));
+    for wheel in glob(&wheels.to_string_lossy())? {
+        copy(&wheel?, &folder.join("wheels"))?;
     }
-    for (file, to) in TEXTS {
-        copy(&run::root().join(file), &folder.join(to))?;
+    for (to, texts) in TEXTS {
+        texts.split(' ').try_for_each(|text| copy(&run::root().join(text), &folder.join(to)))?;
     }
-    for (list, package, kind, compiler) in &lists {
-        let text = list.document(package, kind, compiler)?;
-        write(&folder.join("sbom").join(format!("{package}.cdx.json")), text.as_bytes())?;
+    let mut others = BTreeSet::new();
+    for (package, target, compiler) in built {
+        let list = Sbom::new(package, target)?;
+        if target == run::TARGET {
+            let elf = folder.join("firmware").join(image::REFERENCE).with_extension("elf");
+            list.check(&fs::read(elf)?)?;
+        }
+        let kind = if target == run::TARGET { "firmware" } else { "application" };
+        let text = list.document(package, kind, &compiler.version()?)?;
+        fs::write(run::folder("dist/sbom")?.join(format!("{package}.cdx.json")), text)?;
+        others.extend(list.of_others().map(|one| one.replace('@', "-")));
     }
-    for name in lists.iter().flat_map(|(list, ..)| list.of_others()).collect::<BTreeSet<_>>() {
-        for source in paths::registries()?.iter().map(|registry| registry.join(&name)) {
-            for entry in source.read_dir().into_iter().flatten().flatten() {
-                let file = entry.file_name().to_string_lossy().to_uppercase();
-                if LICENCES.iter().any(|begin| file.starts_with(begin)) {
-                    copy(&entry.path(), &folder.join("licences").join(&name))?;
-                }
-            }
+    for (name, licence) in others.iter().flat_map(|name| LICENCES.map(|one| (name, one))) {
+        let files = paths::cargo_home()?.join("registry/src/*").join(name).join(licence);
+        for file in glob(&files.to_string_lossy())? {
+            copy(&file?, &folder.join("licences").join(name))?;
         }
     }
-    let text: String =
-        sums(&folder)?.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect();
-    write(&folder.join(SUMS), text.as_bytes())?;
+    let lines = |(name, sum)| format!("{sum}  {name}\n");
+    let text: String = sums(&folder)?.into_iter().map(lines).collect();
+    fs::write(folder.join(SUMS), text)?;
     println!("\n{}", folder.display());
-    Ok(folder)
+    if options.twice {
+        same_elsewhere(&folder)?;
+    }
+    options.out.as_ref().map_or(Ok(()), |out| copy(&folder, out))
+}
+
+/// Builds the programs for this machine into a folder.
+fn programs(host: &str, folder: &Path) -> Result<()> {
+    let mut command = run::cargo("build --locked --profile");
+    command.args([PROFILE, &paths::option(host, &[])?]);
+    command.args(PROGRAMS.map(|name| format!("--package={name}")));
+    // Two packages of the profile are built by increments, which leave traces.
+    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
+    run::step("programs", command.env_remove("CARGO_ENCODED_RUSTFLAGS"))?;
+    PROGRAMS.iter().try_for_each(|name| {
+        let program = run::target_dir()?.join(PROFILE).join(format!("{name}{EXE_SUFFIX}"));
+        paths::check(&fs::read(&program)?).with_context(|| name.to_string())?;
+        copy(&program, folder)
+    })
 }
 
 /// Builds the release of this commit again in a clone in another folder; fails if one of the files differs.
@@ -133,13 +122,14 @@ fn same_elsewhere(here: &Path) -> Result<()> {
     let clone = elsewhere.join("clone");
     let mut git = run::command("git");
     run::step("clone", git.args(["clone", "--quiet"]).arg(run::root()).arg(&clone))?;
-    let built = clone.join("target");
-    // The program that makes the book is no part of the release.
-    copy(&run::folder("tools")?, &built.join("tools"))?;
+    // Neither the program that makes the book nor a wheel is built by the release.
+    for made in ["tools", "wheels"] {
+        copy(&run::folder(made)?, &clone.join("target").join(made))?;
+    }
     let mut command = run::cargo("xtask dist");
-    command.current_dir(&clone).env("CARGO_TARGET_DIR", &built);
+    command.current_dir(&clone).env("CARGO_TARGET_DIR", clone.join("target"));
     run::step("release in another folder", &mut command)?;
-    let (ours, theirs) = (sums(here)?, sums(&built.join("dist"))?);
+    let (ours, theirs) = (sums(here)?, sums(&clone.join("target/dist"))?);
     let mut names: BTreeSet<_> = ours.keys().chain(theirs.keys()).collect();
     println!("{} files", names.len());
     names.retain(|name| ours.get(*name) != theirs.get(*name));
@@ -147,35 +137,30 @@ fn same_elsewhere(here: &Path) -> Result<()> {
     fs::remove_dir_all(&elsewhere).with_context(|| elsewhere.display().to_string())
 }
 
-/// The sum of each file below a folder but [`SUMS`], by its path.
+/// The sum of each file below a folder, by its path.
 fn sums(folder: &Path) -> Result<BTreeMap<String, String>> {
-    let mut sums = BTreeMap::new();
-    for file in files(folder)? {
+    let sum = |file: PathBuf| {
         let path = file.strip_prefix(folder)?.to_string_lossy().replace('\\', "/");
         let sum = Sha256::digest(fs::read(&file)?);
-        sums.insert(path, sum.iter().map(|byte| format!("{byte:02x}")).collect());
-    }
-    sums.remove(SUMS);
-    Ok(sums)
+        Ok((path, sum.iter().map(|byte| format!("{byte:02x}")).collect()))
+    };
+    files(folder)?.into_iter().map(sum).collect()
 }
 
 /// Copies a file, or all below a folder, into a folder.
-fn copy(from: &Path, to: &Path) -> Result<()> {
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
     let base = if from.is_dir() { from } else { from.parent().unwrap_or(from) };
-    for file in files(from)? {
-        let to = to.join(file.strip_prefix(base)?);
-        fs::create_dir_all(to.parent().unwrap_or(&to))?;
-        fs::copy(&file, &to).with_context(|| file.display().to_string())?;
-    }
-    Ok(())
+    files(from)?.iter().try_for_each(|file| copy_as(file, &to.join(file.strip_prefix(base)?)))
 }
 
-fn write(to: &Path, bytes: &[u8]) -> Result<()> {
+/// Copies a file to a place, whose folder is made.
+pub fn copy_as(from: &Path, to: &Path) -> Result<()> {
     fs::create_dir_all(to.parent().unwrap_or(to))?;
-    fs::write(to, bytes).with_context(|| to.display().to_string())
+    fs::copy(from, to).map(drop).with_context(|| from.display().to_string())
 }
 
-fn files(from: &Path) -> Result<Vec<PathBuf>> {
+/// All files below a folder.
+pub fn files(from: &Path) -> Result<Vec<PathBuf>> {
     let entries = WalkDir::new(from).into_iter().collect::<Result<Vec<_>, _>>()?;
     let files = entries.into_iter().filter(|entry| entry.file_type().is_file());
     Ok(files.map(walkdir::DirEntry::into_path).collect())
@@ -186,11 +171,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_are_of_every_file_but_their_own() {
-        let folder = run::folder("tmp/sums").unwrap();
-        write(&folder.join("a/b"), b"abc").unwrap();
-        write(&folder.join(SUMS), b"old").unwrap();
-        let sums = sums(&folder).unwrap();
+    fn sums_are_those_of_sha256sum() {
+        let folder = run::folder("tmp/sums/a").unwrap();
+        fs::write(folder.join("b"), "abc").unwrap();
+        let sums = sums(&folder.join("..")).unwrap();
         // FIPS 180-4, example 1.
         let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sums, BTreeMap::from([("a/b".to_owned(), abc.to_owned())]));

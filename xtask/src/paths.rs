@@ -14,17 +14,16 @@ use crate::run;
 /// Directories of this machine, and their short names in the image. Where several fit, the last counts.
 fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut names = vec![(run::root().to_owned(), "."), (run::target_dir()?, "target")];
-    names.extend(registries()?.into_iter().map(|registry| (registry, "")));
+    // One directory for each registry, with a directory for each package. It exists, since this program
+    // has dependencies too.
+    for registry in cargo_home()?.join("registry/src").read_dir().into_iter().flatten().flatten() {
+        names.push((registry.path(), ""));
+    }
     Ok(names)
 }
 
-/// One directory for each registry, with a directory for each package. It exists, since this program has dependencies too.
-pub fn registries() -> Result<Vec<PathBuf>> {
-    let entries = cargo_home()?.join("registry/src").read_dir().into_iter().flatten().flatten();
-    Ok(entries.map(|registry| registry.path()).collect())
-}
-
-fn cargo_home() -> Result<PathBuf> {
+/// The folder of cargo, with the sources of all packages.
+pub fn cargo_home() -> Result<PathBuf> {
     match env::var_os("CARGO_HOME") {
         Some(home) => std::path::absolute(home).context("CARGO_HOME"),
         None => Ok(env::home_dir().context("there is no home directory")?.join(".cargo")),

@@ -5,120 +5,96 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
-use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::{run, sources};
 
-/// What `Cargo.lock` has of a crate.
-#[derive(Deserialize)]
-struct Locked {
-    name: String,
-    version: String,
-    checksum: Option<String>,
-}
-
-#[derive(Deserialize)]
-struct Lock {
-    package: Vec<Locked>,
-}
-
-/// A crate by name and version, and its licence as SPDX.
-type Crates = BTreeMap<(String, String), String>;
+/// What is known of each crate, by `NAME@VERSION`.
+type Crates = BTreeMap<String, String>;
 
 /// The crates of a program.
 pub struct Sbom {
-    /// In the program, its own package among them.
+    /// Licences of those in the program, its own package among them.
     inside: Crates,
-    /// With those that run while it is built: macros, build scripts and what they need.
+    /// The same, with those that run while it is built: macros, build scripts and what they need.
     all: Crates,
-    lock: Vec<Locked>,
+    /// Check sums of the packages of others in `Cargo.lock`.
+    sums: Crates,
 }
 
 impl Sbom {
     /// The crates of a package's program for a target.
     pub fn new(package: &str, target: &str) -> Result<Self> {
         let tree = |edges| {
-            let words = format!(
-                "tree --locked --package {package} --target {target} --edges {edges} --prefix none \
-                 --no-dedupe --format {{p}}|{{l}}"
-            );
-            crates(&run::said(&mut run::cargo(&words))?)
+            let what = format!("tree --locked -p {package} --target {target} -e {edges}");
+            let form = " --prefix none --no-dedupe --format {p}|{l}";
+            crates(&run::said(&mut run::cargo(&(what + form)))?)
         };
         let (all, inside) = (tree("no-dev")?, tree("no-dev,no-build,no-proc-macro")?);
-        let Lock { package: lock } = toml::from_str(&sources::read("Cargo.lock")?)?;
-        Ok(Self { inside, all, lock })
+        Ok(Self { inside, all, sums: sums(&sources::read("Cargo.lock")?)? })
     }
 
-    /// Names with versions of the crates of others that are in the program.
-    pub fn of_others(&self) -> impl Iterator<Item = String> {
-        let others = self.lock.iter().filter(|one| one.checksum.is_some());
-        others.filter(|one| self.has(one)).map(|one| format!("{}-{}", one.name, one.version))
+    /// The crates of others in the program.
+    pub fn of_others(&self) -> impl Iterator<Item = &String> {
+        self.sums.keys().filter(|one| self.inside.contains_key(*one))
     }
 
-    fn has(&self, one: &Locked) -> bool {
-        self.inside.contains_key(&(one.name.clone(), one.version.clone()))
-    }
-
-    /// Fails if the debug information of an image names sources of a crate that is not listed, or no crate of others.
+    /// Fails if the debug information of an image names sources of a crate that is not listed, or none at all.
     pub fn check(&self, image: &[u8]) -> Result<()> {
-        let is_named = |one: &&Locked| {
-            let path = format!("\0{}-{}/src/", one.name, one.version);
-            one.checksum.is_some() && image.windows(path.len()).any(|part| part == path.as_bytes())
-        };
-        let (listed, others): (Vec<_>, Vec<_>) =
-            self.lock.iter().filter(is_named).partition(|one| self.has(one));
-        let others: Vec<_> = others.iter().map(|one| &one.name).collect();
-        ensure!(others.is_empty(), "in the image, and not in its list of crates: {others:?}");
+        let named = self.sums.keys().filter(|one| {
+            let path = format!("\0{}/src/", one.replace('@', "-"));
+            image.windows(path.len()).any(|part| part == path.as_bytes())
+        });
+        let (listed, not): (Vec<_>, Vec<_>) = named.partition(|one| self.inside.contains_key(*one));
+        ensure!(not.is_empty(), "in the image, and not in its list of crates: {not:?}");
         ensure!(!listed.is_empty(), "the image has no debug information of crates");
         Ok(())
     }
 
     /// The document for a package's program of this kind, built by this compiler. The same crates give the same text.
     pub fn document(&self, package: &str, kind: &str, compiler: &str) -> Result<String> {
-        let of_package = |(name, _): &(String, String)| name == package;
-        let (_, version) = self.inside.keys().find(|one| of_package(one)).context("no package")?;
-        let library = "Rust standard library";
-        let mut components =
-            vec![json!({ "type": "library", "name": library, "version": compiler })];
-        let crates = self.all.iter().filter(|(one, _)| !of_package(one));
-        components.extend(crates.map(|(one, licence)| self.component(one, licence)));
+        let version = env!("CARGO_PKG_VERSION");
+        // Not in `Cargo.lock`.
+        let library = json!({ "type": "library", "name": "rust-std", "version": compiler });
+        let mut components = vec![library];
+        for (one, licence) in &self.all {
+            let (name, version) = one.split_once('@').unwrap_or_default();
+            let (purl, inside) = (format!("pkg:cargo/{one}"), self.inside.contains_key(one));
+            let sum = self.sums.get(one).map(|sum| json!({ "alg": "SHA-256", "content": sum }));
+            components.push(json!({
+                "type": "library", "bom-ref": purl, "purl": purl, "name": name, "version": version,
+                "scope": if inside { "required" } else { "excluded" },
+                "licenses": [{ "expression": licence }], "hashes": sum.as_slice(),
+            }));
+        }
         let document = json!({
-            "bomFormat": "CycloneDX",
-            "specVersion": "1.6",
-            "version": 1,
+            "bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "components": components,
             "metadata": { "component": { "type": kind, "name": package, "version": version } },
-            "components": components,
         });
         Ok(serde_json::to_string_pretty(&document)? + "\n")
     }
-
-    fn component(&self, one: &(String, String), licence: &str) -> Value {
-        let (name, version) = one;
-        let purl = format!("pkg:cargo/{name}@{version}");
-        let scope = if self.inside.contains_key(one) { "required" } else { "excluded" };
-        let mut component = json!({
-            "type": "library", "bom-ref": purl, "purl": purl, "name": name, "version": version, "scope": scope,
-            "licenses": [{ "expression": licence }],
-        });
-        let locked = self.lock.iter().find(|has| (&has.name, &has.version) == (name, version));
-        if let Some(sum) = locked.and_then(|locked| locked.checksum.as_deref()) {
-            component["hashes"] = json!([{ "alg": "SHA-256", "content": sum }]);
-        }
-        component
-    }
 }
 
-/// The crates of `cargo tree`, one a line: `NAME vVERSION (path or kind)|LICENCE`.
+/// The licences in the lines of `cargo tree`: `NAME vVERSION (path or kind)|LICENCE`.
 fn crates(tree: &str) -> Result<Crates> {
     let lines = tree.lines().map(|line| {
         let (of, licence) = line.split_once('|')?;
         let (name, version) = of.split_once(" v")?;
-        let version = version.split(' ').next()?;
-        // The older way to write a choice.
-        Some(((name.to_owned(), version.to_owned()), licence.replace('/', " OR ")))
+        // A slash is the older way to write a choice.
+        Some((format!("{name}@{}", version.split(' ').next()?), licence.replace('/', " OR ")))
     });
     lines.collect::<Option<_>>().with_context(|| format!("cargo tree: {tree}"))
+}
+
+/// The check sums of a `Cargo.lock`.
+fn sums(lock: &str) -> Result<Crates> {
+    let lock: Value = toml::from_str(lock)?;
+    let packages = lock["package"].as_array().into_iter().flatten();
+    let sums = packages.filter_map(|one| {
+        let [name, version, sum] = ["name", "version", "checksum"].map(|key| one[key].as_str());
+        Some((format!("{}@{}", name?, version?), sum?.to_owned()))
+    });
+    Ok(sums.collect())
 }
 
 #[cfg(test)]
@@ -131,28 +107,27 @@ mod tests {
         let inside = crates("drive v0.2.0 (/a/folder)|MIT\naz v1.3.0|MIT/Apache-2.0").unwrap();
         let build = crates("syn v3.0.1 (proc-macro)|MIT\naz v1.3.0|MIT/Apache-2.0").unwrap();
         let all = inside.clone().into_iter().chain(build).collect();
-        let Lock { package: lock } = toml::from_str(
-            r#"
+        let lock = r#"
             package = [{ name = "az", version = "1.3.0", checksum = "ab" }, { name = "az", version = "2.0.0", checksum = "cd" },
             { name = "drive", version = "0.2.0" }, { name = "syn", version = "3.0.1", checksum = "ef" }]
-            "#,
-        )
-        .unwrap();
-        Sbom { inside, all, lock }
+        "#;
+        Sbom { inside, all, sums: sums(lock).unwrap() }
     }
 
     #[test]
     fn the_document_lists_each_crate_with_licence_and_check_sum() {
         let text = fixture().document("drive", "firmware", "rustc 1").unwrap();
         let document: Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(document["metadata"]["component"]["version"], "0.2.0");
-        let [library, az, syn] = document["components"].as_array().unwrap().as_slice() else {
+        assert_eq!(document["metadata"]["component"]["version"], env!("CARGO_PKG_VERSION"));
+        let [library, az, drive, syn] = document["components"].as_array().unwrap().as_slice()
+        else {
             panic!("{text}");
         };
         assert_eq!(library["version"], "rustc 1");
         assert_eq!(az["purl"], "pkg:cargo/az@1.3.0");
         assert_eq!(az["licenses"][0]["expression"], "MIT OR Apache-2.0");
         assert_eq!((&az["hashes"][0]["content"], &az["scope"]), (&json!("ab"), &json!("required")));
+        assert_eq!((&drive["hashes"], &drive["scope"]), (&json!([]), &json!("required")));
         assert_eq!(syn["scope"], "excluded");
     }
 
@@ -160,10 +135,10 @@ mod tests {
     fn a_crate_of_the_image_that_is_not_listed_fails() {
         let check = |image: &[u8]| fixture().check(image).map_err(|error| error.to_string());
         assert_eq!(check(b"\0az-1.3.0/src/lib.rs\0"), Ok(()));
-        let unlisted = "in the image, and not in its list of crates: [\"az\"]".to_owned();
+        let unlisted = "in the image, and not in its list of crates: [\"az@2.0.0\"]".to_owned();
         assert_eq!(check(b"\0az-1.3.0/src/lib.rs\0az-2.0.0/src/lib.rs\0"), Err(unlisted));
         assert!(check(b"\0xaz-2.0.0/src/lib.rs\0").is_err());
-        assert_eq!(fixture().of_others().collect::<Vec<_>>(), ["az-1.3.0"]);
+        assert_eq!(fixture().of_others().collect::<Vec<_>>(), ["az@1.3.0"]);
     }
 
     /// What cargo resolves for the image by its other command.
@@ -180,7 +155,7 @@ mod tests {
             .map(|node| (node["id"].to_string(), node))
             .collect();
         let packages = list(&metadata["packages"]);
-        let of = |id: &str| packages.iter().find(|one| one["id"].to_string() == id).unwrap();
+        let of = |id: &str| packages.iter().find(|one| one["id"] == id).unwrap();
         let is_macro = |id: &str| {
             list(&of(id)["targets"]).iter().any(|target| target["kind"][0] == "proc-macro")
         };
@@ -199,13 +174,13 @@ mod tests {
         }
         let name = |id: &String| {
             let text = |key: &str| of(id)[key].as_str().unwrap().to_owned();
-            (text("name"), text("version"))
+            text("name") + "@" + &text("version")
         };
         let found: BTreeSet<_> = found.iter().map(name).collect();
         let ours: BTreeSet<_> = sbom.inside.keys().cloned().collect();
         assert_eq!(ours.difference(&found).next(), None);
         // That command joins the features of all targets: rand_core's random numbers of the system are those of the host.
-        let more: Vec<_> = found.difference(&ours).map(|(name, _)| name).collect();
-        assert_eq!(more, ["getrandom"]);
+        let more: Vec<_> = found.difference(&ours).collect();
+        assert!(more.iter().all(|one| one.starts_with("getrandom@")), "{more:?}");
     }
 }

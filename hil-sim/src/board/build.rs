@@ -112,9 +112,8 @@ fn root() -> Result<PathBuf, Error> {
     let places = [std::env::current_exe(), std::env::current_dir()];
     let mut folders = places.iter().flatten().flat_map(|place| place.ancestors());
     let root = folders.find(|folder| folder.join("hil-sim/virtual-board").is_dir());
-    let refused =
-        || Error::Refused("the virtual board is built in the repository: go there".into());
-    root.map(Path::to_owned).ok_or_else(refused)
+    let refused = "the virtual board is built in the repository: go there";
+    root.map(Path::to_owned).ok_or_else(|| Error::Refused(refused.into()))
 }
 
 #[cfg(test)]
