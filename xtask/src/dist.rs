@@ -9,8 +9,8 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use glob::glob;
 use sha2::{Digest, Sha256};
-use walkdir::WalkDir;
 
+use crate::files::{copy, copy_as, files};
 use crate::sbom::Sbom;
 use crate::toolchain::{self, Target};
 use crate::{image, paths, run, tools, web};
@@ -145,25 +145,6 @@ fn sums(folder: &Path) -> Result<BTreeMap<String, String>> {
         Ok((path, sum.iter().map(|byte| format!("{byte:02x}")).collect()))
     };
     files(folder)?.into_iter().map(sum).collect()
-}
-
-/// Copies a file, or all below a folder, into a folder.
-pub fn copy(from: &Path, to: &Path) -> Result<()> {
-    let base = if from.is_dir() { from } else { from.parent().unwrap_or(from) };
-    files(from)?.iter().try_for_each(|file| copy_as(file, &to.join(file.strip_prefix(base)?)))
-}
-
-/// Copies a file to a place, whose folder is made.
-pub fn copy_as(from: &Path, to: &Path) -> Result<()> {
-    fs::create_dir_all(to.parent().unwrap_or(to))?;
-    fs::copy(from, to).map(drop).with_context(|| from.display().to_string())
-}
-
-/// All files below a folder.
-pub fn files(from: &Path) -> Result<Vec<PathBuf>> {
-    let entries = WalkDir::new(from).into_iter().collect::<Result<Vec<_>, _>>()?;
-    let files = entries.into_iter().filter(|entry| entry.file_type().is_file());
-    Ok(files.map(walkdir::DirEntry::into_path).collect())
 }
 
 #[cfg(test)]

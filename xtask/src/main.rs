@@ -6,6 +6,7 @@ mod by_name;
 mod control;
 mod dist;
 mod elf;
+mod files;
 mod foreign;
 mod fuzz;
 mod image;

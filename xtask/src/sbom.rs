@@ -152,7 +152,7 @@ mod tests {
         let list = |value: &Value| value.as_array().unwrap().clone();
         let nodes: BTreeMap<_, _> = list(&metadata["resolve"]["nodes"])
             .into_iter()
-            .map(|node| (node["id"].to_string(), node))
+            .map(|node| (node["id"].as_str().unwrap().to_owned(), node))
             .collect();
         let packages = list(&metadata["packages"]);
         let of = |id: &str| packages.iter().find(|one| one["id"] == id).unwrap();
@@ -168,7 +168,7 @@ mod tests {
             }
             for dependency in list(&nodes[&id]["deps"]) {
                 if list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"].is_null()) {
-                    open.push(dependency["pkg"].to_string());
+                    open.push(dependency["pkg"].as_str().unwrap().to_owned());
                 }
             }
         }

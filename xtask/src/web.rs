@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 
-use crate::{dist, paths, run, toolchain};
+use crate::{files, paths, run, toolchain};
 
 /// Largest folder, bytes.
 const FOLDER_BYTES: u64 = 700_000;
@@ -16,10 +16,10 @@ pub fn build() -> Result<PathBuf> {
     paths::check(&fs::read(&wasm)?)?;
     let folder = run::folder("web")?;
     fs::remove_dir_all(&folder)?;
-    dist::copy(&run::root().join("live/page"), &folder)?;
-    dist::copy_as(&wasm, &folder.join("drive.wasm"))?;
-    let files = dist::files(&folder)?;
-    let bytes = files.iter().flat_map(|file| file.metadata()).map(|file| file.len()).sum();
+    files::copy(&run::root().join("live/page"), &folder)?;
+    files::copy_as(&wasm, &folder.join("drive.wasm"))?;
+    let all = files::files(&folder)?;
+    let bytes = all.iter().flat_map(|file| file.metadata()).map(|file| file.len()).sum();
     run::limit("drive in a browser", bytes, FOLDER_BYTES, "bytes")?;
     println!("{}: put it on any server of static files", folder.display());
     Ok(folder)
