@@ -4,7 +4,9 @@ mod board;
 mod budget;
 mod by_name;
 mod control;
+mod dist;
 mod elf;
+mod files;
 mod foreign;
 mod fuzz;
 mod image;
@@ -15,6 +17,7 @@ mod paths;
 mod prove;
 mod rooms;
 mod run;
+mod sbom;
 mod seal;
 mod sections;
 mod size;
@@ -90,6 +93,8 @@ enum Task {
     Pages,
     /// Builds the drive in a browser, firmware and motor on the live page: a folder of static files
     Web,
+    /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
+    Dist(dist::Dist),
     /// Long proofs in shards, which a later call continues. Lists them, or does one
     Prove {
         /// Name of the proof
@@ -141,9 +146,10 @@ fn run(task: Task) -> Result<()> {
         Task::Lines => lines::report(),
         Task::Rooms => rooms::check(),
         Task::Mutants { shard } => tools::mutants(&shard),
-        Task::Book => tools::book(),
+        Task::Book => tools::book().map(drop),
         Task::Pages => by_name::pages(),
         Task::Web => web::build().map(drop),
+        Task::Dist(options) => dist::dist(&options),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }

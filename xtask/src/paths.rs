@@ -22,7 +22,8 @@ fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(names)
 }
 
-fn cargo_home() -> Result<PathBuf> {
+/// The folder of cargo, with the sources of all packages.
+pub fn cargo_home() -> Result<PathBuf> {
     match env::var_os("CARGO_HOME") {
         Some(home) => std::path::absolute(home).context("CARGO_HOME"),
         None => Ok(env::home_dir().context("there is no home directory")?.join(".cargo")),

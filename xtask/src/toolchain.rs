@@ -80,6 +80,12 @@ impl Target {
         Ok(self.target_dir()?.join(TARGET).join(PROFILE).join("induction-drive"))
     }
 
+    /// Name and version of the compiler.
+    pub fn version(&self) -> Result<String> {
+        let rustc = if let Self::Debian = self { "/usr/bin/rustc" } else { "rustc" };
+        run::output(rustc, &["--version"])
+    }
+
     fn target_dir(&self) -> Result<PathBuf> {
         let base = run::target_dir()?;
         Ok(match self {

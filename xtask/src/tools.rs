@@ -10,15 +10,15 @@ use crate::{run, sources};
 /// Least share of the viable mutants that the tests must catch.
 const CAUGHT: f64 = 0.9;
 
-/// `cargo xtask book`: builds the pages in `docs/`.
-pub fn book() -> Result<()> {
+/// `cargo xtask book`: builds the pages in `docs/`; their folder. their folder.
+pub fn book() -> Result<PathBuf> {
     let docs = run::root().join("docs");
     ensure!(docs.join("book.toml").is_file(), "there is no book: docs/book.toml is missing");
     let html = run::target_dir()?.join("book");
     let mdbook = tool("mdbook", "0.5.4")?;
     run::step("book", run::command(mdbook).arg("build").arg(docs).arg("--dest-dir").arg(&html))?;
     println!("\n{}", html.join("index.html").display());
-    Ok(())
+    Ok(html)
 }
 
 /// `cargo xtask mutants`: changes `drive-core` in the places of one shard, `K/N`, and runs unit tests, filters and

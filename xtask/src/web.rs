@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 
-use crate::{paths, run, toolchain};
+use crate::{files, paths, run, toolchain};
 
 /// Largest folder, bytes.
 const FOLDER_BYTES: u64 = 700_000;
@@ -16,21 +16,10 @@ pub fn build() -> Result<PathBuf> {
     paths::check(&fs::read(&wasm)?)?;
     let folder = run::folder("web")?;
     fs::remove_dir_all(&folder)?;
-    let mut files = vec![(wasm, folder.join("drive.wasm"))];
-    for part in ["", "uplot"] {
-        let from = run::root().join("live/page").join(part);
-        for entry in from.read_dir().with_context(|| from.display().to_string())? {
-            let entry = entry?;
-            if entry.file_type()?.is_file() {
-                files.push((entry.path(), folder.join(part).join(entry.file_name())));
-            }
-        }
-        fs::create_dir_all(folder.join(part))?;
-    }
-    let mut bytes = 0;
-    for (from, to) in files {
-        bytes += fs::copy(&from, to).with_context(|| from.display().to_string())?;
-    }
+    files::copy(&run::root().join("live/page"), &folder)?;
+    files::copy_as(&wasm, &folder.join("drive.wasm"))?;
+    let all = files::files(&folder)?;
+    let bytes = all.iter().flat_map(|file| file.metadata()).map(|file| file.len()).sum();
     run::limit("drive in a browser", bytes, FOLDER_BYTES, "bytes")?;
     println!("{}: put it on any server of static files", folder.display());
     Ok(folder)

@@ -20,7 +20,7 @@ pub fn image(board: &str, verbose: bool) -> Result<PathBuf, Error> {
     eprintln!("firmware: built where its source has changed; some minutes the first time");
     let mut command = cargo();
     command.args(["run", "--package", "xtask", "--", "firmware", "--board", board]);
-    command.current_dir(root());
+    command.current_dir(root()?);
     // The last line is the path; the others tell what xtask does.
     let mut lines = lines_of("firmware", command)?;
     let path = lines.pop().map(PathBuf::from);
@@ -43,7 +43,7 @@ pub fn virtual_board() -> Result<PathBuf, Error> {
     let mut command = cargo();
     command.args(["build", "--release", "--bin", "board"]);
     command.arg("--message-format=json-render-diagnostics");
-    command.current_dir(root().join("hil-sim/virtual-board"));
+    command.current_dir(root()?.join("hil-sim/virtual-board"));
     let lines = lines_of("emulator", command)?;
     let program = lines.iter().rev().find_map(|line| executable(line));
     program.ok_or_else(|| failed("emulator", "cargo names no program"))
@@ -107,9 +107,13 @@ fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-fn root() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
+/// The repository: around this program, or around the folder that one is in. A shipped program names no folder of its builder.
+fn root() -> Result<PathBuf, Error> {
+    let places = [std::env::current_exe(), std::env::current_dir()];
+    let mut folders = places.iter().flatten().flat_map(|place| place.ancestors());
+    let root = folders.find(|folder| folder.join("hil-sim/virtual-board").is_dir());
+    let refused = "the virtual board is built in the repository: go there";
+    root.map(Path::to_owned).ok_or_else(|| Error::Refused(refused.into()))
 }
 
 #[cfg(test)]
