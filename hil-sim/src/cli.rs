@@ -66,7 +66,7 @@ enum Command {
     Run {
         /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
         name: String,
-        /// For `profile`: CSV file with the profile
+        /// For `profile`: CSV file with the profile; for `measured-start`: with the recorded start
         #[arg(long = "input", value_name = "FILE")]
         file: Option<PathBuf>,
         #[command(flatten)]

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::cli_common::folder;
+use crate::cli_common::{folder, hil_sim, object, text};
 use crate::common::{TOP, duties};
-use hil_sim::config::Config;
+use hil_sim::config::{Config, plant_settings};
 use hil_sim::experiments::identify_trace::{Reading, Voltages, identify};
 use hil_sim::outcome::Outcome;
 use hil_sim::plant::{
@@ -254,5 +254,38 @@ fn deviations_are_the_scatter_of_the_result_and_grow_when_the_model_is_wrong() {
         println!("{whole:?} {part:?}");
         assert!(apart < 3.0 * whole[n + 2].hypot(part[n + 2]), "{whole:?} and {part:?}");
         assert!(whole[n + 2] > 5.0 * all[0][n + 2], "{whole:?}");
+    }
+}
+
+/// A start of the plant itself is repeated to its noise; with unsaturated leakages it is not.
+#[test]
+fn a_recorded_start_is_compared() {
+    let folder = folder("measured-start");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../motors/measured/laboratory-4kw.toml");
+    let motor = Config::of_motor(Some(file)).expect("a motor");
+    let mut plant = plant_settings(&motor);
+    plant.mechanics.load = steps()[0];
+    let (iron, shaft) = (plant.iron.expect("iron"), Mechanics::new(&plant.mechanics).unwrap());
+    let machine = EnergyMachine::new(&plant.machine, &iron).expect("a machine");
+    let mut start = MotorModel::new(machine, shaft);
+    let (mut rows, mut random) = (Vec::new(), Xoshiro256PlusPlus::seed_from_u64(1));
+    let v = |t: f64| Complex::from_polar(326.6, TAU * 50.0 * t);
+    for k in 0..2000 {
+        let t = f64::from(k) / 5000.0;
+        let i = start.state.electrical.current() + noise(&mut random, 0.03);
+        rows.push((t, v(t), i, start.state.speed * 60.0 / TAU));
+        (0..8).for_each(|n| start.step(v(t + (f64::from(n) + 0.5) * 25e-6), 25e-6));
+    }
+    let path = written(&folder, "start.csv", &rows);
+    let path = path.to_str().expect("letters");
+    for (more, bounds) in
+        [(&[][..], 0.0..2.0), (&["--set", "iron.leakage_saturation=0"], 20.0..90.0)]
+    {
+        let run = ["run", "measured-start", "--input", path, "--motor", file, "--json"];
+        let output = hil_sim(&folder, &[&run[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let share = object(&output)["metrics"]["start_current_percent"].as_f64().expect("a share");
+        println!("{share} %");
+        assert!(bounds.contains(&share), "{share} %");
     }
 }
