@@ -120,16 +120,13 @@ pub(crate) fn read(
     }
     let time = column(TIME)?;
     let h = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-    let off = |row: &usize| (time[*row] - time[row - 1] - h).abs() > JITTER * h.abs();
-    if h <= 0.0 || (1..time.len()).any(|row| off(&row)) {
-        let row = (1..time.len()).find(off).unwrap_or(1);
+    let off = |row: &usize| h <= 0.0 || (time[*row] - time[row - 1] - h).abs() > JITTER * h;
+    if let Some(row) = (1..time.len()).find(off) {
         let step = time[row] - time[row - 1];
-        return Err(columns.at(
-            first + row + 1,
-            format!(
-                "time_s is {step} s after the row before; the rows must be {h} s apart, within 1 %"
-            ),
-        ));
+        let problem = format!(
+            "time_s is {step} s after the row before; the rows must be {h} s apart, within 1 %"
+        );
+        return Err(columns.at(first + row + 1, problem));
     }
     let are_phases = columns.get(names.of(VECTORS[0][0])).is_none()
         && columns.get(names.of(PHASES[0][0])).is_some();
@@ -148,8 +145,7 @@ pub(crate) fn read(
         let common = (square(&sum) / square(&a)).sqrt();
         let last = PHASES[given][2];
         if !third && measured {
-            remarks
-                .push(format!("No {last}: taken as −a −b, though the three need not sum to zero."));
+            remarks.push(format!("No {last}: taken as −a −b; the three need not sum to zero."));
         } else if common > COMMON {
             remarks.push(format!(
                 "{last} and the others have {:.1} % of phase a in common, which is left out: another point than the star point, \
@@ -207,7 +203,7 @@ fn nearest_machine(
         record.fit(&Parameters { r_s, sigma_l_s, l_s, ..*start }, drop_v)
     };
     let left =
-        |fit: &Result<OutputErrorFit, _>| fit.as_ref().map_or(f64::MAX, |fit| fit.residual_a);
+        |fit: &Result<_, _>| fit.as_ref().map_or(f64::MAX, |it: &OutputErrorFit| it.residual_a);
     let fits: Vec<_> = STARTS.par_iter().map(from).collect();
     let nearest = fits.into_iter().min_by(|a, b| left(a).total_cmp(&left(b)));
     nearest.unwrap_or(Err(NotIdentifiable::NotConverged))

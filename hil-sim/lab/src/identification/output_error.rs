@@ -151,7 +151,8 @@ impl Record {
                 let leap = step.rows(0, 4).amax();
                 step *= (1.0 / leap).min(1.0);
                 let mut next = x.clone();
-                *&mut next.rows_mut(0, free) += step;
+                let mut moved = next.rows_mut(0, free);
+                moved += step;
                 let there = self.residual(&next);
                 let lower = there.filter(|there| there.norm_squared() < residual.norm_squared());
                 if let Some(there) = lower {
@@ -205,7 +206,8 @@ impl Record {
             }
             let moved = rest.cholesky().ok_or(NotIdentifiable::PoorExcitation)?;
             let mut other = x.clone();
-            *&mut other.rows_mut(0, free) += moved.solve(&without.tr_mul(&left));
+            let mut changed = other.rows_mut(0, free);
+            changed += moved.solve(&without.tr_mul(&left));
             let (here, there) = (of(x), of(&other));
             for n in 0..5 {
                 squares[n] += (there[n] - here[n]).powi(2);
