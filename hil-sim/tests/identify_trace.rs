@@ -289,3 +289,35 @@ fn a_recorded_start_is_compared() {
         assert!(bounds.contains(&share), "{share} %");
     }
 }
+
+/// With a nameplate the motor of a trace loads; without one it is refused.
+#[test]
+fn the_passport_of_a_trace_is_a_motor() {
+    let folder = folder("identify-passport");
+    written(&folder, "a.csv", &on_the_mains(&IronSettings::LINEAR, 5000.0, steps(), 3));
+    let made = |more: &[&str]| {
+        let trace = ["identify-trace", "--input", "a.csv", "--voltages", "sampled"];
+        hil_sim(&folder, &[&trace, &["--json", "--passport", "a.json"], more].concat())
+    };
+    let output = made(&["--motor", "buildings-4kw"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let path = folder.join("a.json");
+    let motor = Config::of_motor(path.to_str()).expect("a motor");
+    for (found, truth) in [
+        (motor.motor.r_s, MOTOR.rs),
+        (motor.motor.r_r, MOTOR.rr),
+        (motor.motor.l_ls, MOTOR.lls),
+        (motor.motor.l_m, MOTOR.lm),
+    ] {
+        assert!((found / truth - 1.0).abs() < 0.02, "{found}, true {truth}");
+    }
+    assert_eq!((motor.inverter.dc_link_v, motor.drive.nameplate.speed_rpm), (540.0, 1430.0));
+    let output = made(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("--motor"), "{}", text(&output.stderr));
+    let whole = std::fs::read_to_string(&path).unwrap();
+    let lacking = whole.lines().filter(|line| !line.contains("pole_pairs")).collect::<Vec<_>>();
+    std::fs::write(&path, lacking.join("\n")).unwrap();
+    let error = Config::of_motor(path.to_str()).unwrap_err().to_string();
+    assert!(error.contains("these are missing: motor.pole_pairs"), "{error}");
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 36] = [
+const ELSEWHERE: [(&str, &str); 37] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -21,6 +21,7 @@ const ELSEWHERE: [(&str, &str); 36] = [
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo sim update", "needs a port; a test of the virtual board updates it"),
+    ("cargo sim passport", "needs a port; a test makes one from the console"),
     ("cargo sim first-light", "needs a port; a test of the virtual board walks through it"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
     ("cargo sim completion", "prints a script"),

@@ -14,6 +14,7 @@ use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
 use crate::outcome::{self, Origin, Outcome};
+use crate::passport;
 use crate::report::{self, Section};
 
 /// Where the results of a run go.
@@ -50,6 +51,9 @@ pub struct Trace {
     /// Voltage that the inverter loses at each phase current [default: 0; commanded: found]
     #[arg(long, value_name = "V", value_parser = drop_v, allow_negative_numbers = true)]
     drop: Option<f64>,
+    /// Passport of the motor that was found, with nameplate and dc link of --motor
+    #[arg(long, value_name = "FILE.json", requires = "motor")]
+    passport: Option<PathBuf>,
     /// Time of the first row
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     from: Option<f64>,
@@ -195,6 +199,9 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     let (columns, times) = (given.columns.clone(), [from, to]);
     let reading = trace::Reading { columns, voltages, delay, drop_v, times };
     let outcome = trace::identify(&given.file, &reading, &config)?;
+    if let Some(path) = &given.passport {
+        passport::write(&passport::of_trace(&outcome, &config, &given.file), path)?;
+    }
     used::check(trace::EXPERIMENT.name, &[&trace::EXPERIMENT], input)?;
     let mut command = format!("identify-trace --input {}", given.file.display());
     if voltages != Voltages::Commanded {
