@@ -20,6 +20,7 @@ use crate::error::Error;
 use crate::experiments;
 use crate::first_light;
 use crate::input::{Input, OUT};
+use crate::passport;
 use part::Part;
 use run::{Output, Trace};
 
@@ -56,7 +57,7 @@ enum Command {
     },
     /// Every motor that --motor takes; with a name: its numbers, their sources, and the lines for the console
     Motors {
-        /// Name of the motor, or a file that ends in .toml
+        /// Name of the motor, or a file that ends in .toml or .json
         name: Option<String>,
         /// Print a JSON list
         #[arg(long)]
@@ -66,7 +67,7 @@ enum Command {
     Run {
         /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
         name: String,
-        /// For `profile`: CSV file with the profile
+        /// For `profile`: CSV file with the profile; for `measured-start`: with the recorded start
         #[arg(long = "input", value_name = "FILE")]
         file: Option<PathBuf>,
         #[command(flatten)]
@@ -129,6 +130,10 @@ enum Command {
     /// commands of the board itself: reset button, power, end. The end, Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
     /// count; those of the drive do not, for the image has settings of its own: `set` at the console.
     Board(board::Options),
+    /// The passport of a motor, from what the drive measures and learns of it with the shaft locked: one JSON file and one page
+    ///
+    /// --motor FILE.json then loads a twin of the motor. Exit code 2 when the drive or the record does not give it whole.
+    Passport(passport::Options),
     /// Talk to a drive at a serial port: line editor, backup and restore of settings, plots of traces
     ///
     /// For a board and for the pseudo-terminal of `cargo sim board` alike. `!help` lists the commands of this program;
@@ -178,6 +183,7 @@ pub fn main() -> ExitCode {
             clap_complete::generate(shell, &mut Cli::command(), command, &mut text);
             say(&String::from_utf8_lossy(&text))
         }
+        Some(Command::Passport(options)) => passport::run(&options).and_then(|text| say(&text)),
         Some(Command::Board(options)) => board::become_board(&options),
         Some(Command::Console(options)) => console::run(&options),
         Some(Command::Update(options)) => console::update::run(&options),

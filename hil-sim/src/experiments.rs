@@ -32,7 +32,9 @@ use sim_lab::{
     identify_validate, injection_map, learn_reference, modulation, motor_tests, online_tracking,
     perturbation, pi_design, plant_identification, recomputed,
 };
-pub use sim_lab::{identify_trace, measured_motors, saliency, source, warming_rotor};
+pub use sim_lab::{
+    identify_trace, measured_motors, measured_start, saliency, source, warming_rotor,
+};
 
 use statistics::Statistical;
 
@@ -115,7 +117,7 @@ pub const SOURCES: [&str; 20] = [
 ];
 
 /// The experiments that need an input file; they are no part of the report.
-pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE];
+pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE, measured_start::EXPERIMENT];
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
 pub const EVERYDAY: [&str; 10] = [

@@ -43,6 +43,19 @@ pub struct Options {
     pub skip_learning: bool,
 }
 
+/// Set when the person interrupts.
+///
+/// # Errors
+/// [`Error::Internal`].
+pub fn interruptible() -> Result<Arc<AtomicBool>, Error> {
+    let interrupted = Arc::<AtomicBool>::default();
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, interrupted.clone())
+            .map_err(|why| Error::Internal(format!("cannot listen for Ctrl-C: {why}")))?;
+    }
+    Ok(interrupted)
+}
+
 /// Walks through all steps that the evidence does not have.
 ///
 /// # Errors
@@ -50,11 +63,7 @@ pub struct Options {
 /// drive does not answer, or it is not that of the evidence.
 pub fn run(options: &Options) -> Result<(), Error> {
     let table = Table::read()?;
-    let interrupted = Arc::<AtomicBool>::default();
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, interrupted.clone())
-            .map_err(|why| Error::Internal(format!("cannot listen for Ctrl-C: {why}")))?;
-    }
+    let interrupted = interruptible()?;
     let wire = Port::new(&options.port, options.baud, interrupted.clone())?;
     Walk::new(&table, (wire, Terminal::new()?), options.clone(), interrupted)?.run()?;
     println!("\nAll steps were passed or skipped: {}", options.evidence.display());

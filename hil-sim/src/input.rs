@@ -11,7 +11,8 @@ use crate::progress::Progress;
 /// The options that describe a simulation.
 #[derive(Args, Default)]
 pub struct Input {
-    /// Motor with the inverter and the sensors that suit it: a name that `motors` shows, or a file that ends in .toml
+    /// Motor with the inverter and the sensors that suit it: a name that `motors` shows, or a file that ends in .toml, or
+    /// a passport that ends in .json
     #[arg(long, value_name = "NAME")]
     pub motor: Option<String>,
     /// Configuration file, TOML

@@ -8,6 +8,7 @@ pub mod console;
 pub mod experiments;
 pub mod first_light;
 pub mod input;
+pub mod passport;
 mod prelude;
 mod random;
 pub mod report;

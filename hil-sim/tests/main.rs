@@ -22,6 +22,7 @@ mod identification_model;
 mod identification_recursive;
 mod identification_structured;
 mod identification_tables;
+mod identify_trace;
 mod keys_used;
 mod measured_motors;
 mod no_debug_text;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 35] = [
+const ELSEWHERE: [(&str, &str); 37] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -21,6 +21,7 @@ const ELSEWHERE: [(&str, &str); 35] = [
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo sim update", "needs a port; a test of the virtual board updates it"),
+    ("cargo sim passport", "needs a port; a test makes one from the console"),
     ("cargo sim first-light", "needs a port; a test of the virtual board walks through it"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
     ("cargo sim completion", "prints a script"),
@@ -42,6 +43,7 @@ const ELSEWHERE: [(&str, &str); 35] = [
     ("cargo sim run FILE.toml", "a placeholder"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),
     ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
+    ("cargo sim run measured-start --input", "a file of the reader's; a test runs it with a start"),
     ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
     ("cargo flash", "named to be avoided"),
     ("cargo build", "named to be avoided: `cargo firmware` puts the check sum in"),

@@ -25,7 +25,7 @@ fn recorded_trace(changes: &[(&str, &str)]) -> String {
     rig.start(Mode::Torque).expect("a start");
     let mut trace = "time_s,i_alpha_a,i_beta_a,u_alpha_v,u_beta_v,speed_rpm\n".to_owned();
     let mut row = 0;
-    for (magnetising, torque) in [(0.7, 0.5), (1.0, 2.0), (0.5, -1.5), (0.8, 1.0)] {
+    for (magnetising, torque) in [(0.7, 0.5), (1.0, 2.0), (0.6, 1.0), (0.9, 0.4)] {
         rig.command(&Command::Magnetising(magnetising)).expect("a command");
         rig.command(&Command::Torque(torque)).expect("a command");
         for _ in 0..1500 {
@@ -42,7 +42,7 @@ fn recorded_trace(changes: &[(&str, &str)]) -> String {
     trace
 }
 
-/// True parameters are found within 2 % (r_s) and 3 % (the others) from 6000 noisy samples of the default inverter: for the
+/// True parameters are found within 2 % from 6000 noisy samples of the default inverter: for the
 /// motor of the settings, and for another one.
 #[test]
 fn a_simulated_trace_is_identified() {
@@ -62,13 +62,15 @@ fn a_simulated_trace_is_identified() {
         println!("{metrics}");
         for (metric, truth, share) in [
             ("r_s_ohm", r_s, 0.02),
-            ("tau_r_s", tau_r, 0.03),
-            ("sigma_l_s_mh", sigma_l_s, 0.03),
-            ("l_s_mh", l_s, 0.03),
+            ("tau_r_s", tau_r, 0.02),
+            ("sigma_l_s_mh", sigma_l_s, 0.02),
+            ("l_s_mh", l_s, 0.02),
         ] {
             let found = metrics[metric].as_f64().expect(metric);
             assert!((found / truth - 1.0).abs() < share, "{name} {metric}: {found}, true {truth}");
         }
+        // The drive has taken its own drop off.
+        assert!(metrics["drop_v"].as_f64().unwrap() < 0.5);
     }
     // The columns of other tools, by their names; the settings are those of the second motor now.
     let trace = std::fs::read_to_string(folder.join("b.csv")).unwrap();

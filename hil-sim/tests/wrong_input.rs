@@ -25,7 +25,7 @@ const FILES: [(&str, &str); 16] = [
 
 /// Arguments, separated by spaces, and parts of the message.
 #[rustfmt::skip] // a case a line
-const CASES: [(&str, &[&str]); 54] = [
+const CASES: [(&str, &[&str]); 57] = [
     // Commands and names.
     ("rum torque-steps", &["rum", "run"]),
     ("run", &["<NAME>", "cargo sim run"]),
@@ -84,7 +84,10 @@ const CASES: [(&str, &[&str]); 54] = [
     ("run profile --input back.csv", &["back.csv, line 4: time_s = 1 after 2"]),
     ("run profile --input text.csv", &["text.csv, line 3: speed_rpm = `fast`", "finite number"]),
     ("identify-trace --input text.csv --column n=x", &["--column n=x", "allowed: time_s, speed_rpm"]),
-    ("identify-trace --input text.csv --delay 11", &["11", "--delay", "0 to 10 rows"]),
+    ("identify-trace --input text.csv --delay 11", &["11", "--delay", "-1 to 10 rows"]),
+    ("identify-trace --input text.csv --drop -2", &["-2", "--drop", "0 to 100 V"]),
+    ("identify-trace --input text.csv --from soon", &["soon", "--from"]),
+    ("identify-trace --input text.csv --voltages pwm", &["pwm", "--voltages", "commanded, sampled, mean"]),
 ];
 
 /// Further profiles, each with its message.

@@ -6,6 +6,7 @@ mod doubles;
 mod learning;
 mod lists;
 mod numbers;
+mod passport;
 mod staging;
 mod stream;
 mod strip;

@@ -13,6 +13,12 @@ pub struct Columns {
     rows: Vec<(u64, Vec<f64>)>,
 }
 
+/// The beginning of a text of a file, for a message.
+fn cut(text: &str) -> String {
+    let short: String = text.chars().take(60).collect();
+    if short.len() < text.len() { short + "..." } else { short }
+}
+
 impl Columns {
     /// Reads a file. Spaces around names and numbers do not count; lines that begin with `#` are comments.
     ///
@@ -36,6 +42,12 @@ impl Columns {
         let mut reader = builder.from_path(path).map_err(of_csv)?;
         let names: Vec<String> =
             reader.headers().map_err(of_csv)?.iter().map(str::to_owned).collect();
+        let line = cut(&names.join(", "));
+        if names.len() == 1 && line.contains([';', '\t']) {
+            return Err(failed(Some(1), format!("`{line}`: the separator must be a comma")));
+        } else if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return Err(failed(Some(1), format!("`{line}`: the first line must name the columns")));
+        }
         for (n, name) in names.iter().enumerate() {
             if names[..n].contains(name) {
                 return Err(failed(Some(1), format!("two columns are called `{name}`")));
@@ -47,7 +59,10 @@ impl Columns {
             let line = record.position().map_or(0, csv::Position::line);
             let number = |(cell, name): (&str, &String)| match cell.parse::<f64>() {
                 Ok(number) if number.is_finite() => Ok(number),
-                _ => Err(failed(Some(line), format!("{name} = `{cell}` is not a finite number"))),
+                _ => Err(failed(
+                    Some(line),
+                    format!("{} = `{}` is not a finite number", cut(name), cut(cell)),
+                )),
             };
             rows.push((line, record.iter().zip(&names).map(number).collect::<Result<_, _>>()?));
         }
@@ -77,7 +92,7 @@ impl Columns {
     pub fn need(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.get(name).ok_or_else(|| {
             let names = self.names.join(", ");
-            self.error(format!("there is no column `{name}`; the file has: {names}"))
+            self.error(format!("there is no column `{name}`; the file has: {}", cut(&names)))
         })
     }
 

@@ -10,6 +10,7 @@ pub mod file;
 mod key;
 mod keys;
 pub mod motors;
+pub mod passport;
 mod plant;
 mod value;
 mod words;

@@ -120,7 +120,7 @@ impl Error {
         let list = match what {
             "key" => "`keys` shows all of them",
             "experiment" => "`list` and `list --lab` show all of them",
-            _ => "`motors` shows all of them, and a name that ends in .toml is a file",
+            _ => "`motors` shows all of them, and a name that ends in .toml or .json is a file",
         };
         let nearest = nearest(name, known.into_iter()).map(str::to_owned);
         Self::Unknown { what, name: name.to_owned(), nearest, list }

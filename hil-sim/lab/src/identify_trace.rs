@@ -3,13 +3,16 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use drive_settings::value::Words;
+use drive_settings::words;
 use rayon::prelude::*;
 use sim_bench::columns::Columns;
-use sim_bench::error::nearest;
+use sim_bench::error::unknown;
+use sim_bench::plant::clarke;
 use sim_bench::prelude::*;
 
 use crate::identification::output_error::{OutputErrorFit, Record};
-use crate::identification::{Complex, Parameters};
+use crate::identification::{Complex, NotIdentifiable, Parameters};
 
 /// A command of its own, for its options; not in the list of experiments.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -23,20 +26,63 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const TIME: &str = "time_s";
 const SPEED: &str = "speed_rpm";
-/// Voltages and currents as vectors, or of the phases a and b; the three phases sum to zero.
-const VECTORS: [&str; 4] = ["u_alpha_v", "u_beta_v", "i_alpha_a", "i_beta_a"];
-const PHASES: [&str; 4] = ["u_a_v", "u_b_v", "i_a_a", "i_b_a"];
+/// Voltages and currents, as vectors or of the phases. The third phase may be absent.
+const VECTORS: [&[&str]; 2] = [&["u_alpha_v", "u_beta_v"], &["i_alpha_a", "i_beta_a"]];
+const PHASES: [&[&str]; 2] = [&["u_a_v", "u_b_v", "u_c_v"], &["i_a_a", "i_b_a", "i_c_a"]];
 /// Largest relative difference of two sampling periods.
 const JITTER: f64 = 0.01;
+/// Remark on a drop at its bound.
+const BOUND: &str = "The drop of the inverter would come out negative, which none is: it is held at 0. Are the voltages those of the \
+                     terminals (--voltages sampled or mean)?";
 /// Starts of the fit: factors of the resistance and of the inductances of the settings.
 const STARTS: [f64; 3] = [1.0, 0.2, 5.0];
+/// Largest deviation of a parameter, relative to it, and largest residual, relative to the current, of a record that tells the
+/// motor.
+const OPEN: f64 = 0.3;
+/// Residual, relative to the current, that a remark names.
+const REMARKED: f64 = 0.05;
+/// Part that the three phases have in common, relative to phase a, that a remark names.
+const COMMON: f64 = 0.01;
+/// Smallest share of the current by which a rotor time constant twice as long must show. With less, an error of the record of
+/// some percent, which harmonics and iron loss are, is more than what the slip tells.
+const TOLD: f64 = 0.1;
+/// Share to which the residual must fall for the speed to be taken for another quantity.
+const NEARER: f64 = 0.3;
+
+words! {
+    /// What the voltages of a record are.
+    pub enum Voltages {
+        /// Those a drive asks for: held over a row, less the drop of its inverter.
+        Commanded = "commanded",
+        /// Samples at the terminals, at the instants of the currents; straight between them.
+        Sampled = "sampled",
+        /// Means at the terminals from a row to the next.
+        Mean = "mean",
+    }
+}
+
+/// What is read of a file, and how.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Other names of columns, each `OURS=THEIRS`.
+    pub columns: Vec<String>,
+    /// What the voltages are.
+    pub voltages: Voltages,
+    /// Rows after the currents of a row at which its voltage acts; unset: 0 for a voltage at the terminals, for a commanded one
+    /// 1 and the delay of the current filter.
+    pub delay: Option<f64>,
+    /// Drop of the inverter, V; unset: none of a voltage at the terminals, found of a commanded one.
+    pub drop_v: Option<f64>,
+    /// Times of the first and the last row, s; unset: all.
+    pub times: [Option<f64>; 2],
+}
 
 /// Names of the columns in the file, by ours.
 struct Names(Vec<(String, String)>);
 
 impl Names {
     fn new(mapping: &[String]) -> Result<Self, Error> {
-        let known = [&[TIME, SPEED], &VECTORS[..], &PHASES].concat();
+        let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
         let pair = |given: &String| {
             let Some((ours, theirs)) = given.split_once('=') else {
                 return Err(Error::Refused(format!(
@@ -44,12 +90,8 @@ impl Names {
                 )));
             };
             if !known.contains(&ours) {
-                let guess = nearest(ours, known.iter().copied())
-                    .map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-                let known = known.join(", ");
-                return Err(Error::Refused(format!(
-                    "--column {given}: there is no column `{ours}`{guess}; allowed: {known}"
-                )));
+                let problem = unknown("column", ours, &known);
+                return Err(Error::Refused(format!("--column {given}: {problem}")));
             }
             Ok((ours.to_owned(), theirs.to_owned()))
         };
@@ -62,50 +104,83 @@ impl Names {
     }
 }
 
-fn read(path: &Path, names: &Names, delay: Option<f64>, config: &Config) -> Result<Record, Error> {
-    let columns = Columns::read(path)?;
-    let column = |ours: &str| columns.need(names.of(ours));
+/// A record, and what is to be said of its file.
+pub(crate) fn read(
+    path: &Path,
+    reading: &Reading,
+    config: &Config,
+) -> Result<(Record, Vec<String>), Error> {
+    let (names, columns) = (Names::new(&reading.columns)?, Columns::read(path)?);
+    let (all, [from, to]) = (columns.need(names.of(TIME))?, reading.times);
+    let first = from.map_or(0, |from| all.partition_point(|time| *time < from));
+    let end = to.map_or(all.len(), |to| all.partition_point(|time| *time <= to)).max(first);
+    let column = |ours: &str| columns.need(names.of(ours)).map(|all| all[first..end].to_vec());
+    if end - first < 100 {
+        return Err(columns.error(format!("{} rows; at least 100 are needed", end - first)));
+    }
     let time = column(TIME)?;
-    if time.len() < 100 {
-        return Err(columns.error(format!("{} rows; at least 100 are needed", time.len())));
-    }
     let h = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-    let off = |row: &usize| (time[*row] - time[row - 1] - h).abs() > JITTER * h.abs();
-    if h <= 0.0 || (1..time.len()).any(|row| off(&row)) {
-        let row = (1..time.len()).find(off).unwrap_or(1);
+    let off = |row: &usize| h <= 0.0 || (time[*row] - time[row - 1] - h).abs() > JITTER * h;
+    if let Some(row) = (1..time.len()).find(off) {
         let step = time[row] - time[row - 1];
-        return Err(columns.at(
-            row + 1,
-            format!(
-                "time_s is {step} s after the row before; the rows must be {h} s apart, within 1 %"
-            ),
-        ));
+        let problem = format!(
+            "time_s is {step} s after the row before; the rows must be {h} s apart, within 1 %"
+        );
+        return Err(columns.at(first + row + 1, problem));
     }
-    let speed = column(SPEED)?;
-    let are_phases =
-        columns.get(names.of(VECTORS[0])).is_none() && columns.get(names.of(PHASES[0])).is_some();
-    let given = if are_phases { PHASES } else { VECTORS };
-    let [u0, u1, i0, i1] = given.map(column);
-    let vectors = |first: Vec<f64>, second: Vec<f64>| -> Vec<Complex> {
-        let vector = |(a, b): (f64, f64)| match are_phases {
-            // Eq. 2.3 with a + b + c = 0.
-            true => Complex::new(a, (a + 2.0 * b) / 3.0_f64.sqrt()),
-            false => Complex::new(a, b),
-        };
-        first.into_iter().zip(second).map(vector).collect()
+    let are_phases = columns.get(names.of(VECTORS[0][0])).is_none()
+        && columns.get(names.of(PHASES[0][0])).is_some();
+    let (mut remarks, measured) = (Vec::new(), reading.voltages != Voltages::Commanded);
+    let mut vectors = |given: usize| -> Result<Vec<Complex>, Error> {
+        if !are_phases {
+            let [re, im] = [0, 1].map(|n| column(VECTORS[given][n]));
+            return Ok(re?.into_iter().zip(im?).map(|(re, im)| Complex::new(re, im)).collect());
+        }
+        let [a, b, c] = [0, 1, 2].map(|n| column(PHASES[given][n]));
+        let (a, b, third) = (a?, b?, c.is_ok());
+        let c = c.unwrap_or_else(|_| a.iter().zip(&b).map(|(a, b)| -a - b).collect());
+        let of = |k: usize| [a[k], b[k], c[k]];
+        let sum: Vec<f64> = (0..a.len()).map(|k| of(k).iter().sum::<f64>() / 3.0).collect();
+        let square = |of: &[f64]| of.iter().map(|x| x * x).sum::<f64>();
+        let common = (square(&sum) / square(&a)).sqrt();
+        let last = PHASES[given][2];
+        if !third && measured {
+            remarks.push(format!("No {last}: taken as −a −b; the three need not sum to zero."));
+        } else if common > COMMON {
+            remarks.push(format!(
+                "{last} and the others have {:.1} % of phase a in common, which is left out: another point than the star point, \
+                 an offset, or another scale.",
+                100.0 * common
+            ));
+        }
+        Ok((0..a.len()).map(|k| clarke(of(k))).collect())
     };
-    let (v, i) = (vectors(u0?, u1?), vectors(i0?, i1?));
-    let delay = delay.unwrap_or(1.0 + f64::from(config.drive.scales.current_age_s()) / h);
+    let (v, i) = (vectors(0)?, vectors(1)?);
+    let age = 1.0 + f64::from(config.drive.scales.current_age_s()) / h;
+    let delay = reading.delay.unwrap_or(if measured { 0.0 } else { age });
     let to_rad_s = TAU / 60.0 * f64::from(config.motor.pole_pairs);
-    let omega_m = speed.into_iter().map(|rpm| rpm * to_rad_s).collect();
-    Ok(Record { h, v: delayed(&v, delay), i, omega_m })
+    // The mean of the row.
+    let mut omega_m: Vec<f64> = column(SPEED)?.into_iter().map(|rpm| rpm * to_rad_s).collect();
+    (1..omega_m.len()).for_each(|k| omega_m[k - 1] = 0.5 * (omega_m[k - 1] + omega_m[k]));
+    let (v, sampled) = (delayed(&v, delay), reading.voltages == Voltages::Sampled);
+    let v = if sampled { curved(&v) } else { v };
+    Ok((Record { h, v, sampled, i, omega_m }, remarks))
 }
 
-/// A signal some samples later; the first value before its beginning.
+/// A signal some samples later, straight between them; the first and the last value beyond its ends.
 fn delayed(signal: &[Complex], samples: f64) -> Vec<Complex> {
-    let (whole, share) = (samples.floor() as usize, samples.fract());
-    let at = |k: usize| signal[k.saturating_sub(whole)];
-    (0..signal.len()).map(|k| at(k) * (1.0 - share) + at(k.saturating_sub(1)) * share).collect()
+    let at = |k: f64| signal[(k.max(0.0) as usize).min(signal.len() - 1)];
+    let late =
+        |k: f64| at(k.floor()) * (1.0 - k + k.floor()) + at(k.floor() + 1.0) * (k - k.floor());
+    (0..signal.len()).map(|k| late(k as f64 - samples)).collect()
+}
+
+/// Samples whose straight connection has the integral of a smooth line through the given ones: a sine of 40 samples would
+/// otherwise be 0.2 % small.
+fn curved(v: &[Complex]) -> Vec<Complex> {
+    let mut curved = v.to_vec();
+    (1..v.len() - 1).for_each(|k| curved[k] -= (v[k - 1] + v[k + 1] - v[k] * 2.0) / 12.0);
+    curved
 }
 
 /// The machine of the settings, as the terminals show it.
@@ -116,79 +191,140 @@ fn settings(config: &Config) -> Parameters {
     Parameters { r_s: m.r_s, tau_r: l_r / m.r_r, sigma_l_s, l_s, omega_m: 0.0 }
 }
 
+/// The machine nearest to a record, from the best of all starts.
+fn nearest_machine(
+    record: &Record,
+    start: &Parameters,
+    drop_v: Option<f64>,
+) -> Result<OutputErrorFit, NotIdentifiable> {
+    let from = |factor: &f64| {
+        let Parameters { r_s, sigma_l_s, l_s, .. } = *start;
+        let [r_s, sigma_l_s, l_s] = [r_s, sigma_l_s, l_s].map(|value| value * factor);
+        record.fit(&Parameters { r_s, sigma_l_s, l_s, ..*start }, drop_v)
+    };
+    let left =
+        |fit: &Result<_, _>| fit.as_ref().map_or(f64::MAX, |it: &OutputErrorFit| it.residual_a);
+    let fits: Vec<_> = STARTS.par_iter().map(from).collect();
+    let nearest = fits.into_iter().min_by(|a, b| left(a).total_cmp(&left(b)));
+    nearest.unwrap_or(Err(NotIdentifiable::NotConverged))
+}
+
+/// Length of a current, rms.
+pub(crate) fn rms(current: &[Complex]) -> f64 {
+    (current.iter().map(Complex::norm_sqr).sum::<f64>() / current.len() as f64).sqrt()
+}
+
+/// Why a fit does not count, if it does not.
+fn fault(fit: &OutputErrorFit, current_a: f64) -> Option<String> {
+    let [share, told] = [fit.residual_a, fit.told_a[1]].map(|a| 100.0 * a / current_a);
+    let values = fit.parameters.array();
+    let open = (0..4).find(|&n| fit.deviations[n] > OPEN * values[n]);
+    match open {
+        _ if share > 100.0 * OPEN => {
+            Some(format!("the nearest machine leaves {share:.0} % of the current"))
+        }
+        _ if told < 100.0 * TOLD => Some(format!(
+            "no load: the slip is too small to tell the time constant of the rotor; were it twice as long, the current would change \
+             by {told:.1} %, and {:.0} % are needed",
+            100.0 * TOLD
+        )),
+        _ if !fit.converged => Some(NotIdentifiable::NotConverged.to_string()),
+        Some(n) => {
+            let (name, value, deviation) = (Parameters::NAMES[n], values[n], fit.deviations[n]);
+            Some(format!("it leaves {name} open: {value:.3e} ± {deviation:.1e}, SI units"))
+        }
+        None => None,
+    }
+}
+
 /// Identifies the motor from a CSV file with the columns `time_s`, `speed_rpm`, and `u_alpha_v`, `u_beta_v`, `i_alpha_a`,
-/// `i_beta_a` or `u_a_v`, `u_b_v`, `i_a_a`, `i_b_a`; `mapping` names others, each `OURS=THEIRS`. A voltage acts `delay`
-/// rows after the currents of its row; unset: one, as the drive records it, and the delay of its current filter.
+/// `i_beta_a` or `u_a_v`, `u_b_v`, `u_c_v`, `i_a_a`, `i_b_a`, `i_c_a`, of which phase c may be absent.
 ///
 /// # Errors
-/// [`Error::Data`] with the line; [`Error::Refused`] for a wrong mapping, and when the record does not determine the
-/// motor.
-pub fn identify(
-    path: &Path,
-    mapping: &[String],
-    delay: Option<f64>,
-    config: &Config,
-) -> Result<Outcome, Error> {
-    let record = read(path, &Names::new(mapping)?, delay, config)?;
-    let expected = settings(config);
-    let fits: Vec<_> = STARTS
-        .par_iter()
-        .map(|factor| {
-            let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = expected;
-            let (r_s, sigma_l_s, l_s) = (r_s * factor, sigma_l_s * factor, l_s * factor);
-            record.fit(&Parameters { r_s, tau_r, sigma_l_s, l_s, omega_m: 0.0 })
-        })
-        .collect();
-    let reason = fits[0].as_ref().err().copied();
-    let best = fits.into_iter().flatten().min_by(|a, b| a.residual_a.total_cmp(&b.residual_a));
-    let Some(fit) = best else {
-        let reason = reason.map_or(String::new(), |reason| reason.to_string());
+/// [`Error::Data`] with the line; [`Error::Refused`] for a wrong mapping, and with the likely reason when the record does not
+/// determine the motor.
+pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outcome, Error> {
+    let (record, mut remarks) = read(path, reading, config)?;
+    let refused = |why: String| {
         let path = path.display();
-        return Err(Error::Refused(format!(
-            "{path}: the trace does not determine the motor: {reason}"
-        )));
+        Error::Refused(format!("{path}: the record does not determine the motor: {why}"))
     };
-    Ok(outcome(&record, &fit, &expected, config))
+    let expected = settings(config);
+    // In electrical radians: an offset of the speed is no turning.
+    let speed = (record.omega_m.iter().map(|w| w * w).sum::<f64>() / record.i.len() as f64).sqrt();
+    if speed * record.h * (record.i.len() as f64) < TAU {
+        let why = "the shaft does not turn; a locked rotor shows neither L_s nor the time constant at small slip";
+        return Err(refused(why.to_owned()));
+    }
+    let terminals = reading.voltages != Voltages::Commanded;
+    let drop_v = reading.drop_v.or(terminals.then_some(0.0));
+    let nearest = |record: &Record| nearest_machine(record, &expected, drop_v);
+    let (current_a, fit) =
+        (rms(&record.i), nearest(&record).map_err(|why| refused(why.to_string()))?);
+    let Some(why) = fault(&fit, current_a) else {
+        if drop_v.is_none() && fit.drop_v == 0.0 {
+            remarks.push(BOUND.to_owned());
+        }
+        return Ok(outcome(&record, &fit, &expected, remarks, config));
+    };
+    let pairs = f64::from(config.motor.pole_pairs);
+    let read_as = [
+        (60.0 / TAU, "rad/s"),
+        (60.0, "turns a second"),
+        (1.0 / pairs, "electrical"),
+        (-1.0, "of the other sense"),
+    ];
+    let other = read_as.iter().find(|(factor, _)| {
+        let omega_m = record.omega_m.iter().map(|w| w * factor).collect();
+        let other = Record { omega_m, ..record.clone() };
+        nearest(&other).is_ok_and(|it| it.residual_a < NEARER * fit.residual_a)
+    });
+    let hint = other.map(|(_, what)| format!("; the speed looks like {what}: so it fits"));
+    Err(refused(why + &hint.unwrap_or_default()))
 }
 
 fn outcome(
     record: &Record,
     fit: &OutputErrorFit,
     expected: &Parameters,
+    remarks: Vec<String>,
     config: &Config,
 ) -> Outcome {
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome { remarks, ..Outcome::default() };
     let p = &fit.parameters;
     let rows = [
         ("stator resistance r_s", "r_s", "ohm", p.r_s, expected.r_s, 1.0),
         ("rotor time constant τ_r", "tau_r", "s", p.tau_r, expected.tau_r, 1.0),
         ("transient inductance σL_s", "sigma_l_s", "mH", p.sigma_l_s, expected.sigma_l_s, 1e3),
         ("stator inductance L_s", "l_s", "mH", p.l_s, expected.l_s, 1e3),
+        ("drop of the inverter", "drop", "V", fit.drop_v, f64::NAN, 1.0),
     ];
+    let share = fit.residual_a / rms(&record.i);
     let mut table = Table::new("Identified motor", &[]).note(format!(
-        "{} rows of {:.1} µs. ±: standard deviation, for a white residual; a false voltage or current scale is not in it. \
-         Settings: {}.",
+        "{} rows of {:.1} µs. ±: standard deviation between parts of the record; a false scale of voltage, current or speed is \
+         not in it. Residual: {:.1} % of the current. Settings: {}.",
         record.i.len(),
         1e6 * record.h,
+        100.0 * share,
         config.motor_text()
     ));
     for ((label, name, unit, found, set, scale), deviation) in rows.into_iter().zip(fit.deviations)
     {
+        let of_settings = |cell: Cell| if set.is_nan() { Cell::from("–") } else { cell };
         table.record([
             ("parameter", Cell::from(label)),
             ("unit", Cell::from(unit)),
             ("identified", Cell::significant(scale * found, 4)),
             ("±", Cell::significant(scale * deviation, 2)),
-            ("settings", Cell::significant(scale * set, 4)),
-            ("difference (%)", Cell::fixed(100.0 * (found / set - 1.0), 1)),
+            ("settings", of_settings(Cell::significant(scale * set, 4))),
+            ("difference (%)", of_settings(Cell::fixed(100.0 * (found / set - 1.0), 1))),
         ]);
         let unit = unit.to_lowercase();
         outcome.metrics.set(format!("{name}_{unit}"), scale * found);
         outcome.metrics.set(format!("{name}_deviation_{unit}"), scale * deviation);
     }
-    outcome.metrics.set("drop_v", fit.drop_v);
-    outcome.metrics.set("drop_deviation_v", fit.deviations[4]);
     outcome.metrics.set("residual_rms_a", fit.residual_a);
+    outcome.metrics.set("residual_percent", 100.0 * share);
     outcome.tables.push(table);
     let line = |of: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
         (0..record.i.len()).map(|k| (k as f64 * record.h, of(k))).collect()
@@ -208,6 +344,11 @@ fn outcome(
                     .with(Series::line("β", line(&|k| difference(k).im))),
             ),
     );
+    if share > REMARKED {
+        outcome.remark(
+            "The residual is large: harmonics, a leakage that saturates, or a false scale.",
+        );
+    }
     outcome.remark(
         "The terminals determine four parameters. A T circuit with L_ls = L_lr has L_m = √(L_s (L_s − σL_s)), and \
          r_r = L_s/τ_r.",

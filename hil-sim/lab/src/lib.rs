@@ -19,6 +19,7 @@ pub mod injection_map;
 pub mod learn_reference;
 mod linear_model;
 pub mod measured_motors;
+pub mod measured_start;
 pub mod modulation;
 pub mod motor_tests;
 pub mod online_tracking;

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use drive_settings::value::Words as _;
+use trace::Voltages;
 
 use super::part::Part;
 use super::{say, used};
@@ -12,6 +14,7 @@ use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
 use crate::outcome::{self, Origin, Outcome};
+use crate::passport;
 use crate::report::{self, Section};
 
 /// Where the results of a run go.
@@ -37,15 +40,41 @@ pub struct Trace {
     /// Another name of a column in the file; can be given many times
     #[arg(long = "column", value_name = "OURS=THEIRS")]
     columns: Vec<String>,
-    /// Rows by which a voltage acts after the currents of its row; 0 for measured voltages [default: 1 and the delay of
-    /// the current filter, as the drive records it]
+    /// What the voltages are: `commanded` by a drive that recorded them; measured at the terminals, `sampled` when the currents
+    /// are, or `mean` from a row to the next
+    #[arg(long, value_name = "KIND", value_parser = voltages, default_value = "commanded")]
+    voltages: Voltages,
+    /// Rows by which a voltage acts after the currents of its row [default: 0; commanded: 1 and the delay of the current
+    /// filter, as the drive records it]
     #[arg(long, value_name = "ROWS", value_parser = delay, allow_negative_numbers = true)]
     delay: Option<f64>,
+    /// Voltage that the inverter loses at each phase current [default: 0; commanded: found]
+    #[arg(long, value_name = "V", value_parser = drop_v, allow_negative_numbers = true)]
+    drop: Option<f64>,
+    /// Passport of the motor that was found, with nameplate and dc link of --motor
+    #[arg(long, value_name = "FILE.json", requires = "motor")]
+    passport: Option<PathBuf>,
+    /// Time of the first row
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// Time of the last row
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    to: Option<f64>,
+}
+
+fn voltages(text: &str) -> Result<Voltages, String> {
+    let known = Voltages::VALUES.iter().find(|kind| kind.word() == text);
+    known.copied().ok_or_else(|| format!("allowed: {}", Voltages::WORDS.join(", ")))
 }
 
 fn delay(text: &str) -> Result<f64, String> {
-    let rows = text.parse().ok().filter(|rows| (0.0..=10.0).contains(rows));
-    rows.ok_or_else(|| "allowed: 0 to 10 rows".to_owned())
+    let rows = text.parse().ok().filter(|rows| (-1.0..=10.0).contains(rows));
+    rows.ok_or_else(|| "allowed: -1 to 10 rows".to_owned())
+}
+
+fn drop_v(text: &str) -> Result<f64, String> {
+    let drop_v = text.parse().ok().filter(|drop_v| (0.0..=100.0).contains(drop_v));
+    drop_v.ok_or_else(|| "allowed: 0 to 100 V".to_owned())
 }
 
 /// A run, as the functions that write its results need it.
@@ -166,11 +195,20 @@ pub fn run(
 /// As [`trace::identify`], [`Input::config`]; [`Error::Write`].
 pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(), Error> {
     let config = input.config()?;
-    let outcome = trace::identify(&given.file, &given.columns, given.delay, &config)?;
+    let Trace { voltages, delay, drop: drop_v, from, to, .. } = *given;
+    let (columns, times) = (given.columns.clone(), [from, to]);
+    let reading = trace::Reading { columns, voltages, delay, drop_v, times };
+    let outcome = trace::identify(&given.file, &reading, &config)?;
+    if let Some(path) = &given.passport {
+        passport::write(&passport::of_trace(&outcome, &config, &given.file), path)?;
+    }
     used::check(trace::EXPERIMENT.name, &[&trace::EXPERIMENT], input)?;
     let mut command = format!("identify-trace --input {}", given.file.display());
-    if let Some(delay) = given.delay {
-        command.push_str(&format!(" --delay {delay}"));
+    if voltages != Voltages::Commanded {
+        command.push_str(&format!(" --voltages {}", voltages.word()));
+    }
+    for (name, value) in [("delay", delay), ("drop", drop_v), ("from", from), ("to", to)] {
+        command.extend(value.map(|value| format!(" --{name} {value}")));
     }
     for column in &given.columns {
         command.push_str(&format!(" --column {column}"));

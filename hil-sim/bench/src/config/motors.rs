@@ -8,13 +8,14 @@ use std::path::Path;
 use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
+use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
 use crate::error::Error;
 
 static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
 
 /// What a file of one's own must say, because no rule gives it and nothing of another motor may stand in for it.
-const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
+pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
 /// Where numbers of a motor come from.
@@ -33,7 +34,7 @@ pub struct Source {
 /// A motor with the inverter and the sensors that suit it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Motor {
-    /// Name on the command line: that of the file; with `.toml` for a file of one's own.
+    /// Name on the command line: that of the file; with `.toml` for a file of one's own, with `.json` for a passport.
     #[serde(skip)]
     pub name: String,
     /// Rated data in a line.
@@ -58,16 +59,19 @@ impl Motor {
         all
     }
 
-    /// The motor with this name, or of this file when the name ends in `.toml`.
+    /// The motor with this name, or of this file when the name ends in `.toml`, or, a passport, in `.json`.
     ///
     /// # Errors
     /// [`Error::Unknown`] with the most similar name; [`Error::ConfigFile`].
     pub fn find(name: &str) -> Result<Self, Error> {
-        if name.ends_with(".toml") {
+        if is_file(name) {
             let path = Path::new(name);
             let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
-            return parse(name, &text).map_err(|e| failed(e.to_string()));
+            return match name.ends_with(".json") {
+                true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),
+                false => parse(name, &text).map_err(|e| failed(e.to_string())),
+            };
         }
         let all = Self::all();
         let names = || all.iter().map(|motor| motor.name.as_str());
@@ -95,7 +99,7 @@ impl Motor {
 
     /// Whether it is a file of one's own; the others come with the program.
     fn is_own(&self) -> bool {
-        self.name.ends_with(".toml")
+        is_file(&self.name)
     }
 
     /// Sets the keys of the file, and those that a file of one's own leaves to [`implied`](Self::implied).
@@ -162,6 +166,16 @@ impl Motor {
             .map(|key| format!("set {} {}", key.name(), key.get(&config)))
             .collect()
     }
+}
+
+/// Whether a motor of this name is a file of one's own.
+fn is_file(name: &str) -> bool {
+    [".toml", ".json"].iter().any(|end| name.ends_with(end))
+}
+
+fn of_passport(name: &str, Passport { image, twin, .. }: Passport) -> Motor {
+    let (name, about, source) = (name.to_owned(), String::new(), Vec::new());
+    Motor { name, title: format!("passport, {image}"), about, source, settings: twin }
 }
 
 fn embedded(path: &Path) -> Option<Motor> {

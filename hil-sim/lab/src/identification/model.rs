@@ -120,6 +120,18 @@ impl Continuous {
         Step { e: product(&integral, &ah), h: times(&integral, &self.b.map(|b| b * h)) }
     }
 
+    /// Change of the state over `h` s, A, by a voltage that rises by 1 V from 0: the sum of `(A h)^n B h/(n + 2)!`, up to the
+    /// power `order` of `h`.
+    pub fn ramp(&self, h: f64, order: u32) -> Column {
+        let mut term = self.b.map(|b| b * (0.5 * h));
+        let mut sum = term;
+        for n in 2..=order {
+            term = times(&self.a, &term).map(|x| x * (h / f64::from(n + 1)));
+            sum = [0, 1].map(|k| sum[k] + term[k]);
+        }
+        sum
+    }
+
     /// The exact step over `h` s at constant voltage: F = e^(A h) by scaling and squaring.
     pub fn exact(&self, h: f64) -> Step {
         let norm = self.a.iter().flatten().map(|x| x.norm()).fold(0.0, f64::max) * h;

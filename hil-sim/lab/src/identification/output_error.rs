@@ -1,10 +1,13 @@
 //! Output-error fit: the machine whose simulated current is nearest to a recorded one, at the recorded voltage and speed.
 //!
-//! The unknowns are the four parameters, the voltage drop of the inverter that goes with the sign of each phase current,
-//! and the state at the first sample. Minimised is the sum of the squared differences of the currents, by Levenberg and
-//! Marquardt's method. Noise of the current does not bias the fit, as it does a regression with measured currents as
-//! regressors. Uncertainties are standard deviations from the residual and the sensitivity of the current (L. Ljung,
-//! "System Identification", 1999, section 9.4), for a white residual.
+//! The unknowns are the four parameters, the state at the first sample and, unless it is given, the voltage drop of the
+//! inverter that goes with the sign of each phase current. Minimised is the sum of the squared differences of the currents, by
+//! Levenberg and Marquardt's method. Noise of the current does not bias the fit, as it does a regression with measured
+//! currents as regressors.
+//!
+//! A residual is seldom white: it holds harmonics, saturation, a speed that errs. So deviations are those of fits that leave
+//! out a part of the record each (delete-a-group jackknife: J. Shao, D. Tu, "The Jackknife and Bootstrap", 1995, section 2.3),
+//! every part in turn, each by one step of Gauss and Newton.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,21 +20,25 @@ const STEPS: u32 = 60;
 /// A fit has converged when a step lowers the squared error by less than this share.
 const CONVERGED: f64 = 1e-8;
 /// The sampled equation is computed anew when the speed has changed by this much, rad/s.
-const SPEED_STEP: f64 = 0.05;
+const SPEED_STEP: f64 = 0.002;
 /// Order of the series of the sampled equation; see [`Continuous::series`](super::Continuous::series).
 const ORDER: u32 = 5;
-/// Parameters, drop, rotor state, current.
+/// Parameters, rotor state, current, drop.
 const UNKNOWNS: usize = 9;
-/// Steps of the numeric derivative: relative, V, A.
-const DERIVATIVE: [f64; UNKNOWNS] = [1e-5, 1e-5, 1e-5, 1e-5, 1e-3, 1e-4, 1e-4, 1e-4, 1e-4];
+/// Steps of the numeric derivative: relative, A, V.
+const DERIVATIVE: [f64; UNKNOWNS] = [1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3];
+/// Parts of the record, each left out once.
+const PARTS: usize = 10;
 
 /// A record of a machine, one value a sampling period.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     /// Sampling period, s.
     pub h: f64,
-    /// Stator voltage that acts from sample k to k+1, V.
+    /// Stator voltage, V: what acts from sample k to k+1, or the samples themselves, between which it is straight.
     pub v: Vec<Complex>,
+    /// Whether `v` are samples.
+    pub sampled: bool,
     /// Stator current, A.
     pub i: Vec<Complex>,
     /// Speed of the rotor, electrical rad/s.
@@ -43,10 +50,14 @@ pub struct Record {
 pub struct OutputErrorFit {
     /// The machine; its speed is the mean of the record.
     pub parameters: Parameters,
-    /// Drop of a phase with the sign of its current, V.
+    /// Drop of a phase with the sign of its current, V; not negative.
     pub drop_v: f64,
-    /// Standard deviations: of the first four parameters in their units, and of the drop, V.
+    /// Standard deviations: of the first four parameters in their units, and of the drop, V; that of a given drop is 0.
     pub deviations: [f64; 5],
+    /// Change of the current that each parameter alone can make, all else fitted anew: rms per relative change, A.
+    pub told_a: [f64; 4],
+    /// Whether further steps would change next to nothing.
+    pub converged: bool,
     /// Simulated current, A.
     pub current: Vec<Complex>,
     /// Difference of the currents, rms of the length, A.
@@ -62,17 +73,25 @@ impl Record {
 
     /// The current that the machine would have had.
     fn simulate(&self, x: &DVector<f64>) -> Vec<Complex> {
-        let mut state = [Complex::new(x[7], x[8]), Complex::new(x[5], x[6])];
+        let mut state = [Complex::new(x[6], x[7]), Complex::new(x[4], x[5])];
         let mut speed = f64::INFINITY;
-        let mut step = Self::machine(x, 0.0).continuous().series(self.h, 1);
+        let (mut step, mut ramp) = (Self::machine(x, 0.0).continuous().series(self.h, 1), None);
+        let at = |k: usize| self.v[k] - signs(self.i[k]) * x[8];
         let mut current = Vec::with_capacity(self.i.len());
-        for ((v, i), omega_m) in self.v.iter().zip(&self.i).zip(&self.omega_m) {
+        for (k, omega_m) in self.omega_m.iter().enumerate() {
             current.push(state[0]);
             if (omega_m - speed).abs() > SPEED_STEP || !speed.is_finite() {
                 speed = *omega_m;
-                step = Self::machine(x, speed).continuous().series(self.h, ORDER);
+                let machine = Self::machine(x, speed).continuous();
+                step = machine.series(self.h, ORDER);
+                ramp = self.sampled.then(|| machine.ramp(self.h, ORDER));
             }
-            state = step.advance(state, v - signs(*i) * x[4]);
+            let v = at(k);
+            state = step.advance(state, v);
+            if let (Some(ramp), true) = (ramp, k + 1 < self.v.len()) {
+                let rise = at(k + 1) - v;
+                state = [0, 1].map(|n| state[n] + ramp[n] * rise);
+            }
         }
         current
     }
@@ -85,9 +104,9 @@ impl Record {
         residual.iter().all(|r| r.is_finite()).then_some(residual)
     }
 
-    fn jacobian(&self, x: &DVector<f64>, at: &DVector<f64>) -> Option<DMatrix<f64>> {
-        let mut jacobian = DMatrix::zeros(at.len(), UNKNOWNS);
-        for (column, step) in DERIVATIVE.into_iter().enumerate() {
+    fn jacobian(&self, x: &DVector<f64>, at: &DVector<f64>, free: usize) -> Option<DMatrix<f64>> {
+        let mut jacobian = DMatrix::zeros(at.len(), free);
+        for (column, step) in DERIVATIVE.into_iter().enumerate().take(free) {
             let mut moved = x.clone();
             moved[column] += step;
             jacobian.set_column(column, &((self.residual(&moved)? - at) / step));
@@ -95,12 +114,16 @@ impl Record {
         Some(jacobian)
     }
 
-    /// The machine that fits best, from this start.
+    /// The machine that fits best, from this start, with the given drop, V, or one that is found: 0 where it would be negative.
     ///
     /// # Errors
     /// [`NotIdentifiable::TooFewSamples`]; [`NotIdentifiable::NotFinite`]; [`NotIdentifiable::PoorExcitation`] when the
-    /// record leaves a parameter open; [`NotIdentifiable::NotConverged`].
-    pub fn fit(&self, start: &Parameters) -> Result<OutputErrorFit, NotIdentifiable> {
+    /// record leaves a parameter open.
+    pub fn fit(
+        &self,
+        start: &Parameters,
+        drop_v: Option<f64>,
+    ) -> Result<OutputErrorFit, NotIdentifiable> {
         let count = self.i.len();
         if count < 2 * UNKNOWNS || self.v.len() != count || self.omega_m.len() != count {
             return Err(NotIdentifiable::TooFewSamples);
@@ -109,16 +132,17 @@ impl Record {
         let logs = [start.r_s, start.tau_r, start.sigma_l_s, k].map(f64::ln);
         let mut x = DVector::zeros(UNKNOWNS);
         x.rows_mut(0, 4).copy_from_slice(&logs);
-        (x[7], x[8]) = (self.i[0].re, self.i[0].im);
+        (x[6], x[7], x[8]) = (self.i[0].re, self.i[0].im, drop_v.unwrap_or(0.0));
+        let free = UNKNOWNS - usize::from(drop_v.is_some());
         let mut residual = self.residual(&x).ok_or(NotIdentifiable::NotFinite)?;
-        let mut damping = 1e-3;
+        let (mut damping, mut converged) = (1e-3, false);
         for _ in 0..STEPS {
-            let jacobian = self.jacobian(&x, &residual).ok_or(NotIdentifiable::NotFinite)?;
+            let jacobian = self.jacobian(&x, &residual, free).ok_or(NotIdentifiable::NotFinite)?;
             let normal = jacobian.tr_mul(&jacobian);
             let gradient = jacobian.tr_mul(&residual);
-            loop {
+            let gain = loop {
                 let mut damped = normal.clone();
-                for n in 0..UNKNOWNS {
+                for n in 0..free {
                     damped[(n, n)] += damping * normal[(n, n)].max(1e-12);
                 }
                 let factor = damped.cholesky().ok_or(NotIdentifiable::PoorExcitation)?;
@@ -126,57 +150,86 @@ impl Record {
                 // No leap of more than a factor e in any parameter.
                 let leap = step.rows(0, 4).amax();
                 step *= (1.0 / leap).min(1.0);
-                let next = &x + &step;
+                let mut next = x.clone();
+                let mut moved = next.rows_mut(0, free);
+                moved += step;
                 let there = self.residual(&next);
                 let lower = there.filter(|there| there.norm_squared() < residual.norm_squared());
                 if let Some(there) = lower {
                     let gain = 1.0 - there.norm_squared() / residual.norm_squared();
                     (x, residual) = (next, there);
                     damping = (damping * 0.2).max(1e-12);
-                    if gain < CONVERGED {
-                        return self.finished(&x, &residual);
-                    }
-                    break;
+                    break gain;
                 }
                 if damping > 1e6 {
                     // No direction leads down: the minimum to rounding.
-                    return self.finished(&x, &residual);
+                    break 0.0;
                 }
                 damping *= 8.0;
+            };
+            converged = gain < CONVERGED;
+            if converged {
+                break;
             }
         }
-        Err(NotIdentifiable::NotConverged)
+        if free == UNKNOWNS && x[8] < 0.0 {
+            return self.fit(&Self::machine(&x, 0.0), Some(0.0));
+        }
+        self.finished(&x, &residual, free, converged)
     }
 
     fn finished(
         &self,
         x: &DVector<f64>,
         residual: &DVector<f64>,
+        free: usize,
+        converged: bool,
     ) -> Result<OutputErrorFit, NotIdentifiable> {
-        let jacobian = self.jacobian(x, residual).ok_or(NotIdentifiable::NotFinite)?;
-        let inverse = jacobian.tr_mul(&jacobian).try_inverse();
-        let inverse = inverse.ok_or(NotIdentifiable::PoorExcitation)?;
-        let variance = residual.norm_squared() / (residual.len() - UNKNOWNS) as f64;
+        let jacobian = self.jacobian(x, residual, free).ok_or(NotIdentifiable::NotFinite)?;
+        let normal = jacobian.tr_mul(&jacobian);
+        let inverse = normal.clone().try_inverse().ok_or(NotIdentifiable::PoorExcitation)?;
         let omega_m = self.omega_m.iter().sum::<f64>() / self.omega_m.len() as f64;
         let parameters = Self::machine(x, omega_m);
-        let deviation = |n: usize| (variance * inverse[(n, n)]).sqrt();
-        // l_s = sigma_l_s (1 + k), both unknown as logarithms.
-        let share = 1.0 - parameters.sigma_l_s / parameters.l_s;
-        let of_l_s =
-            inverse[(2, 2)] + 2.0 * share * inverse[(2, 3)] + share.powi(2) * inverse[(3, 3)];
-        let deviations = [
-            parameters.r_s * deviation(0),
-            parameters.tau_r * deviation(1),
-            parameters.sigma_l_s * deviation(2),
-            parameters.l_s * (variance * of_l_s).sqrt(),
-            deviation(4),
-        ];
-        if !deviations.iter().all(|deviation| deviation.is_finite()) {
+        let of = |x: &DVector<f64>| {
+            let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = Self::machine(x, 0.0);
+            [r_s, tau_r, sigma_l_s, l_s, x[8]]
+        };
+        let mut squares = [0.0; 5];
+        for part in 0..PARTS {
+            let edge = |part: usize| 2 * (part * self.i.len() / PARTS);
+            let (from, count) = (edge(part), edge(part + 1) - edge(part));
+            let (without, left) = (jacobian.rows(from, count), residual.rows(from, count));
+            let mut rest = &normal - without.tr_mul(&without);
+            for n in 0..free {
+                // The state at the first sample is in the first part alone.
+                rest[(n, n)] += 1e-9 * normal[(n, n)];
+            }
+            let moved = rest.cholesky().ok_or(NotIdentifiable::PoorExcitation)?;
+            let mut other = x.clone();
+            let mut changed = other.rows_mut(0, free);
+            changed += moved.solve(&without.tr_mul(&left));
+            let (here, there) = (of(x), of(&other));
+            for n in 0..5 {
+                squares[n] += (there[n] - here[n]).powi(2);
+            }
+        }
+        let deviations = squares.map(|sum| (sum * (1.0 - 1.0 / PARTS as f64)).sqrt());
+        let rows = self.i.len() as f64;
+        let told_a = [0, 1, 2, 3].map(|n| (1.0 / (rows * inverse[(n, n)])).sqrt());
+        if !told_a.iter().all(|told| told.is_finite()) {
             return Err(NotIdentifiable::PoorExcitation);
         }
-        let residual_a = (residual.norm_squared() / self.i.len() as f64).sqrt();
-        let (current, drop_v) = (self.simulate(x), x[4]);
-        Ok(OutputErrorFit { parameters, drop_v, deviations, current, residual_a })
+        let residual_a = (residual.norm_squared() / rows).sqrt();
+        let (current, drop_v) = (self.simulate(x), x[8]);
+        Ok(OutputErrorFit {
+            parameters,
+            drop_v,
+            deviations,
+            told_a,
+            converged,
+            current,
+            residual_a,
+        })
     }
 }
 

@@ -73,6 +73,11 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
                 outcome.metrics.set(format!("{}_{name}", case.name()), *value);
             }
         }
+        let torque = Stats::of(some.iter().filter_map(|(_, _, run)| run.torque_error));
+        if torque.count() > 0 {
+            let name = format!("{}_torque_error_mean_pct", case.name());
+            outcome.metrics.set(name, 100.0 * torque.mean());
+        }
         // In the table the least voltage stands before the most.
         verdict.swap(8, 9);
         let cell = |value: f64, decimals: Option<usize>| match decimals {

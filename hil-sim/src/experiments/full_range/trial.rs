@@ -8,7 +8,7 @@ use super::case::Case;
 use crate::config::RangeKind;
 use crate::experiments::battery::{
     Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
-    nominal_limit_a,
+    nominal_limit_a, torque_nm,
 };
 use crate::prelude::*;
 
@@ -149,7 +149,13 @@ impl<'a> Run<'a> {
         match self.case.kind {
             RangeKind::Constant | RangeKind::WrongParameters => {
                 self.up_to_speed()?;
-                self.counted(0.5, &[Part::constant(i_q, 3.5)])
+                self.counted(0.5, &[Part::constant(i_q, 3.5)])?;
+                let nm = |a: f64| torque_nm(self.config, a);
+                let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
+                let error = self.bench.torque.mean() - nm(taken);
+                let share = error * i_q.signum() / nm(nominal_limit_a(self.config));
+                self.bench.trial.torque_error = Some(share);
+                Ok(())
             }
             RangeKind::Reversals => {
                 self.up_to_speed()?;

@@ -1,0 +1,83 @@
+//! A recorded start beside the simulated motor at the recorded voltages.
+
+use std::f64::consts::TAU;
+
+use sim_bench::plant::{
+    ElectricalState as _, EnergyMachine, IronSettings, Load, MachineModel as _, Mechanics,
+    MotorModel,
+};
+use sim_bench::prelude::*;
+
+use crate::identification::Complex;
+use crate::identify_trace::{Reading, Voltages, read, rms};
+
+/// With a file of the user: columns as those of `identify-trace`, voltages sampled at the terminals, from the switching on.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "measured-start",
+    stands_for: "a recorded start",
+    about: "A recorded direct start beside the simulated motor: its voltages imposed, current and speed compared.",
+    uses: &[&["motor.", "plant", "iron.", "flux_level", "nameplate.", "load.torque_nm"]],
+    not: &[],
+    run,
+};
+
+/// Parts of a start, with their ends, s: the first is that of the largest currents.
+const PARTS: [(&str, f64); 3] = [("start", 0.12), ("run_in", 0.25), ("later", f64::INFINITY)];
+/// Integration steps a row.
+const STEPS: u32 = 4;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let (config, file) = (context.config, context.file);
+    let path =
+        file.ok_or_else(|| Error::Refused("measured-start needs --input FILE".to_owned()))?;
+    let voltages = Voltages::Sampled;
+    let all =
+        Reading { columns: Vec::new(), voltages, delay: None, drop_v: None, times: [None; 2] };
+    let (record, remarks) = read(path, &all, config)?;
+    let mut plant = plant_settings(config);
+    let iron = plant.iron.unwrap_or(IronSettings::LINEAR);
+    let machine = EnergyMachine::new(&plant.machine, &iron).map_err(Error::refused)?;
+    plant.mechanics.load = Load::Free { torque: config.load.torque_nm.unwrap_or(0.0) };
+    let shaft = Mechanics::new(&plant.mechanics).map_err(Error::refused)?;
+    let mut motor = MotorModel::new(machine, shaft);
+    motor.state.speed = record.omega_m[0] / machine.pole_pairs();
+    let (mut current, mut speed) = (Vec::new(), Vec::new());
+    for (k, v) in record.v.iter().enumerate() {
+        current.push(motor.state.electrical.current());
+        speed.push(motor.state.speed * 60.0 / TAU);
+        let rise = record.v[(k + 1).min(record.v.len() - 1)] - v;
+        for n in 0..STEPS {
+            let share = (f64::from(n) + 0.5) / f64::from(STEPS);
+            motor.step(v + rise * share, record.h / f64::from(STEPS));
+        }
+    }
+    let mut outcome = Outcome { remarks, ..Outcome::default() };
+    let mut table = Table::new("Recorded and simulated start", &[])
+        .note(format!("{}; rms of the difference.", config.motor_text()));
+    let row = |t: f64| ((t / record.h) as usize).min(current.len());
+    let mut from = 0.0;
+    for (name, to) in PARTS {
+        let part = row(from)..row(to);
+        if part.is_empty() {
+            continue;
+        }
+        let (recorded, simulated) = (&record.i[part.clone()], &current[part.clone()]);
+        let apart: Vec<Complex> = recorded.iter().zip(simulated).map(|(a, b)| a - b).collect();
+        let to_rpm = 60.0 / TAU / machine.pole_pairs();
+        let rpm =
+            part.clone().map(|k| (record.omega_m[k] * to_rpm - speed[k]).powi(2)).sum::<f64>();
+        let peak = |i: &[Complex]| Cell::fixed(i.iter().map(|i| i.norm()).fold(0.0, f64::max), 1);
+        let share = 100.0 * rms(&apart) / rms(recorded);
+        outcome.metrics.set(format!("{name}_current_percent"), share);
+        table.record([
+            ("from (s)", Cell::fixed(std::mem::replace(&mut from, to), 2)),
+            ("to (s)", Cell::fixed(part.end as f64 * record.h, 2)),
+            ("recorded peak (A)", peak(recorded)),
+            ("simulated peak (A)", peak(simulated)),
+            ("current (%)", Cell::fixed(share, 1)),
+            ("speed (rpm)", Cell::fixed((rpm / part.len() as f64).sqrt(), 1)),
+        ]);
+    }
+    outcome.tables.push(table);
+    Ok(outcome)
+}
