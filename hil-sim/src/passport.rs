@@ -58,8 +58,11 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<String, Error> {
     let text = match (&options.port, &options.from) {
         (Some(port), _) => session(port, options.baud)?,
-        (None, from) => std::fs::read_to_string(from.as_deref().unwrap_or(Path::new("")))
-            .map_err(|why| Error::Refused(format!("--from: {why}")))?,
+        (None, from) => {
+            let path = from.clone().unwrap_or_default();
+            let failed = |why| Error::Refused(format!("--from {}: {why}", path.display()));
+            std::fs::read_to_string(&path).map_err(|why: std::io::Error| failed(why.to_string()))?
+        }
     };
     report::write_whole(&options.out.with_extension("log"), &text)?;
     write(&of_console(&text).map_err(Error::Refused)?, &options.out)

@@ -297,7 +297,7 @@ fn the_passport_of_a_trace_is_a_motor() {
     written(&folder, "a.csv", &on_the_mains(&IronSettings::LINEAR, 5000.0, steps(), 3));
     let made = |more: &[&str]| {
         let trace = ["identify-trace", "--input", "a.csv", "--voltages", "sampled"];
-        hil_sim(&folder, &[&trace, &["--json", "--passport", "a.json"], more].concat())
+        hil_sim(&folder, &[&trace[..], &["--json", "--passport", "a.json"], more].concat())
     };
     let output = made(&["--motor", "buildings-4kw"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
