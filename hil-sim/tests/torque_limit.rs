@@ -32,11 +32,6 @@ fn word(limit: &TorqueLimit) -> &'static str {
     }
 }
 
-/// What raises it, in a word.
-fn next(limit: &TorqueLimit) -> &'static str {
-    if limit.more.contains("direct current") { "more flux" } else { "`limits.current_a`" }
-}
-
 /// The table of the page is that of drives that have learned, on model A and on the families of teeth.
 #[test]
 fn the_page_prints_the_torque_limits() {
@@ -44,7 +39,8 @@ fn the_page_prints_the_torque_limits() {
     let first = std::fs::read_to_string(first).expect("the page");
     let first = first.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut others = Vec::new();
-    let mut table = "| name | rated | `a` | binds | next | `r` | `r5` | `g7` |\n|---|---|---|---|---|---|---|---|\n".to_owned();
+    let mut table =
+        "| name | rated | `a` | `r` | `r5` | `g7` |\n|---|---|---|---|---|---|\n".to_owned();
     for motor in Motor::all() {
         let name = &motor.name;
         let (config, on_a) = limit(name, &[]);
@@ -55,11 +51,10 @@ fn the_page_prints_the_torque_limits() {
             }
         });
         let row = format!(
-            "| `{name}` | {:.1} Nm | {:.0} % | {} | {} | {} |",
+            "| `{name}` | {:.1} Nm | {:.0} %, {} | {} |",
             config.rated_nm(),
             on_a.percent,
             word(&on_a),
-            next(&on_a),
             cells.join(" | ")
         );
         println!("{row}");
