@@ -2,7 +2,7 @@
 
 /// Number of points of a table, from i_q = 0 on.
 pub const POINTS: usize = 16;
-/// The largest regulated current lies at this multiple of the distance of the points.
+/// The largest current of a table lies at this multiple of the distance of the points.
 const STEPS: f32 = 14.0;
 
 /// The torque currents of the points: 0, a step, two steps, and so on.
@@ -103,13 +103,12 @@ impl<const KIND: u8> Table<KIND> {
         &self.values
     }
 
-    /// The default in proportion to the largest regulated current, A peak: a beginning until the motor's own is
-    /// learned.
-    pub fn guessed(largest_a: f32) -> Self
+    /// The default at these currents: a beginning until the motor's own is learned.
+    pub fn guessed(grid: Grid) -> Self
     where
         Self: Default,
     {
-        Self { grid: Grid::for_current(largest_a), ..Self::default() }
+        Self { grid, ..Self::default() }
     }
 }
 
@@ -210,7 +209,8 @@ mod tests {
     /// The defaults are of 3.5 A; for twice that they are the same at twice the current.
     #[test]
     fn a_guess_is_in_proportion_to_the_largest_current() {
-        let (reference, carrier) = (ReferenceTable::guessed(7.0), CarrierTable::guessed(7.0));
+        let grid = Grid::for_current(7.0);
+        let (reference, carrier) = (ReferenceTable::guessed(grid), CarrierTable::guessed(grid));
         for n in 0..POINTS {
             let (i_q, twice) = (0.25 * n as f32, reference.grid().current(n));
             assert!((twice - 2.0 * i_q).abs() < 1e-5);

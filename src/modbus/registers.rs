@@ -232,7 +232,7 @@ impl View<'_> {
     /// By 3/2 P L_m/L_r psi i_q (Eq. 2.7), as at the console.
     fn torque(&self) -> f32 {
         let (motor, plate) = (&self.settings.drive.motor, &self.settings.drive.nameplate);
-        let rated = plate.power_w / (plate.speed_rpm * core::f32::consts::TAU / 60.0);
+        let rated = plate.torque_nm();
         self.active().map_or(0.0, |status| {
             let i = status.telemetry.current;
             100.0 * motor.torque_per_ampere(i.d) * i.q / rated

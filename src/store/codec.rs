@@ -175,7 +175,10 @@ pub fn settings(
     if present > 0 {
         let same = learned::in_both(&words) == settings.drive.scales.both_zero_vectors;
         let learned = learned::from_words(&words, present).filter(|_| same);
-        settings.learned = Some(learned.ok_or(Rejected::Value(learned::NAME))?);
+        let learned = learned.ok_or(Rejected::Value(learned::NAME))?;
+        // Else the drive has to learn again.
+        let current = learned::of_todays_rules(&words, settings.drive.sequence.flux);
+        settings.learned = current.then_some(learned);
     }
     Ok(settings)
 }

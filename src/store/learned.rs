@@ -8,7 +8,7 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start; rotor positions in the third byte, 0 counts as 1 |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, today's rules of the torque; rotor positions in the third byte, 0 counts as 1 |
 //! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
@@ -24,6 +24,7 @@ use bytemuck::{Pod, Zeroable, must_cast};
 use drive_core::carrier::Asymmetry;
 use drive_core::learned::{Fitted, Learned, Verdict};
 use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
+use drive_settings::Flux;
 
 use crate::hash;
 
@@ -65,6 +66,7 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
+const TODAYS_RULES: u32 = 1 << 14;
 
 /// A bit for each value before this offset, in bytes.
 const fn bits_before(offset: usize) -> u64 {
@@ -92,6 +94,12 @@ pub fn in_both(words: &[u32; WORDS]) -> bool {
     words[FLAGS] & IN_BOTH != 0
 }
 
+/// Whether a result with these values is of the rules in force, which give direct current, current limit and table with high flux: it is
+/// of no use with those of another firmware.
+pub fn of_todays_rules(words: &[u32; WORDS], flux: Flux) -> bool {
+    flux == Flux::Low || words[FLAGS] & TODAYS_RULES != 0
+}
+
 /// The values of a result, and of whether it was learned with the currents of both zero vectors.
 pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     let flag = |set: bool, bit: u32| if set { bit } else { 0 };
@@ -113,7 +121,8 @@ pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
             | flag(learned.carrier.is_some(), HAS_CARRIER)
             | flag(learned.slope.is_some(), HAS_SLOPE)
             | flag(learned.at_start.is_some(), HAS_START)
-            | flag(both, IN_BOTH),
+            | flag(both, IN_BOTH)
+            | TODAYS_RULES,
         step_a: learned.reference.grid().step_a(),
         slope: learned.slope.map_or([0.0; POINTS], |table| *table.points()),
         limit_a: learned.limit_a,

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The flux sees i_d' and i_q', which give its magnetising current and its slip. It does not slip where tan x = i_q/i_d, so
-//! tan x is an odd multiple of half a step of the table over i_d: 8.5° to 15°. Each point has a mirrored one, (-i_q, -e);
+//! tan x is an odd multiple of half a step of the table over i_d: the first from 5.7° on, up to 17°. Each point has a mirrored one, (-i_q, -e);
 //! q is odd. In the mirrored one the flux turns back over the angles of the first: what depends on the angle alone drops out.
 //!
 //! From the current on at which the flux makes a half turn in about the averaging time, points last for whole half turns. The
@@ -55,8 +55,10 @@ const LAG: f32 = 23.5;
 const MOVED_RAD_PER_S: f32 = 4.66;
 /// Expected direct voltage of a free shaft from which on the shaft is judged, likewise. Half of it counts as moved.
 const JUDGED_RAD_PER_S: f32 = 9.32;
-/// Least tangent of the lead of the flux: 8.5°.
-const LEAST_TAN_LEAD: f32 = 0.15;
+/// Least tangent of the lead of the flux: 5.7°. A larger one meets the second zero of the signal at a smaller torque current. A smaller
+/// one learns the slope with more noise, and does not see how near that zero is: with 4.6° a drive accepted a torque that it
+/// could not hold.
+const LEAST_TAN_LEAD: f32 = 0.1;
 /// Largest tangent that half a step may give, 15°, and the tangent where it gives more: a small direct current, with which
 /// the flux slips at every lead below half a step.
 const MOST_TAN_LEAD: f32 = 0.27;
@@ -163,10 +165,9 @@ pub struct Operate {
 }
 
 impl Learning {
-    /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak. `normalised`: the
-    /// signal is the saliency, not a current difference.
-    pub fn new(motor: &Motor, i_d: f32, largest_a: f32, normalised: bool) -> Self {
-        let grid = Grid::for_current(largest_a);
+    /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak, at the torque currents of `grid`.
+    /// `normalised`: the signal is the saliency, not a current difference.
+    pub fn new(motor: &Motor, i_d: f32, largest_a: f32, grid: Grid, normalised: bool) -> Self {
         let most = fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
         let half_step = 0.5 * grid.step_a() / i_d;
@@ -176,7 +177,8 @@ impl Learning {
             let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
             half_step * if odd > 1.0 { odd } else { 1.0 }
         };
-        let points = (most as usize).min(POINTS - 1);
+        // A grid up to the largest torque current has it as a point, whatever the rounding.
+        let points = ((most + 1e-3) as usize).min(POINTS - 1);
         let lead = libm::atanf(tan_lead);
         // The flux makes a half turn in pi tau_r i_d / i_q.
         let half_turn_s = PI * motor.tau_r() * i_d / grid.step_a();

@@ -128,8 +128,7 @@ impl Config {
 
     /// Rated torque, Nm: power over speed of the nameplate.
     pub fn rated_nm(&self) -> f64 {
-        let plate = &self.drive.nameplate;
-        f64::from(plate.power_w) / (f64::from(plate.speed_rpm) * std::f64::consts::TAU / 60.0)
+        self.drive.nameplate.torque_nm().into()
     }
 
     /// A quantity of the drive's settings relative to that of the dissertation's drive.

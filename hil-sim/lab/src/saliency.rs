@@ -30,8 +30,8 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 /// Frequency of the carrier, rad/s.
 const CARRIER: f64 = TAU * 600.0;
-/// Torque currents, A with the dissertation's motor.
-const CURRENTS_A: [f64; 6] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0];
+/// Torque currents, A with the dissertation's motor: up to 1.66 times the rated one.
+const CURRENTS_A: [f64; 9] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0];
 /// Angle errors of the table, degrees.
 const SHOWN_DEG: [i32; 7] = [-10, 0, 10, 20, 40, 60, 70];
 /// Angle errors of the curves: up to the quadrature axis on either side.

@@ -48,8 +48,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         rig.plant = Plant::new(&plant_settings(&after), context.seed).map_err(Error::refused)?;
         rig.plant.set_open_phase(open_phase(&after)).map_err(Error::refused)?;
     }
-    let limit = allowed_a(&rig.drive, config.amperes(BEYOND_A))?;
-    let torque = TorqueLimit::new(&config, limit);
+    let torque = TorqueLimit::new(&config, allowed_a(&rig.drive, config.amperes(BEYOND_A))?)
+        .at_most(config.record.torque_pct);
+    let limit = torque.i_q;
     let held = context.in_parallel("record", &COURSES, |_, (course, sign)| {
         hold(&after, rig.clone(), course, sign * limit)
     })?;
@@ -57,6 +58,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let m = &mut outcome.metrics;
     m.set("limit_a", limit);
     m.set("limit_nm", torque.nm);
+    m.set("torque_rated_nm", config.rated_nm());
     m.set("limit_pct_of_rated_torque", torque.percent);
     for course in [STANDSTILL, REVERSAL] {
         let of = || COURSES.iter().zip(&held).filter(|((known, _), _)| *known == course);

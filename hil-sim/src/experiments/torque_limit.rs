@@ -2,7 +2,6 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use drive_core::table::Grid;
 use drive_settings::Flux;
 
 use super::battery::{allowed_a, torque_nm};
@@ -52,6 +51,14 @@ impl TorqueLimit {
         Self { i_q, nm, percent: 100.0 * nm / config.rated_nm(), binds, more }
     }
 
+    /// This limit, or the smaller one of so much of the rated torque, %.
+    pub fn at_most(self, percent: f64) -> Self {
+        let share = (percent / self.percent).min(1.0);
+        let Self { i_q, nm, binds, more, .. } = self;
+        let binds = if share < 1.0 { "`record.torque_pct`".to_owned() } else { binds };
+        Self { i_q: share * i_q, nm: share * nm, percent: self.percent.min(percent), binds, more }
+    }
+
     /// In words.
     pub fn text(&self, config: &Config) -> String {
         let Self { i_q, nm, percent, binds, more } = self;
@@ -70,15 +77,14 @@ fn binding(config: &Config, i_q: f64) -> (String, bool) {
     let (limit, i_d) = (f64::from(drive.current_limit_a()), f64::from(drive.i_d()));
     let is = |other: f64| (i_q / other - 1.0).abs() < SAME;
     let largest = (limit * limit - i_d * i_d).max(0.0).sqrt();
-    let step = f64::from(Grid::for_current(limit as f32).step_a());
+    let step = f64::from(drive.grid().step_a());
     if is(largest) {
         let range = f64::from(drive.sensor_range_a());
-        let by_range = limit < (1.0 - SAME) * f64::from(drive.share_of_rated(3.5));
-        let what = match drive.limits.current_a {
-            None if by_range => format!(
+        let what = match drive.better_sensors() {
+            Some(_) => format!(
                 "the current limit of {limit:.2} A, which is that of the sensors (`measurement.range_a` = {range:.2} A)"
             ),
-            _ => format!("the current limit of {limit:.2} A (`limits.current_a`)"),
+            None => format!("the current limit of {limit:.2} A (`limits.current_a`)"),
         };
         (what, true)
     } else if is((largest / step).floor() * step) {
@@ -95,11 +101,15 @@ fn more(config: &Config, by_current: bool) -> String {
         f64::from(plate.voltage_v) * (2.0_f64 / 3.0).sqrt() / (TAU * f64::from(plate.frequency_hz));
     let of_rated_flux = rated_flux / config.motor.l_m;
     let is_low = i_d < LOW_FLUX * of_rated_flux.min(f64::from(drive.rated_a()) / SQRT_2);
-    if !is_low && by_current {
-        return "More: a larger `limits.current_a`, and current sensors of a larger range."
-            .to_owned();
-    }
     let by_rule = drive.sequence.flux == Flux::High && drive.sequence.i_d.is_none();
+    if by_current && (by_rule || !is_low) {
+        return match drive.better_sensors() {
+            Some((range_a, percent)) => {
+                format!("More: `measurement.range_a` = {range_a:.1} A would allow {percent:.0} %.")
+            }
+            None => "More: a larger `limits.current_a`.".to_owned(),
+        };
+    }
     let how = if by_rule { "" } else { "`sequence.flux=high` with `sequence.i_d=auto`, or " };
     format!(
         "More: a larger direct current, which is {:.0} % of that of the rated flux: {how}a larger `sequence.i_d`.",

@@ -162,7 +162,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let list = talk.say("learned\n");
     let told = "slope -0.0700 /rad, torque current up to 2.75 A";
     // 3/2 P L_M i_d of Table 5 with 0.7 A: 0.322 Nm/A; L_m i_d: 0.124 Wb.
-    let range = "trackable from -0.88 to 0.88 Nm (-2.75 to 2.75 A) at 0.124 Wb (0.70 A); the limit is the slope, which is lost beyond";
+    let range = "trackable from -0.88 to 0.88 Nm (14 % of rated, -2.75 to 2.75 A) at 0.124 Wb (0.70 A); the limit is the slope, which is lost beyond";
     let first = [format!("* learned: {told}; `save` keeps it"), format!("* learned: {range}")];
     let list = list.strip_prefix(&first).unwrap();
     assert_eq!(

@@ -2,6 +2,8 @@
 
 use drive_core::{AngleSource, Command, Drive, Mode, Refused};
 
+use drive_settings::Flux;
+
 use super::*;
 
 /// The flash of a board that runs commit 1abee12 and has saved this record.
@@ -73,6 +75,25 @@ fn records_saved_by_commit_1abee12_are_read() {
         verdict: Verdict::Sound,
     });
     assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
+}
+
+/// With high flux, direct current, current limit and table follow from rules that an earlier firmware had not: what it learned is of another
+/// drive, which has to learn again. Its settings stay. The dissertation's flux has the rules that it had.
+#[test]
+fn a_result_of_other_rules_is_left_out_with_high_flux() {
+    for (flux, is_kept) in [(Flux::Low, true), (Flux::High, false)] {
+        let mut new = with_learned();
+        new.drive.sequence.flux = flux;
+        let mut record = codec::record(&new, 3);
+        let mut fake = Fake::new();
+        fake.hold(0, record);
+        assert_eq!(load(&mut fake), Loaded::Settings(new));
+        // The bit that an earlier firmware did not write.
+        record[2 + keys::COUNT + 36] &= !(1 << (32 + 14));
+        fake.hold(0, resealed(record));
+        new.learned = new.learned.filter(|_| is_kept);
+        assert_eq!(load(&mut fake), Loaded::Settings(new), "{flux:?}");
+    }
 }
 
 /// Later firmware wrote the distance of the points, too, but no slope yet.

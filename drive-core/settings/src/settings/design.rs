@@ -173,7 +173,7 @@ impl Settings {
     /// The learning with these settings; they must be [valid](Self::check).
     pub fn learning(&self) -> Learning {
         let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
-        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), synchronous)
+        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), synchronous)
     }
 
     /// The choice of the phases, with three shunts.

@@ -12,6 +12,7 @@ use core::f32::consts::SQRT_2;
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
+use super::rules::{TRIP_OF_RANGE, TRIP_OF_RATED};
 use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
@@ -353,12 +354,13 @@ settings! {
         /// phase current that trips
         ///
         /// A trip level beyond the sensors' range would never be reached.
-        trip_a: Option<f32> = None, 65: auto("A", trip_a: |s| f32::min(s.share_of_rated(4.3), 0.962 * s.sensor_range_a()))
+        trip_a: Option<f32> = None, 65: auto("A", trip_a: |s| f32::min(TRIP_OF_RATED * s.rated_a(), TRIP_OF_RANGE * s.sensor_range_a()))
             .beside(|s| (0.05, s.sensor_range_a())).hardware();
         /// largest current that is regulated, peak
         ///
-        /// The length of the current vector. The carrier and the noise stay clear of the trip.
-        current_a: Option<f32> = None, 66: auto("A", current_limit_a: |s| f32::min(s.share_of_rated(3.5), 0.814 * s.trip_a()))
+        /// The length of the current vector. With high flux that of 155 % of the rated torque, at most 1.6 times the rated current. The
+        /// carrier and the noise stay clear of the trip.
+        current_a: Option<f32> = None, 66: auto("A", current_limit_a: Settings::current_limit_rule)
             .beside(|s| (0.01, s.trip_a()));
         /// dc link above which the drive trips
         dc_over_v: Option<f32> = None, 67: auto("V", dc_over_v: Settings::dc_over_rule).beside(Settings::dc_over_range).hardware();
@@ -376,7 +378,10 @@ settings! {
         /// current that the motor carries for any time at standstill, peak
         motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
         /// thermal time constant of its windings
-        motor_s: f32 = 300.0, 72: number("s").from_to(1.0, 10_000.0);
+        ///
+        /// By default between those of the trip classes 10 and 20 (IEC 60947-4-1: 7.2 times the rated current for 10 and 20 s mean 518 and
+        /// 1037 s): a warm motor bears 150 % of its torque for 60 s.
+        motor_s: f32 = 600.0, 72: number("s").from_to(1.0, 10_000.0);
         /// current that the inverter carries for any time, peak
         inverter_a: Option<f32> = None, 73: auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a()));
         /// thermal time constant of its switches to the heat sink
@@ -413,8 +418,8 @@ settings! {
         flux: Flux = Flux::Low, 80: word().learned();
         /// direct (magnetising) current, peak
         ///
-        /// 0.7 A is that of section 3.10. With high flux it is that of the rated flux or, where it is smaller, 0.55 times the rated
-        /// current; and where the current limit is small, 4/7 of that, which leaves 0.82 of it for the torque.
+        /// 0.7 A is that of section 3.10. With high flux it is that of the rated flux, but at most the one of the largest torque of the
+        /// rated current and of the current limit: 0.707 times these.
         i_d: Option<f32> = None, 81: auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
         /// slope of the torque current at a stop
         stop_a_per_s: Option<f32> = None, 82: auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5);

@@ -65,10 +65,10 @@ words! {
 words! {
     /// The flux that the drive magnetises the motor with.
     pub enum Flux {
-        /// That of the dissertation: 15 % of the rated flux of its motor.
+        /// That of the dissertation, 15 % of the rated flux of its motor, with the current limit and trip of its drive.
         Low = "low",
-        /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
-        /// where it hardly has a saliency at the low one.
+        /// The rated flux, or that of 0.707 times the rated current where it is smaller: a motor of iron can be tracked with it
+        /// where it hardly has a saliency at the low one, and current limit and trip are those of 150 % of the rated torque.
         High = "high",
     }
 }

@@ -2,14 +2,15 @@
 //! set.
 //!
 //! Each rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it
-//! depends on. On that motor the rules give these numbers back.
+//! depends on. On that motor the rules give these numbers back. With `sequence.flux` high, current limit and direct current follow
+//! the torque instead: [`Settings::current_limit_a`], [`Settings::i_d`].
 //!
 //! | setting | on the dissertation's motor | in proportion to |
 //! |---|---|---|
-//! | `limits.trip_a` | 4.3 A | rated current; at most 0.962 of the sensors' range |
+//! | `limits.trip_a` | 4.3 A | the sensors' range; at most 2.2 times the rated current |
 //! | `limits.current_a` | 3.5 A | rated current; at most 0.814 of the trip |
 //! | `speed.i_q_limit_a` | 3 A | `limits.current_a` |
-//! | `sequence.i_d` | 0.7 A | rated current; with `sequence.flux` high see [`Settings::i_d`]: 1.991 A |
+//! | `sequence.i_d` | 0.7 A | rated current |
 //! | `limits.motor_a` | 3.62 A | rated current |
 //! | `limits.inverter_a` | 3.5 A | `limits.current_a` |
 //! | `sequence.stop_a_per_s` | 30 A/s | rated current |
@@ -33,14 +34,14 @@
 
 pub mod dc_link;
 
-use core::f32::consts::{SQRT_2, TAU};
+use core::f32::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
 use super::list::RATED_A;
 use super::numbers::{WITHIN, either_sign};
 use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::table::{CarrierTable, ReferenceTable, SlopeTable};
+use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{AngleSource, CONVERTER_CODES, FirstOrder, Line, Motor, PERIOD_S, SQRT_3};
 
 /// Carrier current per direct current.
@@ -48,6 +49,19 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 /// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
 /// overshoot.
 const CARRIER_OF_ROOM: f32 = 0.75;
+/// Share of the sensors' range that trips: noise and drift leave the reading of a larger current at the end of the range. And trip in
+/// rated currents: it leaves the current limit with high flux what that needs. A trip has one rule for any flux: the bench steps
+/// of a board hold for it, and commissioning changes the flux.
+pub(super) const TRIP_OF_RANGE: f32 = 0.9614;
+pub(super) const TRIP_OF_RATED: f32 = 2.2;
+/// With high flux: torque at the current limit, as a share of the rated one. 150 % for a minute is what frequency converters give;
+/// the rest is for the angle's error and a warmer motor.
+const OVERLOAD: f32 = 1.55;
+/// The same: current limit at most, in rated currents, so that a circuit that needs more does not ask too much of motor and inverter.
+const LIMIT_OF_RATED: f32 = 1.6;
+/// The same: current limit per trip. What it leaves bears the carrier, whose current grows by 14 % and more as the leakage
+/// saturates (0.814 tripped in 27 of 36 learnings with iron), the noise, and overshoot of a step.
+const LIMIT_OF_TRIP: f32 = 0.76;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Frequency of the carrier, Hz.
@@ -133,6 +147,11 @@ impl Settings {
 }
 
 impl Nameplate {
+    /// Rated torque, Nm: power over speed.
+    pub fn torque_nm(&self) -> f32 {
+        self.power_w / (self.speed_rpm * TAU / 60.0)
+    }
+
     /// Base impedance of a phase, ohm.
     pub fn base_impedance(&self) -> f32 {
         self.voltage_v / (SQRT_3 * self.current_a)
@@ -162,15 +181,74 @@ impl Settings {
 
     /// Rule of `sequence.i_d`.
     pub(super) fn i_d_rule(&self) -> f32 {
+        let limit = self.current_limit_a();
         match self.sequence.flux {
-            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
+            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * limit),
+            Flux::High => self.useful_i_d(limit),
+        }
+    }
+
+    /// The most useful direct current beside a current limit, A: that of the rated flux, at most that of the largest torque per
+    /// rated current, and per limit. Torque is proportional to i_d i_q, which is largest where both are equal.
+    fn useful_i_d(&self, limit_a: f32) -> f32 {
+        let plate = &self.nameplate;
+        let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
+        f32::min(rated_flux / self.motor.l_m, FRAC_1_SQRT_2 * self.rated_a().min(limit_a))
+    }
+
+    /// Rule of `limits.current_a`.
+    pub(super) fn current_limit_rule(&self) -> f32 {
+        self.wanted_limit_a().min(self.limit_of_trip() * self.trip_a())
+    }
+
+    /// Current limit per trip.
+    fn limit_of_trip(&self) -> f32 {
+        match self.sequence.flux {
+            Flux::Low => 0.814,
+            Flux::High => LIMIT_OF_TRIP,
+        }
+    }
+
+    /// The current limit by rule, A, where the trip allows it.
+    fn wanted_limit_a(&self) -> f32 {
+        match self.sequence.flux {
+            Flux::Low => self.share_of_rated(3.5),
             Flux::High => {
-                let plate = &self.nameplate;
-                let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
-                let of_flux = rated_flux / self.motor.l_m;
-                f32::min(of_flux, 0.55 * self.rated_a()).min(4.0 / 7.0 * self.current_limit_a())
+                let i_d = self.useful_i_d(f32::INFINITY);
+                let i_q = OVERLOAD * self.nameplate.torque_nm() / self.motor.torque_per_ampere(i_d);
+                libm::hypotf(i_d, i_q).min(LIMIT_OF_RATED * self.rated_a())
             }
         }
+    }
+
+    /// Torque at rest, % of the rated one, of a direct current, A, and what a current limit, A, leaves beside it.
+    pub fn torque_pct(&self, i_d: f32, limit_a: f32) -> f32 {
+        let i_q = libm::sqrtf((limit_a * limit_a - i_d * i_d).max(0.0));
+        100.0 * self.motor.torque_per_ampere(i_d) * i_q / self.nameplate.torque_nm()
+    }
+
+    /// The range of current sensors, A, that would not bind, and the torque at rest that it allows, % of the rated one, where the present
+    /// range limits the current.
+    pub fn better_sensors(&self) -> Option<(f32, f32)> {
+        let (limits, wanted) = (&self.limits, self.wanted_limit_a());
+        let by_rule = limits.current_a.is_none() && limits.trip_a.is_none();
+        let i_d = self.sequence.i_d.unwrap_or_else(|| match self.sequence.flux {
+            Flux::Low => self.i_d(),
+            Flux::High => self.useful_i_d(wanted),
+        });
+        let range_a = wanted / self.limit_of_trip() / TRIP_OF_RANGE;
+        (by_rule && range_a > 1.001 * self.sensor_range_a())
+            .then(|| (range_a, self.torque_pct(i_d, wanted)))
+    }
+
+    /// Torque currents of the tables: up to the current limit with the dissertation's flux, else up to what it leaves beside the direct
+    /// current, so that the last point is the largest torque.
+    pub fn grid(&self) -> Grid {
+        let (limit, i_d) = (self.current_limit_a(), self.i_d());
+        Grid::for_current(match self.sequence.flux {
+            Flux::Low => limit,
+            Flux::High => libm::sqrtf((limit * limit - i_d * i_d).max(f32::MIN_POSITIVE)),
+        })
     }
 
     /// Rule of `injection.amplitude_v`; the setting says why.
@@ -218,7 +296,7 @@ impl Settings {
 
     /// Reference of the saliency over the torque current.
     pub fn reference(&self) -> ReferenceTable {
-        let guess = || ReferenceTable::guessed(self.current_limit_a());
+        let guess = || ReferenceTable::guessed(self.grid());
         self.injection.synchronous.reference.unwrap_or_else(guess)
     }
 
@@ -230,7 +308,7 @@ impl Settings {
 
     /// Carrier current over the torque current.
     pub fn carrier(&self) -> CarrierTable {
-        let guess = || CarrierTable::guessed(self.current_limit_a());
+        let guess = || CarrierTable::guessed(self.grid());
         self.injection.synchronous.carrier.unwrap_or_else(guess)
     }
 }
@@ -325,11 +403,59 @@ mod tests {
         assert_eq!(s.check(), Ok(()));
     }
 
+    /// 1.5 kW at 1435 rpm are 9.982 Nm; with 3/2 P L_m^2/L_r = 0.951 H the 3.15 A of the rated flux need 5.164 A for 155 % of it. Sensors of
+    /// 6 A trip at 5.768 A and leave 0.76 of it, of which each current has 0.707: 0.951 * 3.1^2 Nm.
+    #[test]
+    fn with_high_flux_the_torque_decides() {
+        let mut s = Settings::default();
+        s.nameplate = Nameplate {
+            power_w: 1500.0,
+            voltage_v: 400.0,
+            current_a: 3.4,
+            frequency_hz: 50.0,
+            speed_rpm: 1435.0,
+        };
+        s.motor = Motor { r_s: 4.6, r_r: 3.3, l_ls: 0.0135, l_lr: 0.0135, l_m: 0.33, ..s.motor };
+        s.inverter.dc_link_v = 560.0;
+        s.scales.dc_link = s.scales.dc_link.scaled(1.8);
+        s.sequence.flux = Flux::High;
+        let sensors = |range_a: f32| {
+            let mut s = s;
+            for line in [&mut s.scales.current_a, &mut s.scales.current_b] {
+                *line = line.scaled(range_a / 4.472_713);
+            }
+            assert_eq!(s.check(), Ok(()));
+            s
+        };
+        let fit = sensors(12.0);
+        near(fit.trip_a(), 10.58);
+        near(fit.current_limit_a(), 6.049);
+        near(fit.i_d(), 3.15);
+        near(fit.grid().current(14), 5.164);
+        near(fit.torque_pct(fit.i_d(), fit.current_limit_a()), 155.0);
+        assert_eq!(fit.better_sensors(), None);
+        let small = sensors(6.0);
+        near(small.trip_a(), 5.768);
+        near(small.current_limit_a(), 4.384);
+        near(small.i_d(), 3.1);
+        near(small.torque_pct(small.i_d(), small.current_limit_a()), 91.6);
+        let (range_a, pct) = small.better_sensors().unwrap();
+        near(range_a, 8.279);
+        near(pct, 155.0);
+        // Sensors of that range do not bind.
+        near(sensors(range_a).current_limit_a(), 6.049);
+        // The dissertation's circuit has no direct current for its torque: the largest torque of the rated current is that of equal ones.
+        let mut own = Settings::default();
+        own.sequence.flux = Flux::High;
+        near(own.i_d(), core::f32::consts::FRAC_1_SQRT_2 * own.current_limit_a());
+        near(own.current_limit_a(), 0.76 * own.trip_a());
+    }
+
     #[test]
     fn small_sensors_lower_the_limits() {
         let mut s = Settings::default();
         s.nameplate.current_a *= 10.0;
-        near(s.trip_a(), 0.962 * 4.472_713);
+        near(s.trip_a(), 0.9614 * 4.472_713);
         near(s.current_limit_a(), 0.814 * s.trip_a());
     }
 }

@@ -14,7 +14,7 @@ fn carrier(i_q: f32) -> f32 {
 }
 
 fn learning() -> Learning {
-    Learning::new(&Motor::default(), 0.7, 3.5, true)
+    Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, true)
 }
 
 /// Measurements before the learning: no check, and the carrier without torque current.
@@ -204,13 +204,19 @@ fn what_does_not_fit_is_not_accepted() {
     assert!(learned.verdict.is_accepted() && !learned.current_saliency.accepted, "{learned:?}");
 }
 
-/// The lead is such that the flux slips at every point, by half a step of the table at least.
+/// The lead is such that the flux slips at every point, by half a step of the table at least. A grid up to the largest torque current has all its points.
 #[test]
 fn the_flux_turns_at_every_point() {
-    for (i_d, largest) in [(0.7, 3.5), (2.0, 3.5), (2.5, 3.5), (12.0, 70.0), (0.05, 3.5)] {
-        let learning = Learning::new(&Motor::default(), i_d, largest, true);
-        let degrees = learning.lead.to_degrees();
-        assert!((8.5..16.0).contains(&degrees), "{i_d}: {degrees}");
+    let currents =
+        [(0.7, 3.5), (2.0, 3.5), (2.5, 3.5), (12.0, 70.0), (0.05, 3.5), (3.15_f32, 6.049)];
+    let left = |(i_d, largest): (f32, f32)| (largest * largest - i_d * i_d).sqrt();
+    let all = |at: (f32, f32)| [(at, at.1), (at, left(at))];
+    for ((i_d, largest), end) in currents.into_iter().flat_map(all) {
+        let grid = Grid::for_current(end);
+        let learning = Learning::new(&Motor::default(), i_d, largest, grid, true);
+        assert!(end == largest || learning.points == 14, "{i_d}: {}", learning.points);
+        let tan = learning.lead.tan();
+        assert!((0.099..0.3).contains(&tan), "{i_d}: {tan}");
         let (mut seen, mut magnetising, mut previous) = ([[0; POINTS]; 3], i_d, None);
         for number in 0..learning.points() {
             let point = learning.point(number);
@@ -237,7 +243,8 @@ fn the_flux_turns_at_every_point() {
         assert!(of(1).eq([0].into_iter().chain(led.into_iter().rev())), "{seen:?}");
     }
     // A current difference has no slope.
-    assert_eq!(Learning::new(&Motor::default(), 0.7, 3.5, false).points(), 26);
+    let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, false);
+    assert_eq!(learning.points(), 26);
 }
 
 #[test]

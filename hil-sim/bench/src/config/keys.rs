@@ -383,6 +383,8 @@ keys! {
     "record." record: RecordConfig {
         /// How long the torque limit is held at zero stator frequency.
         minutes: f64 = 10.0, [0.05 .. 1000], "min";
+        /// Largest torque of the rated one; with more than the drive gives, its torque limit.
+        torque_pct: f64 = 1000.0, [1 .. 1000], "%";
         /// Where the rotor flux stands meanwhile, electrical, from phase a.
         flux_deg: f64 = 0.0, [-180 .. 180], "deg";
         /// How long the reversal of the speed takes.

@@ -102,7 +102,7 @@ impl Motor {
         is_file(&self.name)
     }
 
-    /// Sets the keys of the file, and those that a file of one's own leaves to [`implied`](Self::implied).
+    /// Sets the keys of the file, and those that it leaves to [`implied`](Self::implied).
     ///
     /// # Errors
     /// As [`Config::set`]; [`Error::Refused`] when a number that comes with the program has no source, when one has two,
@@ -133,7 +133,8 @@ impl Motor {
         self.settings().iter().any(|(name, value)| alias::today(name, value).0 == key)
     }
 
-    /// The keys that a file of one's own does not set and that follow from its nameplate, with the reason.
+    /// The keys that the file does not set and that follow, with the reason; of one that comes with the program those alone that a
+    /// commissioned drive has.
     pub fn implied(&self, config: &Config) -> Vec<(&'static str, Value, &'static str)> {
         let (base, four_digits) = (Config::default(), |value: f64| {
             Value::Number(format!("{value:.3e}").parse().unwrap_or(value))
@@ -142,14 +143,16 @@ impl Motor {
         let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
         let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
         let word = |word: &str| Value::Word(word.to_owned());
+        let commissioned = "by rule: as a commissioned drive has it";
         let all = [
-            ("current_plant", word("motor"), "by rule: as a commissioned drive has it"),
+            ("current_plant", word("motor"), commissioned),
+            (flux, word("high"), commissioned),
             ("measurement.range_a", range_a, "by rule: 1.24 times the rated current, peak"),
             ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
             ("prepare.learn", Value::Switch(true), "by rule: the drive has not learned this motor"),
-            (flux, word("high"), "by rule: rated flux, or what the current allows"),
         ];
-        all.into_iter().filter(|(key, ..)| self.is_own() && !self.says(key)).collect()
+        let of_all = |reason| self.is_own() || reason == commissioned;
+        all.into_iter().filter(|(key, _, reason)| of_all(*reason) && !self.says(key)).collect()
     }
 
     /// The lines that set the drive to this motor at the console.
@@ -204,7 +207,14 @@ mod tests {
             assert_eq!(named.len(), motor.settings().len(), "{}", motor.name);
             assert!(config.drive.check().is_ok(), "{}: {:?}", motor.name, config.drive.check());
             assert!(config.drive.build().is_ok(), "{}", motor.name);
-            assert!(!motor.title.is_empty() && motor.implied(&config).is_empty());
+            let implied: Vec<_> = motor.implied(&config).into_iter().map(|(key, ..)| key).collect();
+            let high: &[&str] = if motor.name == "dissertation" {
+                &[]
+            } else {
+                &["current_plant", "sequence.flux"]
+            };
+            assert_eq!(implied, high, "{}", motor.name);
+            assert!(!motor.title.is_empty());
             assert!(!motor.about.trim().is_empty() && motor.console_lines().len() < 20);
         }
     }
@@ -213,8 +223,6 @@ mod tests {
     fn the_default_is_the_dissertations() {
         let mut config = Config::default();
         Motor::find("dissertation").unwrap().apply(&mut config).unwrap();
-        // The direct current is that of the rule.
-        config.drive.sequence.i_d = None;
         assert_eq!(config.changes(), [""; 0]);
     }
 
@@ -232,7 +240,7 @@ mod tests {
     #[test]
     fn the_console_is_set_to_the_motor() {
         let lines = Motor::find("motulator-2kw2").unwrap().console_lines();
-        for line in ["set motor.r_s 3.7", "set nameplate.current_a 5", "set sequence.i_d 2"] {
+        for line in ["set motor.r_s 3.7", "set nameplate.current_a 5", "set sequence.flux high"] {
             assert!(lines.iter().any(|found| found == line), "{line} in {lines:?}");
         }
     }

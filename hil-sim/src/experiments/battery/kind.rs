@@ -1,12 +1,14 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
 use drive_core::Accepted;
+use drive_settings::Flux;
 
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
 use crate::prelude::*;
 
-/// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
+/// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion, torque currents to
+/// the [nominal limit](nominal_limit_a).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
     /// Constant torque current while a dynamometer holds this speed, rpm.
@@ -84,12 +86,21 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     }
 }
 
-/// The nominal limit of the torque current, A peak: the smaller of that of the speed loop, 3 A with the dissertation's
-/// motor, and the current that the drive's limit leaves beside the magnetising current. A drive that has learned a
-/// lower one is measured by the nominal one.
+/// The nominal limit of the torque current, A peak: the current that the drive's limit leaves beside the magnetising current; with the
+/// dissertation's flux not more than its speed loop takes, 3 A. A drive that has learned a lower one is measured by the nominal
+/// one.
 pub fn nominal_limit_a(config: &Config) -> f64 {
     let (all, i_d) = (f64::from(config.drive.current_limit_a()), f64::from(config.drive.i_d()));
-    config.amperes(MOST_A).min((all * all - i_d * i_d).max(0.0).sqrt())
+    let left = (all * all - i_d * i_d).max(0.0).sqrt();
+    match config.drive.sequence.flux {
+        Flux::Low => left.min(config.amperes(MOST_A)),
+        Flux::High => left,
+    }
+}
+
+/// A torque current of a run, A on the dissertation's motor, in proportion to the [nominal limit](nominal_limit_a), A peak.
+pub fn share_of_limit(config: &Config, on_reference: f64) -> f64 {
+    on_reference * (nominal_limit_a(config) / MOST_A)
 }
 
 /// Torque, Nm, of a torque current, A peak, at the right angle and the flux of the magnetising current: 3/2 P L_m^2/L_r

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::bench::Bench;
-use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, torque_nm};
+use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{Refused, Trial};
 use crate::plant::PlantSettings;
 use crate::prelude::*;
@@ -151,7 +151,7 @@ pub fn follow(
                     bench.rig.command(&Command::Speed(rpm))?;
                     rpm
                 }
-                _ => bench.torque(config.amperes(reference) as f32)?,
+                _ => bench.torque(share_of_limit(config, reference) as f32)?,
             }
             .into();
             if !bench.watch(part.seconds / f64::from(steps)) {

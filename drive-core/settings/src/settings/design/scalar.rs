@@ -1,7 +1,5 @@
 //! The coefficients of the mode without identification.
 
-use core::f32::consts::TAU;
-
 use crate::settings::Settings;
 use crate::settings::rules::PEAK_OF_PHASE;
 use drive_core::flux::{VoltsPerHertz, VoltsPerHertzSettings};
@@ -24,7 +22,7 @@ impl Settings {
                 rated_volts_per_hz: PEAK_OF_PHASE * plate.voltage_v / plate.frequency_hz,
                 frequency_hz: plate.frequency_hz,
                 slip_hz,
-                torque_nm: plate.power_w / (TAU * plate.speed_rpm / 60.0),
+                torque_nm: plate.torque_nm(),
                 pole_pairs,
                 rated_a: self.rated_a(),
                 limit_a: self.current_limit_a(),
