@@ -12,7 +12,6 @@ use core::f32::consts::SQRT_2;
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
-use super::rules::{TRIP_OF_RANGE, TRIP_OF_RATED};
 use super::value::Words;
 use super::{CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
@@ -354,7 +353,7 @@ settings! {
         /// phase current that trips
         ///
         /// A trip level beyond the sensors' range would never be reached.
-        trip_a: Option<f32> = None, 65: auto("A", trip_a: |s| f32::min(TRIP_OF_RATED * s.rated_a(), TRIP_OF_RANGE * s.sensor_range_a()))
+        trip_a: Option<f32> = None, 65: auto("A", trip_a: Settings::trip_rule)
             .beside(|s| (0.05, s.sensor_range_a())).hardware();
         /// largest current that is regulated, peak
         ///

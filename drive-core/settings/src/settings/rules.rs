@@ -52,8 +52,8 @@ const CARRIER_OF_ROOM: f32 = 0.75;
 /// Share of the sensors' range that trips: noise and drift leave the reading of a larger current at the end of the range. And trip in
 /// rated currents: it leaves the current limit with high flux what that needs. A trip has one rule for any flux: the bench steps
 /// of a board hold for it, and commissioning changes the flux.
-pub(super) const TRIP_OF_RANGE: f32 = 0.9614;
-pub(super) const TRIP_OF_RATED: f32 = 2.2;
+const TRIP_OF_RANGE: f32 = 0.9614;
+const TRIP_OF_RATED: f32 = 2.2;
 /// With high flux: torque at the current limit, as a share of the rated one. 150 % for a minute is what frequency converters give;
 /// the rest is for the angle's error and a warmer motor.
 const OVERLOAD: f32 = 1.55;
@@ -194,6 +194,11 @@ impl Settings {
         let plate = &self.nameplate;
         let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
         f32::min(rated_flux / self.motor.l_m, FRAC_1_SQRT_2 * self.rated_a().min(limit_a))
+    }
+
+    /// Rule of `limits.trip_a`.
+    pub(super) fn trip_rule(&self) -> f32 {
+        f32::min(TRIP_OF_RATED * self.rated_a(), TRIP_OF_RANGE * self.sensor_range_a())
     }
 
     /// Rule of `limits.current_a`.
