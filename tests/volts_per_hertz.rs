@@ -162,11 +162,11 @@ fn braking_keeps_the_link_below_its_limit() {
 /// With a hot heat sink the shaft gives way under a load that it carries when cold, and the drive says why.
 #[test]
 fn a_hot_heat_sink_takes_torque_and_is_named() {
-    for (celsius, why) in [(25.0, Limiting::None), (77.0, Limiting::HeatSink)] {
+    for (celsius, why) in [(25.0, Limiting::None), (79.0, Limiting::HeatSink)] {
         let hot = format!("measurement.heat_sink_c={celsius}");
         let config = Config::load(Some("motulator-2kw2"), None, &[hot]).unwrap();
         let mut rig = turning(&config, 600.0, 1);
-        rig.set_load(Load::Free { torque: 4.0 }).unwrap();
+        rig.set_load(Load::Free { torque: 6.0 }).unwrap();
         let mut limiting = 0;
         for _ in 0..200 {
             rig.run(0.01, |_| {});
@@ -177,11 +177,11 @@ fn a_hot_heat_sink_takes_torque_and_is_named() {
     }
 }
 
-/// A load that needs more power than allowed takes speed until it does not, within 5 % in two seconds. Measured: 192 W of 200 W.
+/// A load that needs more power than allowed takes speed until it does not, within 5 % in two seconds. Measured: 211 W of 210 W.
 #[test]
 fn a_power_limit_takes_speed() {
     let mut config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
-    config.drive.limits.motoring_w = 200.0;
+    config.drive.limits.motoring_w = 210.0;
     let mut rig = turning(&config, 900.0, 1);
     rig.set_load(Load::Free { torque: 4.0 }).unwrap();
     rig.run(2.0, |_| {});
@@ -194,7 +194,7 @@ fn a_power_limit_takes_speed() {
     let rpm = seen(&mut rig).0;
     println!("{watts:.0} W, {rpm:.0} rpm, limiting {limiting}");
     assert_eq!(rig.drive.state(), State::VoltsPerHertz);
-    assert!((150.0..210.0).contains(&watts) && rpm > 150.0, "{watts} W, {rpm} rpm");
+    assert!((160.0..220.5).contains(&watts) && rpm > 150.0, "{watts} W, {rpm} rpm");
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::outcome::Outcome;
 use crate::report;
 
 /// What the twin takes from the settings of the drive beside what every motor file must say; `auto` is left to its rule.
-const ALSO: &str = "motor.inertia inverter.drop_v sequence.flux sequence.i_d limits.current_a observer.leakage_share observer.leakage_slope";
+const ALSO: &str = "motor.inertia inverter.drop_v current_plant sequence.flux sequence.i_d limits.current_a observer.leakage_share observer.leakage_slope";
 /// The lines that are sent, each with the news that ends it.
 const LINES: [(&str, Option<&str>); 6] = [
     ("commission", Some("* commissioning: ended")),

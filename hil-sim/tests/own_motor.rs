@@ -80,9 +80,9 @@ fn sensors_and_flux_follow_the_nameplate() {
     let rated_a = 3.4 * 2.0_f64.sqrt();
     assert!((config.measurement.range_a / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
     assert!((f64::from(config.drive.sensor_range_a()) / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
-    assert!((f64::from(config.drive.current_limit_a()) / rated_a - 0.967).abs() < 2e-3);
-    // 0.55 times the rated current; the rated flux would need 3.15 A.
-    assert!((f64::from(config.drive.i_d()) / (0.55 * rated_a) - 1.0).abs() < 2e-3);
+    assert!((f64::from(config.drive.current_limit_a()) / rated_a - 0.9027).abs() < 2e-3);
+    // 0.707 times the current limit; the rated flux would need 3.15 A.
+    assert!((f64::from(config.drive.i_d()) / (0.6383 * rated_a) - 1.0).abs() < 2e-3);
     assert!(config.prepare.learn);
     assert_eq!(config.drive.current_plant.source, PlantSource::Motor);
     // The inertia of 0.012 kg m2 belongs to 6.1 Nm.
@@ -135,10 +135,10 @@ fn the_example_of_the_page_is_a_motor() {
     let file = written(&folder, "example.toml", example.expect("an example"));
     let config = Config::load(Some(&file), None, &[]).expect("a motor");
     assert!(config.drive.build().is_ok());
-    // It says all that a motor of the program says: the rules add the current loop alone, and every number has its source.
+    // It says all that a motor of the program says: the rules add the current loop and the flux alone, and every number has its source.
     let motor = Motor::find(&file).expect("a motor");
     let implied: Vec<&str> = motor.implied(&config).iter().map(|(key, ..)| *key).collect();
-    assert_eq!(implied, ["current_plant"]);
+    assert_eq!(implied, ["current_plant", "sequence.flux"]);
     assert!(motor.settings().iter().all(|(key, _)| motor.source_of(key).is_some()));
     let output = hil_sim(&folder, &["motors", "example.toml"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

@@ -115,17 +115,17 @@ keys! {
     /// The motor: T equivalent circuit of Figure 21, values of Table 5. The drive is set to the same values.
     "motor." motor: MotorConfig {
         /// Stator resistance.
-        r_s: f64 = 5.4, [0.001 .. 1000], "ohm" => plant.machine.rs;
+        r_s: f64 = 5.4, [0.0001 .. 1000], "ohm" => plant.machine.rs;
         /// Rotor resistance, referred to the stator.
-        r_r: f64 = 1.1, [0.001 .. 1000], "ohm" => plant.machine.rr;
+        r_r: f64 = 1.1, [0.0001 .. 1000], "ohm" => plant.machine.rr;
         /// Leakage inductance of the stator.
-        l_ls: f64 = 0.0276, [1e-6 .. 10], "H" => plant.machine.lls;
+        l_ls: f64 = 0.0276, [1e-7 .. 10], "H" => plant.machine.lls;
         /// Leakage inductance of the rotor, referred to the stator.
-        l_lr: f64 = 0.0276, [1e-6 .. 10], "H" => plant.machine.llr;
+        l_lr: f64 = 0.0276, [1e-7 .. 10], "H" => plant.machine.llr;
         /// Magnetising inductance.
-        l_m: f64 = 0.1771, [1e-5 .. 100], "H" => plant.machine.lm;
+        l_m: f64 = 0.1771, [1e-6 .. 100], "H" => plant.machine.lm;
         /// Pairs of poles.
-        pole_pairs: u32 = 2, [1 .. 50], "" => plant.machine.pole_pairs;
+        pole_pairs: u32 = 2, [1 .. 6], "" => plant.machine.pole_pairs;
         /// Inertia of rotor and load (assumed; not in the source).
         inertia: f64 = 0.012, [1e-6 .. 1000], "kg m2" => plant.mechanics.inertia;
         /// Viscous friction (assumed; not in the source).
