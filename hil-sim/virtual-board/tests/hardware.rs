@@ -62,8 +62,8 @@ fn a_typed_protection_ends_the_confirmation() -> Result<()> {
             ("scales.dc_link.gain", 1.1 * settings.scales.dc_link.gain),
             ("limits.trip_a", 0.99 * settings.trip_a()),
             ("limits.dc_over_v", 0.99 * settings.dc_over_v()),
-            // The trip follows it.
-            ("nameplate.current_a", 0.8 * settings.nameplate.current_a),
+            // The trip is at most 2.2 times it.
+            ("nameplate.current_a", 0.5 * settings.nameplate.current_a),
         ] {
             ask(&mut board, &format!("set {name} {value}"), "ok: staged; ")?;
             ask(&mut board, "start torque", REFUSED).with_context(|| name.to_owned())?;
