@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_SUFFIX;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
@@ -20,7 +21,7 @@ const SUMS: &str = "SHA256SUMS";
 /// Programs for this machine; each is named as its package.
 const PROGRAMS: [&str; 2] = ["hil-sim", "drive-live"];
 /// Their profile.
-const PROFILE: &str = "shipped";
+pub const PROFILE: &str = "shipped";
 /// Texts of the repository by the folder that they are put into.
 const TEXTS: [(&str, &str); 3] = [
     ("description", "docs/settings.md docs/modbus.md docs/faults.md tests/numbers.txt"),
@@ -101,14 +102,20 @@ pub fn dist(options: &Dist) -> Result<()> {
     options.out.as_ref().map_or(Ok(()), |out| copy(&folder, out))
 }
 
+/// A command that compiles without the flags of the environment, and not by increments, which two packages of the profile would be:
+/// both leave traces.
+pub fn plain(mut command: Command) -> Command {
+    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
+    command.env_remove("CARGO_ENCODED_RUSTFLAGS");
+    command
+}
+
 /// Builds the programs for this machine into a folder.
 fn programs(host: &str, folder: &Path) -> Result<()> {
     let mut command = run::cargo("build --locked --profile");
     command.args([PROFILE, &paths::option(host, &[])?]);
     command.args(PROGRAMS.map(|name| format!("--package={name}")));
-    // Two packages of the profile are built by increments, which leave traces.
-    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
-    run::step("programs", command.env_remove("CARGO_ENCODED_RUSTFLAGS"))?;
+    run::step("programs", &mut plain(command))?;
     PROGRAMS.iter().try_for_each(|name| {
         let program = run::target_dir()?.join(PROFILE).join(format!("{name}{EXE_SUFFIX}"));
         paths::check(&fs::read(&program)?).with_context(|| name.to_string())?;
