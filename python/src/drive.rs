@@ -1,7 +1,7 @@
 //! The control alone.
 
 use drive_core::io::Measured;
-use drive_core::{Abc, Accepted, Command, Mode, Stop};
+use drive_core::{Abc, Accepted, Command, Hardware, Mode, Stop};
 use hil_sim::config::built;
 use hil_sim::error::unknown;
 use hil_sim::rig::{RATE_HZ, fault_text};
@@ -11,9 +11,6 @@ use pyo3::types::PyDict;
 
 use crate::config::Config;
 use crate::raised;
-
-/// Control period, s.
-pub const PERIOD_S: f64 = 1.0 / RATE_HZ;
 
 /// Commands by their name at the console; a reference is that of the value.
 #[rustfmt::skip] // one a line
@@ -94,10 +91,13 @@ impl Drive {
         dc_link_v: f32,
         encoder: u32,
     ) -> Option<[f32; 3]> {
-        let c = -current_a - current_b;
-        let phases = Abc { a: current_a, b: current_b, c };
-        let dc_link = dc_link_v;
-        self.0.step(&Measured { phases, third: c, dc_link, encoder, ..Measured::default() }).duties
+        let phases = Abc { a: current_a, b: current_b, c: -current_a - current_b };
+        // The heat sink bears all of the current.
+        let (third, dc_link, heat_sink) = (phases.c, dc_link_v, 1.0);
+        let (hardware, fault) = (Hardware::empty(), None);
+        self.0
+            .step(&Measured { phases, third, dc_link, heat_sink, encoder, hardware, fault })
+            .duties
     }
 
     /// Gives a command by its name at the console: `torque`, a current in A, `speed` in rpm, `position` in turns, `start torque`,

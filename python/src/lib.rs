@@ -22,9 +22,10 @@ use config::Config;
 #[pymodule]
 mod induction_drive {
     #[pymodule_export]
-    use super::{
-        commission, config::Config, drive::Drive, drive::PERIOD_S, plant::Plant, rig::Rig, run,
-    };
+    use super::{commission, config::Config, drive::Drive, plant::Plant, rig::Rig, run};
+    /// Control period, s.
+    #[pymodule_export]
+    const PERIOD_S: f64 = 1.0 / hil_sim::rig::RATE_HZ;
 }
 
 /// The exception of an error of the simulator.

@@ -71,8 +71,8 @@ def test_a_rig_has_the_bits_of_a_scenario_of_the_program(tmp_path, plant):
 @pytest.mark.parametrize(
     "wrong, words",
     [
-        (lambda: drive.Config(set={"motor.r_s": -1}), "motor.r_s = -1: out of range; allowed: 0.0001 to 1000 ohm"),
-        (lambda: drive.Config(set={"motor.r_q": 1}), "there is no key `motor.r_q`; did you mean `motor.r_s`"),
+        (lambda: drive.Config(set={"motor.r_s": -1}), "motor.r_s = -1: out of range; allowed: 0.001 to 1000 ohm"),
+        (lambda: drive.Config(set={"motor.r_q": 1}), "there is no key `motor.r_q`; did you mean `motor.r_r`"),
         (lambda: drive.Config(set={"angle_source": "star"}), "angle_source = star"),
         (lambda: drive.Config(motor="krause-3pH"), "did you mean `krause-3hp`"),
         (lambda: drive.Config(plant="q"), "plant = q"),
@@ -158,4 +158,4 @@ def test_the_notebook_runs(file):
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     print(text)
     assert len(pictures) >= 4
-    assert sys.version_info < (3, 12) or "times motulator" in text
+    assert sys.version_info < (3, 12) or "times motulator's speed" in text

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_SUFFIX;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
@@ -14,14 +13,12 @@ use sha2::{Digest, Sha256};
 use crate::files::{copy, copy_as, files};
 use crate::sbom::Sbom;
 use crate::toolchain::{self, Target};
-use crate::{image, paths, run, tools, web};
+use crate::{image, paths, python, run, tools, web};
 
 /// The file of the check sums, in the form of `sha256sum`.
 const SUMS: &str = "SHA256SUMS";
 /// Programs for this machine; each is named as its package.
 const PROGRAMS: [&str; 2] = ["hil-sim", "drive-live"];
-/// Their profile.
-pub const PROFILE: &str = "shipped";
 /// Texts of the repository by the folder that they are put into.
 const TEXTS: [(&str, &str); 3] = [
     ("description", "docs/settings.md docs/modbus.md docs/faults.md tests/numbers.txt"),
@@ -67,9 +64,9 @@ pub fn dist(options: &Dist) -> Result<()> {
         copy(&web::build()?, &folder.join("web"))?;
         copy(&tools::book()?, &folder.join("book"))?;
     }
-    let wheels = run::target_dir()?.join(concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "-*.whl"));
-    for wheel in glob(&wheels.to_string_lossy())? {
-        copy(&wheel?, &folder.join("wheels"))?;
+    for wheel in python::wheels()? {
+        built.push(("induction-drive-python", &*host, Target::InUse));
+        copy(&wheel, &folder.join("wheels"))?;
     }
     for (to, texts) in TEXTS {
         texts.split(' ').try_for_each(|text| copy(&run::root().join(text), &folder.join(to)))?;
@@ -102,22 +99,14 @@ pub fn dist(options: &Dist) -> Result<()> {
     options.out.as_ref().map_or(Ok(()), |out| copy(&folder, out))
 }
 
-/// A command that compiles without the flags of the environment, and not by increments, which two packages of the profile would be:
-/// both leave traces.
-pub fn plain(mut command: Command) -> Command {
-    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
-    command.env_remove("CARGO_ENCODED_RUSTFLAGS");
-    command
-}
-
 /// Builds the programs for this machine into a folder.
 fn programs(host: &str, folder: &Path) -> Result<()> {
     let mut command = run::cargo("build --locked --profile");
-    command.args([PROFILE, &paths::option(host, &[])?]);
+    command.args([run::SHIPPED, &paths::option(host, &[])?]);
     command.args(PROGRAMS.map(|name| format!("--package={name}")));
-    run::step("programs", &mut plain(command))?;
+    run::step("programs", run::plain(&mut command))?;
     PROGRAMS.iter().try_for_each(|name| {
-        let program = run::target_dir()?.join(PROFILE).join(format!("{name}{EXE_SUFFIX}"));
+        let program = run::target_dir()?.join(run::SHIPPED).join(format!("{name}{EXE_SUFFIX}"));
         paths::check(&fs::read(&program)?).with_context(|| name.to_string())?;
         copy(&program, folder)
     })
