@@ -1,20 +1,21 @@
 //! The control alone.
 
 use drive_core::io::Measured;
-use drive_core::{Abc, Accepted, Command, Hardware, Mode, Stop};
+use drive_core::{Abc, Command, Hardware, Mode, Stop};
 use hil_sim::config::built;
 use hil_sim::error::unknown;
-use hil_sim::rig::{RATE_HZ, fault_text};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::config::Config;
 use crate::raised;
 
+/// A command of a value by its name.
+type Named = (&'static str, fn(f32) -> Command);
+
 /// Commands by their name at the console; a reference is that of the value.
 #[rustfmt::skip] // one a line
-const COMMANDS: &[(&str, fn(f32) -> Command)] = &[
+const COMMANDS: &[Named] = &[
     ("torque", Command::Torque),
     ("speed", Command::Speed),
     ("position", Command::Position),
@@ -37,42 +38,9 @@ pub fn named(name: &str, value: f32) -> PyResult<Command> {
     Ok((found.ok_or_else(error)?.1)(value))
 }
 
-/// Gives the drive a command; the value that holds now where it was limited.
-pub fn give(drive: &mut drive_core::Drive, name: &str, value: f32) -> PyResult<Option<f32>> {
-    match drive.command(&named(name, value)?) {
-        Ok(Accepted::AsGiven) => Ok(None),
-        Ok(Accepted::Limited(to)) => Ok(Some(to)),
-        Err(why) => Err(PyRuntimeError::new_err(format!("the drive refuses {name}: {why}"))),
-    }
-}
-
-/// What the drive estimated and wanted in its last period with the outputs on: angle in electrical turns, frequencies in Hz.
-pub fn seen<'py>(py: Python<'py>, drive: &drive_core::Drive) -> PyResult<Bound<'py, PyDict>> {
-    let seen = drive.telemetry();
-    let values = PyDict::new(py);
-    values.set_item("flux_angle_turns", seen.phi.to_turns())?;
-    for (name, value) in [
-        ("flux_hz", seen.flux_freq * RATE_HZ as f32),
-        ("rotor_hz", seen.rotor_freq * RATE_HZ as f32),
-        ("direct_reference_a", seen.reference.d),
-        ("torque_reference_a", seen.reference.q),
-        ("direct_current_a", seen.current.d),
-        ("torque_current_a", seen.current.q),
-        ("direct_voltage_v", seen.voltage.d),
-        ("torque_voltage_v", seen.voltage.q),
-        ("dc_link_v", seen.dc_link),
-        ("saliency", seen.saliency),
-        ("saliency_loss", seen.saliency_loss),
-        ("position_turns", seen.turns),
-    ] {
-        values.set_item(name, value)?;
-    }
-    Ok(values)
-}
-
 /// The control of the firmware alone, between measured values and duties, with the settings of a configuration.
 #[pyclass(module = "induction_drive")]
-pub struct Drive(drive_core::Drive);
+pub struct Drive(pub drive_core::Drive);
 
 #[pymethods]
 impl Drive {
@@ -98,29 +66,5 @@ impl Drive {
         self.0
             .step(&Measured { phases, third, dc_link, heat_sink, encoder, hardware, fault })
             .duties
-    }
-
-    /// Gives a command by its name at the console: `torque`, a current in A, `speed` in rpm, `position` in turns, `start torque`,
-    /// `stop quick`, `clear` and others. Returns the value that holds where it was limited, else None.
-    #[pyo3(signature = (name, value=0.0))]
-    fn command(&mut self, name: &str, value: f32) -> PyResult<Option<f32>> {
-        give(&mut self.0, name, value)
-    }
-
-    /// What it estimated and wanted in the last period with the outputs on.
-    fn telemetry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        seen(py, &self.0)
-    }
-
-    /// Its state in words.
-    #[getter]
-    fn state(&self) -> String {
-        self.0.state().to_string()
-    }
-
-    /// The fault with which it has stopped itself, with its number, or None.
-    #[getter]
-    fn fault(&self) -> Option<String> {
-        self.0.state().fault().map(fault_text)
     }
 }

@@ -7,6 +7,7 @@ mod config;
 mod drive;
 mod plant;
 mod rig;
+mod talk;
 
 use drive_settings::{SETTINGS, value};
 use hil_sim::error::Error;

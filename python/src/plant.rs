@@ -3,11 +3,8 @@
 use std::f64::consts::TAU;
 
 use hil_sim::config::plant_settings;
-use hil_sim::error::Error;
-use hil_sim::plant::{
-    Complex, ElectricalState as _, EnergyMachine, Load, Machine, MachineModel, MotorModel,
-};
-use hil_sim::{error, plant};
+use hil_sim::error::{self, Error};
+use hil_sim::plant::{self, Complex, ElectricalState as _, Load, MachineModel, MotorModel};
 use numpy::{IntoPyArray as _, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -16,24 +13,36 @@ use pyo3::types::PyDict;
 use crate::config::Config;
 use crate::{check, raised};
 
-/// Either machine model.
-enum Motor {
-    A(MotorModel<Machine>),
-    Energy(Box<MotorModel<EnergyMachine>>),
+/// Either machine model on its shaft.
+trait Motor: Send + Sync {
+    fn step(&mut self, voltage: Complex, h: f64);
+    /// Space vectors of current and rotor flux; torque, speed in rpm, and angle of the shaft.
+    fn seen(&self) -> ([Complex; 2], [f64; 3]);
+    fn set_load(&mut self, load: Load) -> Result<(), Error>;
+}
+
+impl<M: MachineModel<State: Send + Sync> + Send + Sync> Motor for MotorModel<M> {
+    fn step(&mut self, voltage: Complex, h: f64) {
+        self.step(voltage, h);
+    }
+    fn seen(&self) -> ([Complex; 2], [f64; 3]) {
+        let state = &self.state.electrical;
+        let rpm = self.state.speed * 60.0 / TAU;
+        let vectors = [state.current(), state.rotor_flux()];
+        (vectors, [self.machine.torque(state), rpm, self.state.angle])
+    }
+    fn set_load(&mut self, load: Load) -> Result<(), Error> {
+        self.mechanics.set_load(load).map_err(Error::refused)?;
+        self.hold_speed();
+        Ok(())
+    }
 }
 
 /// The motor of a configuration with its shaft, between voltages and currents: without inverter and sensors.
 #[pyclass(module = "induction_drive")]
 pub struct Plant {
-    motor: Motor,
+    motor: Box<dyn Motor>,
     substeps: u32,
-}
-
-/// Space vectors of current and flux, torque, speed and angle over time.
-#[derive(Default)]
-struct Course {
-    vectors: [Vec<Complex>; 2],
-    values: [Vec<f64>; 3],
 }
 
 /// A load by the words of `load.mode`: against a torque, Nm, `locked`, or held at a speed, rpm.
@@ -46,33 +55,15 @@ pub fn load(mode: &str, value: f64) -> PyResult<Load> {
     }
 }
 
-fn integrated<M: MachineModel>(
-    motor: &mut MotorModel<M>,
-    voltages: &[Complex],
-    (h, times): (f64, u32),
-) -> Course {
-    let mut course = Course::default();
-    for &voltage in voltages {
-        (0..times).for_each(|_| motor.step(voltage, h));
-        let state = &motor.state;
-        let vectors = [state.electrical.current(), state.electrical.rotor_flux()];
-        let torque = motor.machine.torque(&state.electrical);
-        let values = [torque, state.speed * 60.0 / TAU, state.angle];
-        course.vectors.iter_mut().zip(vectors).for_each(|(all, one)| all.push(one));
-        course.values.iter_mut().zip(values).for_each(|(all, one)| all.push(one));
-    }
-    course
-}
-
 #[pymethods]
 impl Plant {
     #[new]
     fn new(config: &Config) -> PyResult<Self> {
         let settings = plant_settings(&config.values);
         let plant = plant::Plant::new(&settings, 1).map_err(Error::refused).map_err(raised)?;
-        let motor = match (plant.model_a(), plant.energy_model()) {
-            (Some(motor), _) => Motor::A(*motor),
-            (None, Some(motor)) => Motor::Energy(Box::new(*motor)),
+        let motor: Box<dyn Motor> = match (plant.model_a(), plant.energy_model()) {
+            (Some(motor), _) => Box::new(*motor),
+            (None, Some(motor)) => Box::new(*motor),
             (None, None) => return Err(PyValueError::new_err("the motor has no model")),
         };
         Ok(Self { motor, substeps: settings.substeps })
@@ -88,20 +79,20 @@ impl Plant {
         step_s: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         check("step_s", step_s, (1e-7, 1e-3), "s")?;
-        let voltages = voltages.as_slice()?;
-        let (h, times) = (step_s / f64::from(self.substeps), self.substeps);
-        let motor = &mut self.motor;
-        let course = py.detach(|| match motor {
-            Motor::A(motor) => integrated(motor, voltages, (h, times)),
-            Motor::Energy(motor) => integrated(motor, voltages, (h, times)),
-        });
+        let (voltages, motor, times) = (voltages.as_slice()?, &mut self.motor, self.substeps);
+        let seen = |&voltage: &Complex| {
+            (0..times).for_each(|_| motor.step(voltage, step_s / f64::from(times)));
+            motor.seen()
+        };
+        let course: Vec<_> = py.detach(|| voltages.iter().map(seen).collect());
         let arrays = PyDict::new(py);
-        for (name, vector) in ["current", "flux"].into_iter().zip(course.vectors) {
-            arrays.set_item(name, vector.into_pyarray(py))?;
+        for (n, name) in ["current", "flux"].into_iter().enumerate() {
+            let vectors: Vec<Complex> = course.iter().map(|(vectors, _)| vectors[n]).collect();
+            arrays.set_item(name, vectors.into_pyarray(py))?;
         }
-        for (name, value) in ["torque_nm", "speed_rpm", "angle_rad"].into_iter().zip(course.values)
-        {
-            arrays.set_item(name, value.into_pyarray(py))?;
+        for (n, name) in ["torque_nm", "speed_rpm", "angle_rad"].into_iter().enumerate() {
+            let values: Vec<f64> = course.iter().map(|(_, values)| values[n]).collect();
+            arrays.set_item(name, values.into_pyarray(py))?;
         }
         Ok(arrays)
     }
@@ -109,16 +100,6 @@ impl Plant {
     /// Couples another load: `free` against a torque in Nm, `locked`, or held at a `speed` in rpm.
     #[pyo3(signature = (mode, value=0.0))]
     fn set_load(&mut self, mode: &str, value: f64) -> PyResult<()> {
-        let load = load(mode, value)?;
-        fn set<M: MachineModel>(motor: &mut MotorModel<M>, load: Load) -> Result<(), Error> {
-            motor.mechanics.set_load(load).map_err(Error::refused)?;
-            motor.hold_speed();
-            Ok(())
-        }
-        match &mut self.motor {
-            Motor::A(motor) => set(motor, load),
-            Motor::Energy(motor) => set(motor, load),
-        }
-        .map_err(raised)
+        self.motor.set_load(load(mode, value)?).map_err(raised)
     }
 }

@@ -16,7 +16,7 @@ const LONGEST_S: f64 = 600.0;
 /// The drive on inverter, motor, load and sensors of a configuration, as the experiments run it. With `prepare.learn` it has learned
 /// first, with the shaft locked.
 #[pyclass(module = "induction_drive")]
-pub struct Rig(rig::Rig);
+pub struct Rig(pub rig::Rig);
 
 /// The quantity of a point without a reference.
 fn seen(point: &Point) -> Seen<'_> {
@@ -40,12 +40,6 @@ impl Rig {
             _ => Ok(()),
         })
         .map_err(raised)
-    }
-
-    /// Gives a command by its name at the console, as `Drive.command`.
-    #[pyo3(signature = (name, value=0.0))]
-    fn command(&mut self, name: &str, value: f32) -> PyResult<Option<f32>> {
-        drive::give(&mut self.0.drive, name, value)
     }
 
     /// Couples another load, as `Plant.set_load`.
@@ -75,22 +69,5 @@ impl Rig {
             }
         }
         Ok(arrays)
-    }
-
-    /// What the drive estimated and wanted in the last period with the outputs on.
-    fn telemetry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        drive::seen(py, &self.0.drive)
-    }
-
-    /// Its state in words.
-    #[getter]
-    fn state(&self) -> String {
-        self.0.drive.state().to_string()
-    }
-
-    /// The fault with which the drive has stopped itself, with its number, or None.
-    #[getter]
-    fn fault(&self) -> Option<String> {
-        self.0.fault()
     }
 }

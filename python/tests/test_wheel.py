@@ -157,5 +157,5 @@ def test_the_notebook_runs(file):
     text = "".join(output.get("text", "") for output in outputs)
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     print(text)
-    assert len(pictures) >= 4
-    assert sys.version_info < (3, 12) or "times motulator's speed" in text
+    beside_motulator = sys.version_info >= (3, 12)
+    assert len(pictures) == 3 + beside_motulator and ("times motulator's speed" in text) == beside_motulator
