@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::config::Config;
-use crate::{check, drive, plant, raised};
+use crate::drive::named;
+use crate::{check, plant, raised};
 
 /// Longest run of one call, s: all its columns take 700 MB.
 const LONGEST_S: f64 = 600.0;
@@ -33,13 +34,9 @@ impl Rig {
 
     /// Starts in a mode, `torque`, `speed`, `position` or `vf`, and runs until the drive regulates.
     fn start(&mut self, py: Python<'_>, mode: &str) -> PyResult<()> {
-        let command = drive::named(&format!("start {mode}"), 0.0)?;
+        let Command::Start(mode) = named(&format!("start {mode}"), 0.0)? else { return Ok(()) };
         let rig = &mut self.0;
-        py.detach(|| match command {
-            Command::Start(mode) => rig.start(mode),
-            _ => Ok(()),
-        })
-        .map_err(raised)
+        py.detach(|| rig.start(mode)).map_err(raised)
     }
 
     /// Couples another load, as `Plant.set_load`.

@@ -98,15 +98,10 @@ impl Outcome {
 
 /// The object of an experiment, or one with the objects of several in the list `experiments`.
 pub fn joined(objects: &[String]) -> String {
-    match objects {
-        [object] => object.clone(),
-        _ => {
-            format!(
-                r#"{{"schema_version":{SCHEMA_VERSION},"experiments":[{}]}}"#,
-                objects.join(",")
-            )
-        }
+    if let [object] = objects {
+        return object.clone();
     }
+    format!(r#"{{"schema_version":{SCHEMA_VERSION},"experiments":[{}]}}"#, objects.join(","))
 }
 
 #[cfg(test)]
