@@ -22,6 +22,7 @@ use crate::first_light;
 use crate::input::{Input, OUT};
 use crate::passport;
 use part::Part;
+pub use run::json;
 use run::{Output, Trace};
 
 /// Simulates an induction-motor drive: the control code of the firmware, closed over a motor model.

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::progress::Progress;
 
 /// The options that describe a simulation.
-#[derive(Args, Default)]
+#[derive(Args, Clone, Default)]
 pub struct Input {
     /// Motor with the inverter and the sensors that suit it: a name that `motors` shows, or a file that ends in .toml, or
     /// a passport that ends in .json

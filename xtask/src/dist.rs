@@ -13,14 +13,12 @@ use sha2::{Digest, Sha256};
 use crate::files::{copy, copy_as, files};
 use crate::sbom::Sbom;
 use crate::toolchain::{self, Target};
-use crate::{image, paths, run, tools, web};
+use crate::{image, paths, python, run, tools, web};
 
 /// The file of the check sums, in the form of `sha256sum`.
 const SUMS: &str = "SHA256SUMS";
 /// Programs for this machine; each is named as its package.
 const PROGRAMS: [&str; 2] = ["hil-sim", "drive-live"];
-/// Their profile.
-const PROFILE: &str = "shipped";
 /// Texts of the repository by the folder that they are put into.
 const TEXTS: [(&str, &str); 3] = [
     ("description", "docs/settings.md docs/modbus.md docs/faults.md tests/numbers.txt"),
@@ -66,9 +64,9 @@ pub fn dist(options: &Dist) -> Result<()> {
         copy(&web::build()?, &folder.join("web"))?;
         copy(&tools::book()?, &folder.join("book"))?;
     }
-    let wheels = run::target_dir()?.join(concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "-*.whl"));
-    for wheel in glob(&wheels.to_string_lossy())? {
-        copy(&wheel?, &folder.join("wheels"))?;
+    for wheel in python::wheels()? {
+        built.push(("induction-drive-python", &*host, Target::InUse));
+        copy(&wheel, &folder.join("wheels"))?;
     }
     for (to, texts) in TEXTS {
         texts.split(' ').try_for_each(|text| copy(&run::root().join(text), &folder.join(to)))?;
@@ -104,13 +102,11 @@ pub fn dist(options: &Dist) -> Result<()> {
 /// Builds the programs for this machine into a folder.
 fn programs(host: &str, folder: &Path) -> Result<()> {
     let mut command = run::cargo("build --locked --profile");
-    command.args([PROFILE, &paths::option(host, &[])?]);
+    command.args([run::SHIPPED, &paths::option(host, &[])?]);
     command.args(PROGRAMS.map(|name| format!("--package={name}")));
-    // Two packages of the profile are built by increments, which leave traces.
-    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
-    run::step("programs", command.env_remove("CARGO_ENCODED_RUSTFLAGS"))?;
+    run::step("programs", run::plain(&mut command))?;
     PROGRAMS.iter().try_for_each(|name| {
-        let program = run::target_dir()?.join(PROFILE).join(format!("{name}{EXE_SUFFIX}"));
+        let program = run::target_dir()?.join(run::SHIPPED).join(format!("{name}{EXE_SUFFIX}"));
         paths::check(&fs::read(&program)?).with_context(|| name.to_string())?;
         copy(&program, folder)
     })

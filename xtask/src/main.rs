@@ -15,6 +15,7 @@ mod map;
 mod modules;
 mod paths;
 mod prove;
+mod python;
 mod rooms;
 mod run;
 mod sbom;
@@ -93,6 +94,8 @@ enum Task {
     Pages,
     /// Builds the drive in a browser, firmware and motor on the live page: a folder of static files
     Web,
+    /// Builds the wheel for Python into target/wheels and tests it in a clean environment. Gets maturin, numpy and more from PyPI
+    Python,
     /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
     Dist(dist::Dist),
     /// Long proofs in shards, which a later call continues. Lists them, or does one
@@ -149,6 +152,7 @@ fn run(task: Task) -> Result<()> {
         Task::Book => tools::book().map(drop),
         Task::Pages => by_name::pages(),
         Task::Web => web::build().map(drop),
+        Task::Python => python::test(),
         Task::Dist(options) => dist::dist(&options),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),

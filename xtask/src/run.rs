@@ -16,6 +16,9 @@ pub const BROWSER: &str = "wasm32-unknown-unknown";
 /// Profile of the image that is flashed.
 pub const PROFILE: &str = "firmware";
 
+/// Profile of the programs and the wheel of a release.
+pub const SHIPPED: &str = "shipped";
+
 /// The root of the workspace.
 pub fn root() -> &'static Path {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -42,6 +45,13 @@ pub fn cargo(arguments: &str) -> Command {
     let mut command = command(env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
     command.args(arguments.split(' '));
     command
+}
+
+/// Lets a command compile without the flags of the environment, and not by increments, as two packages of [`SHIPPED`] would be: both
+/// leave traces.
+pub fn plain(command: &mut Command) -> &mut Command {
+    command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
+    command.env_remove("CARGO_ENCODED_RUSTFLAGS")
 }
 
 /// A command that runs in the root of the workspace.

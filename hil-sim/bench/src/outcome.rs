@@ -7,7 +7,7 @@ pub mod name;
 mod table;
 
 pub use figure::{Curve, Figure, Panel, Series, Style};
-pub use json::{SCHEMA_VERSION, group};
+pub use json::{SCHEMA_VERSION, joined};
 pub use table::{Cell, Column, Table};
 
 /// The outcome of an experiment.

@@ -139,11 +139,10 @@ pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
     }
 }
 
-/// Runs the experiment of this name, or all of a group, with the file of an experiment that takes one.
+/// Runs the experiment of this name, or all of a group, with the file of an experiment that takes one; prints the results.
 ///
 /// # Errors
-/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; those of the experiment;
-/// [`Error::Write`]; [`Error::Lost`] after all is written.
+/// As [`made`]; [`Error::Lost`] after all is written.
 pub fn run(
     name: &str,
     file: Option<&Path>,
@@ -151,6 +150,34 @@ pub fn run(
     part: &Part,
     output: &Output,
 ) -> Result<(), Error> {
+    let (objects, lost) = made(name, file, input, part, output)?;
+    if !part.is_shard() {
+        print(&objects, output)?;
+    }
+    lost
+}
+
+/// The JSON object that [`run`] prints; where the run is lost, it says so itself.
+///
+/// # Errors
+/// As [`made`].
+pub fn json(name: &str, file: Option<&Path>, input: &Input) -> Result<String, Error> {
+    let output = Output { json: true, ..Output::default() };
+    let (objects, _) = made(name, file, input, &Part::default(), &output)?;
+    Ok(outcome::joined(&objects))
+}
+
+/// The JSON objects of the results, if they are wanted, and whether one of them is lost.
+///
+/// # Errors
+/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; those of the experiment; [`Error::Write`].
+fn made(
+    name: &str,
+    file: Option<&Path>,
+    input: &Input,
+    part: &Part,
+    output: &Output,
+) -> Result<(Vec<String>, Result<(), Error>), Error> {
     let own = scenario::own(name);
     let chosen: Vec<_> = match &own {
         Some(own) => vec![own],
@@ -183,10 +210,7 @@ pub fn run(
         objects.push(run.write(&outcome, output)?);
         lost = lost.and(check_lost(experiment.name, &outcome));
     }
-    if !part.is_shard() {
-        print(&objects, output)?;
-    }
-    lost
+    Ok((objects, lost))
 }
 
 /// Identifies the motor from a trace.
@@ -223,9 +247,5 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
 /// # Errors
 /// [`Error::Write`].
 pub fn print(objects: &[String], output: &Output) -> Result<(), Error> {
-    match objects {
-        _ if !output.json => Ok(()),
-        [object] => say(&format!("{object}\n")),
-        objects => say(&format!("{}\n", outcome::group(objects))),
-    }
+    if output.json { say(&format!("{}\n", outcome::joined(objects))) } else { Ok(()) }
 }

@@ -13,7 +13,7 @@ use std::path::Path;
 use drive_core::Stop;
 
 pub use file::{Metric, Statistic};
-pub use quantity::QUANTITIES;
+pub use quantity::{QUANTITIES, Seen};
 pub use record::Record;
 
 use self::file::{Ramp, Text};

@@ -96,8 +96,11 @@ impl Outcome {
     }
 }
 
-/// One JSON object with the objects of several experiments, in the list `experiments`.
-pub fn group(objects: &[String]) -> String {
+/// The object of an experiment, or one with the objects of several in the list `experiments`.
+pub fn joined(objects: &[String]) -> String {
+    if let [object] = objects {
+        return object.clone();
+    }
     format!(r#"{{"schema_version":{SCHEMA_VERSION},"experiments":[{}]}}"#, objects.join(","))
 }
 
@@ -150,7 +153,7 @@ mod tests {
             r#"{{"schema_version":3,"version":"{version}","experiment":"filters","seed":1,"settings":{{}},"metrics":{{}},"series":{{}},"remarks":[],"faults":[]}}"#
         );
         assert_eq!(text, expected);
-        let both: serde_json::Value = serde_json::from_str(&group(&[text.clone(), text])).unwrap();
+        let both: serde_json::Value = serde_json::from_str(&joined(&[text.clone(), text])).unwrap();
         assert_eq!(both["experiments"][1]["experiment"], "filters");
     }
 }
