@@ -157,10 +157,10 @@ pub fn run(
     lost
 }
 
-/// The JSON object that [`run`] prints; where the run is lost, it says so itself.
+/// The JSON object that `cargo sim run --json` prints; where the run is lost, it says so itself.
 ///
 /// # Errors
-/// As [`made`].
+/// What `cargo sim run` refuses or fails with.
 pub fn json(name: &str, file: Option<&Path>, input: &Input) -> Result<String, Error> {
     let output = Output { json: true, ..Output::default() };
     let (objects, _) = made(name, file, input, &Part::default(), &output)?;
