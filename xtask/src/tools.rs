@@ -10,7 +10,7 @@ use crate::{run, sources};
 /// Least share of the viable mutants that the tests must catch.
 const CAUGHT: f64 = 0.9;
 
-/// `cargo xtask book`: builds the pages in `docs/`; their folder. their folder.
+/// `cargo xtask book`: builds the pages in `docs/`; returns their folder.
 pub fn book() -> Result<PathBuf> {
     let docs = run::root().join("docs");
     ensure!(docs.join("book.toml").is_file(), "there is no book: docs/book.toml is missing");

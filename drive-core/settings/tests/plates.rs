@@ -7,12 +7,12 @@ use induction_drive_core::Motor;
 use induction_drive_settings::{Nameplate, Settings, SettingsError};
 use proptest::prelude::*;
 
-/// From `from` to `to`, evenly in the logarithm, at 0 to 1.
+/// A value between `from` and `to`, at a share `at` of their distance on a logarithmic scale.
 fn log(from: f32, to: f32, at: f32) -> f32 {
     from * (to / from).powf(at)
 }
 
-/// A motor of that nameplate: parameters per unit of what induction motors have, at 0 to 1 each, a dc link that gives its
+/// A motor with this nameplate. Its parameters, per unit, lie in the usual range of induction motors, each at a share from 0 to 1; a dc link that gives its
 /// rated voltage, and sensors of `range` times its rated peak current.
 fn settings(plate: Nameplate, pole_pairs: u8, at: [f32; 4], range: f32) -> Settings {
     let z = plate.voltage_v / (3_f32.sqrt() * plate.current_a);

@@ -50,7 +50,7 @@ const TOLD: f64 = 0.1;
 const NEARER: f64 = 0.3;
 
 words! {
-    /// What the voltages of a record are.
+    /// Kinds of the voltages in a record.
     pub enum Voltages {
         /// Those a drive asks for: held over a row, less the drop of its inverter.
         Commanded = "commanded",
@@ -61,12 +61,12 @@ words! {
     }
 }
 
-/// What is read of a file, and how.
+/// How a file is read.
 #[derive(Clone, Debug)]
 pub struct Reading {
     /// Other names of columns, each `OURS=THEIRS`.
     pub columns: Vec<String>,
-    /// What the voltages are.
+    /// The kind of its voltages.
     pub voltages: Voltages,
     /// Rows after the currents of a row at which its voltage acts; unset: 0 for a voltage at the terminals, for a commanded one
     /// 1 and the delay of the current filter.

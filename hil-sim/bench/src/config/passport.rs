@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the file.
 pub const SCHEMA: u32 = 1;
-/// What the twin of a motor must say beside a motor file when it has been learned.
+/// Keys that the twin of a learned motor needs beside those of a motor file.
 const OF_LEARNED: &str =
     "saliency.a_psi saliency.psi_n saliency.b1 inverter.residual_v measurement.range_a";
 
@@ -16,7 +16,7 @@ pub struct Passport {
     pub schema: u32,
     /// Program, image and build that measured it; for a trace its file.
     pub image: String,
-    /// What was measured, in its order.
+    /// The measured values, in the order of the steps.
     pub measured: Vec<Measured>,
     /// Torque current, A; reference; slope, 1/rad, and carrier current, null where they are not learned. Empty: of a trace.
     pub over_torque_current: Vec<[Option<f64>; 4]>,
