@@ -4,7 +4,7 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use drive_settings::Flux;
 
-use super::battery::{allowed_a, torque_nm};
+use super::battery::{allowed_a, torque_limit_a, torque_nm};
 use super::full_range::learned_drive;
 use crate::prelude::*;
 
@@ -74,9 +74,8 @@ impl TorqueLimit {
 /// What binds, and whether a larger `limits.current_a` raises that.
 fn binding(config: &Config, i_q: f64) -> (String, bool) {
     let drive = &config.drive;
-    let (limit, i_d) = (f64::from(drive.current_limit_a()), f64::from(drive.i_d()));
+    let (limit, largest) = (f64::from(drive.current_limit_a()), torque_limit_a(config));
     let is = |other: f64| (i_q / other - 1.0).abs() < SAME;
-    let largest = (limit * limit - i_d * i_d).max(0.0).sqrt();
     let step = f64::from(drive.grid().step_a());
     if is(largest) {
         let range = f64::from(drive.sensor_range_a());

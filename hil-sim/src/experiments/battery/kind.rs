@@ -86,15 +86,19 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     }
 }
 
+/// The torque current, A peak, that the drive's current limit leaves beside the magnetising current.
+pub fn torque_limit_a(config: &Config) -> f64 {
+    let (all, i_d) = (f64::from(config.drive.current_limit_a()), f64::from(config.drive.i_d()));
+    (all * all - i_d * i_d).max(0.0).sqrt()
+}
+
 /// The nominal limit of the torque current, A peak: the current that the drive's limit leaves beside the magnetising current; with the
 /// dissertation's flux not more than its speed loop takes, 3 A. A drive that has learned a lower one is measured by the nominal
 /// one.
 pub fn nominal_limit_a(config: &Config) -> f64 {
-    let (all, i_d) = (f64::from(config.drive.current_limit_a()), f64::from(config.drive.i_d()));
-    let left = (all * all - i_d * i_d).max(0.0).sqrt();
     match config.drive.sequence.flux {
-        Flux::Low => left.min(config.amperes(MOST_A)),
-        Flux::High => left,
+        Flux::Low => torque_limit_a(config).min(config.amperes(MOST_A)),
+        Flux::High => torque_limit_a(config),
     }
 }
 
