@@ -101,6 +101,8 @@ impl Coefficients {
                 Ok(())
             }
             REFERENCE_AT => {
+                // Here too: less than half a turn between two looks is told from one backwards, so up to 600 Hz.
+                s.count_by_flux();
                 s.estimator.synchronous.average_reference(step.reference.q);
                 s.estimator.filter.reduce();
                 self.hand_over(s, step);

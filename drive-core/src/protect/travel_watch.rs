@@ -69,7 +69,9 @@ impl TravelWatch {
         phases: &Abc,
         flux_freq: f32,
     ) -> Result<(), Fault> {
+        // From one look to the next, but for half turns, which show a current and its opposite: around 300 Hz they show no more.
         let turn = flux_freq.abs() * CARRIER_SAMPLES as f32;
+        let turn = if turn > TURN { (turn - 0.5).abs() } else { turn };
         if turn * (LONGEST_PERIODS as f32) < TURN {
             state.taken = 0;
             return Ok(());
@@ -94,19 +96,15 @@ impl TravelWatch {
 impl TravelWatchState {
     /// Largest less least value of both channels in so many carrier periods, A.
     fn travel(&self, periods: usize) -> [f32; 2] {
-        let look = |ago: usize| self.looks[self.next.wrapping_sub(1 + ago) % LOOKS];
-        let (mut least, mut largest) = (look(0), look(0));
-        for ago in 1..=periods {
-            for ((now, least), largest) in look(ago).into_iter().zip(&mut least).zip(&mut largest) {
-                if now < *least {
-                    *least = now;
-                }
-                if now > *largest {
-                    *largest = now;
-                }
+        let look = |ago: usize, n: usize| self.looks[self.next.wrapping_sub(1 + ago) % LOOKS][n];
+        [0, 1].map(|n| {
+            let (mut least, mut largest) = (look(0, n), look(0, n));
+            for now in (1..=periods).map(|ago| look(ago, n)) {
+                least = if now < least { now } else { least };
+                largest = if now > largest { now } else { largest };
             }
-        }
-        [largest[0] - least[0], largest[1] - least[1]]
+            largest - least
+        })
     }
 }
 
@@ -135,10 +133,22 @@ mod tests {
         })
     }
 
-    /// Frequencies from the least one of the watch to that of 3600 rpm of four poles, and angles that fill a turn.
+    /// Frequencies from the least one of the watch to that of a spindle, and angles that fill a turn.
     fn cases() -> impl Iterator<Item = (f64, f64)> {
         let angles = |hz| (0..36).map(move |n| (hz, f64::from(n) / 36.0));
-        [24.0, -30.0, 45.0, 60.0, -80.0, 100.0, 120.0].into_iter().flat_map(angles)
+        let watched =
+            [24.0, -30.0, 45.0, 60.0, -80.0, 100.0, 120.0, 200.0, -260.0, 345.0, 400.0, 450.0];
+        watched.into_iter().flat_map(angles)
+    }
+
+    /// Between 279 and 321 Hz the looks show a current and its opposite: nothing is judged.
+    #[test]
+    fn around_half_the_rate_of_the_looks_nothing_is_judged() {
+        for n in 0..36 {
+            for hz in [279.0, 290.0, -299.0, 300.0, 301.0, 315.0, 321.0] {
+                assert_eq!(until((4.0, hz, f64::from(n) / 36.0), (100, 0, 0.0)), None, "{hz} {n}");
+            }
+        }
     }
 
     #[test]

@@ -31,7 +31,7 @@ settings! {
         /// leakage inductance of the rotor, referred to the stator
         "motor.l_lr" [motor] l_lr: f32, 3: number("H").from_to(1e-7, 10.0).learned();
         /// magnetising inductance
-        "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-6, 100.0).learned();
+        "motor.l_m" [motor] l_m: f32, 4: number("H").from_to(1e-6, 1000.0).learned();
         /// pairs of poles
         "motor.pole_pairs" [motor] pole_pairs: u8, 5: whole().from_to(1.0, 6.0).learned();
         /// inertia of rotor and load; for the speed loop
@@ -366,8 +366,11 @@ settings! {
         /// dc link below which it trips while the outputs are on
         dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
         /// speed of the shaft that trips
+        ///
+        /// At most 500 Hz electrical: without an encoder the rotor is counted 1200 times a second, and half a turn is the most it may
+        /// move in between.
         speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
-            .from_to(1.0, 30_000.0);
+            .beside(|s| (1.0, 30_000.0 / f32::from(s.motor.pole_pairs)));
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop

@@ -289,10 +289,11 @@ impl Settings {
     fn identified(&self, set: &IdentifiedPlant, on_reference: FirstOrder) -> FirstOrder {
         let computed = |motor: &Motor| motor_plant(&(*motor).into(), f64::from(PERIOD_S));
         let rule = match (computed(&self.motor), computed(&Motor::DEFAULT)) {
-            (Ok(own), Ok(reference)) => FirstOrder {
-                k: on_reference.k * (own.k / reference.k),
-                p: 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p)),
-            },
+            (Ok(own), Ok(reference)) => {
+                let p = 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p));
+                // A leakage too short for a pole is refused by its time constant, in the design of the controllers.
+                FirstOrder { k: on_reference.k * (own.k / reference.k), p: p.max(f64::EPSILON) }
+            }
             // The parameters are out of their ranges, which is reported of them.
             _ => on_reference,
         };

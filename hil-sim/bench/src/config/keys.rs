@@ -123,7 +123,7 @@ keys! {
         /// Leakage inductance of the rotor, referred to the stator.
         l_lr: f64 = 0.0276, [1e-7 .. 10], "H" => plant.machine.llr;
         /// Magnetising inductance.
-        l_m: f64 = 0.1771, [1e-6 .. 100], "H" => plant.machine.lm;
+        l_m: f64 = 0.1771, [1e-6 .. 1000], "H" => plant.machine.lm;
         /// Pairs of poles.
         pole_pairs: u32 = 2, [1 .. 6], "" => plant.machine.pole_pairs;
         /// Inertia of rotor and load (assumed; not in the source).
