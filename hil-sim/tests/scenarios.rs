@@ -18,6 +18,25 @@ fn a_shipped_file_runs_as_its_experiment() {
     assert!(files(&folder).is_empty());
 }
 
+/// A spindle passes 300 Hz, where the rotor is counted and the currents are looked at twice a turn, and comes back. The rotor follows:
+/// by its true speed, not by that of the drive.
+#[test]
+fn a_spindle_runs_to_its_rated_speed_and_back() {
+    let folder = folder("scenario-spindle");
+    let file = format!("{}/scenarios/spindle.toml", env!("CARGO_MANIFEST_DIR"));
+    for seed in ["1", "2"] {
+        let arguments =
+            ["run", &file, "--motor", "spindle-2kw2", "--json", "--quiet", "--seed", seed];
+        let output = hil_sim(&folder, &arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let result = object(&output);
+        let metric = |name: &str| result["metrics"][name].as_f64().unwrap();
+        assert!((23_400.0..24_500.0).contains(&metric("speed_highest_rpm")), "{result}");
+        assert!(metric("speed_error_in_the_end_rpm").abs() < 60.0, "{result}");
+        assert!(metric("angle_error_rms_deg") < 2.5, "{result}");
+    }
+}
+
 /// Speed regulated with a ramp, a load that comes slowly, and a stop: the drive follows, is off at the end, and only the columns that
 /// are asked for are shown.
 const OWN: &str = r#"
