@@ -370,7 +370,7 @@ settings! {
         /// At most 500 Hz electrical: without an encoder the rotor is counted 1200 times a second, and half a turn is the most it may
         /// move in between.
         speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
-            .beside(|s| (1.0, 30_000.0 / f32::from(s.motor.pole_pairs)));
+            .beside(|s| (1.0, 500.0 / s.nameplate.frequency_hz * s.nameplate.speed_rpm));
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
