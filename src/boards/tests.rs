@@ -73,7 +73,9 @@ fn section(board: &Board) -> String {
         };
         match rows.last_mut() {
             // Sensors that are alike share a row.
-            Some((items, before)) if before[..] == [value.clone(), source.clone()] => {
+            Some((items, before))
+                if SCALES.contains(&item) && before[..] == [value.clone(), source.clone()] =>
+            {
                 *items += &item.replace("scale of current", ",");
             }
             _ => rows.push((item.to_owned(), [value, source])),
