@@ -67,12 +67,15 @@ fn section(board: &Board) -> String {
         let source = sources.iter().find(|(name, _)| *name == item).and_then(|(_, source)| *source);
         let source = match source {
             Some(Source::Read(document)) => format!("read: {document}"),
-            Some(Source::Assumed(step)) => format!("**assumed**; bench: {step}"),
+            // Its bench step is what `board` says.
+            Some(Source::Assumed(_)) => "**assumed**".to_owned(),
             None => panic!("{item}"),
         };
         match rows.last_mut() {
             // Sensors that are alike share a row.
-            Some((items, before)) if before[..] == [value.clone(), source.clone()] => {
+            Some((items, before))
+                if SCALES.contains(&item) && before[..] == [value.clone(), source.clone()] =>
+            {
                 *items += &item.replace("scale of current", ",");
             }
             _ => rows.push((item.to_owned(), [value, source])),
