@@ -3,6 +3,8 @@
 
 use crate::common::config;
 use drive_core::{Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State};
+use hil_sim::Config;
+use hil_sim::config::motors::Motor;
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Channel, CurrentFault, Plant};
 
@@ -22,10 +24,13 @@ enum Wiring {
 /// Starts with the check and runs to its end: the state after it, and the largest phase current on the
 /// way, A.
 fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
-    let config = config(changes);
+    check_of(wiring, &config(changes), seed)
+}
+
+fn check_of(wiring: Wiring, config: &Config, seed: u64) -> (State, f64) {
     let drive_settings = config.drive;
     let mut drive = Drive::new(drive_settings.build().unwrap());
-    let mut plant = Plant::new(&plant_settings(&config), seed).unwrap();
+    let mut plant = Plant::new(&plant_settings(config), seed).unwrap();
     if let Wiring::Open(channel) = wiring {
         plant.set_current_fault(channel, CurrentFault::Open);
     }
@@ -72,6 +77,21 @@ fn exchanged(wiring: Wiring, compare: Compare) -> Compare {
     }
     let [a, b, c] = legs;
     Compare { a, b, c, ..compare }
+}
+
+/// Every motor file with the dead time of the reference board, which a pulse for the leakage of a spindle hardly exceeds.
+#[test]
+fn the_right_wiring_of_every_motor_is_accepted() {
+    for motor in Motor::all() {
+        let dead_time = ["inverter.dead_time_s=2.2e-6".to_owned()];
+        let config = Config::load(Some(&motor.name), None, &dead_time).unwrap();
+        let range = config.measurement.range_a;
+        for seed in 0..12 {
+            let (state, peak) = check_of(Wiring::Right, &config, seed);
+            assert_eq!(state, State::Catching, "{}, seed {seed}", motor.name);
+            assert!(peak < 0.25 * range, "{}, seed {seed}: {peak} A", motor.name);
+        }
+    }
 }
 
 /// Largest current while checking, A.

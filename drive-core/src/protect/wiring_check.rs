@@ -1,5 +1,5 @@
 //! Wiring check: verifies assignment and polarity of the current sensors, once, before the flux is built up,
-//! with voltage pulses so short that no current reaches a seventh of the rated one.
+//! with short voltage pulses.
 //!
 //! Each phase in turn gets a positive and a negative voltage pulse along its axis. Over so short a time the
 //! motor acts as its transient inductance: the current of that phase rises to a known peak, those of the
@@ -16,10 +16,11 @@
 //! turns the other way.
 //!
 //! # Current bound
-//! The pulses are designed for an expected current with the inductance of the settings: 0.2 A with the
-//! dissertation's motor, in proportion to the rated current. Every sample is checked against the current that half
-//! that inductance gives, plus a margin for noise. A motor with at least half the inductance therefore stays below
-//! twice the expected current, whatever the sensors report. With less inductance, a working sensor ends the pulse at
+//! The pulses are designed for an expected current with the inductance of the settings: 0.2 A with the dissertation's
+//! motor, in proportion to the rated current, and more where the pulse would not exceed the dead time (a spindle: 2 A, a
+//! sixth of the rated peak). Every sample is checked against the current that half that inductance gives, plus a margin for
+//! noise. A motor with at least half the inductance therefore stays below twice the expected current, whatever the
+//! sensors report. With less inductance, a working sensor ends the pulse at
 //! the next sample, which keeps the current below 2.5 times the expected one down to a fifth.
 
 use crate::{Abc, AlphaBeta, Fault, PERIOD_S};

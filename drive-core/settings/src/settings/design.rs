@@ -59,6 +59,7 @@ impl Settings {
         let designs = self.current_loops()?;
         let [d, q] = designs.map(|d| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 });
         let motion_design = self.motion_loops()?;
+        let dead_vs = self.inverter.dead_time_s * self.inverter.dc_link_v;
 
         let (inj, t) = (&self.injection, &self.injection.synchronous);
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
@@ -123,7 +124,8 @@ impl Settings {
                 .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
-                expected_a: self.share_of_rated(WIRING_A),
+                // Pulses of twice the voltage that the dead time takes, over the two periods of the shortest one.
+                expected_a: self.share_of_rated(WIRING_A).max(4.0 * dead_vs / m.sigma_l_s()),
                 noise_a: self.share_of_range(WIRING_NOISE_A),
                 highest_v: largest_test_v,
             }),
