@@ -100,8 +100,8 @@ pub struct Chip {
     pub saved: Saved<Pages>,
     /// Reason why the saved settings were rejected, if they were.
     pub rejected: Option<Rejected>,
-    /// Dead time of the timer, s.
-    pub dead_time_s: f32,
+    /// What the timer of the power stage was set to.
+    pub timer: board::Timer,
     /// Reason why the control was not started, if it was not.
     pub not_started: Option<&'static str>,
 }
@@ -313,7 +313,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
-        extended(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
+        extended(&mut self.guard, || settings.build_for(&self.chip.timer))
     }
 
     fn configured(&mut self, settings: &FirmwareSettings) {
