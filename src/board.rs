@@ -93,6 +93,12 @@ impl Timer {
         PWM_TOP / self.carrier_khz.pulses()
     }
 
+    /// By how much that is less than with one pulse: the control interrupt, which has no time to ask, takes it for later by so
+    /// much.
+    pub fn below_the_top(&self) -> u32 {
+        u32::from(PWM_TOP - self.top())
+    }
+
     /// The RCR field: update events skipped. They occur at both ends of the count; used is one in a control period, at the
     /// top (low sides on).
     pub fn updates_left_out(&self) -> u16 {

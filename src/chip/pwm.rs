@@ -167,7 +167,8 @@ impl Pwm {
         // The first update comes half a pulse's period later; a whole control period is time enough.
         for _ in 0..2 * u32::from(board::PWM_TOP) / 16 {
             if self.updated() {
-                let near_the_top = 2 * u32::from(self.timer.cnt().read().cnt().bits()) > self.top();
+                let (count, top) = (self.timer.cnt().read().cnt(), self.timer.arr().read().arr());
+                let near_the_top = 2 * u32::from(count.bits()) > top.bits();
                 return if near_the_top { Ok(()) } else { Err("TIM1 does not run in step") };
             }
             asm::delay(16);
@@ -210,18 +211,15 @@ impl Pwm {
         TimerEvents { updated, pulled: broken || lost }
     }
 
-    /// Ticks since the counter was at its top while it counts down; half a pulse's period or more while it counts up.
+    /// Ticks since the counter was at [`board::PWM_TOP`], or would have been if its top were there, while it counts down; half a
+    /// control period or more while it counts up.
     pub fn since_top(&self) -> u32 {
-        let (count, top) = (u32::from(self.timer.cnt().read().cnt().bits()), self.top());
+        let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {
-            top.saturating_sub(count)
+            u32::from(board::PWM_TOP.saturating_sub(count))
         } else {
-            top + count
+            u32::from(board::PWM_TOP) + u32::from(count)
         }
-    }
-
-    fn top(&self) -> u32 {
-        self.timer.arr().read().arr().bits()
     }
 
     /// Whether the timer has taken over compare values since the last call of [`take_events`](Self::take_events).

@@ -228,7 +228,8 @@ impl Supervisor {
     }
 
     /// Logs changes of state, faults and events; once a second, at the level `debug`, what the drive does.
-    fn log(&mut self, s: Status) {
+    fn log(&mut self, mut s: Status) {
+        s.worst_latency = s.worst_latency.saturating_sub(self.chip.timer.below_the_top());
         let before = self.status.replace(s);
         if before.map(|status| status.state) != Some(s.state) {
             if let Some(fault) = s.state.fault() {
