@@ -140,8 +140,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
-    let chip =
-        Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started };
+    let chip = Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started };
     let link = link.ok();
     let drive = &settings.drive;
     let supervisor =
