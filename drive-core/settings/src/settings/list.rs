@@ -83,9 +83,9 @@ settings! {
             .from_to(1e-4, 100.0).learned();
         /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
         drop_v: Option<f32> = None, 16: auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
-        /// rate at which the legs switch, kHz; the control runs at 6 kHz whatever it is
+        /// rate of the legs, kHz
         ///
-        /// A whole number of equal pulses in each control period. The share of the dead time, the shortest pulse and the
+        /// The control runs at 6 kHz: a whole number of equal pulses in each control period. The share of the dead time, the shortest pulse and the
         /// switching losses grow with it. The board has a largest one; shunts below the low sides are sampled at 6 kHz alone.
         carrier_khz: Carrier = Carrier::Khz6, 130: word().changed(Change::FromReset).learned();
     }
