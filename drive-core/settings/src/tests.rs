@@ -252,7 +252,7 @@ fn the_share_of_the_dead_time_grows_with_the_carrier() {
         let (lost, circle, plain, older) = of(carrier_khz);
         assert!((lost - times * 4.105).abs() < 0.01, "{carrier_khz:?}: {lost} V");
         assert!((older - 0.25 / times).abs() < 1e-6, "{carrier_khz:?}: {older} periods");
-        let circle = circle / (311.0 / 3.0_f32.sqrt());
+        let circle = circle * 1.732_050_8 / 311.0;
         assert!((circle - (1.0 - times * 0.0264)).abs() < 1e-4, "{carrier_khz:?}: {circle}");
         // 3.2 us is the shortest pulse: a duty of 1.92 % at 6 kHz.
         let shortest = times * 3.2e-6 * 6000.0;
