@@ -18,7 +18,7 @@ pub use flash::{SETTINGS_SLOT_BYTES, STORED_SLOTS, settings_address, settings_pa
 
 use drive_core::Line;
 use drive_core::io::PERIOD_S;
-use drive_settings::{CurrentSensors, Inverter, Scales, Sequence, Settings};
+use drive_settings::{Carrier, CurrentSensors, Inverter, Scales, Sequence, Settings};
 
 use crate::boards::converter::REFERENCE_V;
 use crate::boards::pin::{self, Pin, pc};
@@ -48,24 +48,70 @@ pub const WAIT_STATES: u8 = 4;
 
 // Power stage ---------------------------------------------------------------------------------
 
-/// PWM and control rate, Hz. The drive's filters and its carrier are designed for this rate alone.
+/// Control rate, Hz, and that of the legs with one pulse in a control period. The drive's filters and the carrier that it
+/// injects are designed for this rate alone.
 pub const PWM_HZ: u32 = 6000;
-/// Largest count of TIM1, which counts up and down once per period: half a period in ticks of the core clock,
-/// rounded.
+/// Half a control period in ticks of the core clock, rounded: with one pulse in a control period the largest count of TIM1,
+/// which counts up and down once per pulse. With more it is [`Timer::top`].
 pub const PWM_TOP: u16 = {
     let top = (CLOCK_HZ + PWM_HZ) / (2 * PWM_HZ);
     assert!(top <= u16::MAX as u32);
     top as u16
 };
-/// The RCR field of TIM1: update events skipped. They occur at both ends of the count; only those at the top (low
-/// sides on) are used.
-pub const PWM_UPDATES_LEFT_OUT: u16 = 1;
-// The rate differs from the nominal one by less than 1e-4, due to rounding.
+// The control rate differs from the nominal one by less than 1e-4, due to rounding: by 2.4e-5 with one pulse, by 4.7e-5 the
+// other way with two and three.
 const _: () = {
-    let nominal = CLOCK_HZ as f32 * PERIOD_S;
-    let error = (2 * PWM_TOP as u32) as f32 / nominal - 1.0;
-    assert!(error < 1e-4 && error > -1e-4);
+    let mut pulses = 1;
+    while pulses <= 3 {
+        let ticks = 2 * pulses * (PWM_TOP as u32 / pulses);
+        let error = ticks as f32 / (CLOCK_HZ as f32 * PERIOD_S) - 1.0;
+        assert!(error < 1e-4 && error > -1e-4);
+        pulses += 1;
+    }
 };
+
+/// What TIM1 makes of the settings from one reset to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timer {
+    /// The DTG field of TIM1_BDTR.
+    pub dead_time_code: u8,
+    /// Dead time, s.
+    pub dead_time_s: f32,
+    /// Rate of the legs.
+    pub carrier_khz: Carrier,
+}
+
+impl Timer {
+    /// The timer for these settings, which are within the ranges of the board.
+    pub fn of(inverter: &Inverter) -> Self {
+        let (dead_time_code, dead_time_s) = dead_time(inverter.dead_time_s);
+        Self { dead_time_code, dead_time_s, carrier_khz: inverter.carrier_khz }
+    }
+
+    /// The largest count.
+    pub fn top(&self) -> u16 {
+        PWM_TOP / self.carrier_khz.pulses()
+    }
+
+    /// By how much that is less than with one pulse: the control interrupt, which has no time to ask, takes it for later by so
+    /// much.
+    pub fn below_the_top(&self) -> u32 {
+        u32::from(PWM_TOP - self.top())
+    }
+
+    /// The RCR field: update events skipped. They occur at both ends of the count; used is one in a control period, at the
+    /// top (low sides on).
+    pub fn updates_left_out(&self) -> u16 {
+        2 * self.carrier_khz.pulses() - 1
+    }
+
+    /// The MMS field: the trigger output of the currents' sampling. With one pulse that of channel 4 at [`SAMPLE_AT`], so that
+    /// the sampling ends at the top. It would come with every pulse; with more of them the update starts the sampling, which
+    /// ends [`CURRENT_SAMPLING`] behind the top.
+    pub fn trigger_output(&self) -> u8 {
+        if self.carrier_khz == Carrier::Khz6 { 7 } else { 2 }
+    }
+}
 
 /// Core clocks per tick of the dead time (TIM1_CR1.CKD = 1). With one, the longest would be 5.93 us.
 pub const DEAD_TIME_CLOCKS: u32 = 2;
@@ -133,12 +179,12 @@ const _: () = assert!(REFERENCE_SAMPLING.ticks() >= 4 * CYCLES_PER_US);
 /// A 12-bit conversion after the sampling: 12.5 clocks.
 const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 
-/// Compare value of the trigger. The sampling of the currents starts while the counter goes up and ends, which
+/// Compare value of the trigger, with one pulse in a control period. The sampling of the currents starts while the counter goes up and ends, which
 /// fixes the sampled value, when the counter is at the top and all low sides are on.
 pub const SAMPLE_AT: u16 = PWM_TOP - CURRENT_SAMPLING.ticks() as u16;
 /// The same in the upper zero vector, on the way down: this sampling ends when the counter is at 0.
 pub const UPPER_SAMPLE_AT: u32 = CURRENT_SAMPLING.ticks();
-/// From the top of the counter to the control interrupt, in ticks. A third current is converted after the first two.
+/// From the end of the sampling to the control interrupt, in ticks. A third current is converted after the first two.
 pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
     + SLOW_SAMPLING.ticks()
     + if SELECTED.currents.shunts.is_some() { THIRD_CURRENT_TICKS } else { 0 };

@@ -18,7 +18,7 @@ mod reference;
 
 use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
-use drive_settings::{Flux, Ntc};
+use drive_settings::{Carrier, Flux, Ntc};
 
 use crate::terminals::{ANALOG, TERMINALS};
 use pin::Pin;
@@ -197,6 +197,8 @@ pub struct Board {
     pub dead_time_s: Stated<f32>,
     /// Longest that the setting takes, s; the shortest is the board's own.
     pub dead_time_max_s: f32,
+    /// Largest rate of the legs that its switches take. (Shunts refuse more than 6 kHz by themselves.)
+    pub carrier_max_khz: Carrier,
     /// Phase currents.
     pub currents: Currents,
     /// Delay of the analog filters of the currents, s.

@@ -11,10 +11,14 @@ mod tests;
 
 use drive_core::Coefficients;
 use drive_core::learned::Learned;
-use drive_settings::{Settings, SettingsError};
+use drive_settings::value::Words as _;
+use drive_settings::{Inverter, Settings, SettingsError};
 
 use crate::board;
 use crate::boards::{Board, SELECTED};
+
+/// Why a board refuses a carrier.
+const TOO_FAST: &str = "the switches of the board do not take it; set a lower one";
 
 /// All settings of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,20 +106,22 @@ impl FirmwareSettings {
     /// The first value out of range, or the design rule that cannot be met.
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         let mut own = *self;
-        own.build_for(board::dead_time(self.drive.inverter.dead_time_s).1)
+        own.build_for(&board::Timer::of(&self.drive.inverter))
     }
 
-    /// The same as [`build`](Self::build) for a timer whose dead time, s, differs from the setting: the timer takes
-    /// a new one only at a reset.
+    /// The same as [`build`](Self::build) for a timer whose dead time or carrier differs from the setting: it takes new ones
+    /// only at a reset.
     ///
     /// # Errors
     /// As [`build`](Self::build).
-    pub fn build_for(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
+    pub fn build_for(&mut self, timer: &board::Timer) -> Result<Coefficients, SettingsError> {
         self.check()?;
         // Changed in place and back, as the coefficients are: copies would take 2 KiB more of the stack.
-        let own = core::mem::replace(&mut self.drive.inverter.dead_time_s, dead_time_s);
+        let own = self.drive.inverter;
+        let &board::Timer { dead_time_s, carrier_khz, .. } = timer;
+        self.drive.inverter = Inverter { dead_time_s, carrier_khz, ..own };
         let mut built = self.drive.build();
-        self.drive.inverter.dead_time_s = own;
+        self.drive.inverter = own;
         if let (Ok(coefficients), Some(learned)) = (&mut built, &self.learned) {
             coefficients.take(learned);
         }
@@ -128,6 +134,10 @@ impl FirmwareSettings {
     /// The first value out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         self.drive.check()?;
+        let carrier = self.drive.inverter.carrier_khz;
+        if carrier > self.board.carrier_max_khz {
+            return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), TOO_FAST));
+        }
         // Those of the board are narrower.
         keys::all().try_for_each(|key| key.check(self))
     }

@@ -35,6 +35,7 @@ mod plant_phase_model;
 mod plant_saliency;
 mod plant_sensors;
 mod promises;
+mod quiet_inverter;
 mod record;
 mod saliency_families;
 mod same_json;

@@ -73,14 +73,16 @@ fn short_pulses_and_gaps_vanish() {
 #[test]
 fn the_dead_time_takes_4_1_volts() {
     let with = InverterSettings { residual_v: 0.0, ..Default::default() };
-    let without = InverterSettings { dead_time_us: 0.0, ..with };
-    for switched in [false, true] {
+    for (switched, pulses) in [(false, 1), (true, 1), (false, 2), (true, 2), (false, 3), (true, 3)]
+    {
         let d = [0.56, 0.47, 0.47];
-        let (_, v) = settled(InverterSettings { switched, ..with }, d);
-        let (_, v0) = settled(InverterSettings { switched, ..without }, d);
-        // a loses e, b and c gain it: 4/3 e along alpha.
-        let e = 0.75 * (v0 - v).re;
-        assert!((e - 311.0 * 2.2 / 166.667).abs() < 1e-3, "switched {switched}: {e} V");
+        // As many counts a pulse, whatever their number.
+        let alike = InverterSettings { switched, pulses, timer_top: pulses * TOP, ..with };
+        let (_, v) = settled(alike, d);
+        let (_, v0) = settled(InverterSettings { dead_time_us: 0.0, ..alike }, d);
+        // a loses e, b and c gain it: 4/3 e along alpha. Each pulse has a dead time of its own.
+        let e = 0.75 * (v0 - v).re / f64::from(pulses);
+        assert!((e - 311.0 * 2.2 / 166.667).abs() < 1e-3, "{switched} {pulses}: {e} V");
         assert!((e - 4.1).abs() < 0.01 && (v0 - v).im.abs() < 1e-6, "{e} {v0} {v}");
         // And nothing from legs that do not switch.
         let d = [1.0, 0.0, 0.0];

@@ -65,6 +65,23 @@ fn the_numbers_are_those_of_the_design() {
     assert_eq!(SAMPLE_AT, 14_167 - 98);
 }
 
+/// One update in a control period, at a top; the period is the same within 1e-4, and the drive has the timer's count.
+#[test]
+fn the_timer_makes_equal_pulses_in_a_control_period() {
+    let tops = [(Carrier::Khz6, 14_167), (Carrier::Khz12, 7083), (Carrier::Khz18, 4722)];
+    for (carrier_khz, top) in tops {
+        let mut settings = settings();
+        settings.inverter.carrier_khz = carrier_khz;
+        let timer = Timer::of(&settings.inverter);
+        assert_eq!(timer.top(), top);
+        assert_eq!(f32::from(top), settings.build().unwrap().front_end.top);
+        // An update after so many ends of the count, of which each pulse has two.
+        assert_eq!(timer.updates_left_out() + 1, 2 * carrier_khz.pulses());
+        let hz = CLOCK_HZ as f32 / (2 * u32::from(top) * u32::from(carrier_khz.pulses())) as f32;
+        assert!((hz / 6000.0 - 1.0).abs() < 1e-4, "{hz} Hz");
+    }
+}
+
 /// 0 A gave 2024 with 3.0 V (Table 4): the same voltage is 1840 of 3.3 V.
 #[test]
 fn the_calibration_follows_the_reference() {

@@ -3,7 +3,7 @@
 //!
 //! A template: its sources are thin and nobody has tried it. Every step of the bench page comes before mains.
 
-use drive_settings::Flux;
+use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
@@ -27,6 +27,8 @@ pub const BOARD: Board = Board {
         "oscilloscope at both gates of a leg, motor supply off: at least 1.5 us between off and on",
     ),
     dead_time_max_s: 6e-6,
+    // Assumed: IGBTs for up to 20 kHz.
+    carrier_max_khz: Carrier::Khz18,
     // Shunt, ohm, and gain of its amplifier: 0.255 V/A. A current into the motor lowers the output.
     currents: morpho::shunts(assumed(-0.15 * 1.7, morpho::SHUNT_STEP), 1.7),
     current_delay_s: morpho::CURRENT_DELAY_S,

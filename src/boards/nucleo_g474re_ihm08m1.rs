@@ -4,7 +4,7 @@
 //! Not tried with a motor yet. Set-up of the jumpers: JP1 and JP2 closed, J5 and J6 at three shunts, JP3 closed, J9 open
 //! above 12 V, C3, C5 and C7 removed, JP5 of the Nucleo at E5V.
 
-use drive_settings::Flux;
+use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
@@ -33,6 +33,8 @@ pub const BOARD: Board = Board {
         "oscilloscope at both gates of a leg, motor supply off: at least 0.5 us between off and on",
     ),
     dead_time_max_s: 3e-6,
+    // Assumed: MOSFETs, which ST's own motor control switches at 16 to 30 kHz.
+    carrier_max_khz: Carrier::Khz18,
     // Shunt, ohm, and gain of its amplifier: 51.8 mV/A. A current into the motor lowers the output.
     currents: morpho::shunts(read(-0.010 * 5.18, NUTTX), 1.71),
     current_delay_s: morpho::CURRENT_DELAY_S,

@@ -3,7 +3,7 @@
 //!
 //! A template: its sources are thin and nobody has tried it. Every step of the bench page comes before mains.
 
-use drive_settings::{Flux, Ntc};
+use drive_settings::{Carrier, Flux, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho};
@@ -33,6 +33,8 @@ pub const BOARD: Board = Board {
         "oscilloscope at both gates of a leg, motor supply off: at least 1.0 us between off and on",
     ),
     dead_time_max_s: 6e-6,
+    // Assumed: a module of IGBTs for up to 20 kHz.
+    carrier_max_khz: Carrier::Khz18,
     // Shunts of 0.08 ohm and a gain of 2.1 around half the supply (UM2702, page 16). A current into the motor lowers the output.
     currents: morpho::shunts(assumed(-0.08 * 2.1, morpho::SHUNT_STEP), 1.65),
     current_delay_s: morpho::CURRENT_DELAY_S,

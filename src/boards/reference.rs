@@ -1,7 +1,7 @@
 //! The inverter of the dissertation on ST's morpho motor-control pins.
 
 use drive_core::Line;
-use drive_settings::Flux;
+use drive_settings::{Carrier, Flux};
 
 use super::converter::calibrated;
 use super::pin::{pa, pb, pc};
@@ -39,6 +39,8 @@ pub const BOARD: Board = Board {
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
     // The need of slow power modules.
     dead_time_max_s: 6e-6,
+    // Assumed: the dissertation names no switches; the heat sink shows whether they stand the losses.
+    carrier_max_khz: Carrier::Khz18,
     currents: Currents {
         a: Analog {
             pin: morpho::CURRENTS[0],

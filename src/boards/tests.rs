@@ -8,6 +8,9 @@ use super::{
 };
 use crate::board::{protection, settings_of};
 use crate::generated;
+use crate::settings::FirmwareSettings;
+use drive_settings::Carrier;
+use drive_settings::value::Words as _;
 
 const SCALES: [&str; 3] = ["scale of current a", "scale of current b", "scale of current c"];
 
@@ -98,6 +101,29 @@ fn shunts_refuse_both_zero_vectors() {
         let in_line = board.currents.shunts.is_none();
         assert_eq!(checked, if in_line { Ok(()) } else { Err(why.to_owned()) }, "{}", board.name);
     }
+}
+
+/// What each board takes: sensors in the lines up to what its switches do, shunts 6 kHz alone.
+#[test]
+fn a_carrier_that_a_board_does_not_take_is_refused_by_name() {
+    for board in ALL {
+        for (carrier_khz, word) in Carrier::VALUES.iter().zip(Carrier::WORDS) {
+            let mut settings = FirmwareSettings::of(board);
+            settings.drive.inverter.carrier_khz = *carrier_khz;
+            let shunts = board.currents.shunts.is_some() && *carrier_khz != Carrier::Khz6;
+            let why = shunts.then(|| {
+                format!("inverter.carrier_khz = {word}: shunts below the low sides settle too slowly for shorter pulses; set it to 6")
+            });
+            assert_eq!(settings.check().err().map(|why| why.to_string()), why, "{}", board.name);
+        }
+    }
+    let slow: &'static Board =
+        Box::leak(Box::new(Board { carrier_max_khz: Carrier::Khz12, ..*ALL[0] }));
+    let mut settings = FirmwareSettings::of(slow);
+    settings.drive.inverter.carrier_khz = Carrier::Khz18;
+    let why =
+        "inverter.carrier_khz = 18: the switches of the board do not take it; set a lower one";
+    assert_eq!(settings.check().unwrap_err().to_string(), why);
 }
 
 #[test]

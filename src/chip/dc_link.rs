@@ -1,6 +1,6 @@
 //! Outputs for the dc link: brake chopper and precharge relay.
 //!
-//! TIM8 makes the chopper's pulses, one in each control period; the relay is a plain output. High switches either on. A
+//! TIM8 makes the chopper's pulses, one in each control period (with 12 and 18 kHz one less in 2.4 s: its period is fixed); the relay is a plain output. High switches either on. A
 //! reset releases both pins, so external resistors pull them down ([`board::CHOPPER`], [`board::RELAY`]). The break of
 //! TIM8 takes the chopper off without software where the core locks up, the supply or the flash fails.
 
@@ -12,7 +12,7 @@ use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::{Level, pin};
 
-/// Ticks of a control period.
+/// Ticks of a control period with one pulse.
 const PERIOD: u16 = 2 * board::PWM_TOP;
 
 /// Chopper and relay.

@@ -1,9 +1,9 @@
 //! The power stage: TIM1 generates the six gate signals, with dead time and break input.
 //!
-//! The counter runs up to [`board::PWM_TOP`] and down to 0 once per period. A high side is on while
-//! the counter is below the compare value of its leg, so all low sides are on around the top. There
-//! the currents are sampled, and there the timer takes over the compare values written during the
-//! period before: sample `k` acts in period `k + 1`.
+//! The counter runs up to its top and down to 0 once per pulse. A high side is on while the counter is below the compare
+//! value of its leg, so all low sides are on around the top. There, once per control period of one to three pulses, the
+//! currents are sampled, and there the timer takes over the compare values written during the control period before:
+//! sample `k` acts in period `k + 1`.
 
 use cortex_m::asm;
 use drive_core::Compare;
@@ -45,7 +45,7 @@ impl Pwm {
         rcc: &mut Rcc,
         debug: &pac::DBGMCU,
         system: &pac::SYSCFG,
-        dead_time_code: u8,
+        settings: &board::Timer,
     ) -> Result<Self, StartError> {
         if timer.bdtr().as_ptr() as u32 != board::TIM1_BDTR {
             return Err("TIM1 is not where the fault handler expects it");
@@ -55,9 +55,9 @@ impl Pwm {
         // do not come back with the core.
         debug.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
-        // Undivided clock; up and down between 0 and the top, so half a period each way.
+        // Undivided clock; up and down between 0 and the top, so half a pulse's period each way.
         timer.psc().write(|w| w.psc().set(0));
-        timer.arr().write(|w| w.arr().set(u32::from(board::PWM_TOP)));
+        timer.arr().write(|w| w.arr().set(u32::from(settings.top())));
 
         // a, b, c: on below the compare value (PWM mode 1), and that value preloaded.
         timer
@@ -81,8 +81,9 @@ impl Pwm {
             for leg in 0..3 {
                 w.ois(leg).bit(high_low_active).oisn(leg).bit(low_low_active);
             }
-            // SAFETY: four bits and three. The signal of channel 6 is the trigger output 2, that of channel 4 the output 1.
-            unsafe { w.mms2().bits(9).mms().bits(7) }
+            // SAFETY: four bits and three. The signal of channel 6 is the trigger output 2, that of channel 4 or the update the
+            // output 1.
+            unsafe { w.mms2().bits(9).mms().bits(settings.trigger_output()) }
         });
         // Both outputs of the legs.
         timer.ccer().write(|w| {
@@ -107,7 +108,7 @@ impl Pwm {
         // In one write, which the lock belongs to: it counts from the first write after a reset on
         // (`stm32g4xx_ll_tim.h`). It keeps dead time, polarity, break, idle level and output mode until the next reset.
         timer.bdtr().write(|w| {
-            w.dtg().set(dead_time_code);
+            w.dtg().set(settings.dead_time_code);
             // Off means driven to the idle level: not floating.
             w.ossi().idle_level().ossr().idle_level();
             // Only software switches the outputs on again.
@@ -117,7 +118,7 @@ impl Pwm {
             w.lock().level3().moe().disabled_idle()
         });
         let locked = timer.bdtr().read();
-        if locked.dtg().bits() != dead_time_code
+        if locked.dtg().bits() != settings.dead_time_code
             || locked.lock().bits() != 3
             || !(locked.ossi().bit() && locked.ossr().bit() && locked.bke().bit())
             || locked.aoe().bit()
@@ -126,14 +127,13 @@ impl Pwm {
             return Err("dead time, polarity, break or lock of TIM1 do not read back");
         }
 
-        // Load all of it. The repetition counter is loaded with 0 first, so that the first update
-        // comes when the counter first reaches the top; from there on every other one, always at
-        // the top.
+        // Load all of it. The repetition counter is loaded with 0 first, so that the first update comes when the counter first
+        // reaches the top; from there on once in a control period, always at the top.
         timer.rcr().write(|w| w.rep().set(0));
         // See board::DEAD_TIME_CLOCKS.
         timer.cr1().write(|w| w.arpe().enabled().cms().center_aligned1().ckd().div2());
         timer.egr().write(|w| w.ug().update());
-        timer.rcr().write(|w| w.rep().set(board::PWM_UPDATES_LEFT_OUT));
+        timer.rcr().write(|w| w.rep().set(settings.updates_left_out()));
 
         // The pins follow last: they are driven off. The resistors hold them off as well, should the timer ever release
         // them.
@@ -164,10 +164,11 @@ impl Pwm {
     pub fn start(&mut self) -> Result<(), StartError> {
         self.timer.sr().write(|w| w.uif().clear().bif().clear());
         self.timer.cr1().modify(|_, w| w.cen().enabled());
-        // The first update comes half a period later; a whole period is time enough.
+        // The first update comes half a pulse's period later; a whole control period is time enough.
         for _ in 0..2 * u32::from(board::PWM_TOP) / 16 {
             if self.updated() {
-                let near_the_top = self.timer.cnt().read().cnt().bits() > board::PWM_TOP / 2;
+                let (count, top) = (self.timer.cnt().read().cnt(), self.timer.arr().read().arr());
+                let near_the_top = 2 * u32::from(count.bits()) > top.bits();
                 return if near_the_top { Ok(()) } else { Err("TIM1 does not run in step") };
             }
             asm::delay(16);
@@ -210,7 +211,8 @@ impl Pwm {
         TimerEvents { updated, pulled: broken || lost }
     }
 
-    /// Ticks since the counter was at its top while it counts down; half a period or more while it counts up.
+    /// Ticks since the counter was at [`board::PWM_TOP`], or would have been if its top were there, while it counts down; half a
+    /// control period or more while it counts up.
     pub fn since_top(&self) -> u32 {
         let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {

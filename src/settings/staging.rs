@@ -55,8 +55,8 @@ pub const UNCONFIRMED: &str = "the board has to be confirmed again before a star
 pub struct Applied {
     /// What was learned is gone: it held for another value of the setting of this name.
     pub forgotten: Option<&'static str>,
-    /// The dead time of the timer holds from the next reset on.
-    pub dead_time: bool,
+    /// Dead time or carrier of the timer hold from the next reset on.
+    pub timer: bool,
     /// The analog watchdogs and the comparator follow at the next reset.
     pub protection: bool,
     /// The board is not confirmed with these values.
@@ -66,7 +66,7 @@ pub struct Applied {
 impl fmt::Display for Applied {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let notes = [
-            (self.dead_time, "the dead time holds from the next reset on, if saved"),
+            (self.timer, "dead time and carrier hold from the next reset on, if saved"),
             (
                 self.protection,
                 "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
@@ -214,7 +214,7 @@ impl Staging {
                 // The defaults may differ in others only.
                 new.learned_with_another(old).unwrap_or("set of settings")
             }),
-            dead_time: old.inverter.dead_time_s != new.inverter.dead_time_s,
+            timer: board::Timer::of(&old.inverter) != board::Timer::of(&new.inverter),
             protection: board::protection(settings.board, old)
                 != board::protection(settings.board, new),
             unconfirmed: self.in_force.board_is_confirmed() && !settings.board_is_confirmed(),

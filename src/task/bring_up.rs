@@ -88,14 +88,14 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     core.DWT.enable_cycle_counter();
 
     let mut start = load(Pages::new(chip.FLASH));
-    let (dead_time_code, dead_time_s) = board::dead_time(start.settings.drive.inverter.dead_time_s);
+    let timer = board::Timer::of(&start.settings.drive.inverter);
 
     // The clocks of the ports; `pins` does the rest.
     chip.GPIOA.split(&mut rcc);
     chip.GPIOB.split(&mut rcc);
     chip.GPIOC.split(&mut rcc);
     // First, because the drivers are switched off from here on.
-    let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
+    let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, &timer);
     let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
     let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
@@ -116,7 +116,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
             return Err(ONE_BANK);
         }
         timed?;
-        let coefficients = start.build(dead_time_s);
+        let coefficients = start.build(&timer);
         if let Some(why) = &start.rejected {
             defmt::error!("{}", defmt::Display2Format(why));
         }
@@ -140,8 +140,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
-    let chip =
-        Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
+    let chip = Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started };
     let link = link.ok();
     let drive = &settings.drive;
     let supervisor =
@@ -184,16 +183,16 @@ fn load(pages: Pages) -> Start {
 }
 
 impl Start {
-    /// Computes the coefficients, which takes seconds, for the dead time of the timer, s. If the design rules refuse
+    /// Computes the coefficients, which takes seconds, for the timer. If the design rules refuse
     /// the saved settings, the defaults hold.
     #[inline(never)]
-    fn build(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
-        let built = self.settings.build_for(dead_time_s);
+    fn build(&mut self, timer: &board::Timer) -> Result<Coefficients, SettingsError> {
+        let built = self.settings.build_for(timer);
         if built.is_ok() {
             return built;
         }
         self.refuse();
-        self.settings.build_for(dead_time_s)
+        self.settings.build_for(timer)
     }
 
     /// Takes the defaults.

@@ -1,8 +1,7 @@
 //! The control interrupt: samples in, [`Drive::period`], compare values out, 6000 times a second.
 //!
-//! It starts when both converters have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the
-//! counter of TIM1 was at its top, and must have written the compare values before the next top, one period
-//! later. It never logs, formats, waits, or takes a lock.
+//! It starts when both converters have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the sampling of the currents at
+//! a top of TIM1, and must have written the compare values before the next update, one control period later. It never logs, formats, waits, or takes a lock.
 
 mod addresses;
 

@@ -100,8 +100,8 @@ pub struct Chip {
     pub saved: Saved<Pages>,
     /// Reason why the saved settings were rejected, if they were.
     pub rejected: Option<Rejected>,
-    /// Dead time of the timer, s.
-    pub dead_time_s: f32,
+    /// What the timer of the power stage was set to.
+    pub timer: board::Timer,
     /// Reason why the control was not started, if it was not.
     pub not_started: Option<&'static str>,
 }
@@ -228,7 +228,8 @@ impl Supervisor {
     }
 
     /// Logs changes of state, faults and events; once a second, at the level `debug`, what the drive does.
-    fn log(&mut self, s: Status) {
+    fn log(&mut self, mut s: Status) {
+        s.worst_latency = s.worst_latency.saturating_sub(self.chip.timer.below_the_top());
         let before = self.status.replace(s);
         if before.map(|status| status.state) != Some(s.state) {
             if let Some(fault) = s.state.fault() {
@@ -313,7 +314,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
-        extended(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
+        extended(&mut self.guard, || settings.build_for(&self.chip.timer))
     }
 
     fn configured(&mut self, settings: &FirmwareSettings) {

@@ -98,6 +98,7 @@ pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
         mechanics: MechanicsSettings { load: Load::Locked, ..MechanicsSettings::DEFAULT },
         inverter: InverterSettings {
             timer_top: board::PWM_TOP,
+            pulses: settings.drive.inverter.carrier_khz.pulses(),
             dead_time_us: f64::from(dead_time_s) * 1e6,
             ..InverterSettings::DEFAULT
         },
@@ -192,7 +193,8 @@ impl HostBoard {
         }
         self.now_ms = self.now_ms.wrapping_add(1);
         if self.machine.resets {
-            let (plant, saved) = (self.machine.plant.clone(), self.machine.saved);
+            let (mut plant, saved) = (self.machine.plant.clone(), self.machine.saved);
+            plant.set_pulses(saved.drive.inverter.carrier_khz.pulses());
             // The settings were in force when they were saved.
             if let Ok(board) = Self::on(plant, &saved) {
                 *self = board;

@@ -1,7 +1,7 @@
 //! What the steps have found, and the settings that follow from it.
 
 use super::fit::Fitted;
-use drive_core::{FirstOrder, Motor, PERIOD_S};
+use drive_core::{FirstOrder, Motor};
 use drive_settings::{CurrentPlant, Flux, IdentifiedPlant, PlantSource, Settings};
 
 /// What the steps have found; `None` for a step that has not been done or was refused.
@@ -111,7 +111,8 @@ impl Found {
         new.observer.leakage_slope = leakage.slope * per;
         // The direct current of the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
-        let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);
+        let of_dead_time = settings.inverter.dead_time_s / settings.inverter.carrier_s()
+            * self.dc_link.unwrap_or(0.0);
         new.inverter.drop_v = Some(levels.inverter_v - of_dead_time);
         new
     }

@@ -86,10 +86,10 @@ impl Plate {
             i_q_limit: settings.i_q_limit_a(),
             flux: SQRT_2 / SQRT_3 * plate.voltage_v / (TAU * plate.frequency_hz),
             torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
-            filter: settings.scales.current_age_s() / PERIOD_S,
+            filter: settings.current_age_s() / PERIOD_S,
             pulse_noise: settings.share_of_range(0.05),
             pulse_v: settings.share_of_dc_link(60.0),
-            dead_time: settings.inverter.dead_time_s / PERIOD_S,
+            dead_time: settings.inverter.dead_time_s / settings.inverter.carrier_s(),
             dc_link: settings.inverter.dc_link_v,
             implausible: entries.into_iter().find(|entry| !entry.is_allowed()),
         }

@@ -188,7 +188,7 @@ impl Online {
             flux_saliency: settings.injection.synchronous.flux_saliency,
             current_saliency: settings.current_saliency(),
             steady_squared: steady * steady,
-            delay: settings.scales.current_age_s() / PERIOD_S,
+            delay: settings.current_age_s() / PERIOD_S,
             before: AlphaBeta::ZERO,
             present: AlphaBeta::ZERO,
             filters: [Filter::new(TAU * BEFORE_HZ * PERIOD_S); 2],

@@ -4,7 +4,7 @@ use super::entry::{Change, Entry};
 use super::value::Value;
 use super::*;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::{AngleSource, Line};
+use drive_core::{Abc, AlphaBeta, AngleSource, Line};
 
 #[test]
 fn what_a_learning_depends_on_is_compared_and_nothing_else() {
@@ -229,6 +229,39 @@ fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older
     }
     assert!((two.current_lag - one.current_lag - 0.25).abs() < 1e-6);
     assert!((two.estimator.lag - one.estimator.lag - 0.25).abs() < 1e-6);
+}
+
+/// Each of the pulses has a dead time and a shortest pulse of its own: their share grows with the rate. With both zero vectors the
+/// upper one is that of the last pulse.
+#[test]
+fn the_share_of_the_dead_time_grows_with_the_carrier() {
+    let of = |carrier_khz| {
+        let mut settings = Settings::default();
+        settings.inverter.carrier_khz = carrier_khz;
+        let lag = settings.build().unwrap().current_lag;
+        settings.scales.both_zero_vectors = true;
+        let built = settings.build().unwrap();
+        let signs = built.dead_time.signs(Abc::new(1.0, -0.5, -0.5));
+        settings.inverter.compensate = false;
+        let plain = settings.build().unwrap().modulator;
+        let lost = built.dead_time.voltage(signs, 311.0, 0.0).a;
+        (lost, built.modulator.circle(311.0), plain, built.current_lag - lag)
+    };
+    for (carrier_khz, times) in [(Carrier::Khz6, 1.0), (Carrier::Khz12, 2.0), (Carrier::Khz18, 3.0)]
+    {
+        let (lost, circle, plain, older) = of(carrier_khz);
+        assert!((lost - times * 4.105).abs() < 0.01, "{carrier_khz:?}: {lost} V");
+        assert!((older - 0.25 / times).abs() < 1e-6, "{carrier_khz:?}: {older} periods");
+        let circle = circle * 1.732_050_8 / 311.0;
+        assert!((circle - (1.0 - times * 0.0264)).abs() < 1e-4, "{carrier_khz:?}: {circle}");
+        // 3.2 us is the shortest pulse: a duty of 1.92 % at 6 kHz.
+        let shortest = times * 3.2e-6 * 6000.0;
+        for (duty, wanted) in [(0.99 * shortest, shortest), (0.49 * shortest, 0.0)] {
+            let along = AlphaBeta::new((1.0 - 2.0 * duty) * 311.0 * 2.0 / 3.0, 0.0);
+            let made = plain.step(along, Abc::ZERO, 311.0).duties[1];
+            assert!((made - wanted).abs() < 1e-4, "{carrier_khz:?}: {duty} {made}");
+        }
+    }
 }
 
 /// The image is built without the demodulations of the feature `printed`; their words are refused there, and stand for the same

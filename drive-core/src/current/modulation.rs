@@ -4,7 +4,7 @@
 //! O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the two zero vectors, without
 //! sectors or tables. A test compares the on-times with Table 2.
 
-use crate::{Abc, AlphaBeta, PERIOD_S, SQRT_3, math};
+use crate::{Abc, AlphaBeta, SQRT_3, math};
 
 /// Pulses shorter than the dead time plus this time are dropped or extended, s.
 const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
@@ -12,9 +12,9 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 /// Coefficients of the modulator.
 ///
 /// ```
-/// use induction_drive_core::{Abc, AlphaBeta, current::Modulator};
+/// use induction_drive_core::{Abc, AlphaBeta, current::Modulator, io::PERIOD_S};
 ///
-/// let modulator = Modulator::new(2.2e-6, false);
+/// let modulator = Modulator::new(2.2e-6, PERIOD_S, false);
 /// // Zero voltage: all legs at half the dc link.
 /// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).duties, [0.5; 3]);
 /// // 400 V along phase a: limited to the corner of the hexagon, 2/3 of the dc link.
@@ -55,14 +55,14 @@ pub struct Modulated {
 }
 
 impl Modulator {
-    /// Modulator for a dead time in s.
+    /// Modulator for a dead time in s of legs that switch with the period `carrier_s`, s.
     ///
     /// `compensated`: whether a dead-time compensation is added; it needs twice its amplitude of the dc
     /// link.
-    pub fn new(dead_time_s: f32, compensated: bool) -> Self {
-        let ratio = dead_time_s / PERIOD_S;
+    pub fn new(dead_time_s: f32, carrier_s: f32, compensated: bool) -> Self {
+        let ratio = dead_time_s / carrier_s;
         Self {
-            shortest: ratio + SHORTEST_EFFECTIVE_PULSE_S / PERIOD_S,
+            shortest: ratio + SHORTEST_EFFECTIVE_PULSE_S / carrier_s,
             usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
             readable: None,
         }
@@ -174,6 +174,7 @@ fn extremes(v: Abc) -> (f32, f32) {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
+    use crate::PERIOD_S;
     use core::f64::consts::PI;
     use proptest::prelude::*;
 
@@ -183,7 +184,7 @@ mod tests {
     const COUNT_V: f64 = 311.0 / 14_167.0;
 
     fn modulator() -> Modulator {
-        Modulator::new(2.2e-6, false)
+        Modulator::new(2.2e-6, PERIOD_S, false)
     }
 
     fn polar(length: f64, angle: f64) -> AlphaBeta {
@@ -232,7 +233,7 @@ mod tests {
     fn compensation_does_not_cost_the_wanted_voltage() {
         // With the part for the compensation kept free, the compensated legs never saturate. A leg that does not switch loses
         // nothing to the dead time.
-        let m = Modulator::new(2.2e-6, true);
+        let m = Modulator::new(2.2e-6, PERIOD_S, true);
         let dt = V_DC * 2.2e-6 / PERIOD_S;
         for degrees in 0..360 {
             let w = polar(400.0, f64::from(degrees).to_radians());
@@ -254,7 +255,7 @@ mod tests {
     #[test]
     fn with_shunts_two_legs_are_always_readable_and_the_circle_is_kept() {
         for compensated in [false, true] {
-            let plain = Modulator::new(2.2e-6, compensated);
+            let plain = Modulator::new(2.2e-6, PERIOD_S, compensated);
             let m = plain.readable(Some(READABLE));
             for degrees in 0..720 {
                 let angle = f64::from(degrees).to_radians() / 2.0;

@@ -156,7 +156,7 @@ pub(crate) fn read(
         Ok((0..a.len()).map(|k| clarke(of(k))).collect())
     };
     let (v, i) = (vectors(0)?, vectors(1)?);
-    let age = 1.0 + f64::from(config.drive.scales.current_age_s()) / h;
+    let age = 1.0 + f64::from(config.drive.current_age_s()) / h;
     let delay = reading.delay.unwrap_or(if measured { 0.0 } else { age });
     let to_rad_s = TAU / 60.0 * f64::from(config.motor.pole_pairs);
     // The mean of the row.

@@ -51,7 +51,7 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let settings = drive_settings::Inverter::default();
     let inverter = Inverter {
-        modulator: Modulator::new(settings.dead_time_s, false),
+        modulator: Modulator::new(settings.dead_time_s, PERIOD_S, false),
         top: f64::from(settings.top),
         vdc: context.config.inverter.dc_link_v,
     };

@@ -22,8 +22,10 @@ settings! {
     InverterSettings "inverter." |s| {
         /// Dc-link voltage, V.
         vdc: f64 = 311.0;
-        /// Compare value that means high side on throughout. The default is 170 MHz / (2 * 6 kHz).
+        /// Compare value that means high side on throughout, with one pulse. The default is 170 MHz / (2 * 6 kHz).
         timer_top: u16 = 14_167, 100.0..=65_535.0, "";
+        /// Equal pulses of each leg in a period; that compare value is the share of one of them.
+        pulses: u16 = 1, 1.0..=10.0, "";
         /// Time in which both switches of a leg are off at every edge, us (section 3.9).
         dead_time_us: f64 = 2.2;
         /// Time from the command to the first switch acting, us (section 3.9).
@@ -58,6 +60,9 @@ pub struct Inverter {
     /// Dc-link voltage, V.
     pub(crate) vdc: f64,
     pub(crate) top: f64,
+    /// Pulses of each leg in a period.
+    pub(crate) pulses: u16,
+    timer_top: u16,
     /// Seconds.
     pub(crate) dead_time: f64,
     /// Part of it that the drive does not know, us.
@@ -90,7 +95,9 @@ impl Inverter {
         }
         let mut inverter = Self {
             vdc: 0.0,
-            top: f64::from(s.timer_top),
+            top: 0.0,
+            pulses: 1,
+            timer_top: s.timer_top,
             dead_time: 0.0,
             extra_us: s.extra_dead_time_us,
             propagation: s.propagation_us * 1e-6,
@@ -104,7 +111,14 @@ impl Inverter {
         };
         inverter.set_dc_link(s.vdc)?;
         inverter.set_dead_time(s.dead_time_us)?;
+        inverter.set_pulses(s.pulses);
         Ok(inverter)
+    }
+
+    /// Changes the number of pulses in a period.
+    pub fn set_pulses(&mut self, pulses: u16) {
+        self.pulses = pulses.max(1);
+        self.top = f64::from(self.timer_top / self.pulses);
     }
 
     /// Changes the dc-link voltage, V.
@@ -151,9 +165,10 @@ impl Inverter {
             let blend = self.propagation / period;
             v += (clarke(self.duties(&self.previous)) - v) * blend;
         }
+        let pulses = f64::from(self.pulses);
         // A pulse shorter than the dead time vanishes; the dead time cannot take more than it.
         let taken = |leg: usize, available: f64| {
-            let dead = (self.dead_time + self.more_dead_time[leg]) / period;
+            let dead = (self.dead_time + self.more_dead_time[leg]) * pulses / period;
             let switches = duties[leg] > 0.0 && duties[leg] < 1.0;
             if switches { self.vdc * dead.max(0.0).min(available) } else { 0.0 }
         };

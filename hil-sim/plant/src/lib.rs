@@ -298,6 +298,11 @@ impl Plant {
         }))
     }
 
+    /// Changes the number of pulses of each leg in a period.
+    pub fn set_pulses(&mut self, pulses: u16) {
+        self.around.inverter.set_pulses(pulses);
+    }
+
     /// Changes the dead time, us.
     ///
     /// # Errors

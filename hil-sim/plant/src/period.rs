@@ -39,7 +39,7 @@ impl Around {
         period: f64,
     ) {
         motor.begin_period();
-        self.sensors.begin_period(period);
+        self.sensors.begin_period(period, self.inverter.pulses);
         (self.taken, self.volt_seconds) = (0.0, Complex::ZERO);
         if !compare.enabled {
             self.freewheel(motor, period);
@@ -111,15 +111,19 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) {
-        let pattern = switched::Pattern::new(&self.inverter, compare, period);
         let longest = period / f64::from(self.substeps);
-        for (duration, levels) in pattern.pieces() {
-            let steps = (duration / longest).ceil().max(1.0);
-            let h = duration / steps;
-            self.steps(motor, steps as u32, h, |motor, inverter| {
-                let legs = Legs::new(inverter, levels, motor.state.electrical.current());
-                motor.advance(&terminals(legs), h) * h
-            });
+        for _ in 0..self.inverter.pulses {
+            let pulse_s = period / f64::from(self.inverter.pulses);
+            let pattern = switched::Pattern::new(&self.inverter, compare, pulse_s);
+            for (duration, levels) in pattern.pieces() {
+                let steps = (duration / longest).ceil().max(1.0);
+                let h = duration / steps;
+                self.steps(motor, steps as u32, h, |motor, inverter| {
+                    let legs = Legs::new(inverter, levels, motor.state.electrical.current());
+                    motor.advance(&terminals(legs), h) * h
+                });
+            }
+            self.inverter.previous = *compare;
         }
     }
 

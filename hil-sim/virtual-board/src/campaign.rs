@@ -57,6 +57,8 @@ pub struct Selection {
     /// Speed of the shaft, rpm on four poles: 850 to 3500, where the observer alone gives the angle. None: the shaft is
     /// locked without the encoder, and at 300 and 900 rpm with it.
     pub rpm: Option<f64>,
+    /// Assignments `KEY=VALUE` to the configuration.
+    pub set: Vec<String>,
     /// The power stage that the image was built for.
     pub stage: &'static PowerStage,
     /// Takes a protection out, to see that a class fails.
@@ -68,7 +70,7 @@ pub struct Selection {
 /// # Errors
 /// The table with the failures; no class has that name.
 pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
-    let Selection { count, seed, ref class, rpm, stage, without } = *selection;
+    let Selection { count, seed, ref class, rpm, ref set, stage, without } = *selection;
     let all = Class::all(rpm.is_some());
     let classes = all.len() as u64;
     let chosen = |one: &Class| class.split('|').any(|part| one.name.contains(part));
@@ -88,7 +90,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
     let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
     let runs: Mutex<Runs> = Mutex::default();
     let work = || -> Result<()> {
-        let mut scene = Scene::new(open()?, stage, rpm)?;
+        let mut scene = Scene::new(open()?, stage, set, rpm)?;
         scene.board.forgive();
         loop {
             // A seed says all: a campaign of one with the seed of a failure repeats it.
@@ -201,7 +203,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
 /// # Errors
 /// The slot and the operation of the first failure.
 pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
-    let mut scene = Scene::new(image, &REFERENCE, None)?;
+    let mut scene = Scene::new(image, &REFERENCE, &[], None)?;
     scene.board.forgive();
     let mut counts = [0; 2];
     for (slot, count) in counts.iter_mut().enumerate() {

@@ -27,6 +27,9 @@ enum Task {
         /// Speed of the shaft, rpm on four poles: 850 to 3500.
         #[arg(long)]
         rpm: Option<f64>,
+        /// An assignment KEY=VALUE to the configuration; repeatable.
+        #[arg(long)]
+        set: Vec<String>,
         /// The board that the ELF was built for; it has a motor that suits it.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
@@ -65,10 +68,10 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> Result<()> {
     match task {
-        Task::Campaign { elf, count, seed, class, rpm, board } => {
+        Task::Campaign { elf, count, seed, class, rpm, set, board } => {
             let stage = PowerStage::named(&board)?;
             let without = |_: &mut _, _: &_, _: &_| ();
-            let selection = campaign::Selection { count, seed, class, rpm, stage, without };
+            let selection = campaign::Selection { count, seed, class, rpm, set, stage, without };
             println!("{}", campaign::bounds(rpm.is_some()));
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }

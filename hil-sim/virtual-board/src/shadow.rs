@@ -9,6 +9,7 @@ use drive_core::{Accepted, Coefficients, Command, Drive, FrontEndState, Output, 
 use drive_settings::{Settings, SettingsError};
 
 use crate::board::{Options, Period, confirmed};
+use induction_drive::board::Timer;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::{
@@ -37,8 +38,8 @@ struct Orders {
     waiting: VecDeque<Command>,
     state: State,
     periods: u32,
-    /// Dead time that the timer makes since its start, s.
-    dead_time_s: f32,
+    /// What the timer makes since its start.
+    timer: Timer,
     learned: Option<Learned>,
     session: Session,
 }
@@ -58,7 +59,7 @@ impl DriveHandle for Orders {
         self.state.is_off()
     }
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError> {
-        settings.build_for(self.dead_time_s)
+        settings.build_for(&self.timer)
     }
     fn configured(&mut self, _: &FirmwareSettings) {}
     fn session(&mut self) -> &mut Session {
@@ -83,9 +84,9 @@ impl Shadow {
         if !options.confirmed {
             settings = FirmwareSettings::of(settings.board);
         }
-        let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
+        let timer = Timer::of(&settings.drive.inverter);
         Ok(Self {
-            drive: Drive::new(settings.build_for(dead_time_s)?),
+            drive: Drive::new(settings.build_for(&timer)?),
             front_end: FrontEndState::default(),
             output: Output::default(),
             tracking: Tracking::new(&settings.drive),
@@ -94,7 +95,7 @@ impl Shadow {
                 waiting: VecDeque::new(),
                 state: State::Off,
                 periods: 0,
-                dead_time_s,
+                timer,
                 learned: None,
                 session: Session::new(&settings.drive),
             },
@@ -103,10 +104,11 @@ impl Shadow {
         })
     }
 
-    /// Its settings, with the dead time that the timer makes.
+    /// Its settings, with dead time and carrier that the timer makes.
     pub fn settings(&self) -> Settings {
         let mut settings = self.firmware_settings().drive;
-        settings.inverter.dead_time_s = self.orders.dead_time_s;
+        let Timer { dead_time_s, carrier_khz, .. } = self.orders.timer;
+        (settings.inverter.dead_time_s, settings.inverter.carrier_khz) = (dead_time_s, carrier_khz);
         settings
     }
 
@@ -132,8 +134,9 @@ impl Shadow {
     /// # Errors
     /// They make no drive.
     pub fn restart(&mut self, mut settings: FirmwareSettings) -> Result<()> {
+        self.orders.timer = Timer::of(&settings.drive.inverter);
         self.desk = Desk::new(settings);
-        self.drive = Drive::new(settings.build_for(self.orders.dead_time_s)?);
+        self.drive = Drive::new(settings.build_for(&self.orders.timer)?);
         self.front_end = FrontEndState::default();
         self.orders.waiting.clear();
         Ok(())

@@ -3,8 +3,9 @@
 use crate::common;
 use anyhow::Result;
 use drive_core::State;
+use drive_settings::Carrier;
 use hil_sim::Config;
-use virtual_board::Pair;
+use virtual_board::{Image, Options, Pair};
 
 /// A start, magnetising, torque steps, a reversal and a stop, sensorless: every compare value of every
 /// control interrupt is compared where it is written (see `Shadow::follow`).
@@ -43,6 +44,51 @@ fn a_drive_that_was_configured_at_the_console_is_the_same() -> Result<()> {
     pair.until_state(State::Off)?;
     assert!(pair.shadow.compared > 12_000);
     Ok(())
+}
+
+/// Two and three pulses in a control period: the interrupt still comes once in it, the torque is the one asked for within 5 %,
+/// and the compare values are those of the host; the same with the currents of both zero vectors.
+#[test]
+fn a_drive_with_a_quiet_carrier_is_the_same() -> Result<()> {
+    for (carrier_khz, seed) in [(Carrier::Khz12, 13), (Carrier::Khz18, 14)] {
+        let mut config = Config::default();
+        config.drive.inverter.carrier_khz = carrier_khz;
+        let mut pair = Pair::new(Image::built()?, Options::new(&config, seed).set_up(&config)?)?;
+        assert_eq!(pair.shadow.settings().inverter.carrier_khz, carrier_khz);
+        for both in ["no", "yes"] {
+            pair.order(&format!("set scales.both_zero_vectors {both}"))?;
+            pair.order("apply")?;
+            with_pulses(&mut pair, carrier_khz)?;
+        }
+        assert!(pair.shadow.compared > 48_000, "{}", pair.shadow.compared);
+    }
+    Ok(())
+}
+
+fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    let pulse = u64::from(pair.board.chip().tim1.period());
+    let period = pulse * u64::from(carrier_khz.pulses());
+    assert_eq!(period, 28_332, "{carrier_khz:?}");
+    let settings = pair.shadow.settings();
+    let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
+    for i_q in [1.5, -1.0] {
+        pair.order(&format!("torque {i_q}"))?;
+        pair.run(6000, |_, _| {})?;
+        let (mut sum, mut before) = (0.0, None);
+        pair.run(6000, |pair, control| {
+            sum += pair.board.plant.torque() / 6000.0;
+            let since = control.began - before.replace(control.began).unwrap_or(control.began);
+            assert!(since == 0 || since.abs_diff(period) < 200, "{since} ticks");
+        })?;
+        let wanted = per_ampere * i_q;
+        println!("{carrier_khz:?}: {sum:.4} of {wanted:.4} Nm");
+        assert!((sum / wanted - 1.0).abs() < 0.05, "{carrier_khz:?}: {sum} of {wanted} Nm");
+    }
+    compare_telemetry(pair);
+    pair.order("stop")?;
+    pair.until_state(State::Off)
 }
 
 /// The address that the image publishes leads to the telemetry of the host's drive.

@@ -86,7 +86,8 @@ fn run(without: Without) -> Result<String> {
     let class = PROTECTED.map(|(name, _)| name).join("|");
     // Four of each class: some bits matter to nothing, and without the encoder another protection finds a wrong crystal.
     let count = 4 * PROTECTED.len() as u64;
-    let selection = Selection { count, seed: 7000, class, rpm: None, stage: &REFERENCE, without };
+    let (rpm, set, stage) = (None, Vec::new(), &REFERENCE);
+    let selection = Selection { count, seed: 7000, class, rpm, set, stage, without };
     campaign::run(Image::built, &selection)
 }
 

@@ -141,13 +141,13 @@ fn start_and_save_put_staged_values_in_force_first() {
         said,
         [
             "* designing...",
-            "* applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
+            "* applied: dead time and carrier hold from the next reset on, if saved; the board has to be confirmed again before a start",
             "ok"
         ]
     );
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.6);
     talk.ask("set inverter.dead_time_s 2.9e-6");
-    let remark = "ok: the dead time holds from the next reset on, if saved";
+    let remark = "ok: dead time and carrier hold from the next reset on, if saved";
     assert_eq!(talk.say("apply\n"), ["* designing...", remark]);
 }
 

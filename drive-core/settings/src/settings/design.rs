@@ -68,7 +68,7 @@ impl Settings {
         let tracks = self.tracks_synchronously();
         let injecting = self.angle_source == AngleSource::Injection || inj.beside_encoder;
         let s = &self.scales;
-        let current_lag = s.current_age_s() / PERIOD_S;
+        let current_lag = self.current_age_s() / PERIOD_S;
         let carrier_lag = current_lag + estimator::carrier_lag(motor_plant);
         let trip_freq = self.freq_of_rpm(self.speed_trip_rpm());
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
@@ -82,7 +82,8 @@ impl Settings {
         let shunts = self.shunts();
         let limit = VoltageLimit::new(m, i_d, current_limit);
         let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
-        let dead_time = DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a());
+        let (dead_time_s, carrier_s) = (self.inverter.dead_time_s, self.inverter.carrier_s());
+        let dead_time = DeadTime::new(dead_time_s, carrier_s, self.full_compensation_a());
         let leakage = Leakage {
             flux_saliency: 0.5 * self.slope().at_rest(),
             current_saliency: self.current_saliency(),
@@ -98,7 +99,7 @@ impl Settings {
                 dc_link: s.dc_link,
                 full_scale: s.full_scale.saturating_mul(1 + u16::from(s.both_zero_vectors)),
                 heat_sink: s.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
-                top: f32::from(self.inverter.top),
+                top: f32::from(self.inverter.top / self.inverter.carrier_khz.pulses()),
             },
             offsets: OffsetCheck {
                 samples: periods(self.sequence.calibrate_s) as u16,
@@ -134,7 +135,7 @@ impl Settings {
             current_loop: DqPi { d, q },
             current_lag,
             lag_share,
-            modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
+            modulator: Modulator::new(dead_time_s, carrier_s, self.inverter.compensate)
                 .readable(shunts.map(|shunts| shunts.readable)),
             dead_time: if self.inverter.compensate { dead_time } else { DeadTime::NONE },
             inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit)

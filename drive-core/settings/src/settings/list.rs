@@ -13,7 +13,7 @@ use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
 use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
-use super::{CurrentSensors, Flux, PlantSource, SensorKind};
+use super::{Carrier, CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
 use drive_core::{AngleSource, DcLimit, Line, Motor, PERIOD_S};
@@ -67,8 +67,8 @@ settings! {
 
     /// The timer and the power stage. Defaults: section 3.9; 220 V rectified.
     Inverter "inverter." [inverter] {
-        /// count at which the timer turns round
-        /// (14167 at 170 MHz and 6 kHz).
+        /// count at which the timer turns round at 6 kHz
+        /// (14167 at 170 MHz).
         top: u16 = 14_167, 12: whole().from_to(1000.0, 65_534.0).changed(Change::Board).learned();
         /// Nominal voltage of the dc link, V. Its row is behind that of its sensor, which its range depends on.
         dc_link_v: f32 = 311.0;
@@ -83,6 +83,11 @@ settings! {
             .from_to(1e-4, 100.0).learned();
         /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
         drop_v: Option<f32> = None, 16: auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
+        /// rate of the legs, kHz
+        ///
+        /// The control runs at 6 kHz: a whole number of equal pulses in each control period. The share of the dead time, the shortest pulse and the
+        /// switching losses grow with it. The board has a largest one; shunts below the low sides are sampled at 6 kHz alone.
+        carrier_khz: Carrier = Carrier::Khz6, 130: word().changed(Change::FromReset).learned();
     }
 
     /// Scales of the converters and of the encoder. Defaults: Eq. 3.5; 0.11 V per code (451 V at full scale); the 5305 Hz

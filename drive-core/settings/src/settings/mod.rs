@@ -38,6 +38,32 @@ words! {
 }
 
 words! {
+    /// Rates at which the legs switch, kHz.
+    pub enum Carrier {
+        /// One pulse in a control period.
+        Khz6 = "6",
+        /// Two.
+        Khz12 = "12",
+        /// Three.
+        Khz18 = "18",
+    }
+}
+
+impl Carrier {
+    /// Pulses of a leg in a control period.
+    pub const fn pulses(self) -> u16 {
+        self as u16 + 1
+    }
+}
+
+impl Inverter {
+    /// Period at which the legs switch, s.
+    pub fn carrier_s(&self) -> f32 {
+        PERIOD_S / f32::from(self.carrier_khz.pulses())
+    }
+}
+
+words! {
     /// The plant that the current controllers are designed for.
     pub enum PlantSource {
         /// First-order plants identified on the motor with the filters in place (section 3.7).
@@ -82,8 +108,9 @@ words!(DemodulatorKind {
     Envelope = "envelope",
 });
 
-/// Why shunts below the low sides are sampled in one zero vector, and why a demodulation is not there.
+/// Why shunts below the low sides are sampled in one zero vector and at 6 kHz, and why a demodulation is not there.
 const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
+const SLOW: &str = "shunts below the low sides settle too slowly for shorter pulses; set it to 6";
 const ABSENT: &str = "this image is built with synchronous alone";
 
 impl Scales {
@@ -91,15 +118,16 @@ impl Scales {
     pub fn of_code(&self, line: Line) -> Line {
         Line { gain: if self.both_zero_vectors { 0.5 } else { 1.0 } * line.gain, ..line }
     }
-
-    /// Age of the currents at the top of the counter, s: the delay of their filters; the mean of both zero vectors is a quarter
-    /// of a period older.
-    pub fn current_age_s(&self) -> f32 {
-        self.current_delay_s + if self.both_zero_vectors { 0.25 * PERIOD_S } else { 0.0 }
-    }
 }
 
 impl Settings {
+    /// Age of the currents at the top of the counter, s: the delay of their filters; the mean of both zero vectors is a quarter
+    /// of a period of the legs older.
+    pub fn current_age_s(&self) -> f32 {
+        let both = if self.scales.both_zero_vectors { 0.25 } else { 0.0 };
+        self.scales.current_delay_s + both * self.inverter.carrier_s()
+    }
+
     /// Checks the words, and every value against its range, the scales first: the rules of others follow from the
     /// sensors' range.
     ///
@@ -116,6 +144,10 @@ impl Settings {
     pub(crate) fn check_words(&self, has_all: bool) -> Result<(), SettingsError> {
         if self.scales.both_zero_vectors && self.scales.sensors == CurrentSensors::LowSide {
             return Err(SettingsError::Word("scales.both_zero_vectors", true.word(), BLIND));
+        }
+        let carrier = self.inverter.carrier_khz;
+        if carrier != Carrier::Khz6 && self.scales.sensors == CurrentSensors::LowSide {
+            return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), SLOW));
         }
         let kind = self.injection.demodulator;
         let present = has_all || kind == DemodulatorKind::Synchronous;

@@ -139,11 +139,11 @@ impl Sensors {
         })
     }
 
-    /// Begins a PWM period of `period` seconds.
+    /// Begins a period of `period` seconds with so many pulses.
     #[inline]
-    pub(crate) fn begin_period(&mut self, period: f64) {
+    pub(crate) fn begin_period(&mut self, period: f64, pulses: u16) {
         if let Some(rare) = &mut self.rare {
-            rare.begin(period);
+            rare.begin(period, pulses);
         }
     }
 

@@ -23,11 +23,11 @@ pub(super) struct CurrentErrors {
     /// Phase b before and behind that lag.
     before_b: f64,
     behind_b: f64,
-    /// Time from now to the middle of the period, s.
+    /// Time from now to the middle of the last pulse, s.
     until_middle: f64,
     /// What the channels see now.
     now: [f64; 2],
-    /// The same in the middle of the period, if that is converted too.
+    /// The same in the middle of the last pulse, if that is converted too.
     middle: Option<[f64; 2]>,
 }
 
@@ -52,9 +52,9 @@ impl CurrentErrors {
         acts.then_some(errors)
     }
 
-    /// Begins a period.
-    pub(super) fn begin(&mut self, period: f64) {
-        self.until_middle = 0.5 * period;
+    /// Begins a period with so many pulses; the middle is that of the last one.
+    pub(super) fn begin(&mut self, period: f64, pulses: u16) {
+        self.until_middle = period - 0.5 * period / f64::from(pulses);
     }
 
     /// Prepares steps of `h` seconds.
@@ -83,7 +83,7 @@ impl CurrentErrors {
         }
     }
 
-    /// What the channels read now, A, and in the middle of the period where that is converted too.
+    /// What the channels read now, A, and in the middle of the last pulse where that is converted too.
     pub(super) fn currents(&self) -> ([f64; 2], Option<[f64; 2]>) {
         let bent = |seen: [f64; 2]| [0, 1].map(|k| seen[k] + self.cubic[k] * seen[k].powi(3));
         (bent(self.now), self.middle.map(bent))

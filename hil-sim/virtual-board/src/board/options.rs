@@ -57,6 +57,8 @@ impl Options {
         plant.inverter.dead_time_us =
             f64::from(firmware_board::dead_time(settings.inverter.dead_time_s).1) * 1e6;
         plant.inverter.timer_top = firmware_board::PWM_TOP;
+        // It moves from one top of the counter to the next.
+        plant.inverter.pulses = 1;
         plant
     }
 

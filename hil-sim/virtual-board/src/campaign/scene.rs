@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use anyhow::{Result, bail, ensure};
 use drive_core::State;
 use drive_settings::Settings;
+use hil_sim::config::{Value, assigned};
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Loaded, Saved};
@@ -104,12 +105,20 @@ pub struct Scene {
 
 impl Scene {
     /// Starts a board with this power stage and a motor that suits it, once with each angle source; at this speed, rpm on
-    /// four poles, with settings for the whole range, or without one.
+    /// four poles, with settings for the whole range, or without one. `set` are assignments to the configuration.
     ///
     /// # Errors
-    /// The board does not start.
-    pub fn new(image: Image, stage: &'static PowerStage, rpm: Option<f64>) -> Result<Self> {
+    /// The board does not start; an assignment is refused.
+    pub fn new(
+        image: Image,
+        stage: &'static PowerStage,
+        set: &[String],
+        rpm: Option<f64>,
+    ) -> Result<Self> {
         let mut config = stage.config()?;
+        for (name, value) in set.iter().map(|one| assigned(one)).collect::<Result<Vec<_>, _>>()? {
+            config.set(name, &Value::from_text(value))?;
+        }
         let (mut torques, mut speeds) = (vec![config.amperes(TORQUE_A)], SPEEDS_RPM.to_vec());
         if let Some(rpm) = rpm {
             config = for_the_range(&config)?;

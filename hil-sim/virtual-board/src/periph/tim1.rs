@@ -1,7 +1,7 @@
 //! TIM1 in centre-aligned mode, as the timer of a power stage (RM0440, section 28).
 //!
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising edges of OC4REF on the way
-//! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters.
+//! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters; or the update is output 1.
 
 mod outputs;
 
@@ -211,6 +211,9 @@ impl Tim1 {
         self.repetitions = self.store.get(RCR);
         if flag {
             self.status |= UIF;
+        }
+        if self.store.get(CR2) >> 4 & 7 == 2 {
+            self.trigger_at[0] = self.next_end;
         }
     }
 

@@ -1,6 +1,7 @@
 //! The gates of the six switches over a PWM period, behind the drivers.
 
 use drive_core::Compare;
+use induction_drive::board::PWM_TOP;
 use thiserror::Error;
 
 use super::PowerStage;
@@ -178,7 +179,8 @@ impl Leg {
         let ideal = driver.requests(leg, gpio, tim1, false);
         let compare = match ideal {
             [Request::Known(high), Request::Known(low)] if low == high.inverted() => {
-                Some((high.high() / 2) as u16)
+                // As a share of the plant's top, whatever the timer's is.
+                Some((high.high() * u32::from(PWM_TOP) / period) as u16)
             }
             _ => None,
         };
