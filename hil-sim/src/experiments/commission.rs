@@ -13,7 +13,8 @@ use super::drawn_machine::{Circuit, drawn};
 use super::{machines, steady};
 use crate::prelude::*;
 use crate::stats::exact;
-use session::{Abort, Session, unaware};
+pub(super) use session::unaware;
+use session::{Abort, Session};
 
 /// Not in the source, which asks for it as future work.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -42,7 +43,7 @@ const ENOUGH: f64 = 0.7;
 const LISTED: usize = 20;
 
 /// A whole commissioning of the motor of this configuration by a drive that knows its nameplate.
-fn session(config: &Config, seed: u64) -> Result<Session, Error> {
+pub(super) fn session(config: &Config, seed: u64) -> Result<Session, Error> {
     let settings = unaware(config);
     let mut unlearned = Config { drive: settings, ..config.clone() };
     unlearned.prepare.learn = false;

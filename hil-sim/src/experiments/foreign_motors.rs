@@ -1,0 +1,380 @@
+//! Motors that the drive has never seen: each from its nameplate alone through commissioning and learning, four quadrants and disturbances.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{SQRT_2, TAU};
+
+use drive_commission::Refusal;
+use drive_settings::{Flux, SettingsError};
+
+use super::battery::{Kind, Refused, Trial, allowed_a, disturbed, nominal_limit_a, trial};
+use super::commission::{session, unaware};
+use super::drawn_machine::Circuit;
+use super::saliency::Probe;
+use crate::prelude::*;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "foreign-motors",
+    stands_for: "beyond the dissertation",
+    about: "Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.",
+    uses: &[&["runs"]],
+    not: &[],
+    run: whole::<ForeignMotors>,
+};
+
+const RUNS: u32 = 30;
+/// Parts of a record: undisturbed, and with all disturbances drawn up to this share of their full sizes.
+const DRAWN: [f64; 2] = [0.0, 0.5];
+/// Least slope, 1/rad, from which on a motor counts as one that can be tracked, and the angle error that it should have, degrees rms.
+const ENOUGH: f64 = 0.035;
+const GOOD_DEG: f64 = 2.0;
+/// Faults that say what went wrong, but not why with this motor.
+const UNNAMED: [Fault; 10] = [
+    Fault::OverCurrentA,
+    Fault::OverCurrentB,
+    Fault::OverCurrentC,
+    Fault::SensorSaturatedA,
+    Fault::SensorSaturatedB,
+    Fault::CurrentNotAsPredicted,
+    Fault::LostAngle,
+    Fault::LostLock,
+    Fault::NonFiniteState,
+    Fault::NothingLearned,
+];
+
+/// The motors.
+pub struct ForeignMotors {
+    seed: u64,
+    runs: usize,
+}
+
+/// Where a motor was refused, in which words, and whether they name the cause.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Refusing {
+    stage: String,
+    why: String,
+    named: bool,
+}
+
+/// What became of a motor.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Record {
+    refused: Option<Refusing>,
+    /// Errors of the commissioning in percent, as [`Circuit::values`].
+    errors: Vec<f64>,
+    /// Slope of the motor at the drive's direct current, without load, 1/rad.
+    slope: Option<f64>,
+    /// Its runs: undisturbed, and disturbed.
+    runs: [Vec<Trial>; 2],
+}
+
+/// Why a motor goes no further.
+enum End {
+    Refused(Refusing),
+    Failed(Error),
+}
+
+impl From<Error> for End {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+fn refused(stage: &str, why: impl ToString, named: bool) -> End {
+    End::Refused(Refusing { stage: stage.to_owned(), why: why.to_string(), named })
+}
+
+fn is_named(state: State) -> bool {
+    state.fault().is_some_and(|fault| !UNNAMED.contains(&fault))
+}
+
+/// Slip at which a circuit, in units of its plate's impedance, takes the rated current, and the shaft's power there in relation to
+/// the apparent one.
+fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
+    let impedance = |slip: f64| {
+        let (r, x) = (r_r / slip, x_m + x_r);
+        let share = x_m / (r * r + x * x);
+        (share * x_m * r, r_s + share * x_m * r, x_s + share * (r * r + x_r * x))
+    };
+    let (mut low, mut high) = (1e-5, 1.0);
+    for _ in 0..50 {
+        let (_, re, im) = impedance(0.5 * (low + high));
+        *if re.hypot(im) > 1.0 { &mut low } else { &mut high } = 0.5 * (low + high);
+    }
+    (low, (1.0 - low) * impedance(low).0)
+}
+
+/// A motor with its inverter and sensors: nameplate log-uniform over its range; circuit in the usual range, per unit, whose rated
+/// current, slip and power are those of the nameplate; inertia constant 0.1 to 1 s (`motulator-2kw2` has 0.08 s, Krause's 3 hp 0.7 s);
+/// teeth, yoke and leakage of iron up to those of the families. Ideal sensors of 2 to 3 times the rated peak current.
+fn drawn(seed: u64) -> Config {
+    let mut random = seeded(seed);
+    let mut between = |low: f64, high: f64| random.random_range(low..=high);
+    let mut log = |low: f64, high: f64| between(low.ln(), high.ln()).exp();
+    let [volts, watts, hertz] =
+        [(24.0, 690.0), (50.0, 30e3), (25.0, 400.0)].map(|(a, b)| log(a, b));
+    let circuit = [(0.02, 0.1), (0.015, 0.08), (0.05, 0.15), (0.05, 0.15), (1.0, 4.0)];
+    let [r_s, r_r, x_s, x_r, x_m] = circuit.map(|(a, b)| log(a, b));
+    let (inertia_s, range) = (log(0.1, 1.0), log(2.0, 3.0));
+    let pole_pairs = between(1.0, 7.0).min(6.0) as u32;
+    let (slip, power) = rated([r_s, r_r, x_s, x_r, x_m]);
+    let (amperes, speed) =
+        (watts / (3_f64.sqrt() * volts * power), TAU * hertz / f64::from(pole_pairs));
+    let z = volts / (3_f64.sqrt() * amperes);
+    let l = z / (TAU * hertz);
+    let mut config = Config::default();
+    let (m, plate) = (&mut config.motor, &mut config.drive.nameplate);
+    (m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m) = (r_s * z, r_r * z, x_s * l, x_r * l, x_m * l);
+    (m.pole_pairs, m.inertia) = (pole_pairs, 2.0 * inertia_s * watts / speed.powi(2));
+    m.friction = 0.005 * watts / speed.powi(2);
+    (plate.power_w, plate.voltage_v, plate.current_a) =
+        (watts as f32, volts as f32, amperes as f32);
+    plate.frequency_hz = hertz as f32;
+    plate.speed_rpm = ((1.0 - slip) * speed * 60.0 / TAU) as f32;
+    config.drive.sequence.flux = Flux::High;
+    config.drive.injection.synchronous.allow_unlearned = false;
+    config.inverter.dc_link_v = SQRT_2 * volts;
+    config.drive.inverter.dc_link_v = config.inverter.dc_link_v as f32;
+    let (per_ampere, sensors) = (1.0 / config.amperes(1.0), &mut config.measurement);
+    sensors.range_a = range * SQRT_2 * amperes;
+    (sensors.noise_a, sensors.lsb_a, sensors.filter_hz) =
+        (Some(0.0), Some(sensors.range_a / 32e3), 0.0);
+    sensors.dc_link_range_v = Some(1.45 * config.inverter.dc_link_v);
+    let iron = &mut config.iron;
+    iron.psi_n = Some(volts * (2.0_f64 / 3.0).sqrt() / (TAU * hertz));
+    (iron.teeth, iron.teeth_gap) = (Some(between(-0.08, -0.02)), Some(between(0.0, 1.0)));
+    iron.saturation = Some(between(1.0, 1.5));
+    iron.exponent = Some(between(4.0, 9.0) as u32);
+    iron.leakage_saturation = Some(per_ampere * between(0.05, 0.15));
+    config.model.plant = PlantModel::R;
+    config.load.mode = LoadMode::Free;
+    config.calibrate();
+    config
+}
+
+/// The circuit at a direct current, A: with the chord of the magnetising curve there.
+fn truth(config: &Config, i_d: f64) -> Circuit {
+    let (m, iron) = (&config.motor, plant_settings(config).iron.unwrap_or_default());
+    let bent = |flux: f64| (iron.saturation - 1.0) * (flux / iron.psi_n).powi(iron.exponent as i32);
+    let current = |flux: f64| flux / (iron.saturation * m.l_m) * (1.0 + bent(flux));
+    let (mut low, mut high) = (0.0, iron.saturation * m.l_m * i_d);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        *if current(middle) < i_d { &mut low } else { &mut high } = middle;
+    }
+    Circuit::of([m.r_s + config.inverter.on_resistance, m.r_r, m.l_ls, m.l_lr, low / i_d])
+}
+
+fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
+    from.iter().copied().filter(|record| is(record)).collect()
+}
+
+/// From the nameplate to the last run.
+fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<(), End> {
+    let builds = |config: &Config| {
+        config.drive.build().map(drop).map_err(|error| {
+            let by_plate = matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
+            refused(if by_plate { "nameplate" } else { "settings" }, error, true)
+        })
+    };
+    builds(config)?;
+    let session =
+        or_refusal(session(config, seed))?.map_err(|why| refused("commission", why, false))?;
+    if let Some((step, why)) = session.refusal() {
+        let named = !matches!(why, Refusal::Drive(state) if !is_named(state));
+        return Err(refused("commission", format!("{}: {why}", step.word()), named));
+    }
+    let inertia = config.motor.inertia as f32;
+    config.drive = session.commissioning.settings(&unaware(config));
+    config.drive.motor.inertia = inertia;
+    let m = config.drive.motor;
+    let i_d = f64::from(config.drive.i_d());
+    let (mut found, mut truth) =
+        (Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from)), truth(config, i_d));
+    if let (Some(incremental), Some(measured)) =
+        (session.leakage, session.commissioning.found().leakage)
+    {
+        (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
+    }
+    let pairs = found.values().into_iter().zip(truth.values());
+    record.errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
+    builds(config)?;
+    record.slope = Probe::new(config)?.slope(i_d, 0.0);
+    for (share, runs) in DRAWN.into_iter().zip(&mut record.runs) {
+        config.disturbed.drawn = share;
+        let mut bench = config.clone();
+        disturbed::add(
+            &mut bench,
+            &disturbed::ALWAYS,
+            &disturbed::sizes(config, &disturbed::ALWAYS, seed),
+        );
+        bench.load.mode = LoadMode::Locked;
+        let mut rig = Rig::new(&plant_settings(&bench), &config.drive, seed)?;
+        if let Err(why) = or_refusal(rig.learn())? {
+            if share == 0.0 {
+                return Err(refused("learn", why, is_named(rig.drive.state())));
+            }
+            *runs = vec![Trial::unlearned(seed, rig.drive.state().fault().map_or(0, Fault::code))];
+            continue;
+        }
+        disturbed::add(
+            &mut bench,
+            &disturbed::AFTER,
+            &disturbed::sizes(config, &disturbed::AFTER, seed),
+        );
+        let nominal = nominal_limit_a(&bench);
+        let half = 500.0 * allowed_a(&rig.drive, nominal)? / nominal;
+        let kinds =
+            [Kind::Quadrants, Kind::Reversals, Kind::Speed(150), Kind::LoadStep(half as u16)];
+        for (n, kind) in kinds.into_iter().enumerate() {
+            let seed = seed_of(seed, n);
+            let done = trial(&bench, &plant_settings(&bench), &rig.drive, kind, seed);
+            let failed = |why: Error| Trial {
+                kind: Some(kind),
+                seed,
+                refused: Some(Refused::Otherwise(why.to_string())),
+                ..Trial::default()
+            };
+            runs.push(Trial { histogram: Vec::new(), ..done.unwrap_or_else(failed) });
+        }
+    }
+    Ok(())
+}
+
+impl Record {
+    fn refused_at(&self, stage: &str) -> bool {
+        self.refused.as_ref().is_some_and(|refused| refused.stage == stage)
+    }
+
+    /// Angle error of the undisturbed runs, degrees rms.
+    fn rms(&self) -> f64 {
+        let mut error = Stats::default();
+        self.runs[0].iter().for_each(|run| error.add(&run.error));
+        error.rms()
+    }
+
+    /// Whether it runs well undisturbed: to the end, and with a small error.
+    fn is_good(&self) -> bool {
+        let whole = |run: &Trial| run.refused.is_none() && run.trip.is_none();
+        self.refused.is_none() && self.runs[0].iter().all(whole) && self.rms() <= GOOD_DEG
+    }
+}
+
+impl Study for ForeignMotors {
+    type Record = Record;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        Ok(Self { seed: context.seed, runs: context.config.extent.runs.unwrap_or(RUNS) as usize })
+    }
+
+    fn runs(&self) -> usize {
+        self.runs
+    }
+
+    fn run(&self, number: usize) -> Result<Record, Error> {
+        let seed = seed_of(self.seed, number);
+        let mut record = Record::default();
+        match course(&mut drawn(seed), seed, &mut record) {
+            Err(End::Failed(error)) => return Err(error),
+            Err(End::Refused(why)) => record.refused = Some(why),
+            Ok(()) => {}
+        }
+        Ok(record)
+    }
+
+    fn outcome(&self, _: &Context<'_>, records: Vec<Record>) -> Result<Outcome, Error> {
+        let mut outcome = Outcome::default();
+        let all: Vec<&Record> = records.iter().collect();
+        let of = |part: usize, is: fn(&Trial) -> bool| {
+            records.iter().flat_map(|r| &r.runs[part]).filter(|run| is(run)).count()
+        };
+        let legal = some(&all, |r| !r.refused_at("nameplate"));
+        let commissioned = some(&legal, |r| !r.errors.is_empty());
+        let salient = some(&commissioned, |r| r.slope.is_some_and(|slope| slope.abs() > ENOUGH));
+        let refused = some(&legal, |r| r.refused.is_some());
+        let rows: [(&str, &[&Record], Vec<&Record>); 7] = [
+            ("refused by its nameplate", &all, some(&all, |r| r.refused_at("nameplate"))),
+            ("refused in other words", &legal, refused.clone()),
+            (
+                "without a named cause",
+                &refused,
+                some(&refused, |r| r.refused.as_ref().is_some_and(|why| !why.named)),
+            ),
+            ("commissioned", &legal, commissioned.clone()),
+            ("slope above 0.035 /rad", &commissioned, salient.clone()),
+            ("learned", &salient, some(&salient, |r| r.refused.is_none())),
+            ("good", &salient, some(&salient, Record::is_good)),
+        ];
+        let mut table = Table::new("Foreign motors", &[]);
+        for (name, from, which) in &rows {
+            let share = 100.0 * which.len() as f64 / from.len() as f64;
+            outcome.metrics.set(format!("{}_pct", name.replace([' ', '.', '/'], "_")), share);
+            table.record([
+                ("motors", Cell::from(*name)),
+                ("number", Cell::fixed(which.len() as f64, 0)),
+                ("of", Cell::fixed(from.len() as f64, 0)),
+                ("share (%)", Cell::fixed(share, 1)),
+            ]);
+        }
+        outcome.tables.push(table.note(
+            "Good: learned, no undisturbed run stopped or refused, angle error within 2° rms.",
+        ));
+        let m = &mut outcome.metrics;
+        m.set("motors", records.len() as f64);
+        for (n, (name, _)) in Circuit::of([1.0; 5]).values().iter().enumerate() {
+            let mut sizes: Vec<f64> = commissioned.iter().map(|r| r.errors[n].abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let at = |share: f64| sizes.get((share * sizes.len() as f64) as usize).copied();
+            m.set(format!("error_median_pct.{name}"), at(0.5).unwrap_or(f64::NAN));
+            m.set(format!("error_q95_pct.{name}"), at(0.95).unwrap_or(f64::NAN));
+        }
+        for (part, word) in ["undisturbed", "disturbed"].into_iter().enumerate() {
+            m.set(format!("{word}_runs"), of(part, |_| true) as f64);
+            m.set(format!("{word}_lost_runs"), of(part, Trial::is_lost) as f64);
+            m.set(format!("{word}_silent_runs"), of(part, Trial::is_silent) as f64);
+            m.set(format!("{word}_stopped_runs"), of(part, |run| run.trip.is_some()) as f64);
+            m.set(format!("{word}_refused_runs"), of(part, |run| run.refused.is_some()) as f64);
+        }
+        let mut whys = BTreeMap::<String, usize>::new();
+        let mut listed = Table::new("Not good", &[]);
+        for (number, record) in records.iter().enumerate() {
+            let changes = drawn(seed_of(self.seed, number)).changes().join(" ");
+            let mut told: Vec<String> =
+                record.refused.iter().map(|it| format!("{}: {}", it.stage, it.why)).collect();
+            for (part, run) in record
+                .runs
+                .iter()
+                .enumerate()
+                .flat_map(|(part, runs)| runs.iter().map(move |run| (part, run)))
+            {
+                told.extend(run.failure().map(|why| format!("{}{why}", ["", "disturbed: "][part])));
+                let fails = run.is_silent() || part == 0 && run.is_lost();
+                outcome.faults.extend(
+                    run.failure().filter(|_| fails).map(|why| format!("motor {number}: {why}")),
+                );
+            }
+            *whys
+                .entry(
+                    told.first()
+                        .map_or("good", |why| why.split([':', ',']).next().unwrap_or(why))
+                        .to_owned(),
+                )
+                .or_default() += 1;
+            if !record.is_good() || !told.is_empty() {
+                listed.record([
+                    ("motor", Cell::from(number.to_string())),
+                    ("settings", Cell::from(changes)),
+                    ("slope (1/rad)", Cell::fixed_or_dash(record.slope, 4)),
+                    (
+                        "rms (°)",
+                        Cell::fixed_or_dash(Some(record.rms()).filter(|rms| rms.is_finite()), 2),
+                    ),
+                    ("what", Cell::from(told.join("; "))),
+                ]);
+            }
+        }
+        outcome.tables.push(listed);
+        Ok(outcome)
+    }
+}
