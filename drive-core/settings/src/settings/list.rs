@@ -373,7 +373,7 @@ settings! {
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
         /// of the inverter.
         unexplained_v: Option<f32> = None,
-            70: auto("V", unexplained_v: |s| 0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).from_to(0.01, 1000.0);
+            70: auto("V", unexplained_v: |s| (0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).min(s.inverter.dc_link_v)).from_to(0.01, 1000.0);
         /// current that the motor carries for any time at standstill, peak
         motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
         /// thermal time constant of its windings
