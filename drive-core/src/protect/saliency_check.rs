@@ -61,6 +61,8 @@ const LEAST_SHARE: f32 = 0.3;
 const LEAST_SEEN: f32 = 0.375;
 /// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
 const RESTORE_T: f32 = 2.4;
+/// And at least, s: five time constants of the mean carrier current by which the lock monitor judges afterwards.
+const RESTORE_S: f32 = 0.25;
 
 /// Mean saliency seen at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
 ///
@@ -82,7 +84,7 @@ impl SaliencyCheck {
         Self {
             settle: periods(SETTLE_S),
             average,
-            restore: periods(RESTORE_T * tau_r),
+            restore: periods((RESTORE_T * tau_r).max(RESTORE_S)),
             least: LEAST_SHARE * seen_share * flux_saliency,
             seen_share,
             per_average: 1.0 / average as f32,
