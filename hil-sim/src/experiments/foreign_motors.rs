@@ -6,11 +6,12 @@ use std::f64::consts::{SQRT_2, TAU};
 use drive_commission::Refusal;
 use drive_settings::{Flux, SettingsError};
 
-use super::battery::{Kind, Refused, Trial, allowed_a, disturbed, nominal_limit_a, trial};
-use super::commission::{session, unaware};
+use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
+use super::commission::{quantile, session, sorted, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
 use crate::prelude::*;
+use crate::stats::exact;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -28,6 +29,8 @@ const DRAWN: [f64; 2] = [0.0, 0.5];
 /// Least slope, 1/rad, from which on a motor counts as one that can be tracked, and the angle error that it should have, degrees rms.
 const ENOUGH: f64 = 0.035;
 const GOOD_DEG: f64 = 2.0;
+/// Rated frequency of an ordinary motor at most, Hz.
+const SLOW_HZ: f64 = 60.0;
 /// Faults that say what went wrong, but not why with this motor.
 const UNNAMED: [Fault; 10] = [
     Fault::OverCurrentA,
@@ -60,28 +63,22 @@ pub struct Refusing {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Record {
     refused: Option<Refusing>,
+    /// Rated frequency, Hz.
+    #[serde(with = "exact")]
+    hertz: f64,
     /// Errors of the commissioning in percent, as [`Circuit::values`].
     errors: Vec<f64>,
     /// Slope of the motor at the drive's direct current, without load, 1/rad.
     slope: Option<f64>,
+    /// Largest torque current in relation to the direct current, and carrier voltage to that of the dc link.
+    ratios: Option<(f64, f64)>,
     /// Its runs: undisturbed, and disturbed.
     runs: [Vec<Trial>; 2],
 }
 
-/// Why a motor goes no further.
-enum End {
-    Refused(Refusing),
-    Failed(Error),
-}
-
-impl From<Error> for End {
-    fn from(error: Error) -> Self {
-        Self::Failed(error)
-    }
-}
-
-fn refused(stage: &str, why: impl ToString, named: bool) -> End {
-    End::Refused(Refusing { stage: stage.to_owned(), why: why.to_string(), named })
+/// A refusal, as [`course`] returns it.
+fn refused(stage: &str, why: impl ToString, named: bool) -> Result<Option<Refusing>, Error> {
+    Ok(Some(Refusing { stage: stage.to_owned(), why: why.to_string(), named }))
 }
 
 fn is_named(state: State) -> bool {
@@ -167,75 +164,70 @@ fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
     from.iter().copied().filter(|record| is(record)).collect()
 }
 
-/// From the nameplate to the last run.
-fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<(), End> {
-    let builds = |config: &Config| {
-        config.drive.build().map(drop).map_err(|error| {
-            let by_plate = matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
-            refused(if by_plate { "nameplate" } else { "settings" }, error, true)
-        })
+/// From the nameplate to the last run; returns the refusal that ended it.
+fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<Refusing>, Error> {
+    if let Err(error) = config.drive.build() {
+        let by_plate =
+            matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
+        return refused(if by_plate { "nameplate" } else { "settings" }, error, true);
+    }
+    let session = match or_refusal(session(config, seed))? {
+        Ok(session) => session,
+        Err(why) => return refused("commission", why, false),
     };
-    builds(config)?;
-    let session =
-        or_refusal(session(config, seed))?.map_err(|why| refused("commission", why, false))?;
     if let Some((step, why)) = session.refusal() {
         let named = !matches!(why, Refusal::Drive(state) if !is_named(state));
-        return Err(refused("commission", format!("{}: {why}", step.word()), named));
+        return refused("commission", format!("{}: {why}", step.word()), named);
     }
-    let inertia = config.motor.inertia as f32;
-    config.drive = session.commissioning.settings(&unaware(config));
-    config.drive.motor.inertia = inertia;
-    let m = config.drive.motor;
-    let i_d = f64::from(config.drive.i_d());
-    let (mut found, mut truth) =
-        (Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from)), truth(config, i_d));
-    if let (Some(incremental), Some(measured)) =
-        (session.leakage, session.commissioning.found().leakage)
-    {
+    let settings = session.commissioning.settings(&unaware(config));
+    config.drive = settings;
+    config.drive.motor.inertia = config.motor.inertia as f32;
+    let (m, i_d) = (&config.drive.motor, f64::from(config.drive.i_d()));
+    let mut found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
+    let (mut truth, seen) = (truth(config, i_d), session.commissioning.found().leakage);
+    if let (Some(incremental), Some(measured)) = (session.leakage, seen) {
         (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
     }
     let pairs = found.values().into_iter().zip(truth.values());
     record.errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
-    builds(config)?;
+    if let Err(error) = config.drive.build() {
+        return refused("settings", error, true);
+    }
     record.slope = Probe::new(config)?.slope(i_d, 0.0);
     for (share, runs) in DRAWN.into_iter().zip(&mut record.runs) {
-        config.disturbed.drawn = share;
         let mut bench = config.clone();
-        disturbed::add(
-            &mut bench,
-            &disturbed::ALWAYS,
-            &disturbed::sizes(config, &disturbed::ALWAYS, seed),
-        );
+        bench.disturbed.drawn = share;
+        let disturb = |bench: &mut Config, all: &[disturbed::Disturbance]| {
+            let sizes = disturbed::sizes(bench, all, seed);
+            disturbed::add(bench, all, &sizes);
+        };
+        disturb(&mut bench, &disturbed::ALWAYS);
         let mut rig = Rig::new(&plant_settings(&bench), &config.drive, seed)?;
         if let Err(why) = or_refusal(rig.learn())? {
             if share == 0.0 {
-                return Err(refused("learn", why, is_named(rig.drive.state())));
+                return refused("learn", why, is_named(rig.drive.state()));
             }
             *runs = vec![Trial::unlearned(seed, rig.drive.state().fault().map_or(0, Fault::code))];
             continue;
         }
-        disturbed::add(
-            &mut bench,
-            &disturbed::AFTER,
-            &disturbed::sizes(config, &disturbed::AFTER, seed),
-        );
+        disturb(&mut bench, &disturbed::AFTER);
         let nominal = nominal_limit_a(&bench);
-        let half = 500.0 * allowed_a(&rig.drive, nominal)? / nominal;
-        let kinds =
-            [Kind::Quadrants, Kind::Reversals, Kind::Speed(150), Kind::LoadStep(half as u16)];
-        for (n, kind) in kinds.into_iter().enumerate() {
-            let seed = seed_of(seed, n);
+        let most = allowed_a(&rig.drive, nominal)?;
+        let carrier = f64::from(config.drive.carrier_v()) / config.inverter.dc_link_v;
+        record.ratios = Some((most / i_d, 100.0 * carrier));
+        let half = Kind::LoadStep((500.0 * most / nominal) as u16);
+        let kinds = [Kind::Quadrants, Kind::Reversals, Kind::Speed(150), half];
+        for (seed, kind) in (0..).map(|n| seed_of(seed, n)).zip(kinds) {
             let done = trial(&bench, &plant_settings(&bench), &rig.drive, kind, seed);
-            let failed = |why: Error| Trial {
+            let run = done.unwrap_or_else(|why| Trial {
                 kind: Some(kind),
-                seed,
                 refused: Some(Refused::Otherwise(why.to_string())),
-                ..Trial::default()
-            };
-            runs.push(Trial { histogram: Vec::new(), ..done.unwrap_or_else(failed) });
+                ..Trial::unlearned(seed, 0)
+            });
+            runs.push(Trial { histogram: Vec::new(), ..run });
         }
     }
-    Ok(())
+    Ok(None)
 }
 
 impl Record {
@@ -250,10 +242,21 @@ impl Record {
         error.rms()
     }
 
-    /// Whether it runs well undisturbed: to the end, and with a small error.
-    fn is_good(&self) -> bool {
+    /// Whether it learned, and all undisturbed runs came to their end.
+    fn is_whole(&self) -> bool {
         let whole = |run: &Trial| run.refused.is_none() && run.trip.is_none();
-        self.refused.is_none() && self.runs[0].iter().all(whole) && self.rms() <= GOOD_DEG
+        self.refused.is_none() && self.runs[0].iter().all(whole)
+    }
+
+    /// And with a small error.
+    fn is_good(&self) -> bool {
+        self.is_whole() && self.rms() <= GOOD_DEG
+    }
+}
+
+impl ForeignMotors {
+    fn drawn(&self, number: usize) -> Config {
+        drawn(seed_of(self.seed, number))
     }
 }
 
@@ -270,108 +273,99 @@ impl Study for ForeignMotors {
     }
 
     fn run(&self, number: usize) -> Result<Record, Error> {
-        let seed = seed_of(self.seed, number);
-        let mut record = Record::default();
-        match course(&mut drawn(seed), seed, &mut record) {
-            Err(End::Failed(error)) => return Err(error),
-            Err(End::Refused(why)) => record.refused = Some(why),
-            Ok(()) => {}
-        }
+        let (mut config, seed) = (self.drawn(number), seed_of(self.seed, number));
+        let hertz = f64::from(config.drive.nameplate.frequency_hz);
+        let mut record = Record { hertz, ..Record::default() };
+        record.refused = course(&mut config, seed, &mut record)?;
         Ok(record)
     }
 
     fn outcome(&self, _: &Context<'_>, records: Vec<Record>) -> Result<Outcome, Error> {
-        let mut outcome = Outcome::default();
-        let all: Vec<&Record> = records.iter().collect();
-        let of = |part: usize, is: fn(&Trial) -> bool| {
-            records.iter().flat_map(|r| &r.runs[part]).filter(|run| is(run)).count()
-        };
+        let (mut outcome, all) = (Outcome::default(), records.iter().collect::<Vec<_>>());
         let legal = some(&all, |r| !r.refused_at("nameplate"));
         let commissioned = some(&legal, |r| !r.errors.is_empty());
-        let salient = some(&commissioned, |r| r.slope.is_some_and(|slope| slope.abs() > ENOUGH));
         let refused = some(&legal, |r| r.refused.is_some());
-        let rows: [(&str, &[&Record], Vec<&Record>); 7] = [
-            ("refused by its nameplate", &all, some(&all, |r| r.refused_at("nameplate"))),
-            ("refused in other words", &legal, refused.clone()),
-            (
-                "without a named cause",
-                &refused,
-                some(&refused, |r| r.refused.as_ref().is_some_and(|why| !why.named)),
-            ),
-            ("commissioned", &legal, commissioned.clone()),
-            ("slope above 0.035 /rad", &commissioned, salient.clone()),
-            ("learned", &salient, some(&salient, |r| r.refused.is_none())),
-            ("good", &salient, some(&salient, Record::is_good)),
+        let salient = some(&commissioned, |r| r.slope.is_some_and(|slope| slope.abs() > ENOUGH));
+        let slow = some(&salient, |r| r.hertz <= SLOW_HZ);
+        let unnamed = |r: &Record| r.refused.as_ref().is_some_and(|why| !why.named);
+        let rows: [(&str, &[&Record], fn(&Record) -> bool); 9] = [
+            ("refused by its nameplate", &all, |r| r.refused_at("nameplate")),
+            ("refused in other words", &legal, |r| r.refused.is_some()),
+            ("without a named cause", &refused, unnamed),
+            ("commissioned", &legal, |r| !r.errors.is_empty()),
+            ("with a slope", &commissioned, |r| r.slope.is_some_and(|slope| slope.abs() > ENOUGH)),
+            ("learned", &salient, |r| r.refused.is_none()),
+            ("run to the end", &salient, Record::is_whole),
+            ("good", &salient, Record::is_good),
+            ("good up to 60 Hz", &slow, Record::is_good),
         ];
         let mut table = Table::new("Foreign motors", &[]);
-        for (name, from, which) in &rows {
-            let share = 100.0 * which.len() as f64 / from.len() as f64;
-            outcome.metrics.set(format!("{}_pct", name.replace([' ', '.', '/'], "_")), share);
+        for (name, from, is) in rows {
+            let count = some(from, is).len();
+            let share = 100.0 * count as f64 / from.len() as f64;
+            outcome.metrics.set(format!("{}_pct", name.replace(' ', "_")), share);
             table.record([
-                ("motors", Cell::from(*name)),
-                ("number", Cell::fixed(which.len() as f64, 0)),
-                ("of", Cell::fixed(from.len() as f64, 0)),
+                ("motors", Cell::from(name)),
+                ("number", Cell::from(count.to_string())),
+                ("of", Cell::from(from.len().to_string())),
                 ("share (%)", Cell::fixed(share, 1)),
             ]);
         }
-        outcome.tables.push(table.note(
-            "Good: learned, no undisturbed run stopped or refused, angle error within 2° rms.",
-        ));
+        outcome.tables.push(table.note("With a slope: above 0.035 /rad at the direct current; the lines below are of these. Good: all undisturbed runs to their end, within 2° rms."));
         let m = &mut outcome.metrics;
-        m.set("motors", records.len() as f64);
+        m.set("motors", all.len() as f64);
         for (n, (name, _)) in Circuit::of([1.0; 5]).values().iter().enumerate() {
-            let mut sizes: Vec<f64> = commissioned.iter().map(|r| r.errors[n].abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            let at = |share: f64| sizes.get((share * sizes.len() as f64) as usize).copied();
-            m.set(format!("error_median_pct.{name}"), at(0.5).unwrap_or(f64::NAN));
-            m.set(format!("error_q95_pct.{name}"), at(0.95).unwrap_or(f64::NAN));
+            let sizes = sorted(commissioned.iter().map(|r| r.errors[n].abs()));
+            m.set(format!("error_median_pct.{name}"), quantile(&sizes, 0.5));
+            m.set(format!("error_q95_pct.{name}"), quantile(&sizes, 0.95));
         }
         for (part, word) in ["undisturbed", "disturbed"].into_iter().enumerate() {
-            m.set(format!("{word}_runs"), of(part, |_| true) as f64);
-            m.set(format!("{word}_lost_runs"), of(part, Trial::is_lost) as f64);
-            m.set(format!("{word}_silent_runs"), of(part, Trial::is_silent) as f64);
-            m.set(format!("{word}_stopped_runs"), of(part, |run| run.trip.is_some()) as f64);
-            m.set(format!("{word}_refused_runs"), of(part, |run| run.refused.is_some()) as f64);
+            let runs = Summary::of(all.iter().flat_map(|r| &r.runs[part]));
+            let mut count = |what: &str, is: fn(&Trial) -> bool| {
+                m.set(format!("{word}_{what}"), runs.count(is) as f64);
+            };
+            count("runs", |_| true);
+            count("lost_runs", Trial::is_lost);
+            count("silent_runs", Trial::is_silent);
+            count("stopped_runs", |run| run.trip.is_some());
+            count("refused_runs", |run| run.refused.is_some());
         }
-        let mut whys = BTreeMap::<String, usize>::new();
-        let mut listed = Table::new("Not good", &[]);
+        let (mut whys, mut listed) = (BTreeMap::<String, usize>::new(), Table::new("Motors", &[]));
         for (number, record) in records.iter().enumerate() {
-            let changes = drawn(seed_of(self.seed, number)).changes().join(" ");
-            let mut told: Vec<String> =
-                record.refused.iter().map(|it| format!("{}: {}", it.stage, it.why)).collect();
-            for (part, run) in record
-                .runs
-                .iter()
-                .enumerate()
-                .flat_map(|(part, runs)| runs.iter().map(move |run| (part, run)))
-            {
-                told.extend(run.failure().map(|why| format!("{}{why}", ["", "disturbed: "][part])));
-                let fails = run.is_silent() || part == 0 && run.is_lost();
-                outcome.faults.extend(
-                    run.failure().filter(|_| fails).map(|why| format!("motor {number}: {why}")),
-                );
+            let mut told = Vec::new();
+            if let Some(Refusing { stage, why, .. }) = &record.refused {
+                let cause = why.split(" = ").next().and_then(|why| why.split(": slope").next());
+                *whys.entry(format!("{stage}: {}", cause.unwrap_or(why))).or_default() += 1;
+                told.push(format!("{stage}: {why}"));
             }
-            *whys
-                .entry(
-                    told.first()
-                        .map_or("good", |why| why.split([':', ',']).next().unwrap_or(why))
-                        .to_owned(),
-                )
-                .or_default() += 1;
-            if !record.is_good() || !told.is_empty() {
-                listed.record([
-                    ("motor", Cell::from(number.to_string())),
-                    ("settings", Cell::from(changes)),
-                    ("slope (1/rad)", Cell::fixed_or_dash(record.slope, 4)),
-                    (
-                        "rms (°)",
-                        Cell::fixed_or_dash(Some(record.rms()).filter(|rms| rms.is_finite()), 2),
-                    ),
-                    ("what", Cell::from(told.join("; "))),
-                ]);
+            for (word, runs) in ["", "disturbed: "].iter().zip(&record.runs) {
+                let fails = |run: &&Trial| run.is_silent() || word.is_empty() && run.is_lost();
+                let text = |run: &Trial| Some(format!("{word}{}", run.failure()?));
+                let of_motor = |run: &Trial| Some(format!("motor {number}: {}", text(run)?));
+                outcome.faults.extend(runs.iter().filter(fails).filter_map(of_motor));
+                told.extend(runs.iter().filter_map(text));
             }
+            listed.record([
+                ("motor", Cell::from(number.to_string())),
+                ("settings", Cell::from(self.drawn(number).changes().join(" "))),
+                ("slope (1/rad)", Cell::fixed_or_dash(record.slope, 4)),
+                ("i_q/i_d", Cell::fixed_or_dash(record.ratios.map(|it| it.0), 2)),
+                (
+                    "carrier (% of the dc link)",
+                    Cell::fixed_or_dash(record.ratios.map(|it| it.1), 1),
+                ),
+                (
+                    "rms (°)",
+                    Cell::fixed_or_dash(Some(record.rms()).filter(|rms| rms.is_finite()), 2),
+                ),
+                ("what", Cell::from(told.join("; "))),
+            ]);
         }
-        outcome.tables.push(listed);
+        let mut refusals = Table::new("Refusals", &["in words", "motors"]);
+        whys.iter().for_each(|(why, n)| {
+            refusals.row([why, &n.to_string()].map(|it| Cell::from(it.as_str())))
+        });
+        outcome.tables.extend([refusals, listed]);
         Ok(outcome)
     }
 }
