@@ -174,6 +174,15 @@ mod tests {
         }
     }
 
+    /// The baseline of the lock monitor forgets what it saw without current with a time constant of 0.05 s; a rotor of 24 ms, of a motor
+    /// for 250 Hz, would have been back after 58 ms.
+    #[test]
+    fn a_fast_rotor_waits_for_the_baseline() {
+        let check = SaliencyCheck::new(-0.035, 0.024);
+        let (count, end, _) = run(&check, -0.035);
+        assert_eq!((end, count[1]), (SaliencyCheckAction::Passed, 1500));
+    }
+
     #[test]
     fn samples_before_settling_do_not_count() {
         let check = SaliencyCheck::new(-0.035, 0.186);

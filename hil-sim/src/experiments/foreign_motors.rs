@@ -369,3 +369,42 @@ impl Study for ForeignMotors {
         Ok(outcome)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without leakage and magnetising current, and without stator resistance, the rated slip is the rotor resistance, and the power is
+    /// what passes the gap less that share.
+    #[test]
+    fn the_nameplate_is_that_of_the_circuit() {
+        let (slip, power) = rated([0.0, 0.05, 1e-9, 1e-9, 1e9]);
+        assert!((slip - 0.05).abs() < 1e-6 && (power - 0.95).abs() < 1e-6, "{slip} {power}");
+    }
+
+    /// A line beginning and a knee: at the flux of the knee the inductance is the filed one, far below it the unsaturated one.
+    #[test]
+    fn the_truth_is_the_chord_at_the_direct_current() {
+        let config = drawn(7);
+        let (m, iron) = (&config.motor, plant_settings(&config).iron.unwrap());
+        let of = |i_d: f64| truth(&config, i_d).coupled;
+        let coupled = |l_m: f64| l_m * l_m / (l_m + m.l_lr);
+        let knee = of(iron.psi_n / m.l_m) / coupled(m.l_m);
+        let straight = of(0.01 * iron.psi_n / m.l_m) / coupled(iron.saturation * m.l_m);
+        assert!((knee - 1.0).abs() < 1e-6 && (straight - 1.0).abs() < 1e-6, "{knee} {straight}");
+    }
+
+    /// The draws fill the range of the nameplate, and nothing else is refused of them before the motor is known.
+    #[test]
+    fn a_nameplate_builds_or_is_refused_by_its_own_key() {
+        let mut poles = [0; 6];
+        for seed in 0..100 {
+            let config = drawn(seed);
+            poles[config.motor.pole_pairs as usize - 1] += 1;
+            let built = config.drive.build().map(drop);
+            let by_plate = |e: &SettingsError| matches!(e, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
+            assert!(built.as_ref().err().is_none_or(by_plate), "{seed}: {built:?}");
+        }
+        assert!(poles.iter().all(|n| *n > 5), "{poles:?}");
+    }
+}

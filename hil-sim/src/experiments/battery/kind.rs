@@ -387,6 +387,24 @@ mod tests {
 
     /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is
     /// turned once.
+    /// Either torque is there while the speed passes zero in either direction.
+    #[test]
+    fn quadrants_are_all_four() {
+        let parts = Kind::Quadrants.parts(&mut seeded(1));
+        let ways = parts.iter().map(|part| {
+            let (from, to) = part.shaft_rpm.unwrap();
+            assert!(
+                from * to < 0.0
+                    && part.reference.0.abs() >= LEAST_A
+                    && part.reference.0 == part.reference.1
+            );
+            (part.reference.0 > 0.0, to > from)
+        });
+        let mut ways: Vec<_> = ways.collect();
+        ways.sort_unstable();
+        assert_eq!(ways, [(false, false), (false, true), (true, false), (true, true)]);
+    }
+
     #[test]
     fn restless_commands_never_rest() {
         let mut config = Config::default();
