@@ -51,6 +51,9 @@ pub struct ForeignMotors {
     runs: usize,
 }
 
+/// A line of the verdict: its name, the motors that it is counted in, and which count.
+type Class<'a> = (&'a str, &'a [&'a Record], fn(&Record) -> bool);
+
 /// Where a motor was refused, in which words, and whether they name the cause.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Refusing {
@@ -288,7 +291,7 @@ impl Study for ForeignMotors {
         let salient = some(&commissioned, |r| r.slope.is_some_and(|slope| slope.abs() > ENOUGH));
         let slow = some(&salient, |r| r.hertz <= SLOW_HZ);
         let unnamed = |r: &Record| r.refused.as_ref().is_some_and(|why| !why.named);
-        let rows: [(&str, &[&Record], fn(&Record) -> bool); 9] = [
+        let rows: [Class<'_>; 9] = [
             ("refused by its nameplate", &all, |r| r.refused_at("nameplate")),
             ("refused in other words", &legal, |r| r.refused.is_some()),
             ("without a named cause", &refused, unnamed),
