@@ -6,6 +6,7 @@ pub mod battery;
 pub mod commission;
 mod current_step;
 pub mod drawn_machine;
+mod foreign_motors;
 pub mod full_range;
 mod lock_monitor;
 mod losses;
@@ -82,6 +83,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     record::EXPERIMENT,
     torque_rise::EXPERIMENT,
     smallest_slope::EXPERIMENT,
+    foreign_motors::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,
@@ -143,6 +145,7 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<full_range::FullRange>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
     Statistical::of::<smallest_slope::SmallestSlope>(),
+    Statistical::of::<foreign_motors::ForeignMotors>(),
 ];
 
 /// The runs of the experiment with this name.

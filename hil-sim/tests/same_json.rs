@@ -24,6 +24,7 @@ const SHORT: &[(&str, &[&str])] = &[
     ("battery", &["runs=12"]),
     ("commission", &["runs=4"]),
     ("commission-refusals", &["runs=2"]),
+    ("foreign-motors", &["runs=3"]),
     ("full-range", &["runs=1"]),
     ("lock-monitor", &["runs=8"]),
     ("monte-carlo", &["runs=12"]),

@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 8] = [
+const SMALL: [(&str, &[&str]); 9] = [
     (
         "monte-carlo",
         &[
@@ -34,6 +34,7 @@ const SMALL: [(&str, &[&str]); 8] = [
     ),
     ("lock-monitor", &["--set", "runs=1"]),
     ("smallest-slope", &["--set", "runs=1"]),
+    ("foreign-motors", &["--set", "runs=3"]),
 ];
 
 /// A small run whose outcome depends on every record.

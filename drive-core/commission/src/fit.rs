@@ -27,7 +27,7 @@ use drive_core::{AlphaBeta, PERIOD_S, SQRT_3};
 const FROM_OF_TAU_R: f32 = 0.08;
 const FROM_S: (f32, f32) = (0.012, 0.060);
 /// Range of the search, s, and its points: first over the range, then around the best of the last.
-const TAU_R: (f32, f32) = (0.01, 4.0);
+const TAU_R: (f32, f32) = (0.003, 4.0);
 const POINTS: u8 = 40;
 const CLOSER_POINTS: u8 = 9;
 /// Rounds of the search: the spacing shrinks from 15 % to 0.06 %.

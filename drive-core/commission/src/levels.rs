@@ -3,7 +3,7 @@
 use super::fit::bent;
 use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
-    Record, Refusal, SIZE, Step, TAU_R, TIME,
+    Record, Refusal, SIZE, Step, TIME,
 };
 use drive_core::{Excitation, PERIOD_S, SQRT_3};
 
@@ -154,7 +154,7 @@ impl Commissioning {
         Ok([
             Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).checked(plate.r_s, SIZE)?,
             Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).checked(plate.r_r, SIZE)?,
-            Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(TAU_R, TIME)?,
+            Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(plate.tau_r, TIME)?,
             Quantity::new("L_M", "H", levels.coupled()),
             self.inverter_voltage(&levels)?.within(0.75 * d_e),
             Quantity::new("difference of b and c", "", fit.difference),

@@ -72,7 +72,7 @@ pub use found::{Found, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
-use plate::{Plate, TAU_R};
+use plate::Plate;
 use report::{SIZE, TIME};
 use staircase::Staircase;
 use steps::QUIET_S;

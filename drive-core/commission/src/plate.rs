@@ -15,8 +15,8 @@ const OF_RANGE: f32 = 0.8;
 /// Least share of the rated peak current that the sensors have to reach.
 const LEAST_CURRENT: f32 = 0.3;
 
-/// Expected range of the rotor time constant, s.
-pub(super) const TAU_R: (f32, f32) = (0.02, 1.4);
+/// Expected range of the rotor time constant, rated rad: 0.02 to 1.4 s at 60 Hz.
+const TAU_R: (f32, f32) = (7.5, 528.0);
 
 /// What follows from the nameplate, the board and the settings in force: safe currents and expected ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +29,8 @@ pub(super) struct Plate {
     pub leakage: (f32, f32),
     pub r_s: (f32, f32),
     pub r_r: (f32, f32),
+    /// Expected range of the rotor time constant, s.
+    pub tau_r: (f32, f32),
     /// Pairs of poles by the nameplate, and in force.
     pub pole_pairs: u8,
     pub pole_pairs_in_force: f32,
@@ -62,7 +64,8 @@ impl Plate {
         let safe = OF_RANGE * settings.sensor_range_a();
         let rated = settings.rated_a();
         let z_b = plate.base_impedance();
-        let l_b = z_b / (TAU * plate.frequency_hz);
+        let omega = TAU * plate.frequency_hz;
+        let l_b = z_b / omega;
         let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
         let synchronous = 60.0 * plate.frequency_hz / pairs;
         let power = (POWER.0 * apparent, POWER.1 * apparent);
@@ -79,12 +82,13 @@ impl Plate {
             leakage: (0.08 * l_b, 0.8 * l_b),
             r_s: (0.005 * z_b, 0.25 * z_b),
             r_r: (0.001 * z_b, 0.1 * z_b),
+            tau_r: (TAU_R.0 / omega, TAU_R.1 / omega),
             pole_pairs: pairs as u8,
             pole_pairs_in_force: f32::from(settings.motor.pole_pairs),
             peak_v: SQRT_2 * plate.voltage_v,
             rated,
             i_q_limit: settings.i_q_limit_a(),
-            flux: SQRT_2 / SQRT_3 * plate.voltage_v / (TAU * plate.frequency_hz),
+            flux: SQRT_2 / SQRT_3 * plate.voltage_v / omega,
             torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
             filter: settings.current_age_s() / PERIOD_S,
             pulse_noise: settings.share_of_range(0.05),

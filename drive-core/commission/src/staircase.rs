@@ -18,7 +18,7 @@
 use super::fit::bent;
 use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Meaning, Next, Quantity, Record, Refusal, SIZE,
-    Step, TAU_R, TIME,
+    Step, TIME,
 };
 use drive_core::{Motor, PERIOD_S};
 
@@ -200,7 +200,7 @@ impl Commissioning {
             Quantity::new("direct current", "A", i_d),
             Quantity::new("main flux there", "Wb", l_m * i_d),
             Quantity::new("L_m, chord", "H", l_m),
-            Quantity::new("tau_r, chord", "s", motor.tau_r()).checked(TAU_R, TIME)?,
+            Quantity::new("tau_r, chord", "s", motor.tau_r()).checked(plate.tau_r, TIME)?,
             Quantity::new("chord of the straight beginning over it", "", straight)
                 .checked((0.95, 5.0), [Meaning::Misfit; 2])?,
         ];

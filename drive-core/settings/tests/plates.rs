@@ -4,7 +4,7 @@
 use std::f32::consts::{SQRT_2, TAU};
 
 use induction_drive_core::Motor;
-use induction_drive_settings::{Nameplate, Settings, SettingsError};
+use induction_drive_settings::{Flux, Nameplate, Settings, SettingsError};
 use proptest::prelude::*;
 
 /// A value between `from` and `to`, at a share `at` of their distance on a logarithmic scale.
@@ -51,6 +51,13 @@ proptest! {
         let current_a = power_w / (3_f32.sqrt() * voltage_v * power_factor);
         let plate = Nameplate { power_w, voltage_v, current_a, frequency_hz, speed_rpm };
         let s = settings(plate, pole_pairs, at, range);
+        // Before the motor is known, with the flux of a board that is to be commissioned.
+        let mut unknown = Settings { motor: Motor::DEFAULT, ..s };
+        unknown.sequence.flux = Flux::High;
+        if let Err(error) = unknown.build().map(drop) {
+            let by_plate = matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
+            prop_assert!(by_plate, "motor unknown: {error}: {plate:?}, range {range}");
+        }
         match s.build().map(drop) {
             Ok(()) => {}
             Err(SettingsError::Range { name, .. }) if name.starts_with("nameplate.") => {}

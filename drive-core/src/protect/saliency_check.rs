@@ -61,6 +61,8 @@ const LEAST_SHARE: f32 = 0.3;
 const LEAST_SEEN: f32 = 0.375;
 /// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
 const RESTORE_T: f32 = 2.4;
+/// And at least, s: five time constants of the mean carrier current by which the lock monitor judges afterwards.
+const RESTORE_S: f32 = 0.25;
 
 /// Mean saliency seen at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
 ///
@@ -82,7 +84,7 @@ impl SaliencyCheck {
         Self {
             settle: periods(SETTLE_S),
             average,
-            restore: periods(RESTORE_T * tau_r),
+            restore: periods((RESTORE_T * tau_r).max(RESTORE_S)),
             least: LEAST_SHARE * seen_share * flux_saliency,
             seen_share,
             per_average: 1.0 / average as f32,
@@ -170,6 +172,15 @@ mod tests {
             }
             assert_eq!(run(&check, f32::NAN).1, SaliencyCheckAction::Failed);
         }
+    }
+
+    /// The baseline of the lock monitor forgets what it saw without current with a time constant of 0.05 s; a rotor of 24 ms, of a motor
+    /// for 250 Hz, would have been back after 58 ms.
+    #[test]
+    fn a_fast_rotor_waits_for_the_baseline() {
+        let check = SaliencyCheck::new(-0.035, 0.024);
+        let (count, end, _) = run(&check, -0.035);
+        assert_eq!((end, count[1]), (SaliencyCheckAction::Passed, 1500));
     }
 
     #[test]

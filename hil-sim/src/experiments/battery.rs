@@ -6,7 +6,7 @@
 //! above twice its nominal value for as long. It is *silent* when it is wrong or its flux is off.
 
 mod bench;
-mod disturbed;
+pub(super) mod disturbed;
 mod kind;
 mod run;
 mod summary;

@@ -13,7 +13,8 @@ use super::drawn_machine::{Circuit, drawn};
 use super::{machines, steady};
 use crate::prelude::*;
 use crate::stats::exact;
-use session::{Abort, Session, unaware};
+pub(super) use session::unaware;
+use session::{Abort, Session};
 
 /// Not in the source, which asks for it as future work.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -42,7 +43,7 @@ const ENOUGH: f64 = 0.7;
 const LISTED: usize = 20;
 
 /// A whole commissioning of the motor of this configuration by a drive that knows its nameplate.
-fn session(config: &Config, seed: u64) -> Result<Session, Error> {
+pub(super) fn session(config: &Config, seed: u64) -> Result<Session, Error> {
     let settings = unaware(config);
     let mut unlearned = Config { drive: settings, ..config.clone() };
     unlearned.prepare.learn = false;
@@ -347,14 +348,14 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     Ok(margins.map_err(Error::refused)?.phase_margin_deg)
 }
 
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(super) fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values
 }
 
 /// The smallest value that this share of the sorted values does not exceed; not a number without values.
-fn quantile(sorted: &[f64], share: f64) -> f64 {
+pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }

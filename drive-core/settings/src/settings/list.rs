@@ -362,7 +362,7 @@ settings! {
             .beside(|s| (0.05, s.sensor_range_a())).hardware();
         /// largest current that is regulated, peak
         ///
-        /// The length of the current vector. With high flux that of 155 % of the rated torque, at most 1.6 times the rated current. The
+        /// The length of the current vector. With high flux that of 155 % of the rated torque, 1 to 1.6 times the rated current. The
         /// carrier and the noise stay clear of the trip.
         current_a: Option<f32> = None, 66: auto("A", current_limit_a: Settings::current_limit_rule)
             .beside(|s| (0.01, s.trip_a()));
@@ -379,9 +379,9 @@ settings! {
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
-        /// of the inverter.
+        /// of the inverter; the dc link at most.
         unexplained_v: Option<f32> = None,
-            70: auto("V", unexplained_v: |s| 0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).from_to(0.01, 1000.0);
+            70: auto("V", unexplained_v: |s| (0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).min(s.inverter.dc_link_v)).from_to(0.01, 1000.0);
         /// current that the motor carries for any time at standstill, peak
         motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
         /// thermal time constant of its windings

@@ -214,14 +214,15 @@ impl Settings {
         }
     }
 
-    /// The current limit by rule, A, where the trip allows it.
+    /// The current limit by rule, A, where the trip allows it: the rated current at least, which the tests of the commissioning need
+    /// while the motor is not known.
     fn wanted_limit_a(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => self.share_of_rated(3.5),
             Flux::High => {
                 let i_d = self.useful_i_d(f32::INFINITY);
                 let i_q = OVERLOAD * self.nameplate.torque_nm() / self.motor.torque_per_ampere(i_d);
-                libm::hypotf(i_d, i_q).min(LIMIT_OF_RATED * self.rated_a())
+                libm::hypotf(i_d, i_q).clamp(self.rated_a(), LIMIT_OF_RATED * self.rated_a())
             }
         }
     }

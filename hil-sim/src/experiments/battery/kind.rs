@@ -41,6 +41,8 @@ pub enum Kind {
     /// Constant torque current while a dynamometer drags the shaft through zero stator frequency, into or out of
     /// generating; an asymmetry appears after the learning.
     Dragged(Asymmetry),
+    /// Constant torque currents of either sign, each while a dynamometer drags the shaft through zero stator frequency, there and back.
+    Quadrants,
 }
 
 /// The twelve kinds, in the order of the runs.
@@ -217,6 +219,7 @@ impl Kind {
                 format!("steps at {hz} Hz{}", if forced { ", flux turned" } else { "" })
             }
             Self::Dragged(asymmetry) => format!("dragged, {}", asymmetry.name()),
+            Self::Quadrants => "four quadrants".to_owned(),
         }
     }
 
@@ -238,6 +241,7 @@ impl Kind {
             Self::Constant(0) | Self::Forced(0) => Shaft::Locked,
             Self::Constant(rpm) | Self::Forced(rpm) => Shaft::Held(rpm.into()),
             Self::Dragged(_) => Shaft::Held(0.0),
+            Self::Quadrants => Shaft::Held(DRAGGED_RPM.0),
             Self::Steps | Self::Reversals | Self::Ramp | Self::Hold | Self::Restless { .. } => {
                 Shaft::Locked
             }
@@ -298,6 +302,15 @@ impl Kind {
                 let dragged = Part::dragged(i_q, ends, rate);
                 parts.extend([held(DRAGGED_S.0), dragged, held(DRAGGED_S.1)]);
                 parts
+            }
+            Self::Quadrants => {
+                let rate = (DRAGGED_RPM_PER_S.0 * DRAGGED_RPM_PER_S.1).sqrt();
+                let (there, back) =
+                    ((DRAGGED_RPM.0, -DRAGGED_RPM.0), (-DRAGGED_RPM.0, DRAGGED_RPM.0));
+                let mut drag = |sign: f64, rpm| {
+                    Part::dragged(sign * random.random_range(LEAST_A..=MOST_A), rpm, rate)
+                };
+                vec![drag(sign, there), drag(sign, back), drag(-sign, there), drag(-sign, back)]
             }
             Self::Restless { hz, forced } => {
                 let middle = sign * random.random_range(0.0..=MOST_A - RESTLESS_A);
@@ -374,6 +387,24 @@ mod tests {
 
     /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is
     /// turned once.
+    /// Either torque is there while the speed passes zero in either direction.
+    #[test]
+    fn quadrants_are_all_four() {
+        let parts = Kind::Quadrants.parts(&mut seeded(1));
+        let ways = parts.iter().map(|part| {
+            let (from, to) = part.shaft_rpm.unwrap();
+            assert!(
+                from * to < 0.0
+                    && part.reference.0.abs() >= LEAST_A
+                    && part.reference.0 == part.reference.1
+            );
+            (part.reference.0 > 0.0, to > from)
+        });
+        let mut ways: Vec<_> = ways.collect();
+        ways.sort_unstable();
+        assert_eq!(ways, [(false, false), (false, true), (true, false), (true, true)]);
+    }
+
     #[test]
     fn restless_commands_never_rest() {
         let mut config = Config::default();
