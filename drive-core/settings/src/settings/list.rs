@@ -257,9 +257,10 @@ settings! {
         /// The angle error is noise over saliency and carrier current, so the rule asks for a current: 0.368 of the direct
         /// current, 0.26 A of the dissertation's motor at 0.7 A, and at most 0.46 A of it, which the trip leaves room for (family
         /// R at 2 A: 2.9° rms with 0.26 A, 1.7° with 0.46 A). The remainder of the dead time asks for a voltage, 50 V at 311 V.
-        /// The larger of both is taken, but not more than the voltage that drives half the direct current: beyond, phases b and c
-        /// would cross zero at a start, where the drop of the inverter is uncertain; and not more than the trip leaves room for
-        /// beside the current limit. The voltage is between 20 and 110 V at 311 V.
+        /// The larger of both is taken, but not more than the voltage that drives half the direct current, or the 50 V where that is
+        /// less: beyond it, phases b and c would cross zero at a start, where the drop of the inverter is uncertain. (With a spindle's
+        /// 20 V instead of 36 V the dead time loses the angle on iron.) And not more than the trip leaves room for beside the current
+        /// limit. The voltage is between 20 and 110 V at 311 V.
         amplitude_v: Option<f32> = None, 45: auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
         /// demodulation of the carrier current
         demodulator: DemodulatorKind = DemodulatorKind::Synchronous, 46: word().learned();

@@ -262,9 +262,10 @@ impl Settings {
         let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
         let of_i_d = CARRIER_OF_I_D * self.i_d();
         let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
-        let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
+        let of_link = self.share_of_dc_link(50.0);
+        let wanted = f32::max(by_noise, of_link);
         let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
-        let most = f32::min(0.5 * self.i_d(), room) * reactance;
+        let most = f32::min(f32::max(0.5 * self.i_d() * reactance, of_link), room * reactance);
         f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
     }
 
