@@ -79,17 +79,21 @@ fn exchanged(wiring: Wiring, compare: Compare) -> Compare {
     Compare { a, b, c, ..compare }
 }
 
-/// Every motor file with the dead time of the reference board, which a pulse for the leakage of a spindle hardly exceeds.
+/// Every motor file with the dead time of the reference board, which a pulse for the leakage of a spindle hardly exceeds, at each rate of the
+/// legs.
 #[test]
 fn the_right_wiring_of_every_motor_is_accepted() {
     for motor in Motor::all() {
-        let dead_time = ["inverter.dead_time_s=2.2e-6".to_owned()];
-        let config = Config::load(Some(&motor.name), None, &dead_time).unwrap();
-        let range = config.measurement.range_a;
-        for seed in 0..12 {
-            let (state, peak) = check_of(Wiring::Right, &config, seed);
-            assert_eq!(state, State::Catching, "{}, seed {seed}", motor.name);
-            assert!(peak < 0.25 * range, "{}, seed {seed}: {peak} A", motor.name);
+        for khz in [6, 12, 18] {
+            let changes =
+                ["inverter.dead_time_s=2.2e-6".to_owned(), format!("inverter.carrier_khz={khz}")];
+            let config = Config::load(Some(&motor.name), None, &changes).unwrap();
+            let range = config.measurement.range_a;
+            for seed in 0..12 {
+                let (state, peak) = check_of(Wiring::Right, &config, seed);
+                assert_eq!(state, State::Catching, "{} {khz} kHz, seed {seed}", motor.name);
+                assert!(peak < 0.4 * range, "{} {khz} kHz, seed {seed}: {peak} A", motor.name);
+            }
         }
     }
 }

@@ -59,7 +59,6 @@ impl Settings {
         let designs = self.current_loops()?;
         let [d, q] = designs.map(|d| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 });
         let motion_design = self.motion_loops()?;
-        let dead_vs = self.inverter.dead_time_s * self.inverter.dc_link_v;
 
         let (inj, t) = (&self.injection, &self.injection.synchronous);
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
@@ -84,6 +83,7 @@ impl Settings {
         let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
         let (dead_time_s, carrier_s) = (self.inverter.dead_time_s, self.inverter.carrier_s());
         let dead_time = DeadTime::new(dead_time_s, carrier_s, self.full_compensation_a());
+        let dead_v = dead_time_s / carrier_s * self.inverter.dc_link_v;
         let leakage = Leakage {
             flux_saliency: 0.5 * self.slope().at_rest(),
             current_saliency: self.current_saliency(),
@@ -126,7 +126,7 @@ impl Settings {
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
                 // Pulses of twice the voltage that the dead time takes, over the two periods of the shortest one.
-                expected_a: self.share_of_rated(WIRING_A).max(4.0 * dead_vs / m.sigma_l_s()),
+                expected_a: self.share_of_rated(WIRING_A).max(4.0 * PERIOD_S * dead_v / m.sigma_l_s()),
                 noise_a: self.share_of_range(WIRING_NOISE_A),
                 highest_v: largest_test_v,
             }),
