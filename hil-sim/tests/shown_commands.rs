@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 37] = [
+const ELSEWHERE: [(&str, &str); 38] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -35,6 +35,7 @@ const ELSEWHERE: [(&str, &str); 37] = [
         "long; fails for the runs that the drive does not notice",
     ),
     ("cargo sim run commission --set runs", "a file of results/; minutes"),
+    ("cargo sim run foreign-motors", "a file of results/; minutes"),
     ("cargo sim run full-range", "a file of results/; minutes"),
     ("cargo sim merge", "the files are the reader's; a test merges shards"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),

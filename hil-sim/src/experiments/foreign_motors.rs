@@ -342,11 +342,9 @@ impl Study for ForeignMotors {
                 told.push(format!("{stage}: {why}"));
             }
             for (word, runs) in ["", "disturbed: "].iter().zip(&record.runs) {
-                let fails = |run: &&Trial| run.is_silent() || word.is_empty() && run.is_lost();
-                let text = |run: &Trial| Some(format!("{word}{}", run.failure()?));
-                let of_motor = |run: &Trial| Some(format!("motor {number}: {}", text(run)?));
-                outcome.faults.extend(runs.iter().filter(fails).filter_map(of_motor));
-                told.extend(runs.iter().filter_map(text));
+                told.extend(
+                    runs.iter().filter_map(|run| Some(format!("{word}{}", run.failure()?))),
+                );
             }
             listed.record([
                 ("motor", Cell::from(number.to_string())),

@@ -83,7 +83,8 @@ impl Settings {
         let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
         let (dead_time_s, carrier_s) = (self.inverter.dead_time_s, self.inverter.carrier_s());
         let dead_time = DeadTime::new(dead_time_s, carrier_s, self.full_compensation_a());
-        let dead_v = dead_time_s / carrier_s * self.inverter.dc_link_v;
+        // Pulses of twice the voltage that the dead time takes, over the two periods of the shortest one.
+        let pulse_vs = 4.0 * PERIOD_S * dead_time_s / carrier_s * self.inverter.dc_link_v;
         let leakage = Leakage {
             flux_saliency: 0.5 * self.slope().at_rest(),
             current_saliency: self.current_saliency(),
@@ -125,8 +126,7 @@ impl Settings {
                 .then(|| AtStart { decay: periods(DECAY_T * m.tau_r()), learned: None }),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
-                // Pulses of twice the voltage that the dead time takes, over the two periods of the shortest one.
-                expected_a: self.share_of_rated(WIRING_A).max(4.0 * PERIOD_S * dead_v / m.sigma_l_s()),
+                expected_a: self.share_of_rated(WIRING_A).max(pulse_vs / m.sigma_l_s()),
                 noise_a: self.share_of_range(WIRING_NOISE_A),
                 highest_v: largest_test_v,
             }),
