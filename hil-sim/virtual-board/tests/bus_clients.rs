@@ -123,8 +123,9 @@ fn mbpoll(bus: &str, _: &Path) -> Result<f64> {
         said(command.args(options).arg(bus).arg("--").args(words))
     };
     ask(&["-r", "8192"], &["1"])?;
-    ask(&["-r", "8192"], &["18", HUNDREDTHS])?;
+    // The drive stops when nothing is written for two seconds: reads do not count.
     for _ in 0..RUN_UP.as_millis() / 500 {
+        ask(&["-r", "8192"], &["18", HUNDREDTHS])?;
         thread::sleep(Duration::from_millis(500));
         ask(&["-r", "8449"], &[])?;
     }
@@ -143,8 +144,9 @@ client = ModbusSerialClient(sys.argv[1], baudrate=19200, timeout=1)
 assert client.connect()
 def write(at, word):
     assert not client.write_register(at, word, device_id=1).isError()
-write(0x2000, 1); write(0x2001, int(sys.argv[2])); write(0x2000, 18)
+write(0x2000, 1); write(0x2001, int(sys.argv[2]))
 for _ in range(int(float(sys.argv[3]) / 0.25)):
+    write(0x2000, 18)
     time.sleep(0.25)
     page = client.read_holding_registers(0x2100, count=13, device_id=1).registers
 write(0x2000, 1)
