@@ -429,7 +429,7 @@ impl Field {
     }
 
     /// Angle of the rotor, flux less slip, counted as by an encoder.
-    #[inline(never)] // called at two places of the interrupt
+    #[inline(never)] // inlined at both calls, 8 bytes more of control code
     pub fn count_by_flux(&mut self) -> u32 {
         self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::{SQRT_2, TAU};
 
 use drive_commission::Refusal;
+use drive_settings::tuning::bisected;
 use drive_settings::{Flux, SettingsError};
 
 use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
@@ -62,7 +63,7 @@ pub struct Refusing {
     named: bool,
 }
 
-/// What became of a motor.
+/// Result of a motor.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Record {
     refused: Option<Refusing>,
@@ -84,6 +85,11 @@ fn refused(stage: &str, why: impl ToString, named: bool) -> Result<Option<Refusi
     Ok(Some(Refusing { stage: stage.to_owned(), why: why.to_string(), named }))
 }
 
+/// Whether settings were refused by a key of the nameplate.
+fn by_plate(error: &SettingsError) -> bool {
+    matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."))
+}
+
 fn is_named(state: State) -> bool {
     state.fault().is_some_and(|fault| !UNNAMED.contains(&fault))
 }
@@ -96,12 +102,12 @@ fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
         let share = x_m / (r * r + x * x);
         (share * x_m * r, r_s + share * x_m * r, x_s + share * (r * r + x_r * x))
     };
-    let (mut low, mut high) = (1e-5, 1.0);
-    for _ in 0..50 {
-        let (_, re, im) = impedance(0.5 * (low + high));
-        *if re.hypot(im) > 1.0 { &mut low } else { &mut high } = 0.5 * (low + high);
-    }
-    (low, (1.0 - low) * impedance(low).0)
+    let is_below = |slip: f64| {
+        let (_, re, im) = impedance(slip);
+        re.hypot(im) > 1.0
+    };
+    let (slip, _) = bisected((1e-5, 1.0), 50, &is_below);
+    (slip, (1.0 - slip) * impedance(slip).0)
 }
 
 /// A motor with its inverter and sensors: nameplate log-uniform over its range; circuit in the usual range, per unit, whose rated
@@ -155,12 +161,9 @@ fn truth(config: &Config, i_d: f64) -> Circuit {
     let (m, iron) = (&config.motor, plant_settings(config).iron.unwrap_or_default());
     let bent = |flux: f64| (iron.saturation - 1.0) * (flux / iron.psi_n).powi(iron.exponent as i32);
     let current = |flux: f64| flux / (iron.saturation * m.l_m) * (1.0 + bent(flux));
-    let (mut low, mut high) = (0.0, iron.saturation * m.l_m * i_d);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        *if current(middle) < i_d { &mut low } else { &mut high } = middle;
-    }
-    Circuit::of([m.r_s + config.inverter.on_resistance, m.r_r, m.l_ls, m.l_lr, low / i_d])
+    let straight = iron.saturation * m.l_m * i_d;
+    let (flux, _) = bisected((0.0, straight), 50, &|flux| current(flux) < i_d);
+    Circuit::of([m.r_s + config.inverter.on_resistance, m.r_r, m.l_ls, m.l_lr, flux / i_d])
 }
 
 fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
@@ -170,9 +173,7 @@ fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
 /// From the nameplate to the last run; returns the refusal that ended it.
 fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<Refusing>, Error> {
     if let Err(error) = config.drive.build() {
-        let by_plate =
-            matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
-        return refused(if by_plate { "nameplate" } else { "settings" }, error, true);
+        return refused(if by_plate(&error) { "nameplate" } else { "settings" }, error, true);
     }
     let session = match or_refusal(session(config, seed))? {
         Ok(session) => session,
@@ -403,7 +404,6 @@ mod tests {
             let config = drawn(seed);
             poles[config.motor.pole_pairs as usize - 1] += 1;
             let built = config.drive.build().map(drop);
-            let by_plate = |e: &SettingsError| matches!(e, SettingsError::Range { name, .. } if name.starts_with("nameplate."));
             assert!(built.as_ref().err().is_none_or(by_plate), "{seed}: {built:?}");
         }
         assert!(poles.iter().all(|n| *n > 5), "{poles:?}");

@@ -188,7 +188,7 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
 }
 
 /// The interval that is left of one after `steps` bisections; `is_below` holds below the value that is sought.
-fn bisected(
+pub fn bisected(
     (mut low, mut high): (f64, f64),
     steps: u32,
     is_below: &dyn Fn(f64) -> bool,

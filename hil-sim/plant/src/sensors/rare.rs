@@ -83,7 +83,7 @@ impl CurrentErrors {
         }
     }
 
-    /// What the channels read now, A, and in the middle of the last pulse where that is converted too.
+    /// Readings of the channels now, A, and in the middle of the last pulse where that is converted too.
     pub(super) fn currents(&self) -> ([f64; 2], Option<[f64; 2]>) {
         let bent = |seen: [f64; 2]| [0, 1].map(|k| seen[k] + self.cubic[k] * seen[k].powi(3));
         (bent(self.now), self.middle.map(bent))
