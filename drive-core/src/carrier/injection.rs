@@ -5,7 +5,7 @@
 //! carrier to a `share` of it, and reports when less than half would remain.
 
 use crate::{Dq, Fault, FirstOrder, PERIOD_S};
-use num_complex::Complex64;
+use num_complex::{Complex32, Complex64};
 
 /// Samples per period of the carrier.
 pub const CARRIER_SAMPLES: usize = 10;
@@ -25,18 +25,23 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
     0.0, -0.587_785_24, -0.951_056_5, -0.951_056_5, -0.587_785_24,
 ];
 
-/// Coefficients of the injection: the carrier tabulated over one carrier period.
+/// Half of the change of a sine over a PWM period, per mean of the sine a quarter ahead of it: the tangent of 18 degrees.
+const HALF_CHANGE: f32 = 0.324_919_7;
+
+/// Coefficients of the injection: the carrier's voltage and the currents that it makes, as phasors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
-    periods: [CarrierPeriod; CARRIER_SAMPLES],
     /// Amplitude of the voltage, V peak.
     pub amplitude: f32,
     /// Amplitude of the carrier current along the injection axis at full voltage, A peak.
     pub current_amplitude: f32,
+    /// Mean of the carrier current over a period, and the current in the sample from which the period is computed, A.
+    mean: Complex32,
+    sampled: Complex32,
 }
 
 impl Injection {
-    /// Tabulates the carrier for an amplitude in V peak.
+    /// The carrier for an amplitude in V peak.
     ///
     /// `plant` is the current response of the motor, A/V, at the control rate (ten times the carrier
     /// frequency); `analog` the time constant of the analog current filter in samples.
@@ -44,30 +49,18 @@ impl Injection {
         // Steady-state response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current
         // at the start of period n is V k / (e^(j w) - p) e^(j w n). Its mean over the period equals
         // the mean of the samples at both ends to 0.1 %.
-        let one = Complex64 { re: 1.0, im: 0.0 };
         let turn = Complex64 { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
-        let response = Complex64 { re: plant.k, im: 0.0 } / (turn - one * plant.p);
-        let mean = response * (one + turn) * 0.5;
+        let response = Complex64 { re: plant.k, im: 0.0 } / (turn - plant.p);
         // The voltage computed in step k acts from sample k + 1 on: sample k shows the response to
         // period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
         let sampled = response / (turn * Complex64 { re: 1.0, im: w * f64::from(analog) });
-        let single = |z: Complex64| (z.re as f32, z.im as f32);
-        let ((s_re, s_im), (m_re, m_im)) = (single(sampled), single(mean));
-        let periods = core::array::from_fn(|index| {
-            let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
-            CarrierPeriod {
-                voltage: amplitude_v * cos,
-                mean_current: amplitude_v * (m_re * cos - m_im * sin),
-                sampled: amplitude_v * (s_re * cos - s_im * sin),
-                cos,
-                sin,
-            }
-        });
+        let phasor = |z: Complex64| Complex32::new(z.re as f32, z.im as f32) * amplitude_v;
         Self {
             amplitude: amplitude_v,
-            periods,
             current_amplitude: response.norm() as f32 * amplitude_v,
+            mean: phasor(response * (turn + 1.0) * 0.5),
+            sampled: phasor(sampled),
         }
     }
 }
@@ -110,6 +103,8 @@ pub struct CarrierPeriod {
     pub voltage: f32,
     /// Expected mean of the carrier current along the injection axis over the period, A.
     pub mean_current: f32,
+    /// Half of the expected change of the carrier current from the beginning of the period to its end, A.
+    pub half_change: f32,
     /// Expected carrier current along the injection axis in the sample from which this period is
     /// computed, A.
     pub sampled: f32,
@@ -178,12 +173,16 @@ impl Carrier {
 
     /// The carrier in PWM period `index`.
     pub fn at(&self, injection: &Injection, index: usize) -> CarrierPeriod {
-        let full = &injection.periods[if index < CARRIER_SAMPLES { index } else { 0 }];
+        let index = if index < CARRIER_SAMPLES { index } else { 0 };
+        let turn = Complex32 { re: CARRIER_COS[index], im: CARRIER_SIN[index] };
+        let (mean, sampled) = (injection.mean * turn, injection.sampled * turn);
         CarrierPeriod {
-            voltage: self.share * full.voltage,
-            mean_current: self.share * full.mean_current,
-            sampled: self.share * full.sampled,
-            ..*full
+            voltage: self.share * injection.amplitude * turn.re,
+            mean_current: self.share * mean.re,
+            half_change: self.share * -HALF_CHANGE * mean.im,
+            sampled: self.share * sampled.re,
+            cos: turn.re,
+            sin: turn.im,
         }
     }
 }
@@ -217,7 +216,8 @@ mod tests {
             let next = plant.p * i + plant.k * f64::from(now.voltage);
             if n > 5000 {
                 assert!((0.5 * (i + next) - f64::from(now.mean_current)).abs() < 1e-5);
-                let one_later = injection.periods[(index + 1) % CARRIER_SAMPLES].sampled;
+                assert!((0.5 * (next - i) - f64::from(now.half_change)).abs() < 1e-5);
+                let one_later = carrier.at(&injection, (index + 1) % CARRIER_SAMPLES).sampled;
                 assert!((i - f64::from(one_later)).abs() < 1e-5);
                 peak = peak.max(next.abs());
             }
@@ -235,9 +235,14 @@ mod tests {
         let [whole, part] = [1.0, 0.6].map(|share| Carrier { share, ..Carrier::default() });
         for index in 0..CARRIER_SAMPLES {
             let (whole, part) = (whole.at(&injection, index), part.at(&injection, index));
-            assert_eq!(part.voltage, 0.6 * whole.voltage);
-            assert_eq!(part.mean_current, 0.6 * whole.mean_current);
-            assert_eq!(part.sampled, 0.6 * whole.sampled);
+            for (part, whole) in [
+                (part.voltage, whole.voltage),
+                (part.mean_current, whole.mean_current),
+                (part.half_change, whole.half_change),
+                (part.sampled, whole.sampled),
+            ] {
+                assert!((part - 0.6 * whole).abs() < 1e-5 * whole.abs(), "{part} {whole}");
+            }
             assert_eq!((part.cos, part.sin), (whole.cos, whole.sin));
         }
     }

@@ -3,7 +3,7 @@
 //! During the dead time the sign of the phase current determines the level of a leg. A leg that switches with a period
 //! `T` and has a positive current loses `V_dc t_d / T` of its mean voltage, one with a negative current gains as much
 //! (4.1 V at 311 V, 2.2 us and 6 kHz, 12.3 V at 18 kHz). The compensation adds the same voltage in advance. Near zero current, where
-//! the sign is uncertain, it passes through zero linearly.
+//! the sign is uncertain, it passes through zero linearly; so it does where the carrier takes the current through zero within a period.
 
 use crate::Abc;
 
@@ -14,7 +14,7 @@ use crate::Abc;
 ///
 /// // Dead time 2.2 us, full compensation from 30 mA on; 311 V dc link, no further drop.
 /// let dead_time = DeadTime::new(2.2e-6, PERIOD_S, 0.03);
-/// let signs = dead_time.signs(Abc::new(1.0, -0.015, -0.985));
+/// let signs = dead_time.signs(Abc::new(1.0, -0.015, -0.985), Abc::ZERO);
 /// let v = dead_time.voltage(signs, 311.0, 0.0);
 /// assert!((v.a - 4.105).abs() < 0.001);
 /// assert!((v.b + 0.5 * v.a).abs() < 0.001); // half of it at half of 30 mA
@@ -53,10 +53,15 @@ impl DeadTime {
     /// No compensation.
     pub const NONE: Self = Self { ratio: 0.0, per_ampere: 0.0 };
 
-    /// Signs of the expected phase currents `i`, A; all zero for [`DeadTime::NONE`].
-    pub fn signs(&self, i: Abc) -> Signs {
-        let sign = |i: f32| (i * self.per_ampere) as i32 as f32;
-        Signs(Abc { a: sign(i.a), b: sign(i.b), c: sign(i.c) })
+    /// Mean signs over a period of the phase currents `i`, A, which pass from `half` of their change, A, before that mean to as much
+    /// after it: a current that crosses zero on the way has both signs. All zero for [`DeadTime::NONE`].
+    pub fn signs(&self, i: Abc, half: Abc) -> Signs {
+        let sign = |i: f32, half: f32| {
+            let crossing = ONE / half.abs();
+            let per_ampere = if crossing < self.per_ampere { crossing } else { self.per_ampere };
+            (i * per_ampere) as i32 as f32
+        };
+        Signs(Abc { a: sign(i.a, half.a), b: sign(i.b, half.b), c: sign(i.c, half.c) })
     }
 
     /// Voltage to add, V per phase, for a dc link of `v_dc`, V. `drop` is the voltage lost beyond the dead
@@ -73,13 +78,27 @@ mod tests {
     #[test]
     fn full_voltage_beyond_the_threshold_and_smooth_through_zero() {
         let dt = DeadTime::new(2.2e-6, crate::PERIOD_S, 0.05);
-        let step = |dt: &DeadTime, i| dt.voltage(dt.signs(i), 311.0, 0.0);
+        let step = |dt: &DeadTime, i| dt.voltage(dt.signs(i, Abc::ZERO), 311.0, 0.0);
         let v = step(&dt, Abc::new(1.0, -0.5, 0.025));
         assert!((v.a - 4.105).abs() < 1e-3 && (v.b + 4.105).abs() < 1e-3);
         assert!((v.c - 0.5 * 4.105).abs() < 1e-3);
         assert_eq!(step(&dt, Abc::ZERO), Abc::ZERO);
         assert_eq!(step(&DeadTime::NONE, Abc::new(1.0, 1.0, 1.0)), Abc::ZERO);
-        let more = dt.voltage(dt.signs(Abc::new(1.0, -0.5, 0.0)), 311.0, 1.0);
+        let more = dt.voltage(dt.signs(Abc::new(1.0, -0.5, 0.0), Abc::ZERO), 311.0, 1.0);
         assert!((more.a - 5.105).abs() < 1e-3 && (more.b + 5.105).abs() < 1e-3);
+    }
+
+    /// Against the mean of the signs of a thousand moments of the period.
+    #[test]
+    fn a_current_that_crosses_zero_within_a_period_has_the_mean_of_its_signs() {
+        let dt = DeadTime::new(2.2e-6, crate::PERIOD_S, 1e-4);
+        for (mean, half) in
+            [(0.0, 0.2), (0.05, 0.2), (-0.15, 0.2), (-0.1, -0.4), (0.3, 0.2), (-0.3, 0.0)]
+        {
+            let moments = (0..1000).map(|n| mean + half * ((2 * n + 1) as f32 / 1000.0 - 1.0));
+            let expected = moments.map(f32::signum).sum::<f32>() / 1000.0;
+            let sign = dt.signs(Abc::new(0.0, mean, 0.0), Abc::new(0.0, half, 0.0)).to_abc().b;
+            assert!((sign - expected).abs() < 2e-3, "{mean} {half}: {sign}, not {expected}");
+        }
     }
 }

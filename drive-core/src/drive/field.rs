@@ -173,7 +173,8 @@ impl Field {
             false => axes.injection * carrier.mean_current,
         };
         let expected = (current + coming).to_alpha_beta(applied);
-        let signs = c.dead_time.signs(expected.to_abc());
+        let half_change = (axes.injection * carrier.half_change).to_alpha_beta(applied);
+        let signs = c.dead_time.signs(expected.to_abc(), half_change.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
         (k.seen.current, k.seen.voltage) = (current, voltage);

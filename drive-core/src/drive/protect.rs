@@ -53,7 +53,7 @@ impl Coefficients {
         let Some(Pulse { voltage, current }) = pulses.step(state, measured.phases)? else {
             return Ok(None);
         };
-        let signs = self.dead_time.signs(current.to_abc());
+        let signs = self.dead_time.signs(current.to_abc(), crate::Abc::ZERO);
         let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
         Ok(Some(self.modulator.step(voltage, compensation, measured.dc_link).duties))
     }

@@ -4,7 +4,7 @@ use super::{End, Kept, Left, Telemetry};
 use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
-use crate::{Coefficients, Fault, Limiting, Measured, PERIOD_S};
+use crate::{Abc, Coefficients, Fault, Limiting, Measured, PERIOD_S};
 
 /// Frequency below which a motor that stops is switched off, turns per period.
 const STANDS: f32 = 0.2 * PERIOD_S;
@@ -67,7 +67,7 @@ impl Scalar {
         }
         let voltage = turned.voltage.to_alpha_beta(turned.applied);
         let flowing = turned.current.to_alpha_beta(turned.applied);
-        let signs = c.dead_time.signs(flowing.to_abc());
+        let signs = c.dead_time.signs(flowing.to_abc(), Abc::ZERO);
         let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
         let modulated = c.modulator.step(voltage, compensation, measured.dc_link);
 
