@@ -82,8 +82,8 @@ impl EnergyMachine {
         let eddy = if iron.loss > 0.0 { 1.0 / (iron.loss * EDDY_LAG) } else { 0.0 };
         Ok(Self {
             magnetics: Magnetics {
-                stator: Leakage::new(m.lls, iron.leakage_saturation),
-                rotor: Leakage::new(outside, iron.rotor_leakage_saturation),
+                stator: Leakage::new(m.lls, iron.nominal_a, iron.leakage_saturation),
+                rotor: Leakage::new(outside, iron.nominal_a, iron.rotor_leakage_saturation),
                 main: MainFlux {
                     inverse: 1.0 / unsaturated,
                     inverse_knee: knee,
