@@ -1,7 +1,11 @@
 //! The saliency that emerges at 600 Hz against the figures of an independent plant, which shares no code with this one.
 
-use hil_sim::config::{Config, Value};
+use hil_sim::config::motors::Motor;
+use hil_sim::config::{Config, Value, plant_settings};
 use hil_sim::experiments::saliency::Probe;
+use hil_sim::plant::{
+    Complex, ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _,
+};
 
 fn probe(assignments: &[(&str, &str)]) -> Probe {
     let mut config = Config::default();
@@ -197,5 +201,58 @@ fn keys_that_do_nothing_are_refused() {
         }
         let text = Probe::new(&config).err().expect("refused").to_string();
         assert!(text.starts_with(named) && text.contains("does not use it"), "{text}");
+    }
+}
+
+/// Chord inductance of the leakage of the stator, 0, or the rotor, 1, H, at its own current `i`, A, and a rotor flux of zero:
+/// but for the little of the main flux, the current is in both windings.
+fn leakage(machine: &EnergyMachine, side: usize, i: Complex) -> f64 {
+    let mut rest = EnergyState::default();
+    machine.settle(&mut rest);
+    let mut applied = i;
+    for _ in 0..30 {
+        let x = machine.with_current(&rest, applied);
+        let (flux, current) =
+            [(x.psi_s - x.main_flux(), x.current()), (x.main_flux() - x.psi_r, -x.rotor_current())]
+                [side];
+        if (current - i).norm() < 1e-9 * i.norm() {
+            let chord = flux / current;
+            assert!(chord.im.abs() < 1e-6 * chord.re, "{chord} H at {i} A");
+            return chord.re;
+        }
+        applied *= i / current;
+    }
+    panic!("no {i} A in side {side}");
+}
+
+#[test]
+fn both_leakages_saturate_as_measured_on_every_motor() {
+    for motor in Motor::all() {
+        for (family, side) in [("rl", 0), ("rl", 1), ("gl", 0), ("gl", 1)] {
+            let mut config = Config::of_motor(Some(&motor.name)).expect("a motor");
+            for (key, value) in [("plant", family), ("iron.teeth", "0")] {
+                config.set(key, &Value::from_text(value)).expect(key);
+            }
+            let plant = plant_settings(&config);
+            let machine = EnergyMachine::new(&plant.machine, &plant.iron.expect("iron")).unwrap();
+            let rated = 2.0_f64.sqrt() * f64::from(config.drive.nameplate.current_a);
+            let at = |times: f64, degrees: f64| {
+                let i = Complex::cis(f64::to_radians(degrees)) * (times * rated);
+                leakage(&machine, side, i)
+            };
+            let what = format!("{}, {family}, side {side}", motor.name);
+            let own = [config.motor.l_ls, config.motor.l_lr][side];
+            // Measured: 10 to 15, 7.8, 5.4, 3.7 to 4.2 and 2.8 to 3.8 mH at 2, 13, 30, 60 and 90 A, 1 to 7 times the rated.
+            close(at(1.0, 0.0) / own, 1.0, 1e-6, &format!("{what}, rated"));
+            close(at(1.0, 0.0) / at(4.7, 0.0), 2.0, 0.1, &format!("{what}, 1 to 4.7 times"));
+            close(at(1.0, 0.0) / at(5.0, 0.0), 2.0, 1e-6, &format!("{what}, 1 to 5 times"));
+            close(7.8 * at(0.157, 0.0) / own, 12.5, 2.5, &format!("{what}, mH at 2 A"));
+            close(7.8 * at(2.36, 0.0) / own, 5.4, 0.2, &format!("{what}, mH at 30 A"));
+            close(7.8 * at(7.07, 0.0) / own, 3.3, 0.5, &format!("{what}, mH at 90 A"));
+            // Iron has no direction of its own.
+            for degrees in [70.0, 180.0, -140.0] {
+                close(at(1.0, degrees) / own, 1.0, 1e-6, &format!("{what}, turned"));
+            }
+        }
     }
 }

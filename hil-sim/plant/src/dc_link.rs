@@ -59,7 +59,7 @@ impl DcLinkSettings {
 /// The dc link. Its nominal voltage is the peak of the rectified mains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DcLink {
-    settings: DcLinkSettings,
+    pub settings: DcLinkSettings,
     pub nominal: f64,
     /// Duty that the drive gives the chopper.
     pub duty: f64,
@@ -73,11 +73,6 @@ impl DcLink {
     pub(crate) fn new(s: &DcLinkSettings, nominal: f64) -> Result<Self, PlantError> {
         s.check()?;
         Ok(Self { settings: *s, nominal, duty: 0.0, relay: false, time: 0.0, braking: false })
-    }
-
-    /// Whether the voltage changes at all.
-    pub(crate) fn moves(&self) -> bool {
-        self.settings.moves()
     }
 
     /// Voltage after `h` seconds from `v`, V, in which the inverter takes the energy `taken`, J. The rectifier is
@@ -136,7 +131,7 @@ impl Plant {
     pub fn set_mains(&mut self, peak: f64) -> Result<(), PlantError> {
         let held = self.dc_link();
         self.set_dc_link(peak)?;
-        if self.dc_link.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
+        if self.dc_link.settings.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
     }
 
     /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.

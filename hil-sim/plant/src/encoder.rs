@@ -41,14 +41,9 @@ impl Encoder {
     /// # Errors
     /// [`PlantError::OutOfRange`].
     pub fn new(settings: &EncoderSettings) -> Result<Self, PlantError> {
-        let lines = f64::from(settings.lines);
         settings.check()?;
-        Ok(Self {
-            fault: EncoderFault::None,
-            counts_per_radian: 4.0 * lines / TAU,
-            position: 0.0,
-            lost: 0.0,
-        })
+        let counts_per_radian = 4.0 * f64::from(settings.lines) / TAU;
+        Ok(Self { fault: EncoderFault::None, counts_per_radian, position: 0.0, lost: 0.0 })
     }
 
     /// Follows the rotor to this mechanical angle, rad, not wrapped.

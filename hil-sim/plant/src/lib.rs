@@ -184,7 +184,7 @@ impl Plant {
     /// What changes once a period: the dc link and its sensor, and the resistances.
     fn slow(&mut self, period_s: f64) {
         let around = &mut self.around;
-        if self.dc_link.moves() {
+        if self.dc_link.settings.moves() {
             let i = whichever!(&self.motor, motor => motor.state.electrical.current());
             let taken = around.taken + around.inverter.conduction_loss(i) * period_s;
             around.inverter.vdc = self.dc_link.after(around.inverter.vdc, taken, period_s);
@@ -328,7 +328,9 @@ impl Plant {
     /// # Errors
     /// [`PlantError::OutOfRange`].
     pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
-        whichever!(&mut self.motor, motor => motor.machine.set_resistances(rs, rr))
+        MachineSettings { rs, rr, ..MachineSettings::DEFAULT }.check()?;
+        whichever!(&mut self.motor, motor => motor.machine.set_resistances(rs, rr));
+        Ok(())
     }
 
     /// Changes the assumed saliency of model A and keeps the state; without effect on the energy model,

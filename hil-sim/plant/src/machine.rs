@@ -188,18 +188,12 @@ impl Machine {
     }
 
     /// Changes the resistances and keeps all else.
-    ///
-    /// # Errors
-    /// [`PlantError::OutOfRange`].
-    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
-        check("machine.rs", rs, 1e-4..=1000.0, "ohm")?;
-        check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
+    pub(crate) fn set_resistances(&mut self, rs: f64, rr: f64) {
         let coupling = self.coupling;
         self.half_chi_r *= rr / (self.alpha * self.lr);
         self.alpha = rr / self.lr;
         self.rr_coupling = rr * coupling;
         self.r_prime = rs + rr * coupling * coupling;
-        Ok(())
     }
 
     /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A).

@@ -28,6 +28,10 @@ const ALL: IronSettings = IronSettings {
     ..IronSettings::LINEAR
 };
 
+fn family(name: &str) -> IronSettings {
+    FAMILIES.iter().find(|family| family.name == name).expect(name).iron
+}
+
 fn motor(iron: &IronSettings, load: Load) -> MotorModel<EnergyMachine> {
     let mechanics = MechanicsSettings { load, ..MechanicsSettings::default() };
     let machine = EnergyMachine::new(&M, iron).expect("machine");
@@ -69,11 +73,16 @@ fn no_term_makes_energy() {
     }
     assert!(fed > 5.0 && rest[3] < 1e-5 * fed, "{rest:?} of {fed} J");
     // The one exception: teeth that follow the rotor flux alone. Its size is bounded, not zero.
-    let r = FAMILIES.iter().find(|family| family.name == "r").expect("r").iron;
-    assert!(!r.conservative() && ALL.conservative());
-    let (lost, fed) = missing(&r, 16);
-    println!("teeth on the rotor flux: {lost:.4} of {fed:.2} J");
-    assert!(lost.abs() > 1e-4 * fed && lost.abs() < 0.05 * fed, "{lost} of {fed} J");
+    for name in ["r", "rl"] {
+        let r = family(name);
+        assert!(!r.conservative() && ALL.conservative());
+        let (lost, fed) = missing(&r, 16);
+        println!("{name}, teeth on the rotor flux: {lost:.4} of {fed:.2} J");
+        assert!(lost.abs() > 1e-4 * fed && lost.abs() < 0.05 * fed, "{lost} of {fed} J");
+    }
+    let (lost, fed) = missing(&family("gl"), 16);
+    println!("leakages that saturate to half: {lost:e} of {fed:.2} J");
+    assert!(lost.abs() < 1e-5 * fed, "{lost} of {fed} J");
 }
 
 /// Current and torque of the T circuit at this voltage (peak phase value), frequency and slip.
@@ -186,8 +195,7 @@ fn linear_iron_is_model_a_without_saliency() {
 #[test]
 fn two_steps_a_period_are_enough() {
     // Teeth on the rotor flux are not a gradient, and have rates of their own.
-    let r = FAMILIES.iter().find(|family| family.name == "r").expect("r").iron;
-    for iron in [ALL, r] {
+    for iron in [ALL, family("r"), family("rl"), family("gl")] {
         let settings = PlantSettings {
             iron: Some(iron),
             inverter: InverterSettings::IDEAL,
@@ -211,13 +219,14 @@ fn two_steps_a_period_are_enough() {
 #[test]
 fn refusals_name_the_setting() {
     type Case = (&'static str, fn(&mut IronSettings));
-    let cases: [Case; 6] = [
+    let cases: [Case; 7] = [
         ("iron.saturation", |s| s.saturation = 0.9),
         ("iron.exponent", |s| s.exponent = 0),
         ("iron.teeth", |s| s.teeth = 0.3),
         ("iron.skin_leakage", |s| s.skin_leakage = 0.05),
         ("iron.loss", |s| s.loss = f64::NAN),
         ("iron.leakage_saturation", |s| s.leakage_saturation = -1.0),
+        ("iron.nominal_a", |s| s.nominal_a = -1.0),
     ];
     for (name, change) in cases {
         let mut iron = IronSettings::LINEAR;

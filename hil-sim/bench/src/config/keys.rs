@@ -177,6 +177,8 @@ keys! {
         teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg" => iron.teeth_turn_deg;
         /// Turn of the axis of the teeth by load, per torque current behind a lag of 20 Hz.
         teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A" => iron.teeth_turn_deg_per_a;
+        /// Peak current at which motor.l_ls and motor.l_lr are the leakages; 0: without current.
+        nominal_a: Option<f64> = None, [0 .. 10000], "A" => iron.nominal_a;
         /// Relative loss of stator leakage inductance by current.
         leakage_saturation: Option<f64> = None, [0 .. 50], "1/A" => iron.leakage_saturation;
         /// Relative loss of rotor leakage inductance by current.

@@ -63,6 +63,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     let family = FAMILIES.iter().find(|family| family.name == config.model.plant.word());
     let mut iron = family.map_or(IronSettings::DEFAULT, |family| family.iron);
     iron.psi_n = flux_level_a(config) * m.l_m;
+    iron.nominal_a = config.amperes(iron.nominal_a);
     iron.leakage_saturation *= per_ampere;
     iron.rotor_leakage_saturation *= per_ampere;
     iron.skin_leakage = iron.skin_leakage * m.l_lr / plant.machine.llr;

@@ -32,6 +32,10 @@ words! {
         G = "g",
         /// Teeth fixed to the air-gap flux, -7 %.
         G7 = "g7",
+        /// As r; both leakages saturate as measured at a start.
+        Rl = "rl",
+        /// As g; both leakages saturate as measured at a start.
+        Gl = "gl",
         /// Main flux, n = 4.
         M4 = "m4",
         /// Main flux, n = 6.

@@ -121,9 +121,11 @@ pub(crate) struct Leakage {
 }
 
 impl Leakage {
-    /// With the inductance, H, and its relative loss, 1/A.
-    pub(crate) fn new(inductance: f64, per_ampere: f64) -> Self {
-        Self { inverse: 1.0 / inductance, saturation: per_ampere / inductance }
+    /// With the chord inductance, H, at a current, A, and the relative loss of the unsaturated one, 1/A.
+    pub(crate) fn new(inductance: f64, at: f64, per_ampere: f64) -> Self {
+        // Of i = u (1 + b u) with u = x/L, the root 2/(1 + sqrt(1 + 4 b i)) = u/i is chord over unsaturated inductance.
+        let unsaturated = 0.5 * (1.0 + (1.0 + 4.0 * per_ampere * at).sqrt()) * inductance;
+        Self { inverse: 1.0 / unsaturated, saturation: per_ampere / unsaturated }
     }
 
     #[inline]

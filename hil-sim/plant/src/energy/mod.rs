@@ -32,7 +32,7 @@ pub use state::{EnergyRate, EnergyState};
 use magnetics::{Leakage, Magnetics, MainFlux, Teeth};
 
 use crate::complex::{Complex, dot, square};
-use crate::error::{PlantError, check};
+use crate::error::PlantError;
 use crate::machine::MachineSettings;
 use crate::model::MachineModel;
 
@@ -82,8 +82,8 @@ impl EnergyMachine {
         let eddy = if iron.loss > 0.0 { 1.0 / (iron.loss * EDDY_LAG) } else { 0.0 };
         Ok(Self {
             magnetics: Magnetics {
-                stator: Leakage::new(m.lls, iron.leakage_saturation),
-                rotor: Leakage::new(outside, iron.rotor_leakage_saturation),
+                stator: Leakage::new(m.lls, iron.nominal_a, iron.leakage_saturation),
+                rotor: Leakage::new(outside, iron.nominal_a, iron.rotor_leakage_saturation),
                 main: MainFlux {
                     inverse: 1.0 / unsaturated,
                     inverse_knee: knee,
@@ -117,14 +117,8 @@ impl EnergyMachine {
     }
 
     /// Changes the resistances and keeps all else.
-    ///
-    /// # Errors
-    /// [`PlantError::OutOfRange`].
-    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
-        check("machine.rs", rs, 1e-4..=1000.0, "ohm")?;
-        check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
+    pub(crate) fn set_resistances(&mut self, rs: f64, rr: f64) {
         (self.rs, self.rr) = (rs, rr);
-        Ok(())
     }
 
     /// The machine with this current across the rotor flux, A, as the load that turns the axis of its teeth.
@@ -165,12 +159,7 @@ impl EnergyMachine {
     /// Power turned into heat in stator, rotor and iron, W.
     pub fn losses(&self, x: &EnergyState) -> f64 {
         let (top, bottom) = self.bar_currents(x);
-        let eddy = (x.psi_iron - x.main_flux()) * self.magnetics.eddy;
-        let iron = if self.eddy_rate > 0.0 {
-            square(eddy) * self.eddy_rate / self.magnetics.eddy
-        } else {
-            0.0
-        };
+        let iron = square(x.psi_iron - x.main_flux()) * self.magnetics.eddy * self.eddy_rate;
         let rotor = self.rr * (self.top * square(top) + self.bottom * square(bottom));
         1.5 * (self.rs * square(x.solution.i) + rotor + iron)
     }

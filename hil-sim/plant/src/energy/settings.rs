@@ -24,6 +24,9 @@ settings! {
         teeth_turn_deg: f64 = 0.0, -90.0..=90.0, "deg";
         /// The same, per ampere of current across the rotor flux.
         teeth_turn_deg_per_a: f64 = 0.0, -90.0..=90.0, "deg/A";
+        /// Current at which `MachineSettings::lls` and `llr` are the chord inductances of the leakages, A peak; at 0 they are
+        /// the unsaturated ones.
+        nominal_a: f64 = 0.0, 0.0..=1e4, "A";
         /// Relative loss of the stator leakage inductance per ampere, 1/A.
         leakage_saturation: f64 = 0.0, 0.0..=50.0, "1/A";
         /// The same of the rotor leakage, 1/A.
