@@ -119,6 +119,40 @@ fn a_learned_drive_holds_torque_at_rest_and_reports_a_wrong_angle() {
     println!("{}", session.ask("faults").join("\n"));
 }
 
+#[test]
+fn the_contacts_of_the_terminal_strip_start_turn_and_stop_the_drive() {
+    let mut session = Session::learned(1);
+    session.ask("!load free 0");
+    let strip = "strip.enable yes strip.start switch strip.reverse yes strip.presets yes";
+    for line in [&format!("set bus.commands strip {strip} strip.preset_1_rpm 150"), "apply"] {
+        let answer = session.ask(line).pop().unwrap();
+        assert!(answer.starts_with("ok"), "{line}: {answer}");
+    }
+    for (contacts, rpm) in
+        [("ENABLE START PRESET1", 150.0), ("enable reverse start preset1", -150.0)]
+    {
+        session.ask("!strip ENABLE");
+        session.pass(200);
+        assert_eq!(session.ask(&format!("!strip {contacts}")), ["ok"]);
+        session.announced("running: speed");
+        session.pass(3000);
+        let speed =
+            session.talk.board.machine.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+        assert!((speed - rpm).abs() < 5.0, "{speed}");
+        // START opens: a stop by ramp.
+        session.ask("!strip ENABLE");
+        session.announced("off: stopped");
+    }
+    assert!(session.ask("!strip START2")[0].contains("START2: allowed is ENABLE, START, STOP"));
+    // It must have been open for a tenth of a second.
+    session.pass(200);
+    session.ask("!strip ENABLE START PRESET1");
+    session.announced("running: speed");
+    // ENABLE opens: no torque at once.
+    session.ask("!strip START PRESET1");
+    session.announced("off: stopped");
+}
+
 /// A drive under way, a while before its motor loses the saliency.
 fn running(seed: u64, mode: &str, reference: f64, load: &str) -> Session {
     let mut session = Session::learned(seed);
