@@ -188,7 +188,7 @@ fn a_stop_between_two_reports_is_told_as_one() {
         for (by, expected) in sources.clone().zip(expected) {
             let (mut desk, mut drive) = desk(Situation::Starting, Commander::Console);
             let settings = desk.settings.in_force().drive;
-            let mut told = |desk: &mut Desk, state| {
+            let told = |desk: &mut Desk, state| {
                 let status = Status { state, ..Status::default() };
                 desk.announcer.next(&status, &settings, 0)
             };
