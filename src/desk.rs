@@ -189,8 +189,7 @@ impl Desk {
         if now_ms.wrapping_sub(self.motor_ms) < MOTOR_MS {
             return;
         }
-        let sensor = self.settings.in_force().drive.motor_sensor;
-        self.motor = sensor.celsius(code);
+        self.motor = self.settings.in_force().drive.motor_sensor.celsius(code);
         self.motor_ms = now_ms;
         if let Some(reading) = self.motor {
             // It is taken in every state; without an answer there is no control.
@@ -217,7 +216,7 @@ impl Desk {
     pub fn stop_after_silence(&mut self, limit_s: f32, drive: &mut impl DriveHandle, now_ms: u32) {
         if !drive.is_off() {
             self.heard_ms = Some(now_ms);
-            self.announcer.stopped = true;
+            self.announcer.stopped = Some(Commander::Console);
             self.stopped = Some(drive.command(Command::Stop(Stop::Coast)).map(|_| limit_s));
         }
     }
@@ -299,8 +298,9 @@ impl Desk {
             | Order::Save => self.begin(from, order, drive),
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
-                // Off is news for the console if the bus stops the drive.
-                self.announcer.stopped |= from == Commander::Console;
+                if !drive.is_off() {
+                    self.announcer.stopped = Some(from);
+                }
                 give(Command::Stop(stop), "", drive)
             }
             Order::Relock => give(Command::Relock, "", drive),

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use induction_drive_core::{
-    Accepted, Command, Compare, Drive, FrontEndState, Hardware, Line, Mode, Refused, Sample,
+    Accepted, Command, Compare, Drive, FrontEndState, Line, Mode, Refused, Sample,
 };
 use induction_drive_settings::{Ntc, Scales, Settings};
 
@@ -23,17 +23,11 @@ struct Board {
 }
 
 impl Board {
-    /// The readings of this period. The currents were sampled in the middle of the low sides' on-time.
+    /// The readings of this period, without a third shunt, encoder and flags of the chip. The currents were sampled in the middle of the
+    /// low sides' on-time.
     fn sample(&mut self) -> Sample {
-        Sample {
-            current_a: 2048,
-            current_b: 2048,
-            current_c: 2048,
-            dc_link: 1820,
-            heat_sink: 1309,
-            encoder: 0,
-            hardware: Hardware::empty(),
-        }
+        let (current_a, current_b) = (2048, 2048);
+        Sample { current_a, current_b, dc_link: 1820, heat_sink: 1309, ..Sample::default() }
     }
 
     /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.

@@ -86,6 +86,7 @@ pub struct DcLinkSettings {
 /// Why torque is limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Limiting {
     /// It is not.
     #[default]

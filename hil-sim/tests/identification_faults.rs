@@ -175,11 +175,11 @@ fn settings_that_cannot_be_are_refused() {
     let good = RlsSettings::paper(180.0, 30.0);
     assert!(Rls::new(good).is_ok());
     let refused = |settings| Rls::new(settings).map(|_| ()).unwrap_err();
-    assert_eq!(refused(RlsSettings { lambda: 1.01, ..good }), RlsError::Lambda);
-    assert_eq!(refused(RlsSettings { p0: 0.0, ..good }), RlsError::Covariance);
-    assert_eq!(refused(RlsSettings { corner: f32::NAN, ..good }), RlsError::Corner);
-    assert_eq!(refused(RlsSettings { current_base: 0.0, ..good }), RlsError::Base);
-    assert_eq!(refused(RlsSettings { current_limit: f32::INFINITY, ..good }), RlsError::Limit);
+    assert_eq!(refused(RlsSettings { lambda: 1.01, ..good }), RlsError("lambda"));
+    assert_eq!(refused(RlsSettings { p0: 0.0, ..good }), RlsError("p0"));
+    assert_eq!(refused(RlsSettings { corner: f32::NAN, ..good }), RlsError("corner"));
+    assert_eq!(refused(RlsSettings { current_base: 0.0, ..good }), RlsError("a base"));
+    assert_eq!(refused(RlsSettings { current_limit: f32::INFINITY, ..good }), RlsError("a limit"));
 }
 
 #[test]

@@ -272,6 +272,9 @@ $('around').onsubmit = event => event.preventDefault();
 document.querySelectorAll('.repair').forEach(button => { button.onclick = () => { $('around').reset(); document.querySelectorAll('[data-repair]').forEach(field => field.onchange()); }; });
 const minutes = [...document.querySelectorAll('[data-step]')];
 let minute = 0;
+$('strip').append(...['ENABLE', 'START', 'STOP', 'REVERSE', 'RESET', 'PRESET1', 'PRESET2'].map(value =>
+  make('label', {}, make('input', { type: 'checkbox', value, onchange: () =>
+    tell(`!strip ${[...document.querySelectorAll('#strip :checked')].map(box => box.value).join(' ')}`).catch(quiet) }), ` ${value}`)));
 function turn(by) {
   minute += by;
   minutes.forEach((step, n) => { step.hidden = n !== minute; });

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use drive_stream::Frame;
+use drive_web::talk::Frames;
 use hil_sim::console::link::Urgent;
 use serde_json::{Value, json};
 
@@ -15,9 +16,8 @@ use serde_json::{Value, json};
 pub const PAGE_LOST: Duration = Duration::from_millis(350);
 /// A drive that says nothing for so long is busy with a design: signs of life would only fill its memory for what comes in.
 const BUSY: Duration = Duration::from_secs(1);
-/// Most texts and frames that wait for a slow page; the oldest go first.
+/// Most texts that wait for a slow page; the oldest go first.
 const MOST_TEXTS: usize = 2000;
-const MOST_FRAMES: usize = 6000;
 
 /// A question of the page.
 #[derive(Debug)]
@@ -37,9 +37,7 @@ pub struct Shared {
 #[derive(Default)]
 struct Inner {
     texts: VecDeque<Value>,
-    frames: VecDeque<Frame>,
-    counts: Counts,
-    next: Option<u16>,
+    frames: Frames,
     flux: Option<[f64; 3]>,
     /// Number of the page that is connected, and when it has answered last.
     page: u64,
@@ -49,19 +47,6 @@ struct Inner {
     urgent: Option<Urgent>,
     /// When the drive has said something last.
     heard: Option<Instant>,
-}
-
-/// Frames so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Received.
-    pub frames: u64,
-    /// Missing between those received: dropped by the firmware, or damaged.
-    pub missing: u64,
-    /// Damaged on the wire.
-    pub damaged: u64,
-    /// Received, but not taken by a slow page.
-    pub skipped: u64,
 }
 
 impl Shared {
@@ -88,17 +73,7 @@ impl Shared {
     /// Takes a frame of the drive; `None` for damaged bytes.
     pub fn frame(&self, frame: Option<Frame>) {
         self.heard();
-        let mut inner = self.inner();
-        let Some(frame) = frame else { return inner.counts.damaged += 1 };
-        let missing = frame.sequence.wrapping_sub(inner.next.unwrap_or(frame.sequence));
-        inner.counts.missing += u64::from(missing);
-        inner.counts.frames += 1;
-        inner.next = Some(frame.sequence.wrapping_add(1));
-        if inner.frames.len() >= MOST_FRAMES {
-            inner.frames.pop_front();
-            inner.counts.skipped += 1;
-        }
-        inner.frames.push_back(frame);
+        self.inner().frames.push(frame);
     }
 
     /// The drive has said something.
@@ -113,9 +88,7 @@ impl Shared {
 
     /// A new stream begins: its signals are others.
     pub fn new_stream(&self) {
-        let mut inner = self.inner();
-        inner.frames.clear();
-        (inner.next, inner.counts) = (None, Counts::default());
+        self.inner().frames = Frames::default();
     }
 
     /// The flux of the virtual board: the drive's angle, the motor's, turns, and the motor's flux, Wb.
@@ -123,16 +96,12 @@ impl Shared {
         self.inner().flux = Some(flux);
     }
 
-    /// All that is to be told now: texts, and the frames with ten little-endian words each: period, sequence number, values.
+    /// All that is to be told now: texts, and [frames](Frames::take).
     pub fn take(&self) -> (Vec<Value>, Vec<u8>) {
         let mut inner = self.inner();
         let mut texts: Vec<Value> = inner.texts.drain(..).collect();
-        let Counts { frames, missing, damaged, skipped } = inner.counts;
-        let flux = inner.flux.take();
-        texts.push(json!({ "tick": [frames, missing, damaged, skipped], "flux": flux }));
-        let bytes =
-            inner.frames.drain(..).flat_map(|frame| drive_web::talk::words(&frame)).collect();
-        (texts, bytes)
+        texts.push(json!({ "tick": inner.frames.counts, "flux": inner.flux.take() }));
+        (texts, inner.frames.take())
     }
 
     /// A page has come; its number. It takes over from another one. The drive is stopped then: nobody is to drive what
@@ -146,7 +115,7 @@ impl Shared {
         inner.page += 1;
         (inner.answered, inner.watched) = (Some(Instant::now()), true);
         inner.texts.clear();
-        inner.frames.clear();
+        inner.frames.take();
         let page = inner.page;
         drop(inner);
         self.ask(Ask::Hello);

@@ -1,7 +1,7 @@
 //! News: what the desk tells unasked.
 
 use drive_core::homing::Failure;
-use drive_core::{Fault, State};
+use drive_core::{Fault, Stage, State};
 use drive_settings::Settings;
 
 use super::handle::CommandError;
@@ -51,8 +51,8 @@ pub struct Announcer {
     state: Option<State>,
     /// The last one but for those of a stop.
     active: State,
-    /// Whether the console, or silence, has stopped the drive: off is no news then, unless it takes a while.
-    pub stopped: bool,
+    /// Who has stopped the drive, with silence as the console. For that one off is no news, unless it takes a while.
+    pub stopped: Option<Commander>,
     progress: Option<(usize, usize)>,
     told_ms: u32,
 }
@@ -71,23 +71,23 @@ impl Announcer {
         }
         match state {
             State::Fault(fault) => Some(News::Fault(fault)),
-            State::Torque | State::Speed | State::Position | State::VoltsPerHertz => {
-                Some(News::Running(state))
-            }
+            _ if state.regulates() || state == State::VoltsPerHertz => Some(News::Running(state)),
             State::Off => {
-                let asked = core::mem::take(&mut self.stopped);
+                let by = self.stopped.take();
                 match (before?, was) {
                     (State::Fault(_), _) => None,
                     // The commissioning says so itself.
                     (State::Exciting | State::CheckingWiring, State::Exciting) => None,
-                    (State::Learning | State::Stopping, State::Learning) if !asked => {
+                    (State::Learning | State::Stopping, State::Learning) if by.is_none() => {
                         Some(News::Off("the learning has ended"))
                     }
-                    (state, _) if state.is_stopping() || state == State::VoltsPerHertz => {
+                    // Also where no report came on the way.
+                    (state, _) if matches!(state.stage(), Stage::Running | Stage::Stopping) => {
                         Some(News::Off("stopped"))
                     }
                     // At once, and answered.
-                    _ if asked => None,
+                    _ if by == Some(Commander::Console) => None,
+                    _ if by.is_some() => Some(News::Off("stopped")),
                     _ => Some(News::Off("the start has ended")),
                 }
             }

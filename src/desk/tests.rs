@@ -9,6 +9,7 @@ use super::order::{Order, Refusal};
 use super::*;
 use crate::boards;
 use crate::console::tests::FakeDrive;
+use crate::link::Status;
 use crate::settings::keys;
 
 /// The situations of the columns below.
@@ -162,4 +163,48 @@ fn the_other_side_may_stop_and_nothing_else_that_moves() {
         }
     }
     assert!(!Order::Stop(Stop::Coast).is_for_the_commander(Commander::Bus));
+}
+
+/// What is told of a drive that is off in the report behind one with a state, by who has stopped it: nobody, console, bus, strip.
+#[test]
+fn a_stop_between_two_reports_is_told_as_one() {
+    let (start, learned, stop) = ("the start has ended", "the learning has ended", "stopped");
+    let cases = [
+        (State::Calibrating, [start, "", stop, stop]),
+        (State::Magnetising, [start, "", stop, stop]),
+        (State::Torque, [stop; 4]),
+        (State::Speed, [stop; 4]),
+        (State::Position, [stop; 4]),
+        (State::VoltsPerHertz, [stop; 4]),
+        (State::Braking, [stop; 4]),
+        (State::Stopping, [stop; 4]),
+        (State::Learning, [learned, stop, stop, stop]),
+        (State::Exciting, [""; 4]),
+        (State::Fault(Fault::Break), [""; 4]),
+    ];
+    let commanders = [Commander::Console, Commander::Bus, Commander::Strip];
+    let sources = [None].into_iter().chain(commanders.map(Some));
+    for (state, expected) in cases {
+        for (by, expected) in sources.clone().zip(expected) {
+            let (mut desk, mut drive) = desk(Situation::Starting, Commander::Console);
+            let settings = desk.settings.in_force().drive;
+            let told = |desk: &mut Desk, state| {
+                let status = Status { state, ..Status::default() };
+                desk.announcer.next(&status, &settings, 0)
+            };
+            told(&mut desk, state);
+            if let Some(from) = by {
+                desk.order(from, Order::Stop(Stop::Coast), &mut drive).unwrap();
+            }
+            let news = told(&mut desk, State::Off);
+            let text = (!expected.is_empty()).then_some(News::Off(expected));
+            assert_eq!(news, text, "{state:?}, {by:?}");
+            // A stop of a drive that is off is none of the next run.
+            assert!(drive.is_off() || by.is_none());
+            desk.order(Commander::Console, Order::Stop(Stop::Coast), &mut drive).unwrap();
+            told(&mut desk, State::Magnetising);
+            let next = told(&mut desk, State::Off);
+            assert!(by.is_none() || next == Some(News::Off(start)), "{next:?}");
+        }
+    }
 }

@@ -10,7 +10,7 @@
 //! * duties took the place of timer counts in the modulator: a count differs here and there by one;
 //! * tasks of the carrier period moved to other samples, so that no sample has much more to do than another;
 //! * a filter took the place of the tracking loop, and a command is taken behind one sample of ten;
-//! * the voltage limit moved to another sample, the resistance returns to the measured one, and an angle error changes the flux.
+//! * the voltage limit moved to another sample, the resistance returns to the measured one, and an angle error changes the flux;
 //! * the compensation of the dead time takes the mean of the signs of a current that crosses zero within a period.
 
 use std::fs;

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use induction_drive::terminals::{ANALOG, CONTACTS, TERMINALS, Wires};
 use motor_plant::{
     Channel, CurrentFault, Load, MachineSettings, Plant, PlantError, SaliencySettings,
 };
@@ -65,9 +66,21 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
         }
         ["dc", volts] => plant.set_dc_link(number(volts)?).map_err(refused),
         _ => Err("load locked, load free NM, load speed RPM, turn DEG, open a|b|c|none, saliency \
-                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT"
+                  SHARE, warm PERCENT, sensor a|b none|open|high|low, dc VOLT, strip CONTACT ..."
             .to_owned()),
     }
+}
+
+/// The contacts of the terminal strip with these names.
+///
+/// # Errors
+/// The name that is none, and those that are.
+pub fn contacts(names: &str) -> Result<Wires, String> {
+    let all = &TERMINALS[ANALOG..ANALOG + CONTACTS];
+    let known: Vec<(&str, u8)> = all.iter().enumerate().map(|(n, name)| (*name, 1 << n)).collect();
+    names.split_whitespace().try_fold(Wires(0), |closed, name| {
+        Ok(Wires(closed.0 | named(&name.to_ascii_uppercase(), &known)?))
+    })
 }
 
 /// The value of a word.

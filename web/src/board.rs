@@ -36,6 +36,7 @@ pub struct HostBoard {
     /// Drive and motor.
     pub machine: Machine,
     wires: Wires,
+    contacts: Contacts,
     /// A line that is coming in.
     line: Vec<u8>,
     now_ms: u32,
@@ -48,12 +49,13 @@ struct Wires {
     output: Vec<u8>,
 }
 
-/// No terminal strip.
-struct NoStrip;
+/// The contacts of the terminal strip that are closed. Nothing is connected to its other terminals.
+#[derive(Clone, Copy, Default)]
+struct Contacts(terminals::Wires);
 
-impl strip::Port for NoStrip {
+impl strip::Port for Contacts {
     fn look(&mut self) -> terminals::Wires {
-        terminals::Wires::default()
+        self.0
     }
     fn codes(&self) -> [Option<u16>; terminals::ANALOG] {
         [None; terminals::ANALOG]
@@ -131,8 +133,8 @@ impl HostBoard {
 
     fn on(plant: Plant, settings: &FirmwareSettings) -> Result<Self, SettingsError> {
         let (front, machine) = (Front::new(*settings), Machine::new(plant, settings)?);
-        let mut board =
-            Self { front, machine, wires: Wires::default(), line: Vec::new(), now_ms: 0 };
+        let (wires, contacts) = (Wires::default(), Contacts::default());
+        let mut board = Self { front, machine, wires, contacts, line: Vec::new(), now_ms: 0 };
         board.front.console.greet(&board.machine);
         Ok(board)
     }
@@ -167,7 +169,10 @@ impl HostBoard {
                 };
                 match rest.trim().strip_prefix('!') {
                     Some(words) => {
-                        let done = around::change(&mut self.machine.plant, words);
+                        let done = match words.strip_prefix("strip") {
+                            Some(names) => around::contacts(names).map(|c| self.contacts.0 = c),
+                            None => around::change(&mut self.machine.plant, words),
+                        };
                         let answer =
                             done.map_or_else(|why| format!("error: {why}"), |()| "ok".into());
                         let answer = format!("{tag} {answer}\r\n");
@@ -189,7 +194,7 @@ impl HostBoard {
         for _ in 0..PASSES {
             (0..PERIODS).for_each(|_| self.machine.period());
             let (port, drive) = (&mut self.wires, &mut self.machine);
-            self.front.pass(port, &mut None::<NoBus>, &mut NoStrip, drive, self.now_ms);
+            self.front.pass(port, &mut None::<NoBus>, &mut self.contacts, drive, self.now_ms);
         }
         self.now_ms = self.now_ms.wrapping_add(1);
         if self.machine.resets {
@@ -197,7 +202,7 @@ impl HostBoard {
             plant.set_pulses(saved.drive.inverter.carrier_khz.pulses());
             // The settings were in force when they were saved.
             if let Ok(board) = Self::on(plant, &saved) {
-                *self = board;
+                *self = Self { contacts: self.contacts, ..board };
             }
         }
     }

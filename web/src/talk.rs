@@ -37,12 +37,44 @@ pub fn hello(version: Option<&String>, described: &[String]) -> Value {
     json!({ "hello": { "version": version, "program": program, "signals": signals, "misfit": misfit } })
 }
 
-/// Ten little-endian words of a frame: period, sequence number, values.
-pub fn words(frame: &Frame) -> impl Iterator<Item = u8> + use<> {
+fn words(frame: &Frame) -> impl Iterator<Item = u8> + use<> {
     let mut values = [f32::NAN; MOST_SIGNALS];
     values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
     let head = [frame.period, frame.sequence.into()];
     head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
+}
+
+/// Most frames that wait for a slow page; the oldest go first.
+const MOST_FRAMES: usize = 6000;
+
+/// The frames of a stream on their way to the page.
+#[derive(Default)]
+pub struct Frames {
+    waiting: VecDeque<Frame>,
+    /// Frames received; missing between those, dropped by the firmware or damaged; damaged on the wire; not taken by a slow page.
+    pub counts: [u64; 4],
+    next: Option<u16>,
+}
+
+impl Frames {
+    /// Takes a frame of the drive; `None` for damaged bytes.
+    pub fn push(&mut self, frame: Option<Frame>) {
+        let [received, missing, damaged, skipped] = &mut self.counts;
+        let Some(frame) = frame else { return *damaged += 1 };
+        *missing += u64::from(frame.sequence.wrapping_sub(self.next.unwrap_or(frame.sequence)));
+        *received += 1;
+        self.next = Some(frame.sequence.wrapping_add(1));
+        if self.waiting.len() >= MOST_FRAMES {
+            self.waiting.pop_front();
+            *skipped += 1;
+        }
+        self.waiting.push_back(frame);
+    }
+
+    /// Those that wait, each as ten little-endian words: period, sequence number, values.
+    pub fn take(&mut self) -> Vec<u8> {
+        self.waiting.drain(..).flat_map(|frame| words(&frame)).collect()
+    }
 }
 
 /// Who asks the drive.
@@ -69,9 +101,7 @@ pub struct Talk {
     line: Vec<u8>,
     /// For the page.
     texts: Vec<Value>,
-    frames: Vec<u8>,
-    counts: [u32; 4],
-    next: Option<u16>,
+    frames: Frames,
     since_status_ms: u32,
     /// Whether the drive is on its way to its first learning.
     begins: bool,
@@ -90,9 +120,7 @@ impl Talk {
             splitter: Splitter::new(),
             line: Vec::new(),
             texts: Vec::new(),
-            frames: Vec::new(),
-            counts: [0; 4],
-            next: None,
+            frames: Frames::default(),
             since_status_ms: 0,
             begins: false,
         }
@@ -128,7 +156,8 @@ impl Talk {
     /// Whether the drive does what nobody wants to wait for.
     pub fn hurries(&self) -> bool {
         // The page has its first picture first.
-        self.begins && self.counts[0] > 0 || self.board.machine.drive().state() == State::Learning
+        self.begins && self.frames.counts[0] > 0
+            || self.board.machine.drive().state() == State::Learning
     }
 
     /// So many milliseconds pass.
@@ -154,20 +183,12 @@ impl Talk {
                         self.hear(String::from_utf8_lossy(&line).trim_end());
                     }
                     Piece::Text(byte) => self.line.push(byte),
-                    Piece::Frame(frame) => self.frame(&frame),
-                    Piece::Damaged => self.counts[2] += 1,
+                    Piece::Frame(frame) => self.frames.push(Some(frame)),
+                    Piece::Damaged => self.frames.push(None),
                     Piece::Nothing => {}
                 }
             }
         }
-    }
-
-    fn frame(&mut self, frame: &Frame) {
-        let missing = frame.sequence.wrapping_sub(self.next.unwrap_or(frame.sequence));
-        self.counts[0] += 1;
-        self.counts[1] += u32::from(missing);
-        self.next = Some(frame.sequence.wrapping_add(1));
-        self.frames.extend(words(frame));
     }
 
     fn hear(&mut self, line: &str) {
@@ -197,8 +218,7 @@ impl Talk {
             By::Page(number) => {
                 let loops = (line == "describe").then(|| loops::of(&lines));
                 if line.starts_with("stream ") {
-                    self.frames.clear();
-                    (self.counts, self.next) = ([0; 4], None);
+                    self.frames = Frames::default();
                 }
                 self.texts.push(json!({ "id": number, "lines": lines, "loops": loops }));
             }
@@ -210,11 +230,11 @@ impl Talk {
         }
     }
 
-    /// What there is for the page: messages as JSON, and [`words`] of frames. The messages first: the answer to a new stream tells
+    /// What there is for the page: messages as JSON, and [frames](Frames::take). The messages first: the answer to a new stream tells
     /// what its frames are.
     pub fn take(&mut self) -> (String, Vec<u8>) {
         let mut texts = std::mem::take(&mut self.texts);
-        texts.push(json!({ "tick": self.counts, "flux": self.board.machine.flux() }));
-        (Value::from(texts).to_string(), std::mem::take(&mut self.frames))
+        texts.push(json!({ "tick": self.frames.counts, "flux": self.board.machine.flux() }));
+        (Value::from(texts).to_string(), self.frames.take())
     }
 }

@@ -118,3 +118,102 @@ fn a_learned_drive_holds_torque_at_rest_and_reports_a_wrong_angle() {
     session.announced("fault ");
     println!("{}", session.ask("faults").join("\n"));
 }
+
+#[test]
+fn the_contacts_of_the_terminal_strip_start_turn_and_stop_the_drive() {
+    let mut session = Session::learned(1);
+    session.ask("!load free 0");
+    let strip = "strip.enable yes strip.start switch strip.reverse yes strip.presets yes";
+    for line in [&format!("set bus.commands strip {strip} strip.preset_1_rpm 150"), "apply"] {
+        let answer = session.ask(line).pop().unwrap();
+        assert!(answer.starts_with("ok"), "{line}: {answer}");
+    }
+    for (contacts, rpm) in
+        [("ENABLE START PRESET1", 150.0), ("enable reverse start preset1", -150.0)]
+    {
+        session.ask("!strip ENABLE");
+        session.pass(200);
+        assert_eq!(session.ask(&format!("!strip {contacts}")), ["ok"]);
+        session.announced("running: speed");
+        session.pass(3000);
+        let speed =
+            session.talk.board.machine.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+        assert!((speed - rpm).abs() < 5.0, "{speed}");
+        // START opens: a stop by ramp.
+        session.ask("!strip ENABLE");
+        session.announced("off: stopped");
+    }
+    assert!(session.ask("!strip START2")[0].contains("START2: allowed is ENABLE, START, STOP"));
+    // It must have been open for a tenth of a second.
+    session.pass(200);
+    session.ask("!strip ENABLE START PRESET1");
+    session.announced("running: speed");
+    // ENABLE opens: no torque at once.
+    session.ask("!strip START PRESET1");
+    session.announced("off: stopped");
+}
+
+/// A drive under way, a while before its motor loses the saliency.
+fn running(seed: u64, mode: &str, reference: f64, load: &str) -> Session {
+    let mut session = Session::learned(seed);
+    session.ask(if mode == "torque" { "!load locked" } else { "!load free 0" });
+    session.ask(&format!("start {mode}"));
+    session.announced(&format!("running: {mode}"));
+    session.ask(&format!("{mode} {reference}"));
+    session.pass(5000);
+    session.ask(&format!("!load {load}"));
+    session.pass(2000);
+    session.ask("!saliency 0");
+    session
+}
+
+/// Time until the outputs are off, ms, up to `longest`, and the largest error of the angle until then, degrees.
+fn until_off(session: &mut Session, longest: u32) -> (Option<u32>, f64) {
+    let mut largest = 0.0f64;
+    for passed in 0..longest / 5 {
+        if session.talk.board.machine.drive().is_off() {
+            return (Some(5 * passed), largest);
+        }
+        let [own, motor, _] = session.talk.board.machine.flux();
+        largest = largest.max(360.0 * ((own - motor + 1.5).rem_euclid(1.0) - 0.5).abs());
+        session.pass(5);
+    }
+    (None, largest)
+}
+
+/// What the guide of the page says of a motor without its saliency.
+#[test]
+fn the_loss_of_the_saliency_is_told_as_soon_as_it_matters() {
+    for seed in [1, 3] {
+        // Under torque at once, before the angle is wrong.
+        for (mode, reference, load) in [("torque", 2.0, "locked"), ("speed", 150.0, "free 0.4")] {
+            let (off, largest) = until_off(&mut running(seed, mode, reference, load), 1000);
+            println!("{seed}, {mode}, {load}: {off:?} ms, {largest:.0} deg");
+            assert!(off.is_some_and(|ms| ms <= 50) && largest < 20.0, "{off:?}, {largest}");
+        }
+        // Held at rest against a load, the shaft slips away first.
+        let (off, largest) = until_off(&mut running(seed, "speed", 0.0, "free 0.4"), 3000);
+        println!("{seed}, held at rest: {off:?} ms, {largest:.0} deg");
+        assert!(off.is_some());
+        // An idle shaft that turns: later, or not, while the angle stays right.
+        let (off, largest) = until_off(&mut running(seed, "speed", 150.0, "free 0"), 10_000);
+        println!("{seed}, idle: {off:?} ms, {largest:.0} deg");
+        assert!(largest < 10.0, "{off:?}, {largest}");
+        // Without torque there is nothing to notice; with the first torque there is.
+        let mut session = running(seed, "torque", 0.0, "locked");
+        assert_eq!(until_off(&mut session, 5000).0, None);
+        session.ask("torque 2");
+        let (off, largest) = until_off(&mut session, 1000);
+        println!("{seed}, first torque: {off:?} ms, {largest:.0} deg");
+        assert!(off.is_some_and(|ms| ms <= 100) && largest < 30.0, "{off:?}, {largest}");
+        // Above the carrier not at all; on the way down.
+        let mut session = running(seed, "speed", 1200.0, "free 0.2");
+        let (off, largest) = until_off(&mut session, 5000);
+        assert!(off.is_none() && largest < 15.0, "{off:?}, {largest}");
+        session.ask("speed 0");
+        let (off, _) = until_off(&mut session, 10_000);
+        println!("{seed}, on the way down: {off:?} ms");
+        assert!(off.is_some());
+        session.announced("fault 26");
+    }
+}

@@ -188,6 +188,8 @@ fn test() -> Result<()> {
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
+    let crates = "check --package induction-drive-core --package induction-drive-settings";
+    steps.command("features", run::cargo(&format!("{crates} --all-features")));
 
     let commands = "commands_of_the_documents -- --ignored --nocapture";
     let commands = run::cargo(&format!("test --workspace --test simulator {commands}"));
@@ -196,7 +198,8 @@ fn test() -> Result<()> {
     let target = steps.run("compiler for the controller", toolchain::for_target);
     let target = target.as_ref();
     steps.with(target, "control crates for the controller", |target| {
-        let core = ["--package", "induction-drive-commission"];
+        let core =
+            ["--package=induction-drive-commission", "--features=induction-drive-core/defmt"];
         run::step("control crates for the controller", target.cargo("build")?.args(core))
     });
     steps.with(target, "lints of the firmware", |target| {

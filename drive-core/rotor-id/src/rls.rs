@@ -39,17 +39,17 @@ const START: [Complex32; N] =
 pub struct RlsSettings {
     /// Forgetting factor lambda, 0.9 to 1. The memory is 1 / (1 - lambda) samples.
     pub lambda: f32,
-    /// Initial covariance, in units of the bases.
+    /// Initial covariance, in units of the bases, 1e-3 to 1e7.
     pub p0: f32,
     /// Corner of the input filters, omega_n h, 0.001 to 1 rad/sample.
     pub corner: f32,
-    /// Base of the voltage, V.
+    /// Base of the voltage, V, above 1e-9 and below 1e9.
     pub voltage_base: f32,
-    /// Base of the current, A.
+    /// Base of the current, A, likewise.
     pub current_base: f32,
-    /// Voltage limit, V: a sample with a component at or beyond it is not used.
+    /// Voltage limit, V, 0.1 to 100 times its base: a sample with a component at or beyond it is not used.
     pub voltage_limit: f32,
-    /// Current limit, A: a sample with a component at or beyond it is not used. A little below the full
+    /// Current limit, A, likewise: a sample with a component at or beyond it is not used. A little below the full
     /// scale of the converter.
     pub current_limit: f32,
 }
@@ -65,21 +65,10 @@ impl RlsSettings {
     }
 }
 
-/// A setting out of range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RlsError {
-    /// `lambda` is outside 0.9 to 1.
-    Lambda,
-    /// `p0` is outside 1e-3 to 1e7.
-    Covariance,
-    /// `corner` is outside 0.001 to 1.
-    Corner,
-    /// A base is not positive and finite.
-    Base,
-    /// A limit is outside 0.1 to 100 times its base.
-    Limit,
-}
+/// The setting that is out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is out of its range")]
+pub struct RlsError(pub &'static str);
 
 /// Covariance above which nothing is forgotten: the wind-up guard.
 const WIND_UP: f32 = 1e8;
@@ -149,11 +138,11 @@ impl Rls {
         let base = |x: f32| x.is_finite() && x > 1e-9 && x < 1e9;
         let limits = [settings.voltage_limit / voltage_base, settings.current_limit / current_base];
         match () {
-            () if !(0.9..=1.0).contains(&lambda) => Err(RlsError::Lambda),
-            () if !(1e-3..=1e7).contains(&p0) => Err(RlsError::Covariance),
-            () if !(1e-3..=1.0).contains(&corner) => Err(RlsError::Corner),
-            () if !base(voltage_base) || !base(current_base) => Err(RlsError::Base),
-            () if !limits.iter().all(|x| (0.1..=100.0).contains(x)) => Err(RlsError::Limit),
+            () if !(0.9..=1.0).contains(&lambda) => Err(RlsError("lambda")),
+            () if !(1e-3..=1e7).contains(&p0) => Err(RlsError("p0")),
+            () if !(1e-3..=1.0).contains(&corner) => Err(RlsError("corner")),
+            () if !base(voltage_base) || !base(current_base) => Err(RlsError("a base")),
+            () if !limits.iter().all(|x| (0.1..=100.0).contains(x)) => Err(RlsError("a limit")),
             () => Ok(Self::at_rest(settings)),
         }
     }

@@ -10,6 +10,7 @@ use crate::{Coefficients, Dq, Fault};
 // The large variant is passed by reference and kept once, in a mailbox.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Command {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
     /// angle comes from the injection, then regulate as `Mode` says.
@@ -21,6 +22,7 @@ pub enum Command {
     CheckWiring,
     /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
     /// offsets and charges the bootstraps first. See `crate::commission`.
+    #[cfg_attr(feature = "serde", serde(skip))]
     Excite(Excitation),
     /// Stop in this way. A drive that neither regulates torque, speed or position nor turns by voltage and frequency does it by
     /// [`Stop::Coast`].
@@ -59,11 +61,14 @@ pub enum Command {
     /// where the settings have no sensor. A fault, or a motor that is too hot, switches off; a start is refused while it stands.
     MotorTemperature(Result<f32, Fault>),
     /// Replace all settings. Only while off or in fault.
+    #[cfg_attr(feature = "serde", serde(skip))]
     Configure(Coefficients),
 }
 
 /// A way to stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stop {
     /// Take the torque to zero, then switch off: the shaft coasts. While the motor at rest is excited, switch off.
     #[default]
@@ -78,6 +83,7 @@ pub enum Stop {
 ///
 /// Exhaustive on purpose: an answer that is overlooked would be taken for another.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Accepted {
     /// As it was given.
     AsGiven,
@@ -88,6 +94,7 @@ pub enum Accepted {
 /// The reason of a refusal. A refused command changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refused {
     /// The value is not a number or infinite.
     #[error("the value is not a finite number")]

@@ -8,6 +8,8 @@ use crate::Fault;
 ///
 /// Exhaustive on purpose: who names or translates modes has to handle a new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
     /// Torque, by the current on the quadrature axis.
     Torque,
@@ -29,6 +31,8 @@ pub enum Mode {
 ///
 /// Exhaustive on purpose: supervision and field bus have to decide on a new state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
     /// Outputs off.
     #[default]

@@ -21,6 +21,7 @@ macro_rules! frame {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
         $(#[$doc])*
         #[derive(Add, AddAssign, Clone, Copy, Debug, Default, Mul, Neg, PartialEq, Sub, SubAssign)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[repr(C)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f32,)+

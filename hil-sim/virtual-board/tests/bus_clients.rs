@@ -90,7 +90,7 @@ fn clients_start_run_read_and_stop_the_drive() -> Result<()> {
         }
         let rpm = client(&board.bus, &folder).context(name)?;
         board.until("running: speed").context(name)?;
-        board.until("* off: ").context(name)?;
+        board.until("off: stopped").context(name)?;
         println!("    {name}: started, {rpm} rpm, stopped");
         ensure!((rpm - RPM.0).abs() < RPM.1, "{name}: {rpm} rpm");
     }

@@ -11,7 +11,8 @@ use core::f32::consts::SQRT_2;
 
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
-use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
+use super::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN, TRIP_OF_RANGE, TRIP_OF_RATED, WITHIN};
+use super::numbers::{either_sign, or_rule};
 use super::value::Words;
 use super::{Carrier, CurrentSensors, Flux, PlantSource, SensorKind};
 use drive_core::carrier::DemodulatorKind;
@@ -79,8 +80,7 @@ settings! {
         /// phase current from which on the compensation is full
         ///
         /// The rule is three times the spread of noise and prediction.
-        full_compensation_a: Option<f32> = None, 15: auto("A", full_compensation_a: |s| s.share_of_range(0.03))
-            .from_to(1e-4, 100.0).learned();
+        full_compensation_a: Option<f32> = None, 15: auto("A", full_compensation_a: |s| s.share_of_range(0.03)).from_to(1e-4, 100.0).learned();
         /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
         drop_v: Option<f32> = None, 16: auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
         /// rate of the legs, kHz
@@ -260,8 +260,10 @@ settings! {
         /// The larger of both is taken, but not more than the voltage that drives half the direct current, or the 50 V where that is
         /// less: beyond it, phases b and c would cross zero at a start, where the drop of the inverter is uncertain. (With a spindle's
         /// 20 V instead of 36 V the dead time loses the angle on iron.) And not more than the trip leaves room for beside the current
-        /// limit. The voltage is between 20 and 110 V at 311 V.
-        amplitude_v: Option<f32> = None, 45: auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
+        /// limit. The voltage is between 20 and 110 V at 311 V. Near V_dc / sqrt 3 no room would be left for the fundamental; the lock
+        /// monitor needs a carrier.
+        amplitude_v: Option<f32> = None, 45: auto("V", carrier_v: Settings::carrier_rule)
+            .beside(|s| (if s.watches_lock() { 0.003 * s.inverter.dc_link_v } else { 0.0 }, 0.55 * s.inverter.dc_link_v)).learned();
         /// demodulation of the carrier current
         demodulator: DemodulatorKind = DemodulatorKind::Synchronous, 46: word().learned();
         /// Settings of the chain of the dissertation.
@@ -280,8 +282,7 @@ settings! {
         /// follows the sign of i_q, and goes through zero linearly.
         reference_a: f32 = 0.010, 47: number("A").from_to(-1.0, 1.0).learned();
         /// torque current from which on that reference is full
-        full_reference_iq_a: Option<f32> = None, 48: auto("A", full_reference_iq_a: |s| s.share_of_rated(1.0))
-            .from_to(0.01, 1000.0).learned();
+        full_reference_iq_a: Option<f32> = None, 48: auto("A", full_reference_iq_a: |s| s.share_of_rated(1.0)).from_to(0.01, 1000.0).learned();
         /// gain of the tracker (Eq. 3.44); not synchronous
         k_s: f32 = 0.132_546, 49: number("rad/A").from_to(0.0, 100.0);
         /// its zero
@@ -313,8 +314,7 @@ settings! {
         /// saliency per ampere of stator current
         ///
         /// For the observer until it is learned.
-        current_saliency: Option<f32> = None,
-            55: auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
+        current_saliency: Option<f32> = None, 55: auto("1/A", current_saliency: |s| 0.0338 * RATED_A / s.rated_a()).from_to(-30.0, 30.0).learned();
         /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
         reference: Option<ReferenceTable> = None;
         /// whether a start checks the saliency of the motor
@@ -359,16 +359,17 @@ settings! {
         /// phase current that trips
         ///
         /// A trip level beyond the sensors' range would never be reached.
-        trip_a: Option<f32> = None, 65: auto("A", trip_a: Settings::trip_rule)
+        trip_a: Option<f32> = None, 65: auto("A", trip_a: |s| f32::min(TRIP_OF_RATED * s.rated_a(), TRIP_OF_RANGE * s.sensor_range_a()))
             .beside(|s| (0.05, s.sensor_range_a())).hardware();
         /// largest current that is regulated, peak
         ///
         /// The length of the current vector. With high flux that of 155 % of the rated torque, 1 to 1.6 times the rated current. The
         /// carrier and the noise stay clear of the trip.
-        current_a: Option<f32> = None, 66: auto("A", current_limit_a: Settings::current_limit_rule)
+        current_a: Option<f32> = None, 66: auto("A", current_limit_a: |s| s.wanted_limit_a().min(s.limit_of_trip() * s.trip_a()))
             .beside(|s| (0.01, s.trip_a()));
         /// dc link above which the drive trips
-        dc_over_v: Option<f32> = None, 67: auto("V", dc_over_v: Settings::dc_over_rule).beside(Settings::dc_over_range).hardware();
+        dc_over_v: Option<f32> = None, 67: auto("V", dc_over_v: |s| s.share_of_dc_link(400.0).min(WITHIN * s.dc_over_max_v()).min(0.95 * s.dc_link_range_v()))
+            .beside(Settings::dc_over_range).hardware();
         /// dc link below which it trips while the outputs are on
         dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
         /// speed of the shaft that trips
@@ -420,8 +421,10 @@ settings! {
         precharge_s: f32 = 0.010, 78: number("s").from_to(0.0, 10.0);
         /// time with direct current alone
         ///
-        /// The flux is within 1 % after five rotor time constants.
-        magnetise_s: Option<f32> = None, 79: auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r())).beside(Settings::magnetise_range);
+        /// The flux is within 1 % after five rotor time constants. The lock monitor measures its baseline in this time; with the
+        /// saliency check also while the flux is restored.
+        magnetise_s: Option<f32> = None, 79: auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r()))
+            .beside(|s| (if s.watches_lock() && !s.injection.synchronous.check { 0.5 } else { 0.0 }, 60.0));
         /// flux that the rule for the direct current aims at: low as in the dissertation, or high
         flux: Flux = Flux::Low, 80: word().learned();
         /// direct (magnetising) current, peak
@@ -449,18 +452,17 @@ settings! {
     /// The speed loop, and the position loop around it. Unset values follow [`rules`](super::rules).
     SpeedSettings "speed." [speed] {
         /// largest torque current of speed and position mode
-        i_q_limit_a: Option<f32> = None, 85: auto("A", i_q_limit_a: |s| 3.0 / 3.5 * s.current_limit_a())
-            .beside(|s| (0.01, s.current_limit_a()));
+        i_q_limit_a: Option<f32> = None, 85: auto("A", i_q_limit_a: |s| 3.0 / 3.5 * s.current_limit_a()).beside(|s| (0.01, s.current_limit_a()));
         /// largest speed that is asked for
         ///
         /// In either mode. By rule the rated speed with the observer. The injection alone is good to 300 rpm on four poles; with an
         /// encoder it may be larger.
-        limit_rpm: Option<f32> = None, 86: auto("rpm", speed_limit_rpm: Settings::speed_limit_rule).beside(|s| (1.0, s.speed_trip_rpm()));
+        limit_rpm: Option<f32> = None, 86: auto("rpm", speed_limit_rpm: |s| (if s.uses_observer() { s.nameplate.speed_rpm } else { s.share_of_poles(300.0) }).min(WITHIN * s.speed_trip_rpm()))
+            .beside(|s| (1.0, s.speed_trip_rpm()));
         /// largest acceleration that is asked for
         ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
         /// deceleration of a quick stop
-        quick_rpm_per_s: Option<f32> = None,
-            88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
+        quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
         /// time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once
         s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0);
         /// phase margin of the speed loop: more is calmer and slower
@@ -473,7 +475,8 @@ settings! {
     /// [`rules`](super::rules). By default there is no brake resistor; where one is fitted, its energy and power stand on it.
     BrakingSettings "braking." [braking] {
         /// dc link without generating torque
-        high_v: Option<f32> = None, 91: auto("V", dc_high_v: Settings::dc_high_rule).beside(Settings::dc_high_range);
+        high_v: Option<f32> = None, 91: auto("V", dc_high_v: |s| s.share_of_dc_link(390.0).min(HIGH_OF_TRIP * s.dc_over_v()).min(WITHIN * s.highest_dc_link_v()))
+            .beside(|s| (s.inverter.dc_link_v + MARGIN * s.inverter.dc_link_v, s.dc_over_v().min(s.highest_dc_link_v())));
         /// dc link without motoring torque, below which the shaft feeds it
         low_v: Option<f32> = None, 92: auto("V", dc_low_v: |s| f32::max(s.share_of_dc_link(260.0), LOW_OF_TRIP * s.dc_under_v()))
             .beside(|s| (s.dc_under_v() + MARGIN * s.dc_under_v(), s.inverter.dc_link_v - MARGIN * s.inverter.dc_link_v));
@@ -500,8 +503,7 @@ settings! {
     /// [`rules`](super::rules).
     VoltsPerHertzMode "vf." [vf] {
         /// voltage between lines, rms, per frequency, of a motor that nobody has identified
-        volts_per_hz: Option<f32> = None,
-            98: auto("V/Hz", volts_per_hz: |s| s.nameplate.voltage_v / s.nameplate.frequency_hz).from_to(0.01, 200.0);
+        volts_per_hz: Option<f32> = None, 98: auto("V/Hz", volts_per_hz: |s| s.nameplate.voltage_v / s.nameplate.frequency_hz).from_to(0.01, 200.0);
         /// current of this motor at standstill, peak
         ///
         /// By rule the magnetising current of most motors, 0.45 times the rated current.

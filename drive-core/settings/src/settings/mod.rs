@@ -12,6 +12,8 @@ mod motor_sensor;
 mod ntc;
 mod numbers;
 pub mod rules;
+#[cfg(feature = "serde")]
+mod stored;
 mod tracked;
 pub mod value;
 

@@ -8,12 +8,9 @@
 //!
 //! Beyond the resistances of -40 and 200 degC the sensor is open or shorted.
 
+use super::ntc::{COLDEST_C, HOTTEST_C};
 use super::{MotorSensor, Ntc, SensorKind};
 use drive_core::{CONVERTER_CODES, Fault};
-
-/// Coldest and hottest believable motor, °C.
-const COLDEST_C: f32 = -40.0;
-const HOTTEST_C: f32 = 200.0;
 
 impl MotorSensor {
     /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.

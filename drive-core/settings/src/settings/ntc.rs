@@ -10,9 +10,9 @@ use drive_core::protect::HeatSink;
 const T_25: f32 = 298.15;
 /// 0 °C, K.
 const T_0: f32 = 273.15;
-/// Coldest and hottest believable heat sink, °C: beyond them the thermistor is open or shorted.
-const COLDEST_C: f32 = -40.0;
-const HOTTEST_C: f32 = 200.0;
+/// Coldest and hottest believable heat sink and motor, °C: beyond them the sensor is open or shorted.
+pub(super) const COLDEST_C: f32 = -40.0;
+pub(super) const HOTTEST_C: f32 = 200.0;
 
 impl Ntc {
     /// Temperature at a code, °C, within 0.1 °C of the formula from -40 to 150 °C; for telemetry. Codes at either end

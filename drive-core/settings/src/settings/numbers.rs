@@ -2,6 +2,13 @@
 
 /// Rules end this far within the limits of the power stage and of other settings, since they round to four digits.
 pub(super) const WITHIN: f32 = 0.998;
+/// Share of the sensors' range that trips: noise and drift leave the reading of a larger current at the end of the range. And trip in
+/// rated currents: it leaves the current limit with high flux what that needs. A trip has one rule for any flux: the bench steps
+/// of a board hold for it, and commissioning changes the flux.
+pub(super) const TRIP_OF_RANGE: f32 = 0.9614;
+pub(super) const TRIP_OF_RATED: f32 = 2.2;
+/// Largest dc link without generating torque, in relation to the voltage that trips.
+pub(super) const HIGH_OF_TRIP: f32 = 0.975;
 /// Least dc link without motoring torque, in relation to the voltage that trips.
 pub(super) const LOW_OF_TRIP: f32 = 1.15;
 /// `braking.high_v` and `.low_v` stay this far from their neighbours.

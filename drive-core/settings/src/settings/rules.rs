@@ -37,7 +37,7 @@ pub mod dc_link;
 use core::f32::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
 use super::list::RATED_A;
-use super::numbers::{WITHIN, either_sign};
+use super::numbers::{TRIP_OF_RANGE, WITHIN, either_sign};
 use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
 use drive_core::carrier::DemodulatorKind;
@@ -49,11 +49,6 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 /// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
 /// overshoot.
 const CARRIER_OF_ROOM: f32 = 0.75;
-/// Share of the sensors' range that trips: noise and drift leave the reading of a larger current at the end of the range. And trip in
-/// rated currents: it leaves the current limit with high flux what that needs. A trip has one rule for any flux: the bench steps
-/// of a board hold for it, and commissioning changes the flux.
-const TRIP_OF_RANGE: f32 = 0.9614;
-const TRIP_OF_RATED: f32 = 2.2;
 /// With high flux: torque at the current limit, as a share of the rated one. 150 % for a minute is what frequency converters give;
 /// the rest is for the angle's error and a warmer motor.
 const OVERLOAD: f32 = 1.55;
@@ -166,25 +161,11 @@ impl Settings {
         either_sign(-line.gain, 0.05 * full, 0.95 * full)
     }
 
-    /// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.
-    pub(super) fn carrier_range(&self) -> (f32, f32) {
-        let dc_link_v = self.inverter.dc_link_v;
-        (if self.watches_lock() { 0.003 * dc_link_v } else { 0.0 }, 0.55 * dc_link_v)
-    }
-
-    /// The lock monitor measures its baseline during magnetisation; with the saliency check also while the flux is
-    /// restored.
-    pub(super) fn magnetise_range(&self) -> (f32, f32) {
-        let needs_baseline = self.watches_lock() && !self.injection.synchronous.check;
-        (if needs_baseline { 0.5 } else { 0.0 }, 60.0)
-    }
-
     /// Rule of `sequence.i_d`.
     pub(super) fn i_d_rule(&self) -> f32 {
-        let limit = self.current_limit_a();
         match self.sequence.flux {
-            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * limit),
-            Flux::High => self.useful_i_d(limit),
+            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
+            Flux::High => self.useful_i_d(self.current_limit_a()),
         }
     }
 
@@ -196,18 +177,8 @@ impl Settings {
         f32::min(rated_flux / self.motor.l_m, FRAC_1_SQRT_2 * self.rated_a().min(limit_a))
     }
 
-    /// Rule of `limits.trip_a`.
-    pub(super) fn trip_rule(&self) -> f32 {
-        f32::min(TRIP_OF_RATED * self.rated_a(), TRIP_OF_RANGE * self.sensor_range_a())
-    }
-
-    /// Rule of `limits.current_a`.
-    pub(super) fn current_limit_rule(&self) -> f32 {
-        self.wanted_limit_a().min(self.limit_of_trip() * self.trip_a())
-    }
-
     /// Current limit per trip.
-    fn limit_of_trip(&self) -> f32 {
+    pub(super) fn limit_of_trip(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => 0.814,
             Flux::High => LIMIT_OF_TRIP,
@@ -216,7 +187,7 @@ impl Settings {
 
     /// The current limit by rule, A, where the trip allows it: the rated current at least, which the tests of the commissioning need
     /// while the motor is not known.
-    fn wanted_limit_a(&self) -> f32 {
+    pub(super) fn wanted_limit_a(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => self.share_of_rated(3.5),
             Flux::High => {
@@ -267,13 +238,6 @@ impl Settings {
         let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
         let most = f32::min(f32::max(0.5 * self.i_d() * reactance, of_link), room * reactance);
         f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
-    }
-
-    /// Rule of `speed.limit_rpm`: it is below the speed that trips.
-    pub(super) fn speed_limit_rule(&self) -> f32 {
-        let alone = self.share_of_poles(300.0);
-        let rpm = if self.uses_observer() { self.nameplate.speed_rpm } else { alone };
-        f32::min(rpm, WITHIN * self.speed_trip_rpm())
     }
 
     /// Plant of the direct axis for the design of its current controller. The rule is the plant that was identified on the

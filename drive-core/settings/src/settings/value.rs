@@ -8,6 +8,7 @@ use lexical_parse_float::FromLexical as _;
 ///
 /// Exhaustive on purpose: every kind of value has to be stored and shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(untagged))]
 pub enum Value {
     /// A finite number.
     Number(f32),

@@ -54,6 +54,7 @@ impl Settings {
         let limit = 1.5 * speed_limit;
         let inj = &self.injection;
         let p = &inj.printed;
+        let some_v = if carrier_v > 0.0 { carrier_v } else { f32::INFINITY };
         let angle_loop = if inj.demodulator == DemodulatorKind::Synchronous {
             AngleLoop::Filter {
                 schedule: GainSchedule::new(&self.reference(), &self.slope()),
@@ -77,11 +78,7 @@ impl Settings {
             demodulator: inj.demodulator,
             rms_samples: p.rms_samples,
             // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
-            ampere_per_ohm: if carrier_v > 0.0 {
-                carrier_a * carrier_a / carrier_v * FRAC_1_SQRT_2
-            } else {
-                0.0
-            },
+            ampere_per_ohm: carrier_a * carrier_a / some_v * FRAC_1_SQRT_2,
             angle_loop,
             lag: lag_share * carrier_lag,
             band_pass_lag: lag_share * BPF_GROUP_DELAY,

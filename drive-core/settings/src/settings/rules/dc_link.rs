@@ -1,7 +1,7 @@
 //! The rules for the voltages of the dc link.
 
 use crate::settings::Settings;
-use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
+use crate::settings::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN};
 use drive_core::{ChopperSettings, DcLimit, DcLinkSettings, PowerLimit, Relay, periods};
 
 /// Highest dc link above which a drive trips, in relation to the highest in operation.
@@ -14,8 +14,6 @@ const BAND: f32 = 0.64;
 /// Largest change of a dc link that counts as steady, with 311 V.
 const STEADY_V: f32 = 5.0;
 
-/// Largest dc link without generating torque, in relation to the voltage that trips.
-const HIGH_OF_TRIP: f32 = 0.975;
 impl Settings {
     /// Highest dc link that the power stage stands in operation, V.
     pub fn highest_dc_link_v(&self) -> f32 {
@@ -28,14 +26,8 @@ impl Settings {
     }
 
     /// Largest dc link above which the drive may trip, V.
-    fn dc_over_max_v(&self) -> f32 {
+    pub(in crate::settings) fn dc_over_max_v(&self) -> f32 {
         f32::min(OVER_OF_HIGHEST * self.highest_dc_link_v(), self.dc_link_range_v())
-    }
-
-    /// Rule of `limits.dc_over_v`.
-    pub(in crate::settings) fn dc_over_rule(&self) -> f32 {
-        let board = f32::min(WITHIN * self.dc_over_max_v(), 0.95 * self.dc_link_range_v());
-        f32::min(self.share_of_dc_link(400.0), board)
     }
 
     /// Range of `limits.dc_over_v`: it leaves room for `braking.high_v`, which follows from it or is set.
@@ -48,18 +40,6 @@ impl Settings {
     pub(in crate::settings) fn dc_under_range(&self) -> (f32, f32) {
         let low = self.braking.low_v.map_or(LOW_OF_TRIP, |_| 1.0 + MARGIN);
         (5.0, f32::min((1.0 - MARGIN) / low * self.inverter.dc_link_v, self.dc_over_v()))
-    }
-
-    /// Rule of `braking.high_v`.
-    pub(in crate::settings) fn dc_high_rule(&self) -> f32 {
-        let board = f32::min(HIGH_OF_TRIP * self.dc_over_v(), WITHIN * self.highest_dc_link_v());
-        f32::min(self.share_of_dc_link(390.0), board)
-    }
-
-    /// Range of `braking.high_v`.
-    pub(in crate::settings) fn dc_high_range(&self) -> (f32, f32) {
-        let nominal = self.inverter.dc_link_v;
-        (nominal + MARGIN * nominal, f32::min(self.dc_over_v(), self.highest_dc_link_v()))
     }
 
     /// Power that the copper takes of the direct current, W.
@@ -78,9 +58,8 @@ impl Settings {
 
     /// The precharge relay, which opens where the drive trips.
     pub(crate) fn relay(&self) -> Option<Relay> {
-        let (least_v, band_v) = (self.dc_under_v(), self.share_of_dc_link(STEADY_V));
-        let time = periods(self.supply.relay_s);
-        Relay::new(least_v, band_v, time)
+        let band_v = self.share_of_dc_link(STEADY_V);
+        Relay::new(self.dc_under_v(), band_v, periods(self.supply.relay_s))
     }
 
     /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and
