@@ -62,11 +62,11 @@ impl Motor {
     /// The motor with this name, or of this file when the name ends in `.toml`, or, a passport, in `.json`.
     ///
     /// # Errors
-    /// [`Error::Unknown`] with the most similar name; [`Error::ConfigFile`].
+    /// [`Error::Unknown`] with the most similar name; [`Error::Data`].
     pub fn find(name: &str) -> Result<Self, Error> {
         if is_file(name) {
             let path = Path::new(name);
-            let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
+            let failed = |problem: String| Error::data(path, None, problem);
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
             return match name.ends_with(".json") {
                 true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),
