@@ -96,7 +96,7 @@ impl Battery {
             let mut bench = config.clone();
             disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
             let seed = if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
-            learned(config, &plant_settings(&bench), drive, seed)
+            learned(&bench, drive, seed)
         })
     }
 
@@ -139,7 +139,7 @@ impl Study for Battery {
                 disturbed::add(&mut bench, &disturbed::ALWAYS, &always);
                 disturbed::add(&mut bench, &disturbed::AFTER, &after);
                 kind.add(&mut bench);
-                trial(&bench, &plant_settings(&bench), drive, kind, seed)
+                trial(&bench, drive, kind, seed)
             }
             Err(fault) => Ok(Trial { kind: Some(kind), ..Trial::unlearned(seed, *fault) }),
         }

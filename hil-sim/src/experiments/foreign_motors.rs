@@ -222,7 +222,7 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
         let half = Kind::LoadStep((500.0 * most / nominal) as u16);
         let kinds = [Kind::Quadrants, Kind::Reversals, Kind::Speed(150), half];
         for (seed, kind) in (0..).map(|n| seed_of(seed, n)).zip(kinds) {
-            let done = trial(&bench, &plant_settings(&bench), &rig.drive, kind, seed);
+            let done = trial(&bench, &rig.drive, kind, seed);
             let run = done.unwrap_or_else(|why| Trial {
                 kind: Some(kind),
                 refused: Some(Refused::Otherwise(why.to_string())),

@@ -78,7 +78,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
     match tracks(&config.drive) {
-        true => learned(config, &plant_settings(config), drive, seed),
+        true => learned(config, drive, seed),
         false => Ok(Ok(drive)),
     }
 }
