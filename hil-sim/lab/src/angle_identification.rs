@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 use drive_core::carrier::DemodulatorKind;
 use sim_bench::bode::{Bode, frequencies, largest_pole};
 use sim_bench::prelude::*;
-use sim_bench::steady::{OperatingPoint, steady_run_of};
+use sim_bench::steady::{OperatingPoint, steady_run};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use crate::demodulators::tracked;
@@ -270,15 +270,14 @@ fn closed_loops(
     ];
     let runs = context.in_parallel("closed loops", &cases, |_, (.., demodulation, pii)| {
         let pii = pii.ok_or_else(|| Error::Refused("no controller fits the plant".to_owned()))?;
-        let config = demodulation.config(context.config);
-        let mut drive = config.drive;
-        (drive.injection.printed.k_s, drive.injection.printed.z_s) =
-            (pii.k_s as f32, pii.z_s as f32);
+        let mut config = demodulation.config(context.config);
+        let printed = &mut config.drive.injection.printed;
+        (printed.k_s, printed.z_s) = (pii.k_s as f32, pii.z_s as f32);
         let at = |rpm| {
             let case = OperatingPoint { rpm, iq: TABLE_6_A[DESIGN_ROW], seed: context.seed };
-            steady_run_of(&drive, &config, case, 1.0)
+            steady_run(&config, case, 1.0)
         };
-        Ok((tracked::steps(&drive, &config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
+        Ok((tracked::steps(&config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
     })?;
     let mut table = Table::new("Controllers in the closed loop, constant reference of 10 mA", &[]);
     for ((name, from, key, ..), (steps, turning, pii)) in cases.iter().zip(&runs) {

@@ -6,7 +6,7 @@ pub(super) mod tracked;
 
 use rayon::prelude::*;
 use sim_bench::prelude::*;
-use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
+use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
@@ -131,14 +131,15 @@ fn findings(
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
         let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
+        let config = Config { drive, ..config.clone() };
         // One second at constant speed and torque; none where the angle is lost.
         let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
             let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
-            let run = steady_run_of(&drive, config, case, 1.0)?;
+            let run = steady_run(&config, case, 1.0)?;
             Ok::<_, Error>((!run.lost).then_some(run))
         });
         let turning = turning.collect::<Result<_, _>>()?;
-        Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
+        Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
     };
     let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
     let mut found = DemodulationResults {

@@ -136,7 +136,7 @@ impl Commission {
         let mut config = Config { drive: *drive, ..config.clone() };
         config.prepare.learn = true;
         config.drive.injection.synchronous.allow_unlearned = false;
-        let learned = match or_refusal(steady::prepared(drive, &config, seed))? {
+        let learned = match or_refusal(steady::prepared(&config, seed))? {
             Ok(learned) => learned,
             Err(why) => return Ok(Err(why)),
         };

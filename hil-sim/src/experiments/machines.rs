@@ -140,7 +140,7 @@ impl Study for Machines {
 
     fn run(&self, number: usize) -> Result<Self::Record, Error> {
         let (config, seed) = self.drawn(number);
-        let learned = prepared(&config.drive, &config, seed);
+        let learned = prepared(&config, seed);
         or_refusal(learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)))
     }
 

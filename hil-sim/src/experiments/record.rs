@@ -41,7 +41,7 @@ const COURSES: [(Course, f64); 4] =
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = context.config.clone();
     config.prepare.learn = true;
-    let mut rig = prepared(&config.drive, &config, context.seed)?;
+    let mut rig = prepared(&config, context.seed)?;
     let after = config.after_learning()?;
     if plant_settings(&after) != plant_settings(&config) {
         // The drive is off, and the motor at rest without flux: another one takes its place.

@@ -45,7 +45,7 @@ type Seen = (Rise, f64);
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = for_the_range(context.config)?;
     config.prepare.learn = true;
-    let rig = prepared(&config.drive, &config, context.seed)?;
+    let rig = prepared(&config, context.seed)?;
     let cases: Vec<Case> = SPEEDS_RPM
         .iter()
         .flat_map(|&rpm| [1.0, -1.0].map(|sign| (config.rpm(rpm), sign)))

@@ -63,7 +63,7 @@ fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64,
         config.drive.injection.synchronous.check = false;
     }
     let case = OperatingPoint { rpm, iq: IQ_A, seed: context.seed };
-    let mut rig = match prepared(&config.drive, &config, case.seed) {
+    let mut rig = match prepared(&config, case.seed) {
         Ok(rig) => rig,
         Err(_) => return Ok(None),
     };
