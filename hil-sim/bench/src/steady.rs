@@ -107,16 +107,17 @@ pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result
 /// When the drive does not start.
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
-    let (mut error, mut torque) = (Stats::default(), Stats::default());
     if let Some(fault) = rig.drive.state().fault() {
-        return Ok(SteadyRun { case, error, torque: 0.0, lost: true, fault: Some(fault) });
+        return Ok(SteadyRun {
+            case,
+            error: Stats::default(),
+            torque: 0.0,
+            lost: true,
+            fault: Some(fault),
+        });
     }
-    rig.command(&Command::Torque(case.iq as f32))?;
-    rig.run(1.0, |_| {});
-    rig.run(seconds, |p| {
-        error.push(p.angle_error_deg);
-        torque.push(p.torque);
-    });
+    rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
+    let [error, torque] = rig.stats(seconds, |p| [p.angle_error_deg, p.torque]);
     let fault = rig.drive.state().fault();
     let lost = error.largest() > LOST_DEG || fault.is_some();
     Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })

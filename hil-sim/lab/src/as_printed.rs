@@ -109,8 +109,7 @@ fn levels(context: &Context<'_>, a_psi: f64) -> Result<Levels, Error> {
     config.drive.ignore_delays = true;
     config.drive.injection.synchronous.check = false;
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let start = rig.time();
     let mut run =
         Levels { error: Vec::new(), torque: Vec::new(), overshoot: 0.0, trace: Vec::new() };

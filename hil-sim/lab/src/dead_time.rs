@@ -143,10 +143,8 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.inverter.residual_v = Some(0.0);
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(config.amperes(IQ_A) as f32))?;
-    rig.run(0.5, |_| {});
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
+    rig.settle(&Command::Torque(config.amperes(IQ_A) as f32), 0.5)?;
 
     const BINS: usize = 120;
     let mut sums = [(0.0, 0.0, 0u32); BINS];

@@ -174,18 +174,12 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
         config.drive.injection.amplitude_v = Some(0.0);
     }
     let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.3, |_| {});
+    rig.settle(&Command::Torque(iq as f32), 0.3)?;
     let mut curve = Curve::new();
     for x in (-180..=180).step_by(STEP_DEG as usize) {
         // theta = phi + 90° + turn, so phi2 - theta = -90° - turn
-        rig.command(&Command::TurnInjection((-90 - x) as f32))?;
-        rig.run(SETTLE_S, |_| {});
-        let (mut delta_i, mut error) = (Stats::default(), Stats::default());
-        rig.run(AVERAGE_S, |p| {
-            delta_i.push(p.signal() * 1e3);
-            error.push(p.angle_error_deg);
-        });
+        rig.settle(&Command::TurnInjection((-90 - x) as f32), SETTLE_S)?;
+        let [delta_i, error] = rig.stats(AVERAGE_S, |p| [p.signal() * 1e3, p.angle_error_deg]);
         curve.push((f64::from(x) + error.mean(), delta_i.mean()));
     }
     Ok(curve)

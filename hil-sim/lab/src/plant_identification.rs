@@ -101,8 +101,7 @@ const TRIALS: [Trial; 3] = [
 
 /// Pseudo-random voltage on q, beside a torque current of 2 A.
 fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
-    rig.command(&Command::Torque(2.0))?;
-    rig.run(1.0, |_| {});
+    rig.settle(&Command::Torque(2.0), 1.0)?;
     prbs(rig, Axis::Q)
 }
 
@@ -160,9 +159,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
     let mut config = context.config.clone();
     config.drive.angle_source = AngleSource::Encoder;
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
-    Ok(rig)
+    Rig::started(&config, context.seed, Mode::Torque)
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {

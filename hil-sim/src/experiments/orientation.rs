@@ -68,15 +68,11 @@ fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orie
     config.drive.ignore_delays = !compensate;
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = rpm;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let iq = config.amperes(IQ_A);
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(1.0, |_| {});
-    let (mut error, mut share) = (Stats::default(), Stats::default());
-    rig.run(context.seconds.unwrap_or(0.3), |p| {
-        error.push(p.angle_error_deg);
-        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * iq));
+    rig.settle(&Command::Torque(iq as f32), 1.0)?;
+    let [error, share] = rig.stats(context.seconds.unwrap_or(0.3), |p| {
+        [p.angle_error_deg, p.torque / (p.torque_per_flux_ampere * p.flux * iq)]
     });
     Ok((error.mean(), share.mean()))
 }

@@ -46,8 +46,7 @@ pub fn oriented(
     let mut config = config.clone();
     config.drive.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.8, |_| {});
+    rig.settle(&Command::Torque(iq as f32), 0.8)?;
     Ok(rig)
 }
 

@@ -112,8 +112,7 @@ fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     let fastest = 0.7 * LIMIT_A * torque / config.motor.inertia * 60.0 / TAU;
     config.drive.speed.ramp_rpm_per_s = Some(fastest as f32);
     config.load.mode = LoadMode::Free;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Position)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Position)?;
     rig.command(&Command::Position(printed("Figure 37", "reference of position in turns") as f32))?;
     let (start, mut trace, mut n) = (rig.time(), Trace::default(), 0);
     let from = rig.plant.mechanical_angle() / TAU;

@@ -70,12 +70,7 @@ fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64,
     if bring_up(&mut rig, rpm).is_err() || rig.drive.state().fault().is_some() {
         return Ok(None);
     }
-    rig.command(&Command::Torque(case.iq as f32))?;
-    rig.run(1.0, |_| {});
-    let (mut error, mut carrier) = (Stats::default(), Stats::default());
-    rig.run(1.0, |p| {
-        error.push(p.angle_error_deg);
-        carrier.push(1e3 * p.carrier);
-    });
+    rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
+    let [error, carrier] = rig.stats(1.0, |p| [p.angle_error_deg, 1e3 * p.carrier]);
     Ok(rig.drive.state().fault().is_none().then_some((error.largest(), carrier.mean())))
 }

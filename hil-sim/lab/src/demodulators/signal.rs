@@ -34,8 +34,7 @@ pub fn oriented(
     seed: u64,
 ) -> Result<Rig, Error> {
     let mut rig = Rig::oriented(&demodulation.config(config), seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.5, |_| {});
+    rig.settle(&Command::Torque(iq as f32), 0.5)?;
     Ok(rig)
 }
 
@@ -45,13 +44,8 @@ pub fn oriented(
 /// When the drive refuses a command.
 pub fn signal_quality(mut rig: Rig) -> Result<SignalQuality, Error> {
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
-        rig.command(&Command::TurnInjection(turn as f32))?;
-        rig.run(SETTLE_S, |_| {});
-        let (mut signal, mut error) = (Stats::default(), Stats::default());
-        rig.run(AVERAGE_S, |p| {
-            signal.push(p.signal());
-            error.push(p.angle_error_deg - turn);
-        });
+        rig.settle(&Command::TurnInjection(turn as f32), SETTLE_S)?;
+        let [signal, error] = rig.stats(AVERAGE_S, |p| [p.signal(), p.angle_error_deg - turn]);
         Ok((signal, error.mean().to_radians()))
     };
     let [behind, here, ahead] = [at(-TURN_DEG)?, at(0.0)?, at(TURN_DEG)?];

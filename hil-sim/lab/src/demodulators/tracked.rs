@@ -28,8 +28,7 @@ pub struct StepsRun {
 pub fn steps(config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&config, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, seed, Mode::Torque)?;
     let start = rig.time();
     let (mut error, mut stats) = (Vec::new(), Stats::default());
     for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
