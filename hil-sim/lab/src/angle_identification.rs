@@ -212,13 +212,13 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
 
 /// Table 6 and Eq. 3.44: what the printed chain gives on the simulated motor, and a design for the printed plant.
 fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
-    let unknown = Some("the saliency of its motor and the amplitude of the sequence");
+    let unknown = "the saliency of its motor and the amplitude of the sequence";
     for (iq, point) in TABLE_6_A.iter().zip(points) {
         let model = point.models[1];
         let [pole, _] = model.poles();
         for (quantity, value) in [("k_phi", 1e5 * model.k), ("Re p", pole.re), ("Im p", pole.im)] {
-            let ours = beside(&format!("Table 6, {iq:.1} A"), quantity);
-            outcome.compared.push(Compared { unknown, ..ours }.simulated(value));
+            let ours = beside(&format!("Table 6, {iq:.1} A"), quantity).unknown(unknown);
+            outcome.compared.push(ours.simulated(value));
         }
     }
     let plant = Model::printed(DESIGN_ROW);
@@ -247,9 +247,9 @@ fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
             largest(Pii::printed()) < 1.0,
         ),
     ];
-    outcome.compared.extend(
-        claims.map(|(place, claim, holds)| beside(place, claim).simulated(f64::from(holds))),
-    );
+    outcome
+        .compared
+        .extend(claims.map(|(place, claim, holds)| beside(place, claim).simulated(holds)));
 }
 
 /// Controllers in the closed loop: over the steps of Figure 38, and at constant speed.

@@ -73,14 +73,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     // The motor whose errors come nearest to what is printed: a tenth of the assumed saliency.
     let weak = &found[1];
     let errors = Stats::of(weak.error.iter().copied());
-    let unknown = Some("the saliency of its motor, and the torque current of each angle error");
+    let unknown = "the saliency of its motor, and the torque current of each angle error";
     for (place, quantity, value) in [
         ("Figure 38", "angle error, about", errors.mean()),
         ("Figure 39", "angle error, least", weak.error.iter().copied().fold(f64::MAX, f64::min)),
         ("Figure 39", "angle error, largest", errors.largest()),
         ("Figure 38", "overshoot of the current in the last step", 1e3 * weak.overshoot),
     ] {
-        let ours = Compared { unknown, ..Compared::with("S1", place, quantity) };
+        let ours = Compared::with("S1", place, quantity).unknown(unknown);
         outcome.compared.push(ours.simulated(value));
     }
     for (k, level) in LEVELS_A.iter().enumerate() {

@@ -70,7 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
     let holds = "with the correction the dead time does not distort the voltage at the terminals";
-    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(f64::from(clean)));
+    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(clean));
     let title = "What the dead time does to voltage and current";
     outcome
         .figures

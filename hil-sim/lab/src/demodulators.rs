@@ -97,7 +97,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
     let promising = Compared::with("S1", "section 5.2", "detection of the envelope is promising");
-    outcome.compared.push(promising.simulated(f64::from(envelope)));
+    outcome.compared.push(promising.simulated(envelope));
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)

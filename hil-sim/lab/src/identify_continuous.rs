@@ -77,7 +77,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
         }
     }
     let claim = "from 0 to 200 rad/s the errors of Model C are similar to those of Model B";
-    outcome.compared.push(Compared::with("S0", "section 5", claim).simulated(f64::from(similar)));
+    outcome.compared.push(Compared::with("S0", "section 5", claim).simulated(similar));
     table.note("Half the printed noise, the mean of eight times seven measurements; supply at the speed and 1.8 rad/s of slip.")
 }
 

@@ -115,9 +115,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ]);
         if paper.is_some() {
             let quantity = "convergence time of r_s and tau_r, the slowest, Sg";
-            let unknown =
-                Some("the noise of the measurement and when a parameter counts as converged");
-            let place = Compared { unknown, ..Compared::with("S0", source, quantity) };
+            let unknown = "the noise of the measurement and when a parameter counts as converged";
+            let place = Compared::with("S0", source, quantity).unknown(unknown);
             outcome.compared.push(place.simulated(times[0].max(times[1])));
         }
         let key = format!("figure_{}", index + 2);
@@ -143,7 +142,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             worst(3) > worst(2),
         ),
     ] {
-        outcome.compared.push(Compared::with("S0", place, quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S0", place, quantity).simulated(holds));
     }
     outcome.tables.push(table.note(
         "Convergence without noise, into 10 % of the final value by a moving median over 20 ms, \

@@ -42,10 +42,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (by_sg, by_ss) = (by_sg.map_err(Error::refused)?, by_ss.map_err(Error::refused)?);
         let sg = model_c(&by_sg.delta, H).array();
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
-            let unknown = Some("what was measured");
-            let [of_sg, of_ss] = ["Sg", "Ss"].map(|row| Compared {
-                unknown,
-                ..Compared::with("S0", format!("{table}, {row}"), name)
+            let [of_sg, of_ss] = ["Sg", "Ss"].map(|row| {
+                Compared::with("S0", format!("{table}, {row}"), name).unknown("what was measured")
             });
             outcome.compared.extend(sg[k].ok().map(|value| of_sg.simulated(value)));
             // The simulated machine itself.
@@ -90,7 +88,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             (six_step[1] / of_rbv[1] - 1.0).abs() > 0.3,
         ),
     ] {
-        outcome.compared.push(Compared::with("S0", place, quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S0", place, quantity).simulated(holds));
     }
     // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {

@@ -132,7 +132,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let constant = errors.fold(0.0, f64::max);
     outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
     let constant = Compared::with("S1", "section 3.3", "at the reference of convergence the quadrature current does not affect the current difference")
-        .simulated(f64::from(constant < 0.2));
+        .simulated(constant < 0.2);
     outcome.compared.push(constant);
     outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \

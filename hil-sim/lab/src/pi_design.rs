@@ -70,7 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.compared.push(beside("Figure 25", at).recomputed(gain));
     let below = "the closed current loop crosses over below the lower edge of the pass band of BPF";
     let holds = hz(rule.v) < edges[0];
-    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(f64::from(holds)));
+    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(holds));
     outcome.remarks.push(format!(
         "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
          its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 hold a slip \

@@ -196,9 +196,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ]);
         }
         let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
-        let unknown = Some("the motor on the day of the test, and the amplitude of the sequence");
+        let unknown = "the motor on the day of the test, and the amplitude of the sequence";
         for (quantity, value) in [("gain", best.plant.k), ("pole", best.plant.p)] {
-            let ours = Compared { unknown, ..Compared::with("S1", trial.printed, quantity) };
+            let ours = Compared::with("S1", trial.printed, quantity).unknown(unknown);
             outcome.compared.push(ours.simulated(value));
         }
         let design =
@@ -226,7 +226,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let constant = fit(&[10.0; 500], &[1.0; 500], Orders { outputs: 1, inputs: 1, delay: 0 });
     let degrades =
         Compared::with("S1", "Appendix A", "stretches of constant signals degrade the solution");
-    outcome.compared.push(degrades.simulated(f64::from(constant.is_err())));
+    outcome.compared.push(degrades.simulated(constant.is_err()));
     outcome.remarks.extend(remarks(context)?);
     Ok(outcome)
 }

@@ -116,8 +116,8 @@ fn position_loop(outcome: &mut Outcome) {
         outcome.compared.push(beside("Eq. 4.2", "gain").recomputed(rule.k_c));
         outcome.compared.push(beside("Eq. 4.2", "zero").recomputed(rule.z_c));
     }
-    let unknown = Some("inertia, friction and the unit of the position");
-    let of = |quantity| Compared { unknown, ..beside("Eq. 4.1", quantity) };
+    let unknown = "inertia, friction and the unit of the position";
+    let of = |quantity| beside("Eq. 4.1", quantity).unknown(unknown);
     outcome.compared.extend(["gain", "pole"].map(of));
 }
 

@@ -97,9 +97,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ("the reference filter removes the overshoot", overshoot(&filtered) < 0.001),
         ("the reference filter makes the settling time longer", longer),
     ] {
-        outcome
-            .compared
-            .push(Compared::with("S1", "Figure 27", quantity).recomputed(f64::from(holds)));
+        outcome.compared.push(Compared::with("S1", "Figure 27", quantity).recomputed(holds));
     }
     outcome.remark(
         "The identified plant has no delay and no current filter in it; with those the same rule \

@@ -42,7 +42,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
             let unknown =
                 (column == COLUMNS[1]).then_some("how near to zero it means, and the load");
             let place = Compared::with("S1", format!("Table 1, {row}"), column);
-            outcome.compared.push(Compared { unknown, ..place }.simulated(f64::from(works)));
+            outcome.compared.push(Compared { unknown, ..place }.simulated(works));
         }
     }
     outcome.tables.push(table.note(

@@ -75,7 +75,7 @@ pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
         (procedure(format!("errors of {these} 6 % at low speed")), c_most < 6.0),
         (procedure("the error of r_s is at most 20 % at low speed".to_owned()), r_s <= 20.0),
     ] {
-        compared.push(Compared::with("S0", "section 5", quantity).recomputed(f64::from(holds)));
+        compared.push(Compared::with("S0", "section 5", quantity).recomputed(holds));
     }
 
     // f_1b and the speed are proportional (Eq. 42).
