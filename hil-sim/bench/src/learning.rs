@@ -39,7 +39,7 @@ pub fn reference_of(
 ) -> Result<ReferenceTable, Error> {
     let mut config = config.clone();
     config.drive.injection.demodulator = demodulator;
-    let mut rig = Rig::oriented(&config, seed)?;
+    let mut rig = Rig::oriented(&config, seed, 0.0, 0.0)?;
     // The table is odd.
     let mut values = [0.0; POINTS];
     for n in 0..=LAST {

@@ -159,16 +159,18 @@ impl Rig {
         Ok(rig)
     }
 
-    /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
+    /// A drive that the encoder orients, shaft locked, injection beside it, and `seconds` at the torque current `iq`, A.
     ///
     /// # Errors
-    /// As [`Rig::new`] and [`Rig::start`].
-    pub fn oriented(config: &Config, seed: u64) -> Result<Self, Error> {
+    /// As [`Rig::started`] and [`Rig::command`].
+    pub fn oriented(config: &Config, seed: u64, iq: f64, seconds: f64) -> Result<Self, Error> {
         let mut config = config.clone();
         config.drive.angle_source = AngleSource::Encoder;
         config.drive.injection.beside_encoder = true;
         config.load.mode = config::LoadMode::Locked;
-        Self::started(&config, seed, Mode::Torque)
+        let mut rig = Self::started(&config, seed, Mode::Torque)?;
+        rig.settle(&Command::Torque(iq as f32), seconds)?;
+        Ok(rig)
     }
 
     /// Periods since the beginning.

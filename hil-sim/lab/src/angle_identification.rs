@@ -63,7 +63,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Demodulation, f64)> =
         DEMODULATIONS.iter().flat_map(|s| TABLE_6_A.iter().map(move |&iq| (s, iq))).collect();
     let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {
-        let rig = || measure::oriented(context.config, demodulation.demodulator, iq, context.seed);
+        let mut config = context.config.clone();
+        config.drive.injection.demodulator = demodulation.demodulator;
+        let rig = || Rig::oriented(&config, context.seed, iq, 0.8);
         let (record, steps) = (measure::sequence(rig()?)?, measure::steps(rig()?)?);
         Ok(IdentifiedPoint { models: Model::identify(&record)?, record, steps })
     })?;

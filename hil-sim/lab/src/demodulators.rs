@@ -10,7 +10,7 @@ use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
-use signal::SignalQuality;
+use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.
@@ -124,14 +124,14 @@ fn findings(
             .collect::<Result<Vec<_>, _>>()
     };
     let at_each = |config: &Config| {
+        let config = demodulation.config(config);
         IQ_A.par_iter()
-            .map(|&iq| signal::signal_quality(signal::oriented(demodulation, config, iq, seed)?))
+            .map(|&iq| signal::signal_quality(Rig::oriented(&config, seed, iq, SETTLED_S)?))
             .collect::<Result<Vec<_>, _>>()
     };
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
-        let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
-        let config = Config { drive, ..config.clone() };
+        let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
         // One second at constant speed and torque; none where the angle is lost.
         let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
             let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
@@ -150,7 +150,7 @@ fn findings(
         tracked: [constant?, with_table?, retuned?],
     };
     if found.isotropic_share() < 0.5 {
-        found.delay = Some(signal::delay(demodulation, config, DELAY_IQ_A, seed)?);
+        found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
     }
     Ok(found)
 }

@@ -3,8 +3,8 @@
 
 use sim_bench::prelude::*;
 
-use crate::identification::printed::SPEEDS;
-use crate::identification::study::{Case, Entry, MODELS, TRIALS, errors_of, tables};
+use crate::identification::printed::{Case, SPEEDS};
+use crate::identification::study::{Entry, MODELS, TRIALS, errors_of, tables};
 use crate::identification::trial::Noise;
 use crate::identification::{Parameters, Signal, Trial};
 

@@ -4,7 +4,8 @@
 use sim_bench::prelude::*;
 
 use crate::identification::models::model_c;
-use crate::identification::study::{Case, errors};
+use crate::identification::printed::Case;
+use crate::identification::study::errors;
 use crate::identification::trial::Noise;
 use crate::identification::{Complex, Parameters, Signal, Trial};
 use crate::source;

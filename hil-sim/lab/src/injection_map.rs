@@ -173,8 +173,7 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
     if !variant.inject {
         config.drive.injection.amplitude_v = Some(0.0);
     }
-    let mut rig = Rig::oriented(&config, seed)?;
-    rig.settle(&Command::Torque(iq as f32), 0.3)?;
+    let mut rig = Rig::oriented(&config, seed, iq, 0.3)?;
     let mut curve = Curve::new();
     for x in (-180..=180).step_by(STEP_DEG as usize) {
         // theta = phi + 90° + turn, so phi2 - theta = -90° - turn

@@ -3,7 +3,7 @@
 use sim_bench::outcome::{Compared, Metrics};
 
 use super::models::model_c;
-use super::printed::{PERIODS, SPEEDS, error};
+use super::printed::{Case, PERIODS, SPEEDS, error};
 use super::{CurrentVoltage, Parameters, Signal};
 
 /// A row of the tables: model, speed, parameter.
@@ -17,7 +17,7 @@ fn rows(model: &'static str, speed: f64) -> Vec<Row> {
 
 /// Printed errors of a row over the periods, %.
 fn over_h((model, speed, name): Row, signal: Signal) -> [f64; 3] {
-    [0, 1, 2].map(|period| error(model, speed, signal, period, name).unwrap_or(f64::NAN))
+    [0, 1, 2].map(|period| error(model, Case { speed, signal, period }, name).unwrap_or(f64::NAN))
 }
 
 /// Errors at 50 µs but those of the rows left out: the least and the largest.
