@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use include_dir::{Dir, include_dir};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
@@ -19,7 +19,7 @@ pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.curren
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
 /// Where numbers of a motor come from.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// The keys whose values come from here.
