@@ -77,8 +77,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
 }
 
 fn median(values: impl Iterator<Item = Value>) -> f64 {
-    let mut values: Vec<f64> = values.map(|value| value.unwrap_or(0.0)).collect();
-    values.sort_by(f64::total_cmp);
+    let values = sorted(values.map(|value| value.unwrap_or(0.0)));
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 

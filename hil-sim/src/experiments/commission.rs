@@ -347,15 +347,3 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     let margins = current_loop_margins(k_c, z_c, plant, &LPF.sections, period);
     Ok(margins.map_err(Error::refused)?.phase_margin_deg)
 }
-
-pub(super) fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// The smallest value that this share of the sorted values does not exceed; not a number without values.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-}

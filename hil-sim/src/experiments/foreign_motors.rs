@@ -8,7 +8,7 @@ use drive_settings::tuning::bisected;
 use drive_settings::{Flux, SettingsError};
 
 use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
-use super::commission::{quantile, session, sorted, unaware};
+use super::commission::{session, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
 use crate::prelude::*;

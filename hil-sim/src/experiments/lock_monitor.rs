@@ -143,9 +143,7 @@ impl LockMonitor {
     fn forced(&self, all: &[Trial], outcome: &mut Outcome) {
         let parts: Vec<_> = OFFSETS.into_iter().zip(all.chunks(self.runs)).collect();
         let wrong = |trials: &[Trial], share: f64| {
-            let mut wrong: Vec<f64> = trials.iter().map(|t| t.wrong_s).collect();
-            wrong.sort_by(f64::total_cmp);
-            wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
+            quantile(&sorted(trials.iter().map(|t| t.wrong_s)), share)
         };
         let stopped = |trials: &[Trial]| trials.iter().filter(|t| t.fault.is_some()).count();
         let missed = |trials: &[Trial]| trials.iter().filter(|t| !t.is_in_time()).count();

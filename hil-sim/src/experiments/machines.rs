@@ -161,8 +161,7 @@ impl Study for Machines {
         }
         let learned = || machines.iter().filter(|machine| machine.runs.is_ok());
         let good = machines.iter().filter(|machine| machine.is_good()).count();
-        let mut rms: Vec<f64> = learned().map(Machine::rms).collect();
-        rms.sort_by(f64::total_cmp);
+        let rms = sorted(learned().map(Machine::rms));
         let m = &mut outcome.metrics;
         m.set("machines", machines.len() as f64);
         m.set("learned", rms.len() as f64);

@@ -63,10 +63,7 @@ fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64,
         config.drive.injection.synchronous.check = false;
     }
     let case = OperatingPoint { rpm, iq: IQ_A, seed: context.seed };
-    let mut rig = match prepared(&config, case.seed) {
-        Ok(rig) => rig,
-        Err(_) => return Ok(None),
-    };
+    let Ok(mut rig) = prepared(&config, case.seed) else { return Ok(None) };
     if bring_up(&mut rig, rpm).is_err() || rig.drive.state().fault().is_some() {
         return Ok(None);
     }
