@@ -15,7 +15,7 @@ const MOTORS: [Option<&str>; 2] = [None, Some("modelica-18kw5")];
 
 /// A drive that has learned, on a shaft that a dynamometer will turn; current that trips, A.
 fn learned(motor: Option<&str>) -> (Rig, f64) {
-    let config = Config::load(motor, None, &["prepare.learn=yes".to_owned()]).expect("settings");
+    let config = Config::load(motor, None, &["prepare.learn=yes"]).expect("settings");
     let config = for_the_range(&config).expect("settings");
     (Rig::from_config(&config, 5).expect("a bench"), config.drive.trip_a().into())
 }

@@ -9,8 +9,7 @@ use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {
-    let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
-    Config::load(None, None, &changes).unwrap()
+    Config::load(None, None, changes).unwrap()
 }
 
 /// No noise, a converter of 16 bits, no analog filter, an ideal inverter.

@@ -42,7 +42,7 @@ impl Config {
     pub fn load(
         motor: Option<&str>,
         file: Option<&Path>,
-        assignments: &[String],
+        assignments: &[impl AsRef<str>],
     ) -> Result<Self, Error> {
         let mut config = Self::of_motor(motor)?;
         if let Some(path) = file {
@@ -52,7 +52,7 @@ impl Config {
             }
         }
         for assignment in assignments {
-            let (name, value) = assigned(assignment)?;
+            let (name, value) = assigned(assignment.as_ref())?;
             config.set(name, &Value::from_text(value))?;
         }
         Ok(config)
