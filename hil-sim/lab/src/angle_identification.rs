@@ -19,15 +19,14 @@ use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};
 
 /// Section 3.11.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "angle-identification",
-    stands_for: "Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44",
-    about: "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
+pub const EXPERIMENT: Experiment = Experiment::new("angle-identification", run)
+    .stands_for("Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44")
+    .about(
+        "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
             controller made from it, and why the loop is closed around another plant.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+    )
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;

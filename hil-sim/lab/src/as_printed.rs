@@ -12,15 +12,12 @@ use sim_bench::prelude::*;
 use crate::recomputed::printed;
 
 /// Figures 37 to 39, Table 1, section 3.4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "as-printed",
-    stands_for: "Figures 37, 38, 39, Table 1, section 3.4",
-    about: "The drive as the text has it, on motors of three saliencies: angle error over the torque current; its \
-            position controller on its plant; filter and rotation in either order; three angle sources at three speeds.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("as-printed", run)
+    .stands_for("Figures 37, 38, 39, Table 1, section 3.4")
+    .about("The drive as the text has it, on motors of three saliencies: angle error over the torque current; its \
+            position controller on its plant; filter and rotation in either order; three angle sources at three speeds.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]]);
 
 /// Flux-fixed saliencies of the simulated motors; the source measures none.
 const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];

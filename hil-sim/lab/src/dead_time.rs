@@ -8,19 +8,16 @@ use sim_bench::prelude::*;
 use sim_bench::rig::wrapped_degrees;
 
 /// Figures 28 and 29.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "dead-time",
-    stands_for: "Figures 28 and 29, section 3.9",
-    about: "Voltage error and current distortion by the dead time, with and without compensation.",
-    uses: &[BENCH, DRIVE],
-    not: &[
+pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
+    .stands_for("Figures 28 and 29, section 3.9")
+    .about("Voltage error and current distortion by the dead time, with and without compensation.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[
         FREE_SHAFT,
         SPEED_LOOP,
         TRACKING,
         &["angle_source", "inverter.residual_v", "inverter.switched", "inverter.compensate"],
-    ],
-    run,
-};
+    ]);
 
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;

@@ -14,15 +14,12 @@ use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "demodulators",
-    stands_for: "Figures 10, 19, 20, section 5.2",
-    about: "Five demodulations on one motor: what each sees over the injection angle, with and without \
-            a saliency, noise, delay, and the angle error without a position sensor.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("demodulators", run)
+    .stands_for("Figures 10, 19, 20, section 5.2")
+    .about("Five demodulations on one motor: what each sees over the injection angle, with and without \
+            a saliency, noise, delay, and the angle error without a position sensor.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 /// Torque currents of the map and of the table, A.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];

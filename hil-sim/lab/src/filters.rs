@@ -16,15 +16,13 @@ use compared::{ComparedFilter, filters};
 use design::{Band, Prototype, butterworth, chebyshev_1, chebyshev_2, elliptic};
 
 /// Figure 30, Tables 7 and 8.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "filters",
-    stands_for: "Figure 30, Tables 7, 8",
-    about: "Response of the three elliptic filters, and their error in single precision as \
+pub const EXPERIMENT: Experiment = Experiment::new("filters", run)
+    .stands_for("Figure 30, Tables 7, 8")
+    .about(
+        "Response of the three elliptic filters, and their error in single precision as \
             second-order sections and in the printed direct form.",
-    uses: &[&["seconds"]],
-    not: &[],
-    run,
-};
+    )
+    .uses(&[&["seconds"]]);
 
 /// How long each filter is fed, s.
 const SECONDS: f64 = 100.0;

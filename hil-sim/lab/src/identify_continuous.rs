@@ -9,16 +9,13 @@ use crate::identification::trial::Noise;
 use crate::identification::{Parameters, Signal, Trial};
 
 /// Tables 2, 3 and 5.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-continuous",
-    stands_for: "Jacobina 1996, Tables 2, 3 and 5",
-    about: "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-continuous", run)
+    .stands_for("Jacobina 1996, Tables 2, 3 and 5")
+    .about(
+        "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
             the paper, beside the printed ones, and by the exact inverse (D) and the structured \
             fit (S).",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (all, mut outcome) = tables(context, &MODELS);

@@ -12,15 +12,13 @@ use crate::identification::trial::{Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial};
 
 /// Figures 2 to 4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-recursive",
-    stands_for: "Jacobina 1996, Figures 2 to 4",
-    about: "Parameters and speed by recursive least squares while the machine runs: the f32 code \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-recursive", run)
+    .stands_for("Jacobina 1996, Figures 2 to 4")
+    .about(
+        "Parameters and speed by recursive least squares while the machine runs: the f32 code \
             of the drive beside the same in f64, and how long it takes to converge.",
-    uses: &[&["seconds"]],
-    not: &[],
-    run,
-};
+    )
+    .uses(&[&["seconds"]]);
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;

@@ -11,15 +11,12 @@ use crate::identification::{Complex, Parameters, Signal, Trial};
 use crate::source;
 
 /// Figure 5, Tables 6 and 7.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-validate",
-    stands_for: "Jacobina 1996, Figure 5, Tables 6 and 7",
-    about: "The current of a machine beside the current simulated with estimated and with \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-validate", run)
+    .stands_for("Jacobina 1996, Figure 5, Tables 6 and 7")
+    .about(
+        "The current of a machine beside the current simulated with estimated and with \
             classical parameters, and the parameters themselves beside the printed ones.",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 const H: f64 = 50e-6;
 /// Noise of a real converter: a tenth of that of section 5.

@@ -10,14 +10,11 @@ use crate::recomputed::printed;
 pub(super) const PP: f64 = 0.944_061;
 
 /// Figure 19.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "injection-map",
-    stands_for: "Figure 19, Figure 18",
-    about: "Current difference over the injection angle, with the encoder: what each demodulator sees.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("injection-map", run)
+    .stands_for("Figure 19, Figure 18")
+    .about("Current difference over the injection angle, with the encoder: what each demodulator sees.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// Step of phi2 - theta, degrees.

@@ -9,14 +9,11 @@ use sim_bench::prelude::*;
 use crate::linear_model::{Disturbance, LinearModel};
 
 /// Section 5.2 names it as work to be done.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "perturbation",
-    stands_for: "section 5.2",
-    about: "Angle error after load and current steps, measured and by the linear model.",
-    uses: &[BENCH, DRIVE, &["prepare.learn"]],
-    not: &[&["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("perturbation", run)
+    .stands_for("section 5.2")
+    .about("Angle error after load and current steps, measured and by the linear model.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn"]])
+    .not(&[&["angle_source"]]);
 
 /// Seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;

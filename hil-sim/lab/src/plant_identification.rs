@@ -10,15 +10,12 @@ use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "plant-identification",
-    stands_for: "Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A",
-    about: "Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
-            by least squares from what the drive saw, and the controllers by the rule of section 3.8.",
-    uses: &[BENCH, DRIVE],
-    not: &[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("plant-identification", run)
+    .stands_for("Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A")
+    .about("Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
+            by least squares from what the drive saw, and the controllers by the rule of section 3.8.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]]);
 
 /// Amplitude of the pseudo-random voltage, V: assumed, the source gives none. It moves the current by
 /// some 0.3 A.

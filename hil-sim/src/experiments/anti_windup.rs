@@ -8,14 +8,9 @@ use crate::error::Error;
 use crate::outcome::{Cell, Compared, Figure, Outcome, Panel, Series, Table};
 
 /// Figure 40, Eq. B.1 to B.3.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "anti-windup",
-    stands_for: "Figure 40",
-    about: "Step of an integrator under a limited PI controller, without and with anti-windup.",
-    uses: &[],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("anti-windup", run)
+    .stands_for("Figure 40")
+    .about("Step of an integrator under a limited PI controller, without and with anti-windup.");
 
 const K_C: f64 = 0.25;
 const Z_C: f64 = 0.1;

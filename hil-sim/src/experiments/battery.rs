@@ -25,14 +25,10 @@ pub use trial::{Refused, Trial};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "battery",
-    stands_for: "what section 5.2 leaves open",
-    about: "Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]],
-    not: &[],
-    run: whole::<Battery>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("battery", whole::<Battery>)
+    .stands_for("what section 5.2 leaves open")
+    .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]]);
 
 /// Runs for which the drive learns anew.
 const GROUP: usize = KINDS.len();

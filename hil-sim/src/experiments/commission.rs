@@ -17,19 +17,15 @@ pub(super) use session::unaware;
 use session::{Abort, Session};
 
 /// Not in the source, which asks for it as future work.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "commission",
-    stands_for: "beyond the dissertation",
-    about: "From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
-            with `prepare.learn` the drive then learns and is judged at 16 operating points.",
-    uses: &[
+pub const EXPERIMENT: Experiment = Experiment::new("commission", whole::<Commission>)
+    .stands_for("beyond the dissertation")
+    .about("From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
+            with `prepare.learn` the drive then learns and is judged at 16 operating points.")
+    .uses(&[
         BENCH,
         DRIVE,
         &["load.", "prepare.learn", "spread.machine", "runs", "seconds", "commission."],
-    ],
-    not: &[],
-    run: whole::<Commission>,
-};
+    ]);
 
 /// Errors, in percent, as [`Circuit::values`] and of the gain mismatch, twice of which count as wrong: of a linear machine, and
 /// of one of iron.

@@ -15,14 +15,10 @@ use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "foreign-motors",
-    stands_for: "beyond the dissertation",
-    about: "Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.",
-    uses: &[&["runs"]],
-    not: &[],
-    run: whole::<ForeignMotors>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("foreign-motors", whole::<ForeignMotors>)
+    .stands_for("beyond the dissertation")
+    .about("Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
+    .uses(&[&["runs"]]);
 
 const RUNS: u32 = 30;
 /// Parts of a record: undisturbed, and with all disturbances drawn up to this share of their full sizes.

@@ -8,14 +8,11 @@ use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "lock-monitor",
-    stands_for: "what section 5.2 leaves open",
-    about: "The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
-    not: &[&["angle_source"]],
-    run: whole::<LockMonitor>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("lock-monitor", whole::<LockMonitor>)
+    .stands_for("what section 5.2 leaves open")
+    .about("The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn", "runs"]])
+    .not(&[&["angle_source"]]);
 
 /// Trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;

@@ -4,20 +4,17 @@ use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use crate::prelude::*;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "monte-carlo",
-    stands_for: "the claim behind Figures 38 and 39",
-    about: "Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
-    uses: &[
+pub const EXPERIMENT: Experiment = Experiment::new("monte-carlo", whole::<MonteCarlo>)
+    .stands_for("the claim behind Figures 38 and 39")
+    .about("Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.")
+    .uses(&[
         BENCH,
         DRIVE,
         &["load.speed_rpm", "prepare.learn"],
         &["spread.motor", "spread.noise", "spread.gain"],
         &["runs", "seconds"],
-    ],
-    not: &[FREE_SHAFT, SPEED_LOOP],
-    run: whole::<MonteCarlo>,
-};
+    ])
+    .not(&[FREE_SHAFT, SPEED_LOOP]);
 
 const RUNS: u32 = 200;
 /// How many of the worst runs are listed.

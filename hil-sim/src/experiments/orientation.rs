@@ -3,14 +3,11 @@
 use crate::prelude::*;
 
 /// Section 2.3.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "encoder-orientation",
-    stands_for: "Section 2.3, Eq. 2.7 and 2.10",
-    about: "Flux angle and torque over speed with the encoder, delays compensated and left in.",
-    uses: &[BENCH, DRIVE, &["seconds"]],
-    not: &[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("encoder-orientation", run)
+    .stands_for("Section 2.3, Eq. 2.7 and 2.10")
+    .about("Flux angle and torque over speed with the encoder, delays compensated and left in.")
+    .uses(&[BENCH, DRIVE, &["seconds"]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]]);
 
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;

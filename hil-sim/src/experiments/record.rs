@@ -11,14 +11,11 @@ use crate::plant::Plant;
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "record",
-    stands_for: "what section 5.2 leaves open",
-    about: "A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.",
-    uses: &[BENCH, DRIVE, &["record.", "after."]],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("record", run)
+    .stands_for("what section 5.2 leaves open")
+    .about("A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.")
+    .uses(&[BENCH, DRIVE, &["record.", "after."]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
 const SETTLING_S: f64 = 12.0;
