@@ -3,7 +3,7 @@
 mod trials;
 
 pub use self::trials::Trial;
-use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
+use self::trials::{HealthyKind, OVER_SPEED_S};
 use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
@@ -66,7 +66,7 @@ impl Study for LockMonitor {
         }
         n -= OFFSETS.len() * self.runs;
         if n < self.healthy_runs() {
-            let kind = KINDS[n % KINDS.len()];
+            let kind = HealthyKind::VALUES[n % HealthyKind::VALUES.len()];
             return trials::healthy(&self.config, seed(10, n), kind);
         }
         n -= self.healthy_runs();
@@ -121,7 +121,7 @@ impl LockMonitor {
         columns![|n, r: &Trial|
             "forced by (°)" => Cell::or_dash(OFFSETS.get(n / self.runs).map(|o| Cell::fixed(o.0, 0)));
             "seed" => Cell::from(r.case.seed.to_string());
-            "kind" => Cell::from(r.kind.map_or("", HealthyKind::name));
+            "kind" => Cell::from(r.kind.map_or("", Words::word));
             "iq (A)" => Cell::fixed(r.case.iq, 3);
             "speed (rpm)" => Cell::fixed(r.case.rpm, 1);
             "wrong for (s)" => Cell::fixed(r.wrong_s, 3);
@@ -200,10 +200,10 @@ impl LockMonitor {
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
         outcome.tables.extend(self.listed("Every false alarm", &heads, alarms));
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
-        for kind in KINDS {
+        for &kind in HealthyKind::VALUES {
             let of_kind = runs.iter().filter(|r| r.kind == Some(kind));
             let points = of_kind.map(|r| (r.case.iq, r.largest_loss)).collect();
-            panel = panel.with(Series::points(kind.name(), points));
+            panel = panel.with(Series::points(kind.word(), points));
         }
         outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
     }
