@@ -13,8 +13,7 @@ use std::hint::black_box;
 
 /// A rig that regulates 1.5 A, sensorless or with the encoder, with the default plant.
 fn rig(changes: &[&str]) -> Rig {
-    let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
-    let config = Config::load(None, None, &changes).expect("keys of the configuration");
+    let config = Config::load(None, None, changes).expect("keys of the configuration");
     let mut rig = Rig::from_config(&config, 1).expect("the default rig");
     rig.start(Mode::Torque).expect("a start");
     rig.command(&Command::Torque(1.5)).expect("a reference");

@@ -17,7 +17,7 @@ const LONGEST_S: f64 = 0.008;
 
 /// A drive that has learned and regulates torque on a shaft of this speed.
 fn at_speed(rpm: f64) -> Rig {
-    let config = Config::load(None, None, &["prepare.learn=yes".to_owned()]).unwrap();
+    let config = Config::load(None, None, &["prepare.learn=yes"]).unwrap();
     let mut rig = Rig::from_config(&for_the_range(&config).unwrap(), 5).unwrap();
     rig.start(Mode::Torque).unwrap();
     for n in 1..=100 {

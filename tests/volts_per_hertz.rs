@@ -55,7 +55,7 @@ fn motors_turn_by_their_nameplates() {
         (7, Some("rewound-48v")),
         (8, Some("kart-5kw3")),
     ] {
-        let config = Config::load(motor, None, &[]).unwrap();
+        let config = Config::of_motor(motor).unwrap();
         let plate = &config.drive.nameplate;
         let rated_rpm = f64::from(plate.speed_rpm);
         let rated_nm = f64::from(plate.power_w) / (rated_rpm * std::f64::consts::TAU / 60.0);
@@ -88,7 +88,7 @@ fn motors_turn_by_their_nameplates() {
 #[test]
 fn a_load_beyond_the_limit_switches_off() {
     for seed in 1..4 {
-        let config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
+        let config = Config::of_motor(Some("motulator-2kw2")).unwrap();
         let mut rig = turning(&config, 700.0, seed);
         rig.set_load(Load::Locked).unwrap();
         let mut peak = 0.0_f64;
@@ -127,7 +127,7 @@ fn a_sensor_or_a_phase_that_opens_is_seen() {
 /// `stop` switches off at once; by the ramp the shaft comes to rest first.
 #[test]
 fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
-    let config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
+    let config = Config::of_motor(Some("motulator-2kw2")).unwrap();
     let mut rig = turning(&config, 600.0, 1);
     rig.command(&Command::Stop(Stop::Ramp)).unwrap();
     rig.run(0.5, |_| {});
@@ -180,7 +180,7 @@ fn a_hot_heat_sink_takes_torque_and_is_named() {
 /// A load that needs more power than allowed takes speed until it does not, within 5 % in two seconds. Measured: 211 W of 210 W.
 #[test]
 fn a_power_limit_takes_speed() {
-    let mut config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
+    let mut config = Config::of_motor(Some("motulator-2kw2")).unwrap();
     config.drive.limits.motoring_w = 210.0;
     let mut rig = turning(&config, 900.0, 1);
     rig.set_load(Load::Free { torque: 4.0 }).unwrap();

@@ -12,8 +12,7 @@ fn main() -> Result<(), hil_sim::error::Error> {
     config.set("load.mode", &Value::Word("locked".into()))?;
 
     // The drive learns the motor first, because the motor's file says so.
-    let mut rig = Rig::from_config(&config, 1)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, 1, Mode::Torque)?;
     let start = rig.time();
     println!("time_s,torque_nm,angle_error_deg");
     for _ in 0..500 {

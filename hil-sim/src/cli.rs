@@ -21,9 +21,8 @@ use crate::experiments;
 use crate::first_light;
 use crate::input::{Input, OUT};
 use crate::passport;
-use part::Part;
 pub use run::json;
-use run::{Output, Trace};
+use run::{Output, Request, Trace};
 
 /// Simulates an induction-motor drive: the control code of the firmware, closed over a motor model.
 ///
@@ -65,19 +64,7 @@ enum Command {
         json: bool,
     },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
-    Run {
-        /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
-        name: String,
-        /// For `profile`: CSV file with the profile; for `measured-start`: with the recorded start
-        #[arg(long = "input", value_name = "FILE")]
-        file: Option<PathBuf>,
-        #[command(flatten)]
-        input: Input,
-        #[command(flatten)]
-        part: Part,
-        #[command(flatten)]
-        output: Output,
-    },
+    Run(Request),
     /// Merge the shards of a run: prints the JSON object of the whole run
     ///
     /// The shards are what `run NAME --shard I/N` printed, in any order. Exit code 2 when one is missing, there twice, torn,
@@ -155,13 +142,10 @@ enum Command {
 /// has to be changed.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        None => run::run(
-            experiments::DEFAULT,
-            None,
-            &Input { seed: 1, ..Input::default() },
-            &Part::default(),
-            &Output::default(),
-        ),
+        None => {
+            let input = Input { seed: 1, ..Input::default() };
+            run::run(&Request { name: experiments::DEFAULT.into(), input, ..Request::default() })
+        }
         Some(Command::List { lab, json }) => {
             lists::experiments(json, lab).and_then(|text| say(&text))
         }
@@ -171,9 +155,7 @@ pub fn main() -> ExitCode {
         Some(Command::Keys { prefix, toml, input }) => {
             lists::keys(prefix.as_deref(), toml, &input).and_then(|text| say(&text))
         }
-        Some(Command::Run { name, file, input, part, output }) => {
-            run::run(&name, file.as_deref(), &input, &part, &output)
-        }
+        Some(Command::Run(request)) => run::run(&request),
         Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
         Some(Command::Report { of, input, out }) => report::report(of, &input, &out),
         Some(Command::IdentifyTrace { trace, input, output }) => {

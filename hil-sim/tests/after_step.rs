@@ -8,8 +8,7 @@ use hil_sim::{Config, experiments};
 const HOT: &str = "measurement.heat_sink_c=77";
 
 fn metrics(name: &str, set: &[&str]) -> Metrics {
-    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    let config = Config::load(None, None, &set).expect("allowed settings");
+    let config = Config::load(None, None, set).expect("allowed settings");
     experiments::run(name, &config, 1).expect("an outcome").metrics
 }
 

@@ -5,8 +5,7 @@ use hil_sim::outcome::Metrics;
 use hil_sim::{Config, experiments};
 
 fn battery(set: &[&str]) -> (Metrics, usize) {
-    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    let config = Config::load(None, None, &set).expect("allowed settings");
+    let config = Config::load(None, None, set).expect("allowed settings");
     let outcome = experiments::run("battery", &config, 1).expect("a battery");
     (outcome.metrics, outcome.faults.len())
 }
@@ -43,8 +42,8 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
 /// hand-over that oscillated until the angle was lost, in four of these runs.
 #[test]
 fn a_torque_current_of_three_times_the_direct_one_is_held_up_to_600_rpm() {
-    let set = ["load.speed_rpm=600", "runs=70"].map(str::to_owned);
-    let config = Config::load(None, None, &set).expect("allowed settings");
+    let config =
+        Config::load(None, None, &["load.speed_rpm=600", "runs=70"]).expect("allowed settings");
     let metrics = experiments::run("monte-carlo", &config, 19322).expect("statistics").metrics;
     assert_eq!(get(&metrics, "lost_runs"), 0.0, "{metrics:?}");
     assert!(get(&metrics, "angle_error_rms_deg") < 1.1, "{metrics:?}");
@@ -116,9 +115,9 @@ fn values_after_the_learning_do_not_act_while_it_lasts() {
     assert_eq!(get(&learn("saliency.a_psi=0"), "refused_starts"), 3.0);
     let fine = battery(&["prepare.learn=yes", "saliency.a_psi=0", "after.saliency.a_psi=-0.035"]);
     assert!(get(&fine.0, "refused_starts") > 0.0);
-    let error = Config::load(None, None, &["after.plant=g".to_owned()]).unwrap_err().to_string();
+    let error = Config::load(None, None, &["after.plant=g"]).unwrap_err().to_string();
     assert!(error.contains("after.plant"), "{error}");
-    let error = Config::load(None, None, &["after.motor.r_r=-1".to_owned()]).unwrap_err();
+    let error = Config::load(None, None, &["after.motor.r_r=-1"]).unwrap_err();
     let text = "after.motor.r_r = -1: out of range; allowed: 0.0001 to 1000 ohm";
     assert_eq!(error.to_string(), text);
 }

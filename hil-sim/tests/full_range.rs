@@ -10,8 +10,7 @@ fn outcome(name: &str, set: &[&str]) -> Outcome {
 }
 
 fn outcome_of(motor: Option<&str>, name: &str, set: &[&str], seed: u64) -> Outcome {
-    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    let config = Config::load(motor, None, &set).expect("allowed settings");
+    let config = Config::load(motor, None, set).expect("allowed settings");
     experiments::run(name, &config, seed).expect("an outcome")
 }
 

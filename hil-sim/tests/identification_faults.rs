@@ -67,7 +67,7 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
     let mut rls = Rls::new(settings).unwrap();
     let step = machine.continuous().exact(H);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
-    let mut x = [Complex::ZERO; 2];
+    let mut x = nalgebra::Vector2::zeros();
     let mut last_bad = 0;
     let mut result =
         Result { flagged: 0.0, worst_valid: 0.0, back: 0.0, back_from_good: 0.0, errors: [0.0; 2] };

@@ -60,12 +60,9 @@ fn percent(estimate: &Estimate, truth: &Parameters) -> [f64; 5] {
 
 /// Largest difference of two steps, relative to the largest entry of the matrix it is in.
 fn steps_apart(a: &Step, b: &Step) -> f64 {
-    let apart = |a: Vec<Complex>, b: Vec<Complex>| {
-        let largest = b.iter().map(|x| x.norm()).fold(0.0, f64::max);
-        let worst = std::iter::zip(a, b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        worst / largest
-    };
-    apart(a.f().concat(), b.f().concat()).max(apart(a.h.to_vec(), b.h.to_vec()))
+    let largest = |all: &[Complex]| all.iter().map(|x| x.norm()).fold(0.0, f64::max);
+    let f = largest((a.f() - b.f()).as_slice()) / largest(b.f().as_slice());
+    f.max(largest((a.h - b.h).as_slice()) / largest(b.h.as_slice()))
 }
 
 #[test]

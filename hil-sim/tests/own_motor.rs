@@ -57,7 +57,7 @@ fn nameplate_and_circuit_are_enough() {
     let folder = folder("own-motor");
     for (name, text) in [("large.toml", LARGE), ("small.toml", SMALL)] {
         let motor = written(&folder, name, text);
-        let config = Config::load(Some(&motor), None, &[]).expect("a motor");
+        let config = Config::of_motor(Some(&motor)).expect("a motor");
         for experiment in ["torque-steps", "speed-profile"] {
             for seed in 1..=8 {
                 let outcome = experiments::run(experiment, &config, seed);
@@ -76,7 +76,7 @@ fn nameplate_and_circuit_are_enough() {
 #[test]
 fn sensors_and_flux_follow_the_nameplate() {
     let folder = folder("own-motor-rules");
-    let config = Config::load(Some(&written(&folder, "m.toml", LARGE)), None, &[]).unwrap();
+    let config = Config::of_motor(Some(&written(&folder, "m.toml", LARGE))).unwrap();
     let rated_a = 3.4 * 2.0_f64.sqrt();
     assert!((config.measurement.range_a / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
     assert!((f64::from(config.drive.sensor_range_a()) / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
@@ -91,7 +91,7 @@ fn sensors_and_flux_follow_the_nameplate() {
     // A file that says them is followed.
     let more = "[sequence]\ni_d = 1.0\n[measurement]\nrange_a = 20.0\n[prepare]\nlearn = false\n";
     let said = written(&folder, "said.toml", &format!("{LARGE}{more}"));
-    let config = Config::load(Some(&said), None, &[]).unwrap();
+    let config = Config::of_motor(Some(&said)).unwrap();
     assert_eq!((config.measurement.range_a, config.drive.i_d()), (20.0, 1.0));
     assert!(!config.prepare.learn);
     // The other experiments of the whole range take the same motor as it is.
@@ -133,7 +133,7 @@ fn the_example_of_the_page_is_a_motor() {
     let example = format.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
     let folder = folder("own-motor-page");
     let file = written(&folder, "example.toml", example.expect("an example"));
-    let config = Config::load(Some(&file), None, &[]).expect("a motor");
+    let config = Config::of_motor(Some(&file)).expect("a motor");
     assert!(config.drive.build().is_ok());
     // It says all that a motor of the program says: the rules add the current loop and the flux alone, and every number has its source.
     let motor = Motor::find(&file).expect("a motor");

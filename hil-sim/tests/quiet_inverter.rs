@@ -29,10 +29,8 @@ fn turning(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     let mut config = config(carrier);
     config.drive.angle_source = AngleSource::Encoder;
     (config.load.mode, config.load.speed_rpm) = (LoadMode::Speed, 150.0);
-    let mut rig = Rig::from_config(&config, seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(1.5))?;
-    rig.run(2.0, |_| {});
+    let mut rig = Rig::started(&config, seed, Mode::Torque)?;
+    rig.settle(&Command::Torque(1.5), 2.0)?;
     let (mut currents, mut torques) = (Vec::new(), Vec::new());
     for _ in 0..12_000 {
         rig.step();
@@ -54,10 +52,8 @@ fn standing(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     let mut config = config(carrier);
     config.load.mode = LoadMode::Locked;
     config.prepare.learn = true;
-    let mut rig = Rig::from_config(&config, seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(1.5))?;
-    rig.run(1.0, |_| {});
+    let mut rig = Rig::started(&config, seed, Mode::Torque)?;
+    rig.settle(&Command::Torque(1.5), 1.0)?;
     let mut errors = Vec::new();
     rig.run(4.0, |point| errors.push(point.angle_error_deg));
     assert_eq!(rig.fault(), None);

@@ -5,8 +5,7 @@ use hil_sim::{Config, experiments};
 
 fn record(set: &[&str]) -> Metrics {
     let short = ["record.minutes=0.1", "record.reversal_s=5"];
-    let set: Vec<String> = short.iter().chain(set).map(|&set| set.to_owned()).collect();
-    let config = Config::load(None, None, &set).expect("allowed settings");
+    let config = Config::load(None, None, &[&short, set].concat()).expect("allowed settings");
     experiments::run("record", &config, 3).expect("a record").metrics
 }
 

@@ -15,7 +15,7 @@ const MOTORS: [Option<&str>; 2] = [None, Some("modelica-18kw5")];
 
 /// A drive that has learned, on a shaft that a dynamometer will turn; current that trips, A.
 fn learned(motor: Option<&str>) -> (Rig, f64) {
-    let config = Config::load(motor, None, &["prepare.learn=yes".to_owned()]).expect("settings");
+    let config = Config::load(motor, None, &["prepare.learn=yes"]).expect("settings");
     let config = for_the_range(&config).expect("settings");
     (Rig::from_config(&config, 5).expect("a bench"), config.drive.trip_a().into())
 }
@@ -65,12 +65,10 @@ fn a_start_that_was_stopped_in_its_search_is_repeated() {
             turn(&mut rig, RPM * f64::from(n) / 100.0);
             rig.run(0.02, |_| {});
         }
-        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
-        rig.run(0.02, |_| {});
+        rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
         start(&mut rig, State::Catching);
         rig.run(0.015, |_| {});
-        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
-        rig.run(0.005, |_| {});
+        rig.settle(&Command::Stop(Stop::Coast), 0.005).expect("a stop");
         let flux = rig.plant.rotor_flux().norm();
         let (largest, shorted) = start(&mut rig, State::Torque);
         as_expected(motor, flux, largest / trip, shorted);
@@ -85,11 +83,9 @@ fn a_start_follows_a_run_by_voltage_and_frequency() {
         let (mut rig, trip) = learned(motor);
         rig.set_load(Load::Free { torque: 0.0 }).expect("a load");
         rig.start(Mode::VoltsPerHertz).expect("a start");
-        rig.command(&Command::Speed(RPM as f32)).expect("a speed");
-        rig.run(8.0, |_| {});
+        rig.settle(&Command::Speed(RPM as f32), 8.0).expect("a speed");
         let rpm = rig.plant.mechanical_speed() * 60.0 / TAU;
-        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
-        rig.run(0.02, |_| {});
+        rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
         turn(&mut rig, rpm);
         let flux = rig.plant.rotor_flux().norm();
         let (largest, shorted) = start(&mut rig, State::Torque);

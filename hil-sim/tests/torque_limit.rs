@@ -13,8 +13,7 @@ fn limit(motor: &str, set: &[&str]) -> (Config, TorqueLimit) {
 }
 
 fn learned(motor: &str, set: &[&str]) -> (Config, Result<TorqueLimit, Error>) {
-    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    let config = Config::load(Some(motor), None, &set).expect("allowed settings");
+    let config = Config::load(Some(motor), None, set).expect("allowed settings");
     let limit = learned_limit(&config, 1).map(|(_, limit)| limit);
     (config, limit)
 }

@@ -21,8 +21,7 @@ fn recorded_trace(changes: &[(&str, &str)]) -> String {
     for (key, value) in set.iter().chain(changes) {
         config.set(key, &Value::from_text(value)).expect("a key");
     }
-    let mut rig = Rig::from_config(&config, 3).expect("a bench");
-    rig.start(Mode::Torque).expect("a start");
+    let mut rig = Rig::started(&config, 3, Mode::Torque).expect("a start");
     let mut trace = "time_s,i_alpha_a,i_beta_a,u_alpha_v,u_beta_v,speed_rpm\n".to_owned();
     let mut row = 0;
     for (magnetising, torque) in [(0.7, 0.5), (1.0, 2.0), (0.6, 1.0), (0.9, 0.4)] {

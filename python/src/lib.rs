@@ -52,7 +52,7 @@ fn check(name: &str, value: f64, (min, max): (f64, f64), unit: &str) -> PyResult
 #[pyo3(signature = (experiment, config=None, *, seed=1, seconds=None, input=None))]
 fn run<'py>(
     py: Python<'py>,
-    experiment: &str,
+    experiment: String,
     config: Option<&Config>,
     seed: u64,
     seconds: Option<f64>,
@@ -60,7 +60,7 @@ fn run<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let options = config.map(|config| config.input.clone()).unwrap_or_default();
     let options = hil_sim::input::Input { seed, seconds, quiet: true, ..options };
-    let json = py.detach(|| cli::json(experiment, input.as_deref(), &options)).map_err(raised)?;
+    let json = py.detach(|| cli::json(experiment, input, options)).map_err(raised)?;
     py.import("json")?.call_method1("loads", (json,))
 }
 

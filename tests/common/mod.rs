@@ -9,8 +9,7 @@ use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {
-    let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
-    Config::load(None, None, &changes).unwrap()
+    Config::load(None, None, changes).unwrap()
 }
 
 /// No noise, a converter of 16 bits, no analog filter, an ideal inverter.
@@ -43,7 +42,7 @@ pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
 
 /// The same by the encoder, with the shaft locked and the injection beside it.
 pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
-    settled(Rig::oriented(config, seed).unwrap(), i_q, settle)
+    Rig::oriented(config, seed, i_q.into(), settle).unwrap()
 }
 
 /// The same from settings.
@@ -56,11 +55,6 @@ pub fn regulating_with(
 ) -> Rig {
     let mut rig = Rig::new(plant, drive, seed).unwrap();
     rig.start(Mode::Torque).unwrap();
-    settled(rig, i_q, settle)
-}
-
-fn settled(mut rig: Rig, i_q: f32, settle: f64) -> Rig {
-    rig.command(&Command::Torque(i_q)).unwrap();
-    rig.run(settle, |_| {});
+    rig.settle(&Command::Torque(i_q), settle).unwrap();
     rig
 }

@@ -36,8 +36,7 @@ pub struct Bench {
 impl Scene {
     /// The configuration: for the whole range of the speed, without a learning before the start.
     pub fn config(&self) -> Config {
-        let mut keys: Vec<String> = self.keys.iter().map(|&key| key.to_owned()).collect();
-        keys.push("injection.allow_unlearned=yes".into());
+        let keys = [self.keys, &["injection.allow_unlearned=yes"]].concat();
         for_the_range(&Config::load(None, None, &keys).unwrap()).unwrap()
     }
 

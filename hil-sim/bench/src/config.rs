@@ -36,26 +36,23 @@ impl Config {
     /// The defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
-    /// As [`Config::of_motor`] and [`file::read`], [`Error::ConfigLine`] for an assignment of the file that [`Config::set`]
+    /// As [`Config::of_motor`] and [`file::read`], [`Error::Data`] for an assignment of the file that [`Config::set`]
     /// refuses, [`Error::Assignment`] for an assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
     /// other: they are checked when the drive is built.
     pub fn load(
         motor: Option<&str>,
         file: Option<&Path>,
-        assignments: &[String],
+        assignments: &[impl AsRef<str>],
     ) -> Result<Self, Error> {
         let mut config = Self::of_motor(motor)?;
         if let Some(path) = file {
             for FileAssignment { name, value, line } in file::read(path)? {
-                config.set(&name, &value).map_err(|error| Error::ConfigLine {
-                    path: path.to_owned(),
-                    line,
-                    error: Box::new(error),
-                })?;
+                let failed = |e: Error| Error::data(path, Some(line), e.to_string());
+                config.set(&name, &value).map_err(failed)?;
             }
         }
         for assignment in assignments {
-            let (name, value) = assigned(assignment)?;
+            let (name, value) = assigned(assignment.as_ref())?;
             config.set(name, &Value::from_text(value))?;
         }
         Ok(config)

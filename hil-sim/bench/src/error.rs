@@ -33,24 +33,6 @@ pub enum Error {
     /// `--set` without an equals sign.
     #[error("`{0}`: write KEY=VALUE, for example --set motor.r_s=5.4")]
     Assignment(String),
-    /// The configuration file cannot be read or is not TOML.
-    #[error("{}: {problem}", .path.display())]
-    ConfigFile {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        problem: String,
-    },
-    /// An assignment of the configuration file is refused.
-    #[error("{}, line {line}: {error}", .path.display())]
-    ConfigLine {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
-        /// The refusal.
-        error: Box<Error>,
-    },
     /// The experiment does not use a key that was set for it.
     #[error("{name} does not use `{key}`; it uses: {uses}")]
     UnusedKey {
@@ -61,7 +43,7 @@ pub enum Error {
         /// The keys it uses.
         uses: String,
     },
-    /// Data of a file cannot be used.
+    /// A file cannot be read, or is not used as it stands.
     #[error("{}{}: {problem}", .path.display(), line_text(.line))]
     Data {
         /// The file.

@@ -61,6 +61,31 @@ pub struct Experiment {
 }
 
 impl Experiment {
+    /// One that uses no key, by its name and its function.
+    pub const fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
+        Self { name, stands_for: "", about: "", uses: &[], not: &[], run }
+    }
+
+    /// With the part of the source that it reproduces.
+    pub const fn stands_for(self, stands_for: &'static str) -> Self {
+        Self { stands_for, ..self }
+    }
+
+    /// With its description.
+    pub const fn about(self, about: &'static str) -> Self {
+        Self { about, ..self }
+    }
+
+    /// With the keys that it uses.
+    pub const fn uses(self, uses: &'static [&'static [&'static str]]) -> Self {
+        Self { uses, ..self }
+    }
+
+    /// With the exceptions from these keys.
+    pub const fn not(self, not: &'static [&'static [&'static str]]) -> Self {
+        Self { not, ..self }
+    }
+
     /// Runs it for its own time, and shows no progress.
     ///
     /// # Errors

@@ -7,7 +7,6 @@ use drive_core::table::{Grid, POINTS, ReferenceTable};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::rig::Rig;
-use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
 
 /// The values that the drive of the configuration learns.
@@ -40,14 +39,12 @@ pub fn reference_of(
 ) -> Result<ReferenceTable, Error> {
     let mut config = config.clone();
     config.drive.injection.demodulator = demodulator;
-    let mut rig = Rig::oriented(&config, seed)?;
+    let mut rig = Rig::oriented(&config, seed, 0.0, 0.0)?;
     // The table is odd.
     let mut values = [0.0; POINTS];
     for n in 0..=LAST {
-        rig.command(&Command::Torque(Grid::REFERENCE.current(n)))?;
-        rig.run(SETTLE_S, |_| {});
-        let mut signal = Stats::default();
-        rig.run(AVERAGE_S, |p| signal.push(p.signal()));
+        rig.settle(&Command::Torque(Grid::REFERENCE.current(n)), SETTLE_S)?;
+        let [signal] = rig.stats(AVERAGE_S, |p| [p.signal()]);
         if n > 0 {
             values[n..].fill(signal.mean() as f32);
         }

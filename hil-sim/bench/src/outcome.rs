@@ -144,9 +144,14 @@ impl Compared {
         Self { source, place: place.into(), quantity: quantity.into(), ..Self::default() }
     }
 
-    /// With the value from the source's own numbers.
-    pub fn recomputed(self, value: f64) -> Self {
-        Self { recomputed: Some(value), ..self }
+    /// With what the source does not state and the value depends on.
+    pub fn unknown(self, what: &'static str) -> Self {
+        Self { unknown: Some(what), ..self }
+    }
+
+    /// With the value from the source's own numbers, or whether a claim holds by them.
+    pub fn recomputed(self, value: impl Into<f64>) -> Self {
+        Self { recomputed: Some(value.into()), ..self }
     }
 
     /// With what the program takes for it.
@@ -154,9 +159,9 @@ impl Compared {
         Self { used: Some(value), ..self }
     }
 
-    /// With the value from the simulated motor.
-    pub fn simulated(self, value: f64) -> Self {
-        Self { simulated: Some(value), ..self }
+    /// With the value from the simulated motor, or whether a claim holds for it.
+    pub fn simulated(self, value: impl Into<f64>) -> Self {
+        Self { simulated: Some(value.into()), ..self }
     }
 
     /// The value to be judged: the recomputed one, the simulated one, or what the program takes.

@@ -8,4 +8,4 @@ pub use crate::experiment::{
 };
 pub use crate::outcome::{Cell, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
 pub use crate::rig::{RATE_HZ, Rig};
-pub use crate::stats::Stats;
+pub use crate::stats::{Stats, quantile, sorted};

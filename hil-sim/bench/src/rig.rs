@@ -13,6 +13,7 @@ use drive_settings::Settings;
 use crate::config::{self, Config, built, plant_settings};
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
+use crate::stats::Stats;
 
 /// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;
@@ -148,17 +149,27 @@ impl Rig {
         Err(Error::Refused(format!("the drive does not learn: it is {}", self.drive.state())))
     }
 
-    /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
+    /// The same, and started in `mode`.
     ///
     /// # Errors
-    /// As [`Rig::new`] and [`Rig::start`].
-    pub fn oriented(config: &Config, seed: u64) -> Result<Self, Error> {
+    /// As [`Rig::from_config`] and [`Rig::start`].
+    pub fn started(config: &Config, seed: u64, mode: Mode) -> Result<Self, Error> {
+        let mut rig = Self::from_config(config, seed)?;
+        rig.start(mode)?;
+        Ok(rig)
+    }
+
+    /// A drive that the encoder orients, shaft locked, injection beside it, and `seconds` at the torque current `iq`, A.
+    ///
+    /// # Errors
+    /// As [`Rig::started`] and [`Rig::command`].
+    pub fn oriented(config: &Config, seed: u64, iq: f64, seconds: f64) -> Result<Self, Error> {
         let mut config = config.clone();
         config.drive.angle_source = AngleSource::Encoder;
         config.drive.injection.beside_encoder = true;
         config.load.mode = config::LoadMode::Locked;
-        let mut rig = Self::from_config(&config, seed)?;
-        rig.start(Mode::Torque)?;
+        let mut rig = Self::started(&config, seed, Mode::Torque)?;
+        rig.settle(&Command::Torque(iq as f32), seconds)?;
         Ok(rig)
     }
 
@@ -219,6 +230,17 @@ impl Rig {
         }
     }
 
+    /// Runs for `seconds`; the statistics of what `of` takes from each sample.
+    pub fn stats<const N: usize>(
+        &mut self,
+        seconds: f64,
+        of: impl Fn(&Point) -> [f64; N],
+    ) -> [Stats; N] {
+        let mut stats = [Stats::default(); N];
+        self.run(seconds, |p| stats.iter_mut().zip(of(p)).for_each(|(one, value)| one.push(value)));
+        stats
+    }
+
     /// Starts in `mode` and runs until the drive regulates.
     ///
     /// # Errors
@@ -244,6 +266,16 @@ impl Rig {
         self.drive
             .command(command)
             .map_err(|e| Error::Refused(format!("the drive refuses {}: {e}", words(command))))
+    }
+
+    /// Gives the drive a command, and time to settle.
+    ///
+    /// # Errors
+    /// When the drive refuses it.
+    pub fn settle(&mut self, command: &Command, seconds: f64) -> Result<(), Error> {
+        self.command(command)?;
+        self.run(seconds, |_| {});
+        Ok(())
     }
 
     /// The fault with which the drive has stopped itself, with its number.

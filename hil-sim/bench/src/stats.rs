@@ -66,6 +66,19 @@ impl Stats {
     }
 }
 
+/// The values in their order, the smallest first.
+pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// The smallest value that this share of the sorted values does not exceed; not a number without values.
+pub fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
 /// A straight line `y = slope x + intercept`.
 #[derive(Clone, Copy, Debug)]
 pub struct StraightLine {

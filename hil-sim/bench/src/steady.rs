@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Command, Fault, Mode};
-use drive_settings::Settings;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{Config, LoadMode};
@@ -61,7 +60,7 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
-    let mut rig = prepared(&config.drive, config, case.seed)?;
+    let mut rig = prepared(config, case.seed)?;
     bring_up(&mut rig, case.rpm)?;
     rig.command(&Command::Torque(case.iq as f32))?;
     Ok(rig)
@@ -71,8 +70,8 @@ pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
 ///
 /// # Errors
 /// As [`Rig::from_config`].
-pub fn prepared(drive: &Settings, config: &Config, seed: u64) -> Result<Rig, Error> {
-    let mut config = Config { drive: *drive, ..config.clone() };
+pub fn prepared(config: &Config, seed: u64) -> Result<Rig, Error> {
+    let mut config = config.clone();
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
     Rig::from_config(&config, seed)
@@ -99,20 +98,7 @@ pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
-    steady_run_of(&config.drive, config, case, seconds)
-}
-
-/// The same with a drive that is set otherwise than the configuration says.
-///
-/// # Errors
-/// As [`steady_run`].
-pub fn steady_run_of(
-    drive: &Settings,
-    config: &Config,
-    case: OperatingPoint,
-    seconds: f64,
-) -> Result<SteadyRun, Error> {
-    judged(prepared(drive, config, case.seed)?, case, seconds)
+    judged(prepared(config, case.seed)?, case, seconds)
 }
 
 /// The same with a drive that is off.
@@ -121,16 +107,17 @@ pub fn steady_run_of(
 /// When the drive does not start.
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
-    let (mut error, mut torque) = (Stats::default(), Stats::default());
     if let Some(fault) = rig.drive.state().fault() {
-        return Ok(SteadyRun { case, error, torque: 0.0, lost: true, fault: Some(fault) });
+        return Ok(SteadyRun {
+            case,
+            error: Stats::default(),
+            torque: 0.0,
+            lost: true,
+            fault: Some(fault),
+        });
     }
-    rig.command(&Command::Torque(case.iq as f32))?;
-    rig.run(1.0, |_| {});
-    rig.run(seconds, |p| {
-        error.push(p.angle_error_deg);
-        torque.push(p.torque);
-    });
+    rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
+    let [error, torque] = rig.stats(seconds, |p| [p.angle_error_deg, p.torque]);
     let fault = rig.drive.state().fault();
     let lost = error.largest() > LOST_DEG || fault.is_some();
     Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })

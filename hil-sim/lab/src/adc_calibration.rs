@@ -6,14 +6,9 @@ use sim_bench::stats::StraightLine as Line;
 use crate::source;
 
 /// Table 4, Figure 17, Eq. 3.5.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "adc-calibration",
-    stands_for: "Table 4, Figure 17, Eq. 3.5",
-    about: "Least-squares lines through the readings of both current channels.",
-    uses: &[],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("adc-calibration", run)
+    .stands_for("Table 4, Figure 17, Eq. 3.5")
+    .about("Least-squares lines through the readings of both current channels.");
 
 /// Codes of the converter: 12 bits.
 const LAST_CODE: f64 = 4095.0;

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 use drive_core::carrier::DemodulatorKind;
 use sim_bench::bode::{Bode, frequencies, largest_pole};
 use sim_bench::prelude::*;
-use sim_bench::steady::{OperatingPoint, steady_run_of};
+use sim_bench::steady::{OperatingPoint, steady_run};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use crate::demodulators::tracked;
@@ -19,15 +19,14 @@ use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};
 
 /// Section 3.11.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "angle-identification",
-    stands_for: "Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44",
-    about: "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
+pub const EXPERIMENT: Experiment = Experiment::new("angle-identification", run)
+    .stands_for("Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44")
+    .about(
+        "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
             controller made from it, and why the loop is closed around another plant.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+    )
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;
@@ -63,7 +62,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Demodulation, f64)> =
         DEMODULATIONS.iter().flat_map(|s| TABLE_6_A.iter().map(move |&iq| (s, iq))).collect();
     let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {
-        let rig = || measure::oriented(context.config, demodulation.demodulator, iq, context.seed);
+        let mut config = context.config.clone();
+        config.drive.injection.demodulator = demodulation.demodulator;
+        let rig = || Rig::oriented(&config, context.seed, iq, 0.8);
         let (record, steps) = (measure::sequence(rig()?)?, measure::steps(rig()?)?);
         Ok(IdentifiedPoint { models: Model::identify(&record)?, record, steps })
     })?;
@@ -212,13 +213,13 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
 
 /// Table 6 and Eq. 3.44: what the printed chain gives on the simulated motor, and a design for the printed plant.
 fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
-    let unknown = Some("the saliency of its motor and the amplitude of the sequence");
+    let unknown = "the saliency of its motor and the amplitude of the sequence";
     for (iq, point) in TABLE_6_A.iter().zip(points) {
         let model = point.models[1];
         let [pole, _] = model.poles();
         for (quantity, value) in [("k_phi", 1e5 * model.k), ("Re p", pole.re), ("Im p", pole.im)] {
-            let ours = beside(&format!("Table 6, {iq:.1} A"), quantity);
-            outcome.compared.push(Compared { unknown, ..ours }.simulated(value));
+            let ours = beside(&format!("Table 6, {iq:.1} A"), quantity).unknown(unknown);
+            outcome.compared.push(ours.simulated(value));
         }
     }
     let plant = Model::printed(DESIGN_ROW);
@@ -247,9 +248,9 @@ fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
             largest(Pii::printed()) < 1.0,
         ),
     ];
-    outcome.compared.extend(
-        claims.map(|(place, claim, holds)| beside(place, claim).simulated(f64::from(holds))),
-    );
+    outcome
+        .compared
+        .extend(claims.map(|(place, claim, holds)| beside(place, claim).simulated(holds)));
 }
 
 /// Controllers in the closed loop: over the steps of Figure 38, and at constant speed.
@@ -270,15 +271,14 @@ fn closed_loops(
     ];
     let runs = context.in_parallel("closed loops", &cases, |_, (.., demodulation, pii)| {
         let pii = pii.ok_or_else(|| Error::Refused("no controller fits the plant".to_owned()))?;
-        let config = demodulation.config(context.config);
-        let mut drive = config.drive;
-        (drive.injection.printed.k_s, drive.injection.printed.z_s) =
-            (pii.k_s as f32, pii.z_s as f32);
+        let mut config = demodulation.config(context.config);
+        let printed = &mut config.drive.injection.printed;
+        (printed.k_s, printed.z_s) = (pii.k_s as f32, pii.z_s as f32);
         let at = |rpm| {
             let case = OperatingPoint { rpm, iq: TABLE_6_A[DESIGN_ROW], seed: context.seed };
-            steady_run_of(&drive, &config, case, 1.0)
+            steady_run(&config, case, 1.0)
         };
-        Ok((tracked::steps(&drive, &config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
+        Ok((tracked::steps(&config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
     })?;
     let mut table = Table::new("Controllers in the closed loop, constant reference of 10 mA", &[]);
     for ((name, from, key, ..), (steps, turning, pii)) in cases.iter().zip(&runs) {

@@ -12,15 +12,12 @@ use sim_bench::prelude::*;
 use crate::recomputed::printed;
 
 /// Figures 37 to 39, Table 1, section 3.4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "as-printed",
-    stands_for: "Figures 37, 38, 39, Table 1, section 3.4",
-    about: "The drive as the text has it, on motors of three saliencies: angle error over the torque current; its \
-            position controller on its plant; filter and rotation in either order; three angle sources at three speeds.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("as-printed", run)
+    .stands_for("Figures 37, 38, 39, Table 1, section 3.4")
+    .about("The drive as the text has it, on motors of three saliencies: angle error over the torque current; its \
+            position controller on its plant; filter and rotation in either order; three angle sources at three speeds.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]]);
 
 /// Flux-fixed saliencies of the simulated motors; the source measures none.
 const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];
@@ -73,14 +70,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     // The motor whose errors come nearest to what is printed: a tenth of the assumed saliency.
     let weak = &found[1];
     let errors = Stats::of(weak.error.iter().copied());
-    let unknown = Some("the saliency of its motor, and the torque current of each angle error");
+    let unknown = "the saliency of its motor, and the torque current of each angle error";
     for (place, quantity, value) in [
         ("Figure 38", "angle error, about", errors.mean()),
         ("Figure 39", "angle error, least", weak.error.iter().copied().fold(f64::MAX, f64::min)),
         ("Figure 39", "angle error, largest", errors.largest()),
         ("Figure 38", "overshoot of the current in the last step", 1e3 * weak.overshoot),
     ] {
-        let ours = Compared { unknown, ..Compared::with("S1", place, quantity) };
+        let ours = Compared::with("S1", place, quantity).unknown(unknown);
         outcome.compared.push(ours.simulated(value));
     }
     for (k, level) in LEVELS_A.iter().enumerate() {
@@ -109,8 +106,7 @@ fn levels(context: &Context<'_>, a_psi: f64) -> Result<Levels, Error> {
     config.drive.ignore_delays = true;
     config.drive.injection.synchronous.check = false;
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let start = rig.time();
     let mut run =
         Levels { error: Vec::new(), torque: Vec::new(), overshoot: 0.0, trace: Vec::new() };

@@ -8,19 +8,16 @@ use sim_bench::prelude::*;
 use sim_bench::rig::wrapped_degrees;
 
 /// Figures 28 and 29.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "dead-time",
-    stands_for: "Figures 28 and 29, section 3.9",
-    about: "Voltage error and current distortion by the dead time, with and without compensation.",
-    uses: &[BENCH, DRIVE],
-    not: &[
+pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
+    .stands_for("Figures 28 and 29, section 3.9")
+    .about("Voltage error and current distortion by the dead time, with and without compensation.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[
         FREE_SHAFT,
         SPEED_LOOP,
         TRACKING,
         &["angle_source", "inverter.residual_v", "inverter.switched", "inverter.compensate"],
-    ],
-    run,
-};
+    ]);
 
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;
@@ -70,7 +67,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
     let holds = "with the correction the dead time does not distort the voltage at the terminals";
-    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(f64::from(clean)));
+    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(clean));
     let title = "What the dead time does to voltage and current";
     outcome
         .figures
@@ -143,10 +140,8 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.inverter.residual_v = Some(0.0);
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(config.amperes(IQ_A) as f32))?;
-    rig.run(0.5, |_| {});
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
+    rig.settle(&Command::Torque(config.amperes(IQ_A) as f32), 0.5)?;
 
     const BINS: usize = 120;
     let mut sums = [(0.0, 0.0, 0u32); BINS];

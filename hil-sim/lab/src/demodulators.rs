@@ -6,23 +6,20 @@ pub(super) mod tracked;
 
 use rayon::prelude::*;
 use sim_bench::prelude::*;
-use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run_of};
+use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
-use signal::SignalQuality;
+use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "demodulators",
-    stands_for: "Figures 10, 19, 20, section 5.2",
-    about: "Five demodulations on one motor: what each sees over the injection angle, with and without \
-            a saliency, noise, delay, and the angle error without a position sensor.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("demodulators", run)
+    .stands_for("Figures 10, 19, 20, section 5.2")
+    .about("Five demodulations on one motor: what each sees over the injection angle, with and without \
+            a saliency, noise, delay, and the angle error without a position sensor.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 /// Torque currents of the map and of the table, A.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
@@ -97,7 +94,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
     let promising = Compared::with("S1", "section 5.2", "detection of the envelope is promising");
-    outcome.compared.push(promising.simulated(f64::from(envelope)));
+    outcome.compared.push(promising.simulated(envelope));
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
@@ -124,21 +121,22 @@ fn findings(
             .collect::<Result<Vec<_>, _>>()
     };
     let at_each = |config: &Config| {
+        let config = demodulation.config(config);
         IQ_A.par_iter()
-            .map(|&iq| signal::signal_quality(signal::oriented(demodulation, config, iq, seed)?))
+            .map(|&iq| signal::signal_quality(Rig::oriented(&config, seed, iq, SETTLED_S)?))
             .collect::<Result<Vec<_>, _>>()
     };
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
-        let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
+        let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
         // One second at constant speed and torque; none where the angle is lost.
         let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
             let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
-            let run = steady_run_of(&drive, config, case, 1.0)?;
+            let run = steady_run(&config, case, 1.0)?;
             Ok::<_, Error>((!run.lost).then_some(run))
         });
         let turning = turning.collect::<Result<_, _>>()?;
-        Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
+        Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
     };
     let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
     let mut found = DemodulationResults {
@@ -149,7 +147,7 @@ fn findings(
         tracked: [constant?, with_table?, retuned?],
     };
     if found.isotropic_share() < 0.5 {
-        found.delay = Some(signal::delay(demodulation, config, DELAY_IQ_A, seed)?);
+        found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
     }
     Ok(found)
 }

@@ -16,15 +16,13 @@ use compared::{ComparedFilter, filters};
 use design::{Band, Prototype, butterworth, chebyshev_1, chebyshev_2, elliptic};
 
 /// Figure 30, Tables 7 and 8.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "filters",
-    stands_for: "Figure 30, Tables 7, 8",
-    about: "Response of the three elliptic filters, and their error in single precision as \
+pub const EXPERIMENT: Experiment = Experiment::new("filters", run)
+    .stands_for("Figure 30, Tables 7, 8")
+    .about(
+        "Response of the three elliptic filters, and their error in single precision as \
             second-order sections and in the printed direct form.",
-    uses: &[&["seconds"]],
-    not: &[],
-    run,
-};
+    )
+    .uses(&[&["seconds"]]);
 
 /// How long each filter is fed, s.
 const SECONDS: f64 = 100.0;
@@ -46,7 +44,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     );
     let direct = outcome.metrics.get("lpf_direct_1_error_rms_a").unwrap_or(f64::NAN);
     let sensitive = "the filters are sensitive to the precision of their coefficients";
-    let holds = f64::from(direct > 1e-3);
+    let holds = direct > 1e-3;
     outcome.compared.push(Compared::with("S1", "Appendix C", sensitive).recomputed(holds));
     outcome.remark(
         "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA come through, as much as \
@@ -198,9 +196,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         ("elliptic filters have less delay than Butterworth filters", elliptic < delays[0].1),
         ("elliptic filters have less delay than Chebyshev filters", elliptic < fewest),
     ] {
-        outcome
-            .compared
-            .push(Compared::with("S1", "section 3.10", quantity).recomputed(f64::from(holds)));
+        outcome.compared.push(Compared::with("S1", "section 3.10", quantity).recomputed(holds));
     }
     outcome.metrics.set("lpf_currents_high_by_pct", 100.0 * (1.0 / LPF_AS_PRINTED.dc_gain() - 1.0));
     outcome.metrics.set("bpf_gain_dc_db", 20.0 * BPF.dc_gain().log10());

@@ -3,22 +3,19 @@
 
 use sim_bench::prelude::*;
 
-use crate::identification::printed::SPEEDS;
-use crate::identification::study::{Case, Entry, MODELS, TRIALS, errors_of, tables};
+use crate::identification::printed::{Case, SPEEDS};
+use crate::identification::study::{Entry, MODELS, TRIALS, errors_of, tables};
 use crate::identification::trial::Noise;
 use crate::identification::{Parameters, Signal, Trial};
 
 /// Tables 2, 3 and 5.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-continuous",
-    stands_for: "Jacobina 1996, Tables 2, 3 and 5",
-    about: "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-continuous", run)
+    .stands_for("Jacobina 1996, Tables 2, 3 and 5")
+    .about(
+        "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
             the paper, beside the printed ones, and by the exact inverse (D) and the structured \
             fit (S).",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (all, mut outcome) = tables(context, &MODELS);
@@ -77,7 +74,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
         }
     }
     let claim = "from 0 to 200 rad/s the errors of Model C are similar to those of Model B";
-    outcome.compared.push(Compared::with("S0", "section 5", claim).simulated(f64::from(similar)));
+    outcome.compared.push(Compared::with("S0", "section 5", claim).simulated(similar));
     table.note("Half the printed noise, the mean of eight times seven measurements; supply at the speed and 1.8 rad/s of slip.")
 }
 

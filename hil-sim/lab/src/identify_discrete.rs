@@ -5,15 +5,11 @@ use sim_bench::prelude::*;
 use crate::identification::study::tables;
 
 /// Tables 1 and 4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-discrete",
-    stands_for: "Jacobina 1996, Tables 1 and 4",
-    about: "Errors of the coefficients of the sampled equation between current and voltage, by \
+pub const EXPERIMENT: Experiment =
+    Experiment::new("identify-discrete", run).stands_for("Jacobina 1996, Tables 1 and 4").about(
+        "Errors of the coefficients of the sampled equation between current and voltage, by \
             least squares on seven noisy simulated measurements each, beside the printed ones.",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (_, mut outcome) = tables(context, &["A"]);

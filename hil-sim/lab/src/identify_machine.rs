@@ -7,15 +7,11 @@ use crate::identification::{Parameters, claims};
 use crate::source;
 
 /// Numbers that do not depend on the noise.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-machine",
-    stands_for: "Jacobina 1996, Tables 1 to 6",
-    about: "Numbers that follow from the printed tables whatever the noise, beside those of the \
+pub const EXPERIMENT: Experiment =
+    Experiment::new("identify-machine", run).stands_for("Jacobina 1996, Tables 1 to 6").about(
+        "Numbers that follow from the printed tables whatever the noise, beside those of the \
             machine of Table 6 and of one inferred from them.",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();

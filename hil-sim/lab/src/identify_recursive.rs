@@ -12,15 +12,13 @@ use crate::identification::trial::{Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial};
 
 /// Figures 2 to 4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-recursive",
-    stands_for: "Jacobina 1996, Figures 2 to 4",
-    about: "Parameters and speed by recursive least squares while the machine runs: the f32 code \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-recursive", run)
+    .stands_for("Jacobina 1996, Figures 2 to 4")
+    .about(
+        "Parameters and speed by recursive least squares while the machine runs: the f32 code \
             of the drive beside the same in f64, and how long it takes to converge.",
-    uses: &[&["seconds"]],
-    not: &[],
-    run,
-};
+    )
+    .uses(&[&["seconds"]]);
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;
@@ -77,8 +75,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
 }
 
 fn median(values: impl Iterator<Item = Value>) -> f64 {
-    let mut values: Vec<f64> = values.map(|value| value.unwrap_or(0.0)).collect();
-    values.sort_by(f64::total_cmp);
+    let values = sorted(values.map(|value| value.unwrap_or(0.0)));
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
@@ -115,9 +112,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ]);
         if paper.is_some() {
             let quantity = "convergence time of r_s and tau_r, the slowest, Sg";
-            let unknown =
-                Some("the noise of the measurement and when a parameter counts as converged");
-            let place = Compared { unknown, ..Compared::with("S0", source, quantity) };
+            let unknown = "the noise of the measurement and when a parameter counts as converged";
+            let place = Compared::with("S0", source, quantity).unknown(unknown);
             outcome.compared.push(place.simulated(times[0].max(times[1])));
         }
         let key = format!("figure_{}", index + 2);
@@ -143,7 +139,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             worst(3) > worst(2),
         ),
     ] {
-        outcome.compared.push(Compared::with("S0", place, quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S0", place, quantity).simulated(holds));
     }
     outcome.tables.push(table.note(
         "Convergence without noise, into 10 % of the final value by a moving median over 20 ms, \

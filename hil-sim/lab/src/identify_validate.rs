@@ -4,21 +4,19 @@
 use sim_bench::prelude::*;
 
 use crate::identification::models::model_c;
-use crate::identification::study::{Case, errors};
+use crate::identification::printed::Case;
+use crate::identification::study::errors;
 use crate::identification::trial::Noise;
 use crate::identification::{Complex, Parameters, Signal, Trial};
 use crate::source;
 
 /// Figure 5, Tables 6 and 7.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "identify-validate",
-    stands_for: "Jacobina 1996, Figure 5, Tables 6 and 7",
-    about: "The current of a machine beside the current simulated with estimated and with \
+pub const EXPERIMENT: Experiment = Experiment::new("identify-validate", run)
+    .stands_for("Jacobina 1996, Figure 5, Tables 6 and 7")
+    .about(
+        "The current of a machine beside the current simulated with estimated and with \
             classical parameters, and the parameters themselves beside the printed ones.",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 const H: f64 = 50e-6;
 /// Noise of a real converter: a tenth of that of section 5.
@@ -42,10 +40,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (by_sg, by_ss) = (by_sg.map_err(Error::refused)?, by_ss.map_err(Error::refused)?);
         let sg = model_c(&by_sg.delta, H).array();
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
-            let unknown = Some("what was measured");
-            let [of_sg, of_ss] = ["Sg", "Ss"].map(|row| Compared {
-                unknown,
-                ..Compared::with("S0", format!("{table}, {row}"), name)
+            let [of_sg, of_ss] = ["Sg", "Ss"].map(|row| {
+                Compared::with("S0", format!("{table}, {row}"), name).unknown("what was measured")
             });
             outcome.compared.extend(sg[k].ok().map(|value| of_sg.simulated(value)));
             // The simulated machine itself.
@@ -90,7 +86,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             (six_step[1] / of_rbv[1] - 1.0).abs() > 0.3,
         ),
     ] {
-        outcome.compared.push(Compared::with("S0", place, quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S0", place, quantity).simulated(holds));
     }
     // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {

@@ -10,14 +10,11 @@ use crate::recomputed::printed;
 pub(super) const PP: f64 = 0.944_061;
 
 /// Figure 19.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "injection-map",
-    stands_for: "Figure 19, Figure 18",
-    about: "Current difference over the injection angle, with the encoder: what each demodulator sees.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("injection-map", run)
+    .stands_for("Figure 19, Figure 18")
+    .about("Current difference over the injection angle, with the encoder: what each demodulator sees.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// Step of phi2 - theta, degrees.
@@ -132,7 +129,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let constant = errors.fold(0.0, f64::max);
     outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
     let constant = Compared::with("S1", "section 3.3", "at the reference of convergence the quadrature current does not affect the current difference")
-        .simulated(f64::from(constant < 0.2));
+        .simulated(constant < 0.2);
     outcome.compared.push(constant);
     outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
@@ -173,19 +170,12 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
     if !variant.inject {
         config.drive.injection.amplitude_v = Some(0.0);
     }
-    let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.3, |_| {});
+    let mut rig = Rig::oriented(&config, seed, iq, 0.3)?;
     let mut curve = Curve::new();
     for x in (-180..=180).step_by(STEP_DEG as usize) {
         // theta = phi + 90° + turn, so phi2 - theta = -90° - turn
-        rig.command(&Command::TurnInjection((-90 - x) as f32))?;
-        rig.run(SETTLE_S, |_| {});
-        let (mut delta_i, mut error) = (Stats::default(), Stats::default());
-        rig.run(AVERAGE_S, |p| {
-            delta_i.push(p.signal() * 1e3);
-            error.push(p.angle_error_deg);
-        });
+        rig.settle(&Command::TurnInjection((-90 - x) as f32), SETTLE_S)?;
+        let [delta_i, error] = rig.stats(AVERAGE_S, |p| [p.signal() * 1e3, p.angle_error_deg]);
         curve.push((f64::from(x) + error.mean(), delta_i.mean()));
     }
     Ok(curve)

@@ -5,14 +5,11 @@ use sim_bench::learning;
 use sim_bench::prelude::*;
 
 /// Section 5.2 asks for a detection that works at every operating point.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "learn-reference",
-    stands_for: "section 3.3, section 5.2",
-    about: "The drive learns reference, sensor mismatch and saliency with the shaft locked.",
-    uses: &[BENCH, DRIVE],
-    not: &[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("learn-reference", run)
+    .stands_for("section 3.3, section 5.2")
+    .about("The drive learns reference, sensor mismatch and saliency with the shaft locked.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]]);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let learned = learning::learned(context.config, context.seed)?;

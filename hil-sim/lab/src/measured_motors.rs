@@ -15,14 +15,8 @@ use sim_bench::prelude::*;
 use crate::saliency::steady::at_voltage;
 
 /// All comparisons.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "measured-motors",
-    stands_for: "",
-    about: "Simulated motors beside measured ones: load test of an 18.5 kW, saturation curve of a 2.2 kW, direct start of a 4 kW motor.",
-    uses: &[],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("measured-motors", run)
+    .about("Simulated motors beside measured ones: load test of an 18.5 kW, saturation curve of a 2.2 kW, direct start of a 4 kW motor.");
 
 const LOAD_TEST: &str = include_str!("../measured/modelica-18kw5.csv");
 const LARGE: &str = include_str!("../measured/modelica-18kw5.toml");

@@ -12,14 +12,10 @@ use crate::identification::Complex;
 use crate::identify_trace::{Reading, Voltages, read, rms};
 
 /// With a file of the user: columns as those of `identify-trace`, voltages sampled at the terminals, from the switching on.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "measured-start",
-    stands_for: "a recorded start",
-    about: "A recorded direct start beside the simulated motor: its voltages imposed, current and speed compared.",
-    uses: &[&["motor.", "plant", "iron.", "flux_level", "nameplate.", "load.torque_nm"]],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("measured-start", run)
+    .stands_for("a recorded start")
+    .about("A recorded direct start beside the simulated motor: its voltages imposed, current and speed compared.")
+    .uses(&[&["motor.", "plant", "iron.", "flux_level", "nameplate.", "load.torque_nm"]]);
 
 /// Parts of a start, with their ends, s: the first is that of the largest currents.
 const PARTS: [(&str, f64); 3] = [("start", 0.12), ("run_in", 0.25), ("later", f64::INFINITY)];

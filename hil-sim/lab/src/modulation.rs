@@ -10,15 +10,13 @@ use drive_core::{Abc, AlphaBeta};
 use sim_bench::prelude::*;
 
 /// Figures 4, 5 and 11, Table 2.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "modulation",
-    stands_for: "Figures 4, 5, 11, Table 2",
-    about: "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
+pub const EXPERIMENT: Experiment = Experiment::new("modulation", run)
+    .stands_for("Figures 4, 5, 11, Table 2")
+    .about(
+        "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
             spectrum of the current difference, an amplitude modulation of the carrier.",
-    uses: &[&["inverter.dc_link_v"]],
-    not: &[],
-    run,
-};
+    )
+    .uses(&[&["inverter.dc_link_v"]]);
 
 /// The modulator of the drive on this dc link.
 struct Inverter {

@@ -5,15 +5,14 @@ use sim_bench::prelude::*;
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
 
 /// Section 3.6, Table 5.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "motor-tests",
-    stands_for: "Table 5, section 3.6, Eq. 3.17 to 3.19",
-    about: "Direct-current, locked-rotor and no-load test of the simulated motor, and the equivalent \
+pub const EXPERIMENT: Experiment = Experiment::new("motor-tests", run)
+    .stands_for("Table 5, section 3.6, Eq. 3.17 to 3.19")
+    .about(
+        "Direct-current, locked-rotor and no-load test of the simulated motor, and the equivalent \
             circuit from them, by the source's formulas and without what these neglect.",
-    uses: &[&["motor.", "saliency.", "nameplate.current_a"]],
-    not: &[TURNING],
-    run,
-};
+    )
+    .uses(&[&["motor.", "saliency.", "nameplate.current_a"]])
+    .not(&[TURNING]);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let plant = plant_settings(context.config);

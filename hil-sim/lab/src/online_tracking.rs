@@ -7,15 +7,14 @@ use sim_bench::prelude::*;
 use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 
 /// Not in the sources: the recursive estimate in use.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "online-tracking",
-    stands_for: "Jacobina 1996, on the drive",
-    about: "The rotor warms up by 30 % of its resistance: the rotor time constant found while the \
+pub const EXPERIMENT: Experiment = Experiment::new("online-tracking", run)
+    .stands_for("Jacobina 1996, on the drive")
+    .about(
+        "The rotor warms up by 30 % of its resistance: the rotor time constant found while the \
             drive runs, the flux angle error with and without it, and the speed without a sensor.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source", "inverter.residual_v"]],
-    run,
-};
+    )
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source", "inverter.residual_v"]]);
 
 /// Begin and end of the warming, s, and the relative growth of r_r. Fast: a motor takes minutes.
 const WARMING: (f64, f64, f64) = (4.0, 10.0, 0.3);

@@ -9,14 +9,11 @@ use sim_bench::prelude::*;
 use crate::linear_model::{Disturbance, LinearModel};
 
 /// Section 5.2 names it as work to be done.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "perturbation",
-    stands_for: "section 5.2",
-    about: "Angle error after load and current steps, measured and by the linear model.",
-    uses: &[BENCH, DRIVE, &["prepare.learn"]],
-    not: &[&["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("perturbation", run)
+    .stands_for("section 5.2")
+    .about("Angle error after load and current steps, measured and by the linear model.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn"]])
+    .not(&[&["angle_source"]]);
 
 /// Seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;
@@ -109,20 +106,14 @@ fn configured(config: &Config, case: &StepCase) -> Config {
 
 /// Angle error and speed from the step on; the first value is the mean before it.
 fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
-    let mut rig = Rig::from_config(config, seed)?;
     let reference = |value: f64| match case.disturbance {
         Disturbance::Load(_) => Command::Speed(value as f32),
         Disturbance::TorqueCurrent(_) => Command::Torque(value as f32),
     };
     let mode = if case.is_load() { Mode::Speed } else { Mode::Torque };
-    rig.start(mode)?;
-    rig.command(&reference(case.from))?;
-    rig.run(2.0, |_| {});
-    let (mut angle, mut speed) = (Stats::default(), Stats::default());
-    rig.run(BEFORE_S, |p| {
-        angle.push(p.angle_error_deg);
-        speed.push(p.speed_rpm);
-    });
+    let mut rig = Rig::started(config, seed, mode)?;
+    rig.settle(&reference(case.from), 2.0)?;
+    let [angle, speed] = rig.stats(BEFORE_S, |p| [p.angle_error_deg, p.speed_rpm]);
     match case.disturbance {
         Disturbance::Load(nm) => rig.set_load(Load::Free { torque: nm })?,
         Disturbance::TorqueCurrent(by) => rig.command(&reference(case.from + by)).map(|_| ())?,

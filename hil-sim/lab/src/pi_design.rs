@@ -14,15 +14,14 @@ use sim_bench::prelude::*;
 use crate::recomputed::{PERIOD_S, beside, plant, printed};
 
 /// Figures 23 to 25, section 3.8.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "pi-design",
-    stands_for: "Figures 23, 24, 25, Eq. 3.35 to 3.42",
-    about: "The current controllers by the rule of section 3.8, beside the printed ones, and their \
+pub const EXPERIMENT: Experiment = Experiment::new("pi-design", run)
+    .stands_for("Figures 23, 24, 25, Eq. 3.35 to 3.42")
+    .about(
+        "The current controllers by the rule of section 3.8, beside the printed ones, and their \
             margins with the filter, the delay and the motor.",
-    uses: &[&["motor.", "drive.motor."]],
-    not: &[TURNING, &["drive.motor.inertia"]],
-    run,
-};
+    )
+    .uses(&[&["motor.", "drive.motor."]])
+    .not(&[TURNING, &["drive.motor.inertia"]]);
 
 /// The identified plants: where they are printed, the name in the tables and the one of the metrics.
 const PLANTS: [(&str, &str, &str); 3] = [
@@ -70,7 +69,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.compared.push(beside("Figure 25", at).recomputed(gain));
     let below = "the closed current loop crosses over below the lower edge of the pass band of BPF";
     let holds = hz(rule.v) < edges[0];
-    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(f64::from(holds)));
+    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(holds));
     outcome.remarks.push(format!(
         "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
          its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 hold a slip \

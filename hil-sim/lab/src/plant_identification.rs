@@ -10,15 +10,12 @@ use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "plant-identification",
-    stands_for: "Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A",
-    about: "Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
-            by least squares from what the drive saw, and the controllers by the rule of section 3.8.",
-    uses: &[BENCH, DRIVE],
-    not: &[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("plant-identification", run)
+    .stands_for("Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A")
+    .about("Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
+            by least squares from what the drive saw, and the controllers by the rule of section 3.8.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]]);
 
 /// Amplitude of the pseudo-random voltage, V: assumed, the source gives none. It moves the current by
 /// some 0.3 A.
@@ -101,8 +98,7 @@ const TRIALS: [Trial; 3] = [
 
 /// Pseudo-random voltage on q, beside a torque current of 2 A.
 fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
-    rig.command(&Command::Torque(2.0))?;
-    rig.run(1.0, |_| {});
+    rig.settle(&Command::Torque(2.0), 1.0)?;
     prbs(rig, Axis::Q)
 }
 
@@ -160,9 +156,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
     let mut config = context.config.clone();
     config.drive.angle_source = AngleSource::Encoder;
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
-    Ok(rig)
+    Rig::started(&config, context.seed, Mode::Torque)
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {
@@ -199,9 +193,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ]);
         }
         let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
-        let unknown = Some("the motor on the day of the test, and the amplitude of the sequence");
+        let unknown = "the motor on the day of the test, and the amplitude of the sequence";
         for (quantity, value) in [("gain", best.plant.k), ("pole", best.plant.p)] {
-            let ours = Compared { unknown, ..Compared::with("S1", trial.printed, quantity) };
+            let ours = Compared::with("S1", trial.printed, quantity).unknown(unknown);
             outcome.compared.push(ours.simulated(value));
         }
         let design =
@@ -229,7 +223,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let constant = fit(&[10.0; 500], &[1.0; 500], Orders { outputs: 1, inputs: 1, delay: 0 });
     let degrades =
         Compared::with("S1", "Appendix A", "stretches of constant signals degrade the solution");
-    outcome.compared.push(degrades.simulated(f64::from(constant.is_err())));
+    outcome.compared.push(degrades.simulated(constant.is_err()));
     outcome.remarks.extend(remarks(context)?);
     Ok(outcome)
 }

@@ -12,14 +12,9 @@ use crate::identification::bench_tests::Readings;
 use crate::source;
 
 /// Chapters 2 to 4.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "printed-numbers",
-    stands_for: "Figure 13, Eq. 4.2, Tables 3 and 5",
-    about: "The constants of the drive and of the simulated motor beside the printed ones they stand for.",
-    uses: &[],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("printed-numbers", run)
+    .stands_for("Figure 13, Eq. 4.2, Tables 3 and 5")
+    .about("The constants of the drive and of the simulated motor beside the printed ones they stand for.");
 
 /// Control period, s.
 pub const PERIOD_S: f64 = 1.0 / RATE;
@@ -116,8 +111,8 @@ fn position_loop(outcome: &mut Outcome) {
         outcome.compared.push(beside("Eq. 4.2", "gain").recomputed(rule.k_c));
         outcome.compared.push(beside("Eq. 4.2", "zero").recomputed(rule.z_c));
     }
-    let unknown = Some("inertia, friction and the unit of the position");
-    let of = |quantity| Compared { unknown, ..beside("Eq. 4.1", quantity) };
+    let unknown = "inertia, friction and the unit of the position";
+    let of = |quantity| beside("Eq. 4.1", quantity).unknown(unknown);
     outcome.compared.extend(["gain", "pole"].map(of));
 }
 

@@ -12,21 +12,17 @@ use sim_bench::prelude::*;
 use steady::Listed;
 
 /// The map.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "saliency",
-    stands_for: "",
-    about: "Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.",
-    uses: &[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]],
-    not: &[&[
+pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)
+    .about("Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.")
+    .uses(&[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]])
+    .not(&[&[
         "iron.slots",
         "iron.bars",
         "iron.stator_fixed",
         "iron.stator_fixed_deg",
         "motor.inertia",
         "motor.friction",
-    ]],
-    run,
-};
+    ]]);
 
 /// Frequency of the carrier, rad/s.
 const CARRIER: f64 = TAU * 600.0;

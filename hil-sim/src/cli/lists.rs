@@ -84,9 +84,6 @@ pub fn motors(name: Option<&str>, as_json: bool) -> Result<String, Error> {
 }
 
 fn motor_json(motor: &Motor) -> serde_json::Value {
-    let sources = motor.source.iter().map(
-        |source| json!({ "keys": source.keys, "from": source.from, "unverified": source.unverified }),
-    );
     let settings: serde_json::Map<_, _> =
         motor.settings().into_iter().map(|(key, value)| (key, json!(value))).collect();
     json!({
@@ -94,7 +91,7 @@ fn motor_json(motor: &Motor) -> serde_json::Value {
         "title": motor.title,
         "about": motor.about.trim(),
         "settings": settings,
-        "source": sources.collect::<Vec<_>>(),
+        "source": motor.source,
     })
 }
 

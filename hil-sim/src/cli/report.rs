@@ -130,23 +130,16 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
 mod tests {
     use super::*;
 
-    const fn experiment(
-        name: &'static str,
-        run: fn(&Context<'_>) -> Result<Outcome, Error>,
-    ) -> Experiment {
-        Experiment { name, stands_for: "a test", about: "A test.", uses: &[], not: &[], run }
-    }
-
     #[test]
     fn a_report_goes_on_when_experiments_are_refused_or_lost() {
         let experiments = [
-            experiment("refused", |_| Err(Error::Refused("dc link too low".into()))),
-            experiment("sound", |_| {
+            Experiment::new("refused", |_| Err(Error::Refused("dc link too low".into()))),
+            Experiment::new("sound", |_| {
                 let mut outcome = Outcome::default();
                 outcome.metrics.set("torque_nm", 0.625);
                 Ok(outcome)
             }),
-            experiment("lost", |_| {
+            Experiment::new("lost", |_| {
                 let faults = vec!["fault 12: the flux angle is lost".to_owned()];
                 Ok(Outcome { faults, ..Outcome::default() })
             }),

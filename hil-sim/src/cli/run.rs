@@ -31,6 +31,22 @@ pub struct Output {
     pub csv: Option<PathBuf>,
 }
 
+/// A run: of what, how, and where its results go.
+#[derive(Args, Default)]
+pub struct Request {
+    /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
+    pub name: String,
+    /// For `profile`: CSV file with the profile; for `measured-start`: with the recorded start
+    #[arg(long = "input", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    #[command(flatten)]
+    pub input: Input,
+    #[command(flatten)]
+    pub part: Part,
+    #[command(flatten)]
+    pub output: Output,
+}
+
 /// A recorded trace.
 #[derive(Args)]
 pub struct Trace {
@@ -143,16 +159,10 @@ pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
 ///
 /// # Errors
 /// As [`made`]; [`Error::Lost`] after all is written.
-pub fn run(
-    name: &str,
-    file: Option<&Path>,
-    input: &Input,
-    part: &Part,
-    output: &Output,
-) -> Result<(), Error> {
-    let (objects, lost) = made(name, file, input, part, output)?;
-    if !part.is_shard() {
-        print(&objects, output)?;
+pub fn run(request: &Request) -> Result<(), Error> {
+    let (objects, lost) = made(request)?;
+    if !request.part.is_shard() {
+        print(&objects, &request.output)?;
     }
     lost
 }
@@ -161,9 +171,9 @@ pub fn run(
 ///
 /// # Errors
 /// What `cargo sim run` refuses or fails with.
-pub fn json(name: &str, file: Option<&Path>, input: &Input) -> Result<String, Error> {
+pub fn json(name: String, file: Option<PathBuf>, input: Input) -> Result<String, Error> {
     let output = Output { json: true, ..Output::default() };
-    let (objects, _) = made(name, file, input, &Part::default(), &output)?;
+    let (objects, _) = made(&Request { name, file, input, output, ..Request::default() })?;
     Ok(outcome::joined(&objects))
 }
 
@@ -171,13 +181,8 @@ pub fn json(name: &str, file: Option<&Path>, input: &Input) -> Result<String, Er
 ///
 /// # Errors
 /// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; those of the experiment; [`Error::Write`].
-fn made(
-    name: &str,
-    file: Option<&Path>,
-    input: &Input,
-    part: &Part,
-    output: &Output,
-) -> Result<(Vec<String>, Result<(), Error>), Error> {
+fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
+    let Request { name, input, part, output, .. } = request;
     let own = scenario::own(name);
     let chosen: Vec<_> = match &own {
         Some(own) => vec![own],
@@ -186,9 +191,9 @@ fn made(
         }
     };
     if let (None, Some(one)) = (&own, chosen.first()) {
-        experiments::check_file(one, file)?;
+        experiments::check_file(one, request.file.as_deref())?;
     }
-    let file = file.or(own.as_ref().map(|_| Path::new(name)));
+    let file = request.file.as_deref().or(own.as_ref().map(|_| Path::new(name)));
     let config = input.config()?;
     used::check(name, &chosen, input)?;
     let (mut objects, mut lost) = (Vec::new(), Ok(()));

@@ -245,8 +245,8 @@ impl Drop for Link {
     }
 }
 
-/// A thread that panicked while it showed a line leaves the route whole.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// A thread that panicked while it held the lock leaves what is behind it whole.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

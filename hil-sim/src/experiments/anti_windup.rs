@@ -8,14 +8,9 @@ use crate::error::Error;
 use crate::outcome::{Cell, Compared, Figure, Outcome, Panel, Series, Table};
 
 /// Figure 40, Eq. B.1 to B.3.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "anti-windup",
-    stands_for: "Figure 40",
-    about: "Step of an integrator under a limited PI controller, without and with anti-windup.",
-    uses: &[],
-    not: &[],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("anti-windup", run)
+    .stands_for("Figure 40")
+    .about("Step of an integrator under a limited PI controller, without and with anti-windup.");
 
 const K_C: f64 = 0.25;
 const Z_C: f64 = 0.1;
@@ -46,23 +41,12 @@ fn with() -> Controller {
     })
 }
 
-/// Eq. B.1 as printed: the output of a step appears one step later.
-fn literal() -> Controller {
-    let (mut u, mut next, mut before) = (0.0, 0.0, 0.0);
-    Box::new(move |e| {
-        std::mem::swap(&mut u, &mut next);
-        next = u + K_C * (e - Z_C * before);
-        before = e;
-        u
-    })
-}
-
-/// Eq. B.3 as printed: Eq. B.1 with its index, and the limited output in it.
-fn literal_limited() -> Controller {
+/// Eq. B.3 as printed, with the limited output in it; without a limit Eq. B.1. The output of a step appears one step later.
+fn literal(limit: f64) -> Controller {
     let (mut u, mut next, mut before) = (0.0_f64, 0.0_f64, 0.0);
     Box::new(move |e| {
         std::mem::swap(&mut u, &mut next);
-        next = u.clamp(-LIMIT, LIMIT) + K_C * (e - Z_C * before);
+        next = u.clamp(-limit, limit) + K_C * (e - Z_C * before);
         before = e;
         u
     })
@@ -112,10 +96,10 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut table = Table::new("Unit step, limit 0.15", &[]);
     let cases = [
-        ("without anti-windup", "plain", without as fn() -> Controller, immediate),
-        ("with anti-windup", "anti_windup", with, immediate),
-        ("Eq. B.1 with its printed index", "printed_index", literal, delayed),
-        ("Eq. B.3 with its printed index", "printed_anti_windup", literal_limited, delayed),
+        ("without anti-windup", "plain", without(), immediate),
+        ("with anti-windup", "anti_windup", with(), immediate),
+        ("Eq. B.1 with its printed index", "printed_index", literal(f64::INFINITY), delayed),
+        ("Eq. B.3 with its printed index", "printed_anti_windup", literal(LIMIT), delayed),
     ];
     let mut figure = Figure::new(
         "step",
@@ -124,7 +108,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         "Figure 40",
     );
     for (name, key, controller, pole) in cases {
-        let response = Response::of(controller(), LIMIT);
+        let response = Response::of(controller, LIMIT);
         table.record([
             ("controller", Cell::from(name)),
             ("largest y", Cell::fixed(highest(&response.y), 3)),
@@ -167,7 +151,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
 /// What appendix B says of Figure 40.
 fn compared(outcome: &mut Outcome) {
     let plain = Response::of(without(), LIMIT);
-    let late = Response::of(literal_limited(), LIMIT).y.split_off(SAMPLES - 40);
+    let late = Response::of(literal(LIMIT), LIMIT).y.split_off(SAMPLES - 40);
     let swing = highest(&late) - late.iter().copied().fold(f64::INFINITY, f64::min);
     outcome.metrics.set("printed_anti_windup_swing", swing);
     for (quantity, value) in [
@@ -200,7 +184,7 @@ mod tests {
     #[test]
     fn the_printed_index_is_unstable_without_a_limit() {
         assert!((largest_pole(&[-2.0, 1.0 + K_C, -K_C * Z_C]) - 1.0996).abs() < 1e-4);
-        let unlimited = Response::of(literal(), f64::INFINITY);
+        let unlimited = Response::of(literal(f64::INFINITY), f64::INFINITY);
         assert!(highest(&unlimited.y) > 1e6);
     }
 }

@@ -25,14 +25,10 @@ pub use trial::{Refused, Trial};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "battery",
-    stands_for: "what section 5.2 leaves open",
-    about: "Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]],
-    not: &[],
-    run: whole::<Battery>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("battery", whole::<Battery>)
+    .stands_for("what section 5.2 leaves open")
+    .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]]);
 
 /// Runs for which the drive learns anew.
 const GROUP: usize = KINDS.len();
@@ -96,7 +92,7 @@ impl Battery {
             let mut bench = config.clone();
             disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
             let seed = if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
-            learned(config, &plant_settings(&bench), drive, seed)
+            learned(&bench, drive, seed)
         })
     }
 
@@ -139,7 +135,7 @@ impl Study for Battery {
                 disturbed::add(&mut bench, &disturbed::ALWAYS, &always);
                 disturbed::add(&mut bench, &disturbed::AFTER, &after);
                 kind.add(&mut bench);
-                trial(&bench, &plant_settings(&bench), drive, kind, seed)
+                trial(&bench, drive, kind, seed)
             }
             Err(fault) => Ok(Trial { kind: Some(kind), ..Trial::unlearned(seed, *fault) }),
         }

@@ -17,19 +17,15 @@ pub(super) use session::unaware;
 use session::{Abort, Session};
 
 /// Not in the source, which asks for it as future work.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "commission",
-    stands_for: "beyond the dissertation",
-    about: "From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
-            with `prepare.learn` the drive then learns and is judged at 16 operating points.",
-    uses: &[
+pub const EXPERIMENT: Experiment = Experiment::new("commission", whole::<Commission>)
+    .stands_for("beyond the dissertation")
+    .about("From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
+            with `prepare.learn` the drive then learns and is judged at 16 operating points.")
+    .uses(&[
         BENCH,
         DRIVE,
         &["load.", "prepare.learn", "spread.machine", "runs", "seconds", "commission."],
-    ],
-    not: &[],
-    run: whole::<Commission>,
-};
+    ]);
 
 /// Errors, in percent, as [`Circuit::values`] and of the gain mismatch, twice of which count as wrong: of a linear machine, and
 /// of one of iron.
@@ -136,7 +132,7 @@ impl Commission {
         let mut config = Config { drive: *drive, ..config.clone() };
         config.prepare.learn = true;
         config.drive.injection.synchronous.allow_unlearned = false;
-        let learned = match or_refusal(steady::prepared(drive, &config, seed))? {
+        let learned = match or_refusal(steady::prepared(&config, seed))? {
             Ok(learned) => learned,
             Err(why) => return Ok(Err(why)),
         };
@@ -346,16 +342,4 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     let (k_c, z_c) = (design.k_c, design.z_c);
     let margins = current_loop_margins(k_c, z_c, plant, &LPF.sections, period);
     Ok(margins.map_err(Error::refused)?.phase_margin_deg)
-}
-
-pub(super) fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-/// The smallest value that this share of the sorted values does not exceed; not a number without values.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }

@@ -9,15 +9,11 @@ use crate::outcome::{Compared, Figure, Outcome, Panel, Series};
 use sim_lab::recomputed::{plant, printed};
 
 /// Figures 26 and 27, Eq. 3.34, 3.39, 3.40.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "current-step",
-    stands_for: "Figures 26, 27",
-    about: "Step of the closed current loop on the identified plant, with and without reference \
+pub const EXPERIMENT: Experiment =
+    Experiment::new("current-step", run).stands_for("Figures 26, 27").about(
+        "Step of the closed current loop on the identified plant, with and without reference \
             filter, and with a pole 3 % larger.",
-    uses: &[],
-    not: &[],
-    run,
-};
+    );
 
 const SAMPLES: usize = 240;
 const PERIOD_MS: f64 = 1.0 / 6.0;
@@ -97,9 +93,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ("the reference filter removes the overshoot", overshoot(&filtered) < 0.001),
         ("the reference filter makes the settling time longer", longer),
     ] {
-        outcome
-            .compared
-            .push(Compared::with("S1", "Figure 27", quantity).recomputed(f64::from(holds)));
+        outcome.compared.push(Compared::with("S1", "Figure 27", quantity).recomputed(holds));
     }
     outcome.remark(
         "The identified plant has no delay and no current filter in it; with those the same rule \

@@ -8,21 +8,17 @@ use drive_settings::tuning::bisected;
 use drive_settings::{Flux, SettingsError};
 
 use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
-use super::commission::{quantile, session, sorted, unaware};
+use super::commission::{session, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
 use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "foreign-motors",
-    stands_for: "beyond the dissertation",
-    about: "Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.",
-    uses: &[&["runs"]],
-    not: &[],
-    run: whole::<ForeignMotors>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("foreign-motors", whole::<ForeignMotors>)
+    .stands_for("beyond the dissertation")
+    .about("Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
+    .uses(&[&["runs"]]);
 
 const RUNS: u32 = 30;
 /// Parts of a record: undisturbed, and with all disturbances drawn up to this share of their full sizes.
@@ -222,7 +218,7 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
         let half = Kind::LoadStep((500.0 * most / nominal) as u16);
         let kinds = [Kind::Quadrants, Kind::Reversals, Kind::Speed(150), half];
         for (seed, kind) in (0..).map(|n| seed_of(seed, n)).zip(kinds) {
-            let done = trial(&bench, &plant_settings(&bench), &rig.drive, kind, seed);
+            let done = trial(&bench, &rig.drive, kind, seed);
             let run = done.unwrap_or_else(|why| Trial {
                 kind: Some(kind),
                 refused: Some(Refused::Otherwise(why.to_string())),

@@ -21,15 +21,11 @@ use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "full-range",
-    stands_for: "beyond the dissertation",
-    about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
-            the drive does not notice.",
-    uses: &[BENCH, DRIVE, &["full_range.", "prepare.commission", "after.", "runs"]],
-    not: &[],
-    run: whole::<FullRange>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("full-range", whole::<FullRange>)
+    .stands_for("beyond the dissertation")
+    .about("Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
+            the drive does not notice.")
+    .uses(&[BENCH, DRIVE, &["full_range.", "prepare.commission", "after.", "runs"]]);
 
 /// Runs of a kind in a region, unless `runs` says otherwise.
 const RUNS: u32 = 10;
@@ -78,7 +74,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
     match tracks(&config.drive) {
-        true => learned(config, &plant_settings(config), drive, seed),
+        true => learned(config, drive, seed),
         false => Ok(Ok(drive)),
     }
 }

@@ -3,19 +3,16 @@
 mod trials;
 
 pub use self::trials::Trial;
-use self::trials::{HealthyKind, KINDS, OVER_SPEED_S};
+use self::trials::{HealthyKind, OVER_SPEED_S};
 use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "lock-monitor",
-    stands_for: "what section 5.2 leaves open",
-    about: "The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
-    not: &[&["angle_source"]],
-    run: whole::<LockMonitor>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("lock-monitor", whole::<LockMonitor>)
+    .stands_for("what section 5.2 leaves open")
+    .about("The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn", "runs"]])
+    .not(&[&["angle_source"]]);
 
 /// Trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;
@@ -69,7 +66,7 @@ impl Study for LockMonitor {
         }
         n -= OFFSETS.len() * self.runs;
         if n < self.healthy_runs() {
-            let kind = KINDS[n % KINDS.len()];
+            let kind = HealthyKind::VALUES[n % HealthyKind::VALUES.len()];
             return trials::healthy(&self.config, seed(10, n), kind);
         }
         n -= self.healthy_runs();
@@ -124,7 +121,7 @@ impl LockMonitor {
         columns![|n, r: &Trial|
             "forced by (°)" => Cell::or_dash(OFFSETS.get(n / self.runs).map(|o| Cell::fixed(o.0, 0)));
             "seed" => Cell::from(r.case.seed.to_string());
-            "kind" => Cell::from(r.kind.map_or("", HealthyKind::name));
+            "kind" => Cell::from(r.kind.map_or("", Words::word));
             "iq (A)" => Cell::fixed(r.case.iq, 3);
             "speed (rpm)" => Cell::fixed(r.case.rpm, 1);
             "wrong for (s)" => Cell::fixed(r.wrong_s, 3);
@@ -143,9 +140,7 @@ impl LockMonitor {
     fn forced(&self, all: &[Trial], outcome: &mut Outcome) {
         let parts: Vec<_> = OFFSETS.into_iter().zip(all.chunks(self.runs)).collect();
         let wrong = |trials: &[Trial], share: f64| {
-            let mut wrong: Vec<f64> = trials.iter().map(|t| t.wrong_s).collect();
-            wrong.sort_by(f64::total_cmp);
-            wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
+            quantile(&sorted(trials.iter().map(|t| t.wrong_s)), share)
         };
         let stopped = |trials: &[Trial]| trials.iter().filter(|t| t.fault.is_some()).count();
         let missed = |trials: &[Trial]| trials.iter().filter(|t| !t.is_in_time()).count();
@@ -205,10 +200,10 @@ impl LockMonitor {
         let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
         outcome.tables.extend(self.listed("Every false alarm", &heads, alarms));
         let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
-        for kind in KINDS {
+        for &kind in HealthyKind::VALUES {
             let of_kind = runs.iter().filter(|r| r.kind == Some(kind));
             let points = of_kind.map(|r| (r.case.iq, r.largest_loss)).collect();
-            panel = panel.with(Series::points(kind.name(), points));
+            panel = panel.with(Series::points(kind.word(), points));
         }
         outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
     }

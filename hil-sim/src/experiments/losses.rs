@@ -7,14 +7,11 @@ use crate::plant::MachineSettings;
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "losses",
-    stands_for: "beyond the dissertation",
-    about: "Copper loss against the least one for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("losses", run)
+    .stands_for("beyond the dissertation")
+    .about("Copper loss against the least one for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT]);
 
 /// Speed, rpm on four poles: beyond the carrier, short of field weakening.
 const RPM: f64 = 1200.0;

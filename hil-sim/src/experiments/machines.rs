@@ -6,15 +6,12 @@ use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use crate::prelude::*;
 
 /// Not a figure of the source: whether the drive suits other motors.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "machines",
-    stands_for: "beyond the dissertation",
-    about: "A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
-            the motor.",
-    uses: &[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
-    run: whole::<Machines>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("machines", whole::<Machines>)
+    .stands_for("beyond the dissertation")
+    .about("A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
+            the motor.")
+    .uses(&[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
 /// Torque currents of the operating points, A on the dissertation's motor; both signs.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
@@ -140,7 +137,7 @@ impl Study for Machines {
 
     fn run(&self, number: usize) -> Result<Self::Record, Error> {
         let (config, seed) = self.drawn(number);
-        let learned = prepared(&config.drive, &config, seed);
+        let learned = prepared(&config, seed);
         or_refusal(learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)))
     }
 
@@ -161,8 +158,7 @@ impl Study for Machines {
         }
         let learned = || machines.iter().filter(|machine| machine.runs.is_ok());
         let good = machines.iter().filter(|machine| machine.is_good()).count();
-        let mut rms: Vec<f64> = learned().map(Machine::rms).collect();
-        rms.sort_by(f64::total_cmp);
+        let rms = sorted(learned().map(Machine::rms));
         let m = &mut outcome.metrics;
         m.set("machines", machines.len() as f64);
         m.set("learned", rms.len() as f64);

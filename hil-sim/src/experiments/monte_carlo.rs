@@ -4,20 +4,17 @@ use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use crate::prelude::*;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "monte-carlo",
-    stands_for: "the claim behind Figures 38 and 39",
-    about: "Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
-    uses: &[
+pub const EXPERIMENT: Experiment = Experiment::new("monte-carlo", whole::<MonteCarlo>)
+    .stands_for("the claim behind Figures 38 and 39")
+    .about("Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.")
+    .uses(&[
         BENCH,
         DRIVE,
         &["load.speed_rpm", "prepare.learn"],
         &["spread.motor", "spread.noise", "spread.gain"],
         &["runs", "seconds"],
-    ],
-    not: &[FREE_SHAFT, SPEED_LOOP],
-    run: whole::<MonteCarlo>,
-};
+    ])
+    .not(&[FREE_SHAFT, SPEED_LOOP]);
 
 const RUNS: u32 = 200;
 /// How many of the worst runs are listed.
@@ -65,16 +62,13 @@ impl Study for MonteCarlo {
         let mut outcome = Outcome::default();
         outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text));
         let kept: Vec<&SteadyRun> = runs.iter().filter(|run| !run.lost).collect();
-        let mut largest: Vec<f64> = kept.iter().map(|run| run.error.largest()).collect();
-        largest.sort_by(f64::total_cmp);
+        let largest = sorted(kept.iter().map(|run| run.error.largest()));
         let squares = kept.iter().map(|run| run.error.rms().powi(2)).sum::<f64>();
         let m = &mut outcome.metrics;
         m.set("angle_error_rms_deg", (squares / kept.len() as f64).sqrt());
         m.set("worst_run_rms_deg", kept.iter().map(|run| run.error.rms()).fold(0.0, f64::max));
-        m.set("angle_error_max_deg", largest.last().copied().unwrap_or(f64::NAN));
-        // The smallest bound that 99 % of the runs stay below.
-        let p99 = (largest.len() * 99).div_ceil(100).saturating_sub(1);
-        m.set("run_max_p99_deg", largest.get(p99).copied().unwrap_or(f64::NAN));
+        m.set("angle_error_max_deg", quantile(&largest, 1.0));
+        m.set("run_max_p99_deg", quantile(&largest, 0.99));
         m.set("lost_runs", (runs.len() - kept.len()) as f64);
         m.set("runs", runs.len() as f64);
 

@@ -3,14 +3,11 @@
 use crate::prelude::*;
 
 /// Section 2.3.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "encoder-orientation",
-    stands_for: "Section 2.3, Eq. 2.7 and 2.10",
-    about: "Flux angle and torque over speed with the encoder, delays compensated and left in.",
-    uses: &[BENCH, DRIVE, &["seconds"]],
-    not: &[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("encoder-orientation", run)
+    .stands_for("Section 2.3, Eq. 2.7 and 2.10")
+    .about("Flux angle and torque over speed with the encoder, delays compensated and left in.")
+    .uses(&[BENCH, DRIVE, &["seconds"]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]]);
 
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;
@@ -68,15 +65,11 @@ fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orie
     config.drive.ignore_delays = !compensate;
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = rpm;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let iq = config.amperes(IQ_A);
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(1.0, |_| {});
-    let (mut error, mut share) = (Stats::default(), Stats::default());
-    rig.run(context.seconds.unwrap_or(0.3), |p| {
-        error.push(p.angle_error_deg);
-        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * iq));
+    rig.settle(&Command::Torque(iq as f32), 1.0)?;
+    let [error, share] = rig.stats(context.seconds.unwrap_or(0.3), |p| {
+        [p.angle_error_deg, p.torque / (p.torque_per_flux_ampere * p.flux * iq)]
     });
     Ok((error.mean(), share.mean()))
 }

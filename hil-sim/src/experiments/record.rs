@@ -11,14 +11,11 @@ use crate::plant::Plant;
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "record",
-    stands_for: "what section 5.2 leaves open",
-    about: "A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.",
-    uses: &[BENCH, DRIVE, &["record.", "after."]],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("record", run)
+    .stands_for("what section 5.2 leaves open")
+    .about("A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.")
+    .uses(&[BENCH, DRIVE, &["record.", "after."]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
 const SETTLING_S: f64 = 12.0;
@@ -41,7 +38,7 @@ const COURSES: [(Course, f64); 4] =
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = context.config.clone();
     config.prepare.learn = true;
-    let mut rig = prepared(&config.drive, &config, context.seed)?;
+    let mut rig = prepared(&config, context.seed)?;
     let after = config.after_learning()?;
     if plant_settings(&after) != plant_settings(&config) {
         // The drive is off, and the motor at rest without flux: another one takes its place.

@@ -26,17 +26,14 @@ use crate::progress::Progress;
 macro_rules! shipped {
     ($($place:ident $name:literal $stands_for:literal $uses:expr, $not:expr; $about:literal)+) => {$(
         #[doc = $about]
-        pub const $place: Experiment = Experiment {
-            name: $name,
-            stands_for: $stands_for,
-            about: $about,
-            uses: $uses,
-            not: $not,
-            run: |context| {
-                const TEXT: &str = include_str!(concat!("../../scenarios/", $name, ".toml"));
-                Scenario::of_toml(Path::new(concat!($name, ".toml")), TEXT, context.config)?.outcome(context)
-            },
-        };
+        pub const $place: Experiment = Experiment::new($name, |context| {
+            const TEXT: &str = include_str!(concat!("../../scenarios/", $name, ".toml"));
+            Scenario::of_toml(Path::new(concat!($name, ".toml")), TEXT, context.config)?.outcome(context)
+        })
+        .stands_for($stands_for)
+        .about($about)
+        .uses($uses)
+        .not($not);
     )+};
 }
 
@@ -54,28 +51,20 @@ shipped! {
 }
 
 /// References and a load in rows.
-pub const PROFILE: Experiment = Experiment {
-    name: "profile",
-    stands_for: "a profile of the user",
-    about: "References and load over time from a CSV file: `run profile --input FILE.csv`.",
-    uses: REVERSAL.uses,
-    run: |context| {
-        super::check_file(&PROFILE, context.file)?;
-        Scenario::of_csv(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
-    },
-    ..OWN
-};
+pub const PROFILE: Experiment = Experiment::new("profile", |context| {
+    super::check_file(&PROFILE, context.file)?;
+    Scenario::of_csv(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
+})
+.stands_for("a profile of the user")
+.about("References and load over time from a CSV file: `run profile --input FILE.csv`.")
+.uses(REVERSAL.uses);
 /// A TOML file of the user.
-const OWN: Experiment = Experiment {
-    name: "scenario",
-    stands_for: "a scenario of the user",
-    about: "Parts, shaft, columns and judge of a TOML file.",
-    uses: STEPS.uses,
-    not: &[],
-    run: |context| {
-        Scenario::read(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
-    },
-};
+const OWN: Experiment = Experiment::new("scenario", |context| {
+    Scenario::read(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
+})
+.stands_for("a scenario of the user")
+.about("Parts, shaft, columns and judge of a TOML file.")
+.uses(STEPS.uses);
 
 /// The scenario that a TOML file is, with the name of the file; none for another name. The name lasts as long as the program.
 pub fn own(name: &str) -> Option<Experiment> {

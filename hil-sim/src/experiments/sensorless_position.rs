@@ -8,14 +8,13 @@ use crate::prelude::*;
 use crate::stats::StraightLine;
 
 /// The aim that section 5.2 states.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "sensorless-position",
-    stands_for: "section 4.1 without its encoder, section 5.2",
-    about: "A position step of five turns without an encoder, beside the one with it, and the drift.",
-    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
-    not: &[&["angle_source"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("sensorless-position", run)
+    .stands_for("section 4.1 without its encoder, section 5.2")
+    .about(
+        "A position step of five turns without an encoder, beside the one with it, and the drift.",
+    )
+    .uses(&[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]])
+    .not(&[&["angle_source"]]);
 
 /// Time of the step, s: long enough for both to arrive.
 const STEP_S: f64 = 6.0;

@@ -7,14 +7,10 @@ use crate::prelude::*;
 use crate::progress::Progress;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "smallest-slope",
-    stands_for: "what section 5.2 leaves open",
-    about: "The battery with ever weaker saliency of the motor: slope dq/de and what the drive does; `runs` at each.",
-    uses: &[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]],
-    not: &[],
-    run: whole::<SmallestSlope>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("smallest-slope", whole::<SmallestSlope>)
+    .stands_for("what section 5.2 leaves open")
+    .about("The battery with ever weaker saliency of the motor: slope dq/de and what the drive does; `runs` at each.")
+    .uses(&[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]]);
 
 /// The shares of the saliency's source, from the strongest on.
 const STEPS: u32 = 20;

@@ -6,14 +6,11 @@ use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "torque-envelope",
-    stands_for: "beyond the dissertation",
-    about: "Largest torque over speed at three voltages of the dc link, motoring and generating, measured on the motor.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("torque-envelope", run)
+    .stands_for("beyond the dissertation")
+    .about("Largest torque over speed at three voltages of the dc link, motoring and generating, measured on the motor.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT]);
 
 /// Speeds, rpm on four poles.
 const STEP_RPM: f64 = 300.0;

@@ -12,15 +12,12 @@ use super::steady::{bring_up, prepared};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "torque-rise",
-    stands_for: "beyond the dissertation",
-    about: "Torque steps of a learned drive over speed and sign: rise time to 90 %, its physical limit by the dc-link voltage, overshoot, \
-            peak current and angle error.",
-    uses: &[BENCH, DRIVE],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("torque-rise", run)
+    .stands_for("beyond the dissertation")
+    .about("Torque steps of a learned drive over speed and sign: rise time to 90 %, its physical limit by the dc-link voltage, overshoot, \
+            peak current and angle error.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
 /// Speeds, rpm on four poles, and the one from which on there is no carrier.
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 600.0, 800.0, 1200.0, 1800.0, 2100.0, 2700.0, 3600.0];
@@ -45,7 +42,7 @@ type Seen = (Rise, f64);
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = for_the_range(context.config)?;
     config.prepare.learn = true;
-    let rig = prepared(&config.drive, &config, context.seed)?;
+    let rig = prepared(&config, context.seed)?;
     let cases: Vec<Case> = SPEEDS_RPM
         .iter()
         .flat_map(|&rpm| [1.0, -1.0].map(|sign| (config.rpm(rpm), sign)))

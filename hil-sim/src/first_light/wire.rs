@@ -1,10 +1,10 @@
 //! The way to the drive.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use crate::console::link::{Answer, Link, LinkError, Urgent};
+use crate::console::link::{Answer, Link, LinkError, Urgent, locked};
 use crate::console::open;
 use crate::error::Error;
 
@@ -100,8 +100,4 @@ fn connect(path: &str, baud: u32, unasked: &Arc<Mutex<Vec<String>>>) -> Result<L
     let mut link = Link::new(reader, writer, move |line: &str| locked(&to).push(line.to_owned()));
     link.begin();
     Ok(link)
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

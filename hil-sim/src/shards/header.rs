@@ -122,8 +122,7 @@ mod tests {
     use super::*;
 
     fn header(assignments: &[&str], seed: u64) -> Header {
-        let assignments: Vec<String> = assignments.iter().map(|&a| a.to_owned()).collect();
-        let config = Config::load(None, None, &assignments).unwrap();
+        let config = Config::load(None, None, assignments).unwrap();
         Header::new("monte-carlo", &config, seed, Shard::WHOLE, 8).unwrap()
     }
 
@@ -142,7 +141,6 @@ mod tests {
         ];
         let text = serde_json::to_string(&header(&set, 1)).unwrap();
         let back: Header = serde_json::from_str(&text).unwrap();
-        let set: Vec<String> = set.iter().map(|&a| a.to_owned()).collect();
         assert_eq!(back.config().unwrap(), Config::load(None, None, &set).unwrap(), "{text}");
         let motors = crate::config::motors::Motor::all().into_iter();
         for name in motors.map(|motor| motor.name) {

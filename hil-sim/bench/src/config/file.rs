@@ -14,15 +14,15 @@ pub struct FileAssignment {
     /// Its value.
     pub value: Value,
     /// Its line, counted from 1.
-    pub line: usize,
+    pub line: u64,
 }
 
 /// The assignments of a file, those of the drive alone last.
 ///
 /// # Errors
-/// [`Error::ConfigFile`] when the file cannot be read or is not TOML.
+/// [`Error::Data`] when the file cannot be read or is not TOML.
 pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
-    let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
+    let failed = |problem: String| Error::data(path, None, problem);
     let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
     let table: toml::Table =
         text.parse().map_err(|e: toml::de::Error| failed(e.to_string().trim_end().to_owned()))?;
@@ -31,7 +31,7 @@ pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
     find("", places.get_ref(), &mut offsets);
     let line_of = |name: &str| {
         let offset = offsets.iter().find(|(known, _)| known == name).map_or(0, |found| found.1);
-        1 + text[..offset].matches('\n').count()
+        1 + text[..offset].matches('\n').count() as u64
     };
     let assignments = flattened(&table).into_iter();
     Ok(assignments

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use include_dir::{Dir, include_dir};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
@@ -19,7 +19,7 @@ pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.curren
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
 /// Where numbers of a motor come from.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// The keys whose values come from here.
@@ -62,11 +62,11 @@ impl Motor {
     /// The motor with this name, or of this file when the name ends in `.toml`, or, a passport, in `.json`.
     ///
     /// # Errors
-    /// [`Error::Unknown`] with the most similar name; [`Error::ConfigFile`].
+    /// [`Error::Unknown`] with the most similar name; [`Error::Data`].
     pub fn find(name: &str) -> Result<Self, Error> {
         if is_file(name) {
             let path = Path::new(name);
-            let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
+            let failed = |problem: String| Error::data(path, None, problem);
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
             return match name.ends_with(".json") {
                 true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),

@@ -59,9 +59,7 @@ fn just_outside_the_range_is_refused() {
 
 #[test]
 fn errors_name_the_key_the_value_and_the_range() {
-    let text = |assignment: &str| {
-        Config::load(None, None, &[assignment.to_owned()]).unwrap_err().to_string()
-    };
+    let text = |assignment: &str| Config::load(None, None, &[assignment]).unwrap_err().to_string();
     assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.0001 to 1000 ohm");
     assert_eq!(
         text("motor.r_s=nan"),
@@ -145,7 +143,7 @@ fn old_names_are_accepted() {
         "sequence.i_d=0.9",
         "prepare.learn=yes",
     ];
-    let load = |all: [&str; 12]| Config::load(None, None, &all.map(str::to_owned)).unwrap();
+    let load = |all: [&str; 12]| Config::load(None, None, &all).unwrap();
     assert_eq!(load(old), load(today));
     assert_eq!(load(old).drive.motor.r_s, 5.0);
 }

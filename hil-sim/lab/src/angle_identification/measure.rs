@@ -1,7 +1,6 @@
 //! Turning the injection axis, alone or with the current, while the encoder holds the orientation.
 
 use drive_core::Command;
-use drive_core::carrier::DemodulatorKind;
 use sim_bench::prelude::*;
 use sim_bench::rig::wrapped_degrees;
 
@@ -31,24 +30,6 @@ pub struct Record {
     pub u: Vec<f64>,
     /// Signal without its mean, A or 1.
     pub y: Vec<f64>,
-}
-
-/// A drive that the encoder orients, shaft locked, injection beside it, current settled.
-///
-/// # Errors
-/// As [`Rig::oriented`].
-pub fn oriented(
-    config: &Config,
-    demodulator: DemodulatorKind,
-    iq: f64,
-    seed: u64,
-) -> Result<Rig, Error> {
-    let mut config = config.clone();
-    config.drive.injection.demodulator = demodulator;
-    let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.8, |_| {});
-    Ok(rig)
 }
 
 fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
@@ -153,11 +134,15 @@ fn alternate(
 
 #[cfg(test)]
 mod tests {
+    use drive_core::carrier::DemodulatorKind;
+
     use super::*;
 
     /// Slow gain with the axis alone and with the current, by the demodulation.
     fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
-        let responses = steps(oriented(&Config::default(), demodulator, iq, 5).unwrap()).unwrap();
+        let mut config = Config::default();
+        config.drive.injection.demodulator = demodulator;
+        let responses = steps(Rig::oriented(&config, 5, iq, 0.8).unwrap()).unwrap();
         [&responses.alone, &responses.with_current]
             .map(|r| r[SLOW].iter().sum::<f64>() / SLOW.len() as f64)
     }

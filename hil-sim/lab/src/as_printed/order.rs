@@ -48,9 +48,7 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
             !settles,
         ),
     ] {
-        outcome
-            .compared
-            .push(Compared::with("S1", "section 3.4", quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S1", "section 3.4", quantity).simulated(holds));
     }
     Ok(())
 }

@@ -36,19 +36,16 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     outcome.metrics.set("figure_37_printed_swing_deg", swing(&literal));
     outcome.metrics.set("figure_37_ours_swing_deg", swing(&ours));
     outcome.metrics.set("figure_37_ours_current_zero_from_ms", zero_from(&ours));
-    let unknown =
-        Some("the limit of the current, and a controller that comes to rest on its plant");
+    let unknown = "the limit of the current, and a controller that comes to rest on its plant";
     let at = Compared::with("S1", "Figure 37", "time at which the quadrature current is zero");
-    outcome.compared.push(Compared { unknown, ..at }.simulated(zero_from(&ours)));
+    outcome.compared.push(at.unknown(unknown).simulated(zero_from(&ours)));
     let at_start = literal.current.first().is_some_and(|(_, i)| *i >= LIMIT_A - 1e-9);
     let rests = swing(&ours) < 5.0;
     for (quantity, holds) in [
         ("the quadrature current saturates at its largest value at the start", at_start),
         ("the motor works as a servo with encoder", rests),
     ] {
-        outcome
-            .compared
-            .push(Compared::with("S1", "Figure 37", quantity).simulated(f64::from(holds)));
+        outcome.compared.push(Compared::with("S1", "Figure 37", quantity).simulated(holds));
     }
     let target = vec![(0.0, 1800.0), (SECONDS, 1800.0)];
     let stop = printed("Figure 37", "time at which the quadrature current is zero") / 1e3;
@@ -112,8 +109,7 @@ fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     let fastest = 0.7 * LIMIT_A * torque / config.motor.inertia * 60.0 / TAU;
     config.drive.speed.ramp_rpm_per_s = Some(fastest as f32);
     config.load.mode = LoadMode::Free;
-    let mut rig = Rig::from_config(&config, context.seed)?;
-    rig.start(Mode::Position)?;
+    let mut rig = Rig::started(&config, context.seed, Mode::Position)?;
     rig.command(&Command::Position(printed("Figure 37", "reference of position in turns") as f32))?;
     let (start, mut trace, mut n) = (rig.time(), Trace::default(), 0);
     let from = rig.plant.mechanical_angle() / TAU;

@@ -42,7 +42,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
             let unknown =
                 (column == COLUMNS[1]).then_some("how near to zero it means, and the load");
             let place = Compared::with("S1", format!("Table 1, {row}"), column);
-            outcome.compared.push(Compared { unknown, ..place }.simulated(f64::from(works)));
+            outcome.compared.push(Compared { unknown, ..place }.simulated(works));
         }
     }
     outcome.tables.push(table.note(
@@ -63,19 +63,11 @@ fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64,
         config.drive.injection.synchronous.check = false;
     }
     let case = OperatingPoint { rpm, iq: IQ_A, seed: context.seed };
-    let mut rig = match prepared(&config.drive, &config, case.seed) {
-        Ok(rig) => rig,
-        Err(_) => return Ok(None),
-    };
+    let Ok(mut rig) = prepared(&config, case.seed) else { return Ok(None) };
     if bring_up(&mut rig, rpm).is_err() || rig.drive.state().fault().is_some() {
         return Ok(None);
     }
-    rig.command(&Command::Torque(case.iq as f32))?;
-    rig.run(1.0, |_| {});
-    let (mut error, mut carrier) = (Stats::default(), Stats::default());
-    rig.run(1.0, |p| {
-        error.push(p.angle_error_deg);
-        carrier.push(1e3 * p.carrier);
-    });
+    rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
+    let [error, carrier] = rig.stats(1.0, |p| [p.angle_error_deg, 1e3 * p.carrier]);
     Ok(rig.drive.state().fault().is_none().then_some((error.largest(), carrier.mean())))
 }

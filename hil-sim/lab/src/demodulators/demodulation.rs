@@ -2,7 +2,6 @@
 
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::ReferenceTable;
-use drive_settings::Settings;
 use sim_bench::learning;
 use sim_bench::prelude::*;
 
@@ -97,17 +96,18 @@ impl Demodulation {
         learning::reference_of(self.demodulator, &config, seed)
     }
 
-    /// The drive of this kind, if the demodulation has one.
+    /// The configuration with the drive of this kind, if the demodulation has one.
     pub fn drive(
         &self,
         kind: ReferenceKind,
         config: &Config,
         learned: ReferenceTable,
-    ) -> Option<Settings> {
-        let mut drive = self.config(config).drive;
+    ) -> Option<Config> {
+        let mut config = self.config(config);
+        let drive = &mut config.drive;
         if self.demodulator == DemodulatorKind::Synchronous {
             drive.injection.synchronous.reference = Some(learned);
-            return (kind == ReferenceKind::Retuned).then_some(drive);
+            return (kind == ReferenceKind::Retuned).then_some(config);
         }
         let printed = &mut drive.injection.printed;
         if kind == ReferenceKind::Constant {
@@ -119,7 +119,7 @@ impl Demodulation {
             (printed.k_s, printed.z_s) = RETUNED;
         }
         printed.k_s /= self.gain as f32;
-        Some(drive)
+        Some(config)
     }
 }
 

@@ -4,10 +4,10 @@ use drive_core::Command;
 use sim_bench::plant::MeasurementSettings;
 use sim_bench::prelude::*;
 
-use super::demodulation::Demodulation;
-
 /// Half of the turn over which the slope is taken, degrees.
 const TURN_DEG: f64 = 4.0;
+/// Time for the current to settle, s.
+pub const SETTLED_S: f64 = 0.5;
 /// Time to settle after a turn, and to average, s.
 const SETTLE_S: f64 = 0.1;
 const AVERAGE_S: f64 = 0.4;
@@ -23,35 +23,14 @@ pub struct SignalQuality {
     pub noise: f64,
 }
 
-/// A drive that the encoder orients, with the shaft locked and the injection beside it.
-///
-/// # Errors
-/// As [`Rig::oriented`].
-pub fn oriented(
-    demodulation: &Demodulation,
-    config: &Config,
-    iq: f64,
-    seed: u64,
-) -> Result<Rig, Error> {
-    let mut rig = Rig::oriented(&demodulation.config(config), seed)?;
-    rig.command(&Command::Torque(iq as f32))?;
-    rig.run(0.5, |_| {});
-    Ok(rig)
-}
-
 /// Measures at the true flux angle and 4° to either side.
 ///
 /// # Errors
 /// When the drive refuses a command.
 pub fn signal_quality(mut rig: Rig) -> Result<SignalQuality, Error> {
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
-        rig.command(&Command::TurnInjection(turn as f32))?;
-        rig.run(SETTLE_S, |_| {});
-        let (mut signal, mut error) = (Stats::default(), Stats::default());
-        rig.run(AVERAGE_S, |p| {
-            signal.push(p.signal());
-            error.push(p.angle_error_deg - turn);
-        });
+        rig.settle(&Command::TurnInjection(turn as f32), SETTLE_S)?;
+        let [signal, error] = rig.stats(AVERAGE_S, |p| [p.signal(), p.angle_error_deg - turn]);
         Ok((signal, error.mean().to_radians()))
     };
     let [behind, here, ahead] = [at(-TURN_DEG)?, at(0.0)?, at(TURN_DEG)?];
@@ -74,19 +53,13 @@ const AFTER: usize = 603;
 ///
 /// # Errors
 /// As [`Rig::oriented`].
-pub fn delay(
-    demodulation: &Demodulation,
-    config: &Config,
-    iq: f64,
-    seed: u64,
-) -> Result<f64, Error> {
-    let mut config = config.clone();
+pub fn delay(mut config: Config, iq: f64, seed: u64) -> Result<f64, Error> {
     config.measurement.noise_a = Some(0.0);
     // 16 bits.
     let fine = MeasurementSettings::IDEAL;
     config.measurement.lsb_a = Some(fine.lsb_a / fine.range_a * config.measurement.range_a);
     config.calibrate();
-    let mut rig = oriented(demodulation, &config, iq, seed)?;
+    let mut rig = Rig::oriented(&config, seed, iq, SETTLED_S)?;
     let plant = plant_settings(&config);
     let mut response = [0.0; AFTER];
     for n in 0..CHANGES {

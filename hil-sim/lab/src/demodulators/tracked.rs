@@ -2,7 +2,6 @@
 
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Command, Mode};
-use drive_settings::Settings;
 use sim_bench::prelude::*;
 
 /// Levels of Figure 38, A, and the time at each, s.
@@ -26,12 +25,10 @@ pub struct StepsRun {
 ///
 /// # Errors
 /// As [`Rig::new`] and [`Rig::start`].
-pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
+pub fn steps(config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
-    let config = Config { drive: *drive, ..config };
-    let mut rig = Rig::from_config(&config, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::started(&config, seed, Mode::Torque)?;
     let start = rig.time();
     let (mut error, mut stats) = (Vec::new(), Stats::default());
     for iq in LEVELS_A.map(|iq| config.amperes(iq)) {

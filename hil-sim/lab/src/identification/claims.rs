@@ -3,7 +3,7 @@
 use sim_bench::outcome::{Compared, Metrics};
 
 use super::models::model_c;
-use super::printed::{PERIODS, SPEEDS, error};
+use super::printed::{Case, PERIODS, SPEEDS, error};
 use super::{CurrentVoltage, Parameters, Signal};
 
 /// A row of the tables: model, speed, parameter.
@@ -17,7 +17,7 @@ fn rows(model: &'static str, speed: f64) -> Vec<Row> {
 
 /// Printed errors of a row over the periods, %.
 fn over_h((model, speed, name): Row, signal: Signal) -> [f64; 3] {
-    [0, 1, 2].map(|period| error(model, speed, signal, period, name).unwrap_or(f64::NAN))
+    [0, 1, 2].map(|period| error(model, Case { speed, signal, period }, name).unwrap_or(f64::NAN))
 }
 
 /// Errors at 50 µs but those of the rows left out: the least and the largest.
@@ -75,7 +75,7 @@ pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
         (procedure(format!("errors of {these} 6 % at low speed")), c_most < 6.0),
         (procedure("the error of r_s is at most 20 % at low speed".to_owned()), r_s <= 20.0),
     ] {
-        compared.push(Compared::with("S0", "section 5", quantity).recomputed(f64::from(holds)));
+        compared.push(Compared::with("S0", "section 5", quantity).recomputed(holds));
     }
 
     // f_1b and the speed are proportional (Eq. 42).

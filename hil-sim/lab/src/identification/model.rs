@@ -1,6 +1,8 @@
 //! The machine in continuous time (Eq. 7 to 9), sampled (Eq. 10 to 13), and as the sampled
 //! equation between current and voltage alone (Eq. 14 to 18).
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::Complex;
 
 /// The parameters of a symmetric machine that its terminals determine, as Eq. 9 needs them.
@@ -54,8 +56,8 @@ impl Parameters {
         let rotor = Complex::new(1.0 / self.tau_r, -self.omega_m);
         let a11 = -(self.r_s / self.sigma_l_s + k / self.tau_r);
         Continuous {
-            a: [[a11.into(), rotor * k], [(1.0 / self.tau_r).into(), -rotor]],
-            b: [(1.0 / self.sigma_l_s).into(), Complex::ZERO],
+            a: Matrix2::new(a11.into(), rotor * k, (1.0 / self.tau_r).into(), -rotor),
+            b: Vector2::new((1.0 / self.sigma_l_s).into(), Complex::ZERO),
         }
     }
 
@@ -70,28 +72,8 @@ impl Parameters {
     }
 }
 
-type Matrix = [[Complex; 2]; 2];
-type Column = [Complex; 2];
-
-const ONE: Matrix = [[Complex::ONE, Complex::ZERO], [Complex::ZERO, Complex::ONE]];
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    let entry = |i: usize, j: usize| a[i][0] * b[0][j] + a[i][1] * b[1][j];
-    [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
-}
-
-fn times(a: &Matrix, x: &Column) -> Column {
-    [a[0][0] * x[0] + a[0][1] * x[1], a[1][0] * x[0] + a[1][1] * x[1]]
-}
-
-fn scaled(a: &Matrix, k: f64) -> Matrix {
-    a.map(|row| row.map(|x| x * k))
-}
-
-fn sum(a: &Matrix, b: &Matrix) -> Matrix {
-    let entry = |i: usize, j: usize| a[i][j] + b[i][j];
-    [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
-}
+type Matrix = Matrix2<Complex>;
+type Column = Vector2<Complex>;
 
 /// dx/dt = A x + B v, with x = [i_s, phi_r / l_m] in A (Eq. 9).
 #[derive(Clone, Copy, Debug)]
@@ -107,34 +89,34 @@ impl Continuous {
     /// relative to their largest entry, is 4.1e-12 at 50 µs,
     /// 1.3e-10 at 100 µs and 7.5e-9 at 200 µs (PX at 375 rad/s; RBV: 3 to 5 times less).
     pub fn series(&self, h: f64, order: u32) -> Step {
-        let ah = scaled(&self.a, h);
+        let ah = self.a.scale(h);
         // term = (A h)^(n-1) / n!, so F gains term A h and H gains term B h.
-        let mut term = ONE;
-        let mut integral = [[Complex::ZERO; 2]; 2];
+        let mut term = Matrix::identity();
+        let mut integral = Matrix::zeros();
         for n in 1..=order {
             if n > 1 {
-                term = scaled(&product(&term, &ah), 1.0 / f64::from(n));
+                term = (term * ah).scale(1.0 / f64::from(n));
             }
-            integral = sum(&integral, &term);
+            integral += term;
         }
-        Step { e: product(&integral, &ah), h: times(&integral, &self.b.map(|b| b * h)) }
+        Step { e: integral * ah, h: integral * self.b.scale(h) }
     }
 
     /// Change of the state over `h` s, A, by a voltage that rises by 1 V from 0: the sum of `(A h)^n B h/(n + 2)!`, up to the
     /// power `order` of `h`.
     pub fn ramp(&self, h: f64, order: u32) -> Column {
-        let mut term = self.b.map(|b| b * (0.5 * h));
+        let mut term = self.b.scale(0.5 * h);
         let mut sum = term;
         for n in 2..=order {
-            term = times(&self.a, &term).map(|x| x * (h / f64::from(n + 1)));
-            sum = [0, 1].map(|k| sum[k] + term[k]);
+            term = (self.a * term).scale(h / f64::from(n + 1));
+            sum += term;
         }
         sum
     }
 
     /// The exact step over `h` s at constant voltage: F = e^(A h) by scaling and squaring.
     pub fn exact(&self, h: f64) -> Step {
-        let norm = self.a.iter().flatten().map(|x| x.norm()).fold(0.0, f64::max) * h;
+        let norm = self.a.iter().map(|x| x.norm()).fold(0.0, f64::max) * h;
         // More than 60 doublings only for a matrix that overflows anyway.
         let doublings = if norm > 0.25 { ((norm * 4.0).log2().ceil() as i32).min(60) } else { 0 };
         let mut step = self.series(h / f64::from(doublings).exp2(), 14);
@@ -158,14 +140,13 @@ pub struct Step {
 impl Step {
     /// F.
     pub fn f(&self) -> Matrix {
-        sum(&ONE, &self.e)
+        Matrix::identity() + self.e
     }
 
     /// This step and then another one, with the same voltage.
     pub fn then(&self, next: &Self) -> Self {
-        let e = sum(&sum(&self.e, &next.e), &product(&next.e, &self.e));
-        let h = times(&next.e, &self.h);
-        Self { e, h: [0, 1].map(|k| self.h[k] + (h[k] + next.h[k])) }
+        let e = self.e + next.e + next.e * self.e;
+        Self { e, h: self.h + (next.e * self.h + next.h) }
     }
 
     /// `count` of these steps with the same voltage; at least one.
@@ -176,8 +157,7 @@ impl Step {
     /// One step of the state x, A, at the voltage `v`, V.
     #[inline]
     pub fn advance(&self, x: Column, v: Complex) -> Column {
-        let change = times(&self.e, &x);
-        [0, 1].map(|k| x[k] + (change[k] + self.h[k] * v))
+        x + (self.e * x + self.h * v)
     }
 
     /// Eq. 15 to 18.
@@ -188,8 +168,8 @@ impl Step {
     /// Eq. 15 to 18 in differences; the small sums are computed as products, without cancellation:
     /// f1 + f0 - 1 = -det(F - I), h1 + h0 = f12 h21 - (f22 - 1) h11.
     pub fn delta(&self) -> Delta {
-        let [[e11, e12], [e21, e22]] = self.e;
-        let [h11, h21] = self.h;
+        let [[e11, e21], [e12, e22]] = self.e.into();
+        let [h11, h21] = self.h.into();
         Delta { g1: e11 + e22 + 1.0, g0: e12 * e21 - e11 * e22, h1: h11, u0: e12 * h21 - e22 * h11 }
     }
 }

@@ -9,7 +9,7 @@
 //! out a part of the record each (delete-a-group jackknife: J. Shao, D. Tu, "The Jackknife and Bootstrap", 1995, section 2.3),
 //! every part in turn, each by one step of Gauss and Newton.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::batch::parts;
 use super::models::NotIdentifiable;
@@ -73,7 +73,7 @@ impl Record {
 
     /// The current that the machine would have had.
     fn simulate(&self, x: &DVector<f64>) -> Vec<Complex> {
-        let mut state = [Complex::new(x[6], x[7]), Complex::new(x[4], x[5])];
+        let mut state = Vector2::new(Complex::new(x[6], x[7]), Complex::new(x[4], x[5]));
         let mut speed = f64::INFINITY;
         let (mut step, mut ramp) = (Self::machine(x, 0.0).continuous().series(self.h, 1), None);
         let at = |k: usize| self.v[k] - signs(self.i[k]) * x[8];
@@ -89,8 +89,7 @@ impl Record {
             let v = at(k);
             state = step.advance(state, v);
             if let (Some(ramp), true) = (ramp, k + 1 < self.v.len()) {
-                let rise = at(k + 1) - v;
-                state = [0, 1].map(|n| state[n] + ramp[n] * rise);
+                state += ramp * (at(k + 1) - v);
             }
         }
         current

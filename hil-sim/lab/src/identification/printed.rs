@@ -8,15 +8,39 @@ pub const PERIODS: [f64; 3] = [50e-6, 100e-6, 200e-6];
 /// Speeds of Tables 1 to 3 (60 Hz) and of Tables 4 and 5 (10 Hz), electrical rad/s.
 pub const SPEEDS: [f64; 2] = [375.0, 61.0];
 
+/// One column of the tables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Case {
+    /// Speed, electrical rad/s.
+    pub speed: f64,
+    /// The excitation.
+    pub signal: Signal,
+    /// Which of the sampling periods.
+    pub period: usize,
+}
+
+impl Case {
+    /// All twelve, in the order of the tables.
+    pub fn all() -> Vec<Self> {
+        let mut cases = Vec::new();
+        for speed in SPEEDS {
+            for signal in Signal::ALL {
+                cases.extend((0..PERIODS.len()).map(|period| Self { speed, signal, period }));
+            }
+        }
+        cases
+    }
+
+    /// Sampling period, s.
+    pub fn h(&self) -> f64 {
+        PERIODS[self.period]
+    }
+}
+
 /// Place and quantity of an error in the list: of the five parameters by a model at one of [`SPEEDS`], one of [`PERIODS`].
 /// The tables have Model A at both speeds, B at the first, C at both.
-pub fn place(
-    model: &str,
-    speed: f64,
-    signal: Signal,
-    period: usize,
-    parameter: &str,
-) -> [String; 2] {
+pub fn place(model: &str, case: Case, parameter: &str) -> [String; 2] {
+    let Case { speed, signal, period } = case;
     let table = match (model, speed == SPEEDS[0], signal) {
         ("A", true, _) => "Table 1".to_owned(),
         ("A", false, _) => "Table 4".to_owned(),
@@ -29,17 +53,11 @@ pub fn place(
 }
 
 /// The printed error, %.
-pub fn error(
-    model: &str,
-    speed: f64,
-    signal: Signal,
-    period: usize,
-    parameter: &str,
-) -> Option<f64> {
+pub fn error(model: &str, case: Case, parameter: &str) -> Option<f64> {
     let printed = match model {
         "A" | "C" => true,
-        _ => model == "B" && speed == SPEEDS[0],
+        _ => model == "B" && case.speed == SPEEDS[0],
     };
-    let [place, quantity] = place(model, speed, signal, period, parameter);
+    let [place, quantity] = place(model, case, parameter);
     printed.then(|| source::number("S0", &place, &quantity))
 }

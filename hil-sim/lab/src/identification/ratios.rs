@@ -2,7 +2,7 @@
 //! the noise, beside the same numbers of two machines.
 
 use super::models::model_b;
-use super::printed::{self, PERIODS, SPEEDS};
+use super::printed::{self, Case, PERIODS, SPEEDS};
 use super::{CurrentVoltage, FirstOrderTheta, Parameters, Signal};
 
 /// A number that does not depend on the noise, as printed and for two machines.
@@ -28,16 +28,18 @@ fn coefficients(machine: Parameters, h: f64) -> CurrentVoltage {
 /// ratio |h_0b / h_1b|. Geometric mean of the four columns of Tables 1 and 4 that share a period; the
 /// ratio does not depend on the speed.
 fn gains(period: usize) -> f64 {
-    let at = |speed, signal, k| printed::error("A", speed, signal, period, k).unwrap_or(f64::NAN);
-    let of =
-        |speed| Signal::ALL.map(|signal| at(speed, signal, "h_1b") / at(speed, signal, "h_0b"));
+    let at = |case, parameter| printed::error("A", case, parameter).unwrap_or(f64::NAN);
+    let of = |speed| {
+        let cases = Signal::ALL.map(|signal| Case { speed, signal, period });
+        cases.map(|case| at(case, "h_1b") / at(case, "h_0b"))
+    };
     SPEEDS.map(of).iter().flatten().product::<f64>().powf(0.25)
 }
 
 /// Printed errors by a model at 375 rad/s, with both signals.
 fn fast(model: &str, period: usize, parameter: &str) -> [f64; 2] {
-    let at = |signal| printed::error(model, SPEEDS[0], signal, period, parameter);
-    Signal::ALL.map(|signal| at(signal).unwrap_or(f64::NAN))
+    let case = |signal| Case { speed: SPEEDS[0], signal, period };
+    Signal::ALL.map(|signal| printed::error(model, case(signal), parameter).unwrap_or(f64::NAN))
 }
 
 /// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and use the same h_1a: their errors differ by

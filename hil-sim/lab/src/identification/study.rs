@@ -4,39 +4,10 @@ use rayon::prelude::*;
 use sim_bench::prelude::*;
 
 use super::models::{model_b, model_c, model_d};
-use super::printed::{self, PERIODS, SPEEDS};
+use super::printed::{self, Case};
 use super::structured::model_s;
 use super::trial::Noise;
-use super::{CurrentVoltage, Estimate, Parameters, Signal, Trial};
-
-/// One column of the tables.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
-    /// Speed, electrical rad/s.
-    pub speed: f64,
-    /// The excitation.
-    pub signal: Signal,
-    /// Which of the sampling periods.
-    pub period: usize,
-}
-
-impl Case {
-    /// All twelve, in the order of the tables.
-    pub fn all() -> Vec<Self> {
-        let mut cases = Vec::new();
-        for speed in SPEEDS {
-            for signal in Signal::ALL {
-                cases.extend((0..PERIODS.len()).map(|period| Self { speed, signal, period }));
-            }
-        }
-        cases
-    }
-
-    /// Sampling period, s.
-    pub fn h(&self) -> f64 {
-        PERIODS[self.period]
-    }
-}
+use super::{CurrentVoltage, Estimate, Parameters, Trial};
 
 /// Models that give the five parameters.
 pub const MODELS: [&str; 4] = ["B", "C", "D", "S"];
@@ -147,7 +118,7 @@ pub fn share(entries: &[Entry]) -> f64 {
 impl Errors {
     /// The errors of some models (`A`, and those of [`MODELS`]), beside Tables 1 to 5.
     pub fn entries(&self, models: &[&'static str]) -> Vec<Entry> {
-        let case @ Case { speed, signal, period } = self.case;
+        let case = self.case;
         let of_model = |model: &&'static str| -> Vec<Entry> {
             let place = MODELS.iter().position(|known| known == model);
             let (names, errors): (&[&'static str], &[f64]) = match place {
@@ -155,7 +126,7 @@ impl Errors {
                 None => (&CurrentVoltage::NAMES, &self.discrete),
             };
             let entry = |(&parameter, &ours_pct): (&&'static str, &f64)| {
-                let printed_pct = printed::error(model, speed, signal, period, parameter);
+                let printed_pct = printed::error(model, case, parameter);
                 Entry { model, case, parameter, printed_pct, ours_pct }
             };
             names.iter().zip(errors).map(entry).collect()
@@ -189,8 +160,7 @@ pub fn tables(context: &Context<'_>, models: &[&'static str]) -> (Vec<Entry>, Ou
         let over = seeds.iter().map(|seed| seed[k].ours_pct);
         let (low, high) =
             over.fold((f64::MAX, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
-        let Case { speed, signal, period } = entry.case;
-        let [place, quantity] = printed::place(entry.model, speed, signal, period, entry.parameter);
+        let [place, quantity] = printed::place(entry.model, entry.case, entry.parameter);
         let ours = Compared { seeds: Some([low, high]), ..Compared::with("S0", place, quantity) };
         outcome.compared.push(ours.simulated(entry.ours_pct));
     }

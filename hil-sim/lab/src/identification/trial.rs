@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -105,7 +106,7 @@ impl Trial {
         let fine = (h / FINE).round().max(1.0);
         // Held voltage: the fine steps of a period are one map.
         let step = machine.continuous().series(h / fine, ORDER).repeated(fine as u32);
-        let mut x = [Complex::ZERO; 2];
+        let mut x = Vector2::zeros();
         (0u64..).map(move |k| {
             let v = signal.at(hz, k as f64 * h);
             let sample = (v, x[0]);

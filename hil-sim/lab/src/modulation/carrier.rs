@@ -39,7 +39,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     let sideband = at(&p, CARRIER_HZ + middle) / at(&a, middle);
     outcome.metrics.set("sideband_over_signal", sideband);
     let lower = at(&p, CARRIER_HZ - middle) / at(&a, middle);
-    let holds = f64::from((sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01);
+    let holds = (sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01;
     let bands = "the spectrum of A reappears in two side bands about the frequency of injection";
     outcome.compared.push(beside("Figure 11", bands).recomputed(holds));
     for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {

@@ -10,7 +10,7 @@ use super::{Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
 /// What the experiments report.
 pub struct Evidence {
     /// By place in [`PRINTED`]: the experiment, and its values.
-    compared: HashMap<usize, (String, Compared)>,
+    compared: HashMap<usize, (Vec<String>, Compared)>,
     /// By `EXPERIMENT/METRIC`.
     metrics: HashMap<String, f64>,
     /// What was compared with a value that is not in the list.
@@ -25,7 +25,7 @@ impl Default for Evidence {
         let of = |(place, printed): (usize, &'static Printed)| {
             let value = printed.recomputed()?;
             let ours = Compared::with(&printed.source, &*printed.place, &*printed.quantity);
-            Some((place, (String::new(), ours.recomputed(value))))
+            Some((place, (Vec::new(), ours.recomputed(value))))
         };
         let compared = PRINTED.iter().enumerate().filter_map(of).collect();
         Self { compared, metrics: HashMap::new(), astray: Vec::new(), figures: Vec::new() }
@@ -46,9 +46,8 @@ impl Evidence {
                 ));
                 continue;
             };
-            let known = self.compared.entry(place).or_insert_with(|| (String::new(), ours.clone()));
-            let comma = if known.0.is_empty() { "" } else { ", " };
-            known.0 = format!("{}{comma}{experiment}", known.0);
+            let known = self.compared.entry(place).or_insert_with(|| (Vec::new(), ours.clone()));
+            known.0.push(experiment.to_owned());
             known.1.recomputed = known.1.recomputed.or(ours.recomputed);
             known.1.simulated = known.1.simulated.or(ours.simulated);
             known.1.used = known.1.used.or(ours.used);
@@ -60,10 +59,7 @@ impl Evidence {
 
     /// The experiments that report a place; none of what follows from the print itself.
     pub fn by(&self, place: usize) -> impl Iterator<Item = &str> {
-        self.compared
-            .get(&place)
-            .into_iter()
-            .flat_map(|(names, _)| names.split(", ").filter(|name| !name.is_empty()))
+        self.compared.get(&place).into_iter().flat_map(|(names, _)| names).map(String::as_str)
     }
 
     /// Our value of a place.

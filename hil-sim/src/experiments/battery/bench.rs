@@ -6,7 +6,7 @@ use drive_core::Accepted;
 
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::open_phase;
-use crate::plant::{Complex, Plant, PlantSettings};
+use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
 /// An error beyond this, degrees, is wrong, unless the run says otherwise.
@@ -90,14 +90,8 @@ impl Bench {
     ///
     /// # Errors
     /// When the plant is refused.
-    pub fn new(
-        config: &Config,
-        plant: &PlantSettings,
-        drive: &Drive,
-        load: Load,
-        seed: u64,
-    ) -> Result<Self, Error> {
-        let mut settings = *plant;
+    pub fn new(config: &Config, drive: &Drive, load: Load, seed: u64) -> Result<Self, Error> {
+        let mut settings = plant_settings(config);
         settings.mechanics.load = load;
         let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
         plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;

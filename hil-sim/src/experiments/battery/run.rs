@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use super::bench::Bench;
 use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{Refused, Trial};
-use crate::plant::PlantSettings;
 use crate::prelude::*;
 
 /// Time after the first reference that the statistics of the error leave out, s: the angle settles.
@@ -22,13 +21,8 @@ const LONGEST_LEARNING_S: f64 = 1000.0;
 ///
 /// # Errors
 /// When the plant is refused, or the drive neither learns nor says why.
-pub fn learned(
-    config: &Config,
-    plant: &PlantSettings,
-    drive: Drive,
-    seed: u64,
-) -> Result<Result<Drive, u8>, Error> {
-    let mut bench = Bench::new(config, plant, &drive, Load::Locked, seed)?;
+pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive, u8>, Error> {
+    let mut bench = Bench::new(config, &drive, Load::Locked, seed)?;
     bench.rig.command(&Command::Start(Mode::Learning))?;
     match bench.wait(LONGEST_LEARNING_S) {
         State::Off => Ok(Ok(bench.rig.drive)),
@@ -43,13 +37,7 @@ pub fn learned(
 ///
 /// # Errors
 /// When the plant is refused, or the drive refuses a command.
-pub fn trial(
-    config: &Config,
-    plant: &PlantSettings,
-    drive: &Drive,
-    kind: Kind,
-    seed: u64,
-) -> Result<Trial, Error> {
+pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Trial, Error> {
     let mut random = seeded(seed);
     let parts = kind.parts(&mut random);
     let nominal = nominal_limit_a(config);
@@ -58,7 +46,7 @@ pub fn trial(
         Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
         Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
     };
-    let mut bench = Bench::new(config, plant, drive, load, seed)?;
+    let mut bench = Bench::new(config, drive, load, seed)?;
     bench.trial.kind = Some(kind);
     let references = parts.iter().map(|part| part.reference.1);
     let drawn = if mode == Mode::Speed { &mut bench.trial.rpm } else { &mut bench.trial.i_q };
@@ -92,8 +80,7 @@ pub fn trial(
 /// # Errors
 /// When the plant is refused, or the drive refuses to start.
 pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Option<Bench>, Error> {
-    let (load, plant) = (Load::Speed { speed: 0.0 }, plant_settings(config));
-    let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+    let mut bench = Bench::new(config, drive, Load::Speed { speed: 0.0 }, seed)?;
     bench.rig.command(&Command::Start(Mode::Torque))?;
     let regulates =
         bench.wait(LONGEST_START_S).regulates() && bring_up(&mut bench, Shaft::Held(rpm), config)?;
@@ -182,7 +169,7 @@ mod tests {
                 settings.angle_source = drive_core::AngleSource::Encoder;
             }
             let drive = Drive::new(settings.build().unwrap());
-            trial(&config, &plant_settings(&config), &drive, Kind::Constant(0), 5).unwrap()
+            trial(&config, &drive, Kind::Constant(0), 5).unwrap()
         };
         let (lower, whole) = (of(Some(0.74_f32.sqrt())), of(None));
         assert_eq!((lower.is_limited(), whole.is_limited()), (true, false));
@@ -200,7 +187,6 @@ mod tests {
     fn a_dragged_shaft_takes_the_flux_through_zero_frequency_under_torque() {
         let config = Config::default();
         let drive = Drive::new(config.drive.build().unwrap());
-        let plant = plant_settings(&config);
         let (mut into, mut out_of, mut rates) = (0, 0, Vec::new());
         for seed in 0..12 {
             let kind = Kind::Dragged(Asymmetry::None);
@@ -211,7 +197,7 @@ mod tests {
             // The long hold is not needed.
             parts.last_mut().unwrap().seconds = 0.5;
             let load = Load::Speed { speed: 0.0 };
-            let mut bench = Bench::new(&config, &plant, &drive, load, seed).unwrap();
+            let mut bench = Bench::new(&config, &drive, load, seed).unwrap();
             bench.trace = Some(Vec::new());
             bench.rig.command(&Command::Start(Mode::Torque)).unwrap();
             assert_eq!(bench.wait(LONGEST_START_S), State::Torque);

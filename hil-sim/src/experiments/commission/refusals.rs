@@ -11,14 +11,10 @@ use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "commission-refusals",
-    stands_for: "beyond the dissertation",
-    about: "Defects of motor, wiring, sensors and board, on random machines: does the commissioning refuse them by name? `--set runs=N` of each.",
-    uses: &[BENCH, DRIVE, &["load.", "spread.machine", "runs"]],
-    not: &[],
-    run: whole::<Refusals>,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("commission-refusals", whole::<Refusals>)
+    .stands_for("beyond the dissertation")
+    .about("Defects of motor, wiring, sensors and board, on random machines: does the commissioning refuse them by name? `--set runs=N` of each.")
+    .uses(&[BENCH, DRIVE, &["load.", "spread.machine", "runs"]]);
 
 const RUNS: u32 = 50;
 /// The steps that are done.

@@ -63,7 +63,6 @@ pub fn set_up(case: Case, config: &mut Config) {
 pub struct Run<'a> {
     case: Case,
     config: &'a Config,
-    machine: (f64, f64),
     rpm: f64,
     i_q: f64,
     sign: f64,
@@ -104,7 +103,6 @@ impl<'a> Run<'a> {
         seed: u64,
         traced: bool,
     ) -> Result<Self, Error> {
-        let plant = plant_settings(config);
         let mut random = seeded(seed);
         let rpm = case.speed(&mut random);
         let per_a = config.amperes(1.0);
@@ -117,12 +115,11 @@ impl<'a> Run<'a> {
         let off_s = random.random_range(OFF_S.0..=OFF_S.1);
         let held = case.shaft(rpm) != Shaft::Free;
         let load = if held { Load::Speed { speed: 0.0 } } else { Load::Free { torque: 0.0 } };
-        let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+        let mut bench = Bench::new(config, drive, load, seed)?;
         bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
         bench.trace = traced.then(Vec::new);
-        let machine = (plant.machine.rs, plant.machine.rr);
-        Ok(Self { case, config, machine, rpm, i_q, sign, turn_deg, off_s, bench })
+        Ok(Self { case, config, rpm, i_q, sign, turn_deg, off_s, bench })
     }
 
     /// Does the run; returns its record too, where there is one.
@@ -244,11 +241,12 @@ impl<'a> Run<'a> {
         let rpm = self.rpm;
         self.counted(0.0, &[Part::constant(rpm, once + 0.7)])?;
         if self.case.kind == RangeKind::HotRamps {
-            let (rs, rr) = self.machine;
+            let machine = plant_settings(self.config).machine;
             let steps = 100;
             for n in 1..=steps {
                 let share = f64::from(n) / f64::from(steps);
-                let (rs, rr) = (rs * (1.0 + RISE.0 * share), rr * (1.0 + RISE.1 * share));
+                let rs = machine.rs * (1.0 + RISE.0 * share);
+                let rr = machine.rr * (1.0 + RISE.1 * share);
                 self.bench.rig.plant.set_resistances(rs, rr).map_err(Error::refused)?;
                 still(self.bench.watch(WARMING_S / f64::from(steps)))?;
             }

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use drive_settings::words;
+
 use crate::experiments::statistics::fault_code;
 use crate::experiments::steady::{OperatingPoint, at_speed};
 use crate::prelude::*;
@@ -98,34 +100,20 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
     Ok(Trial { case, wrong_s, fault: fault(&rig), loss, ..Trial::default() })
 }
 
-/// Disturbance in a run that the drive must not stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum HealthyKind {
-    /// Nothing, within 150 rpm.
-    Slow,
-    /// Nothing, within 300 rpm.
-    Fast,
-    /// The torque reversed, within 150 rpm.
-    Reversal,
-    /// A free shaft, its speed regulated, loaded with 0.6 Nm.
-    LoadStep,
-}
-
-impl HealthyKind {
-    /// Name in legends and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Slow => "within 150 rpm",
-            Self::Fast => "within 300 rpm",
-            Self::Reversal => "torque reversed, within 150 rpm",
-            Self::LoadStep => "free shaft, load step of 0.6 Nm",
-        }
+words! {
+    /// Disturbance in a run that the drive must not stop, with its name in legends and tables.
+    #[derive(Serialize, Deserialize)]
+    pub enum HealthyKind {
+        /// Nothing, at a low speed.
+        Slow = "within 150 rpm",
+        /// Nothing.
+        Fast = "within 300 rpm",
+        /// The torque reversed, at a low speed.
+        Reversal = "torque reversed, within 150 rpm",
+        /// The speed regulated, and loaded.
+        LoadStep = "free shaft, load step of 0.6 Nm",
     }
 }
-
-/// All of them.
-pub const KINDS: [HealthyKind; 4] =
-    [HealthyKind::Slow, HealthyKind::Fast, HealthyKind::Reversal, HealthyKind::LoadStep];
 
 /// Two seconds, after 0.3 s to settle, with the disturbance after one.
 ///

@@ -48,8 +48,7 @@ impl Scenario {
         let reference = self.reference();
         let (parts, seconds) = self.course(context.seconds);
         let config = self.configured(context.config)?;
-        let mut rig = Rig::from_config(&config, context.seed)?;
-        rig.start(reference.mode)?;
+        let mut rig = Rig::started(&config, context.seed, reference.mode)?;
         let (start, origin) = (rig.time(), rig.plant.mechanical_angle() / TAU);
         let blocks = ((seconds * RATE_HZ).round() as usize).div_ceil(CARRIER_SAMPLES);
         let progress = context.progress.bar("simulating", blocks as u64);

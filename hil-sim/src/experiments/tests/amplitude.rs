@@ -4,14 +4,11 @@ use super::steady::{OperatingPoint, steady_run};
 use crate::prelude::*;
 
 /// Not a figure of the source.
-pub const EXPERIMENT: Experiment = Experiment {
-    name: "amplitude",
-    stands_for: "section 3.4",
-    about: "Angle error at standstill for three amplitudes of the carrier.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
-    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.amplitude_v"]],
-    run,
-};
+pub const EXPERIMENT: Experiment = Experiment::new("amplitude", run)
+    .stands_for("section 3.4")
+    .about("Angle error at standstill for three amplitudes of the carrier.")
+    .uses(&[BENCH, DRIVE, &["prepare.learn", "seconds"]])
+    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.amplitude_v"]]);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();

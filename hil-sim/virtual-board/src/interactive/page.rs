@@ -21,8 +21,9 @@ pub fn outcome(config: &Config, session: &Session) -> Outcome {
     m.set("simulated_s", board.time());
     m.set("control_interrupts", record.interrupts as f64);
     m.set("resets", board.resets.len() as f64);
-    m.set("angle_error_rms_deg", record.error_rms_deg());
-    m.set("angle_error_max_deg", record.largest_error_deg);
+    let judged = record.error.count() > 0;
+    m.set("angle_error_rms_deg", if judged { record.error.rms() } else { 0.0 });
+    m.set("angle_error_max_deg", record.error.largest());
     m.set("phase_current_peak_a", record.peak_current);
     m.set("worst_interrupt_cycles", f64::from(record.worst_cycles));
     outcome.faults = faults(lines);

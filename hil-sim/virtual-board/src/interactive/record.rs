@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Telemetry, carrier::CARRIER_SAMPLES};
-use hil_sim::plant::Plant;
+use hil_sim::plant::{Complex, Plant};
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
+use hil_sim::stats::Stats;
 
 use crate::board::Period;
 
@@ -47,7 +48,7 @@ struct Bucket {
     time: f64,
     sums: Means,
     /// Sum of unit vectors that show the angle error: angles have no mean of their own.
-    error: [f64; 2],
+    error: Complex,
 }
 
 impl Bucket {
@@ -55,7 +56,7 @@ impl Bucket {
         self.periods += other.periods;
         self.time += other.time;
         self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
-        self.error.iter_mut().zip(other.error).for_each(|(sum, more)| *sum += more);
+        self.error += other.error;
     }
 }
 
@@ -73,11 +74,8 @@ pub struct Record {
     doubled: u32,
     /// Control interrupts.
     pub interrupts: u64,
-    /// Those in which the angle was judged: outputs on, and a flux.
-    pub judged: u64,
-    error_squares: f64,
-    /// Largest angle error, electrical degrees.
-    pub largest_error_deg: f64,
+    /// Angle error, electrical degrees, where it is judged: outputs on, and a flux.
+    pub error: Stats,
     /// Largest phase current at a sample, A.
     pub peak_current: f64,
     /// Estimated cycles of the longest control interrupt.
@@ -112,11 +110,8 @@ impl Record {
         self.peak_current = currents.into_iter().fold(self.peak_current, |m, i| m.max(i.abs()));
         if on && flux > FLUX_WB {
             let error = plant.rotor_flux_angle() - f64::from(drive.phi.to_turns()) * TAU;
-            bucket.error = [error.cos(), error.sin()];
-            let degrees = wrapped_degrees(error);
-            self.judged += 1;
-            self.error_squares += degrees * degrees;
-            self.largest_error_deg = self.largest_error_deg.max(degrees.abs());
+            bucket.error = Complex::cis(error);
+            self.error.push(wrapped_degrees(error));
         }
         self.open.add(&bucket);
         if self.open.periods >= (CARRIER_SAMPLES << self.doubled) as f64 {
@@ -133,11 +128,6 @@ impl Record {
         }
     }
 
-    /// Angle error rms, electrical degrees, where it is judged.
-    pub fn error_rms_deg(&self) -> f64 {
-        (self.error_squares / self.judged.max(1) as f64).sqrt()
-    }
-
     /// Curve of a quantity over time, s; quantities that the drive reports are not-a-numbers while the outputs
     /// are off.
     pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
@@ -151,10 +141,8 @@ impl Record {
     /// True minus estimated rotor-flux angle over time, electrical degrees; a not-a-number where it is
     /// not judged.
     pub fn error_deg(&self) -> Vec<(f64, f64)> {
-        self.points(|bucket| match bucket.error {
-            [0.0, 0.0] => f64::NAN,
-            [cos, sin] => sin.atan2(cos).to_degrees(),
-        })
+        let angle = |error: Complex| if error.norm() > 0.0 { error.arg() } else { f64::NAN };
+        self.points(|bucket| angle(bucket.error).to_degrees())
     }
 
     fn points(&self, of: impl Fn(&Bucket) -> f64) -> Vec<(f64, f64)> {

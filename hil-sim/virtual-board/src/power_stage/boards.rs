@@ -15,10 +15,6 @@ const TTL: (f64, f64) = (0.8, 2.0);
 const L639X: (f64, f64) = (0.8, 2.25);
 /// Ringing at a turn-off: 20 nH of the loop, and a current that falls in 40 ns (assumed).
 const RINGING: f64 = 20e-9 / 40e-9;
-/// Divider of the dc link without a capacitor (assumed).
-const DIVIDER: DcLinkPin = DcLinkPin::Divider { ohm: 10e3, farad: 0.0 };
-/// Pull-up of the fault input that the documentation asks for (assumed on all boards).
-const FAULT_PULL_OHM: f64 = 4700.0;
 
 /// HIN of L6398 and L6390: active high; its pull-down draws 260 uA at most from 15 V (L6390 data sheet, p. 11), typically
 /// 175 uA.
@@ -55,7 +51,7 @@ const AMPLIFIERS: Shunts = Shunts {
     noise_v: 0.0008,
 };
 
-/// The inverter of the dissertation, with sensors in the lines a and b. The dissertation does not describe its drivers:
+/// The inverter of the dissertation, of which the others have what they do not state: with sensors in the lines a and b. The dissertation does not describe its drivers:
 /// inputs active high with external pull-downs of 10 kOhm, as the documentation asks for, without interlock.
 pub const REFERENCE: PowerStage = PowerStage {
     name: "reference",
@@ -64,8 +60,10 @@ pub const REFERENCE: PowerStage = PowerStage {
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
     // Those of a drive for 230 V (assumed).
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
-    dc_link_pin: DIVIDER,
-    fault_pull_ohm: FAULT_PULL_OHM,
+    // Without a capacitor (assumed).
+    dc_link_pin: DcLinkPin::Divider { ohm: 10e3, farad: 0.0 },
+    // The pull-up that the documentation asks for (assumed on all boards).
+    fault_pull_ohm: 4700.0,
     analog_only: &[],
     terminals: ["B5 B7 B9 B10 B11 C4 C5", "C7 C9 A12", "B12 B13 B14"],
     ntc: Ntc::DEFAULT,
@@ -91,10 +89,8 @@ const IHM08M1: PowerStage = PowerStage {
     switches: Switches { rated_v: 60.0, ringing_v_per_a: RINGING },
     // 169 kOhm beside 9.31 kOhm. Whether there is a capacitor is not known.
     dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
-    fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[(0, 11), (1, 14), (1, 15)],
     terminals: ["B5 B7 B9 - C7 - -", "- - -", "B12 - B13"],
-    ntc: Ntc::DEFAULT,
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
     dc_link_divider: Some(19.15),
@@ -102,6 +98,7 @@ const IHM08M1: PowerStage = PowerStage {
     delay_and_drop: Some((125e-9, 0.1)),
     motor: Some("rewound-48v"),
     supply_v: Some(42.0),
+    ..REFERENCE
 };
 
 /// STEVAL-IHM023V3 behind X-NUCLEO-IHM09M1 at 320 V: L6390 with STGP10H60DF. Its sources are thin: shunts, gain, bias and
@@ -112,35 +109,23 @@ const IHM023V3: PowerStage = PowerStage {
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 180e-9 },
     // Assumed: an IGBT is off within 0.5 us.
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
-    switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
-    dc_link_pin: DIVIDER,
-    fault_pull_ohm: FAULT_PULL_OHM,
-    analog_only: &[],
     terminals: ["- - - - - - -", "- - -", "- - -"],
     ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
     // 125 ns (L6390 data sheet); drop of an IGBT, assumed.
     delay_and_drop: Some((125e-9, 1.5)),
-    motor: None,
     supply_v: Some(320.0),
+    ..REFERENCE
 };
 
 /// STEVAL-IPMM10B behind X-NUCLEO-IHM09M1 at 320 V: a SLLIMM module of the second series. Shunts and gain: UM2702, page 16; all
-/// else is assumed.
+/// else is assumed, the same as above where the adapter board is.
 const IPMM10B: PowerStage = PowerStage {
     name: "nucleo-g474re-ipmm10b",
     driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: true, dead_time_s: 0.0 },
-    limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
-    switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
-    dc_link_pin: DIVIDER,
-    fault_pull_ohm: FAULT_PULL_OHM,
-    analog_only: &[],
-    terminals: ["- - - - - - -", "- - -", "- - -"],
     ntc: Ntc { ohm_25: 85e3, beta_k: 4092.0, divider_ohm: 12e3, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
-    dc_link_divider: Some(1.0 / 0.0075),
     delay_and_drop: Some((125e-9, 1.0)),
-    motor: None,
-    supply_v: Some(320.0),
+    ..IHM023V3
 };
