@@ -241,7 +241,7 @@ fn the_share_of_the_dead_time_grows_with_the_carrier() {
         let lag = settings.build().unwrap().current_lag;
         settings.scales.both_zero_vectors = true;
         let built = settings.build().unwrap();
-        let signs = built.dead_time.signs(Abc::new(1.0, -0.5, -0.5));
+        let signs = built.dead_time.signs(Abc::new(1.0, -0.5, -0.5), Abc::ZERO);
         settings.inverter.compensate = false;
         let plain = settings.build().unwrap().modulator;
         let lost = built.dead_time.voltage(signs, 311.0, 0.0).a;
