@@ -19,21 +19,24 @@ fn a_shipped_file_runs_as_its_experiment() {
 }
 
 /// A spindle passes 300 Hz, where the rotor is counted and the currents are looked at twice a turn, and comes back. The rotor follows:
-/// by its true speed, not by that of the drive.
+/// by its true speed, not by that of the drive. Learned on iron, too: nothing holds the rotor while it starts.
 #[test]
 fn a_spindle_runs_to_its_rated_speed_and_back() {
     let folder = folder("scenario-spindle");
     let file = format!("{}/scenarios/spindle.toml", env!("CARGO_MANIFEST_DIR"));
-    for seed in ["1", "2"] {
+    for (plant, seed) in [("a", "1"), ("a", "2"), ("r", "1"), ("g7", "1")] {
         let arguments =
             ["run", &file, "--motor", "spindle-2kw2", "--json", "--quiet", "--seed", seed];
-        let output = hil_sim(&folder, &arguments);
+        let learns = format!("prepare.learn={}", if plant == "a" { "no" } else { "yes" });
+        let more = ["--plant", plant, "--set", &learns];
+        let output = hil_sim(&folder, &[&arguments[..], &more].concat());
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let result = object(&output);
         let metric = |name: &str| result["metrics"][name].as_f64().unwrap();
         assert!((23_400.0..24_500.0).contains(&metric("speed_highest_rpm")), "{result}");
         assert!(metric("speed_error_in_the_end_rpm").abs() < 60.0, "{result}");
-        assert!(metric("angle_error_rms_deg") < 2.5, "{result}");
+        let most = if plant == "a" { 2.5 } else { 3.0 };
+        assert!(metric("angle_error_rms_deg") < most, "{plant}: {result}");
     }
 }
 

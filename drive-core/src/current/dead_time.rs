@@ -58,8 +58,7 @@ impl DeadTime {
     pub fn signs(&self, i: Abc, half: Abc) -> Signs {
         let sign = |i: f32, half: f32| {
             let crossing = ONE / half.abs();
-            let per_ampere = if crossing < self.per_ampere { crossing } else { self.per_ampere };
-            (i * per_ampere) as i32 as f32
+            (i * if crossing < self.per_ampere { crossing } else { self.per_ampere }) as i32 as f32
         };
         Signs(Abc { a: sign(i.a, half.a), b: sign(i.b, half.b), c: sign(i.c, half.c) })
     }

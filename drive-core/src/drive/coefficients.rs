@@ -183,6 +183,8 @@ pub struct SequenceSteps {
     pub magnetise: u32,
     /// Verification of the lock.
     pub verify: u32,
+    /// Electrical speed up to which the shaft counts as standing, turns per period.
+    pub standing_freq: f32,
     /// A per period.
     pub stop_ramp: f32,
 }

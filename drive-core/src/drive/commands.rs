@@ -200,7 +200,7 @@ impl Drive {
         if field.frame != Frame::Tracked {
             return Err(Refused::NeedsInjection);
         }
-        if !k.stands() {
+        if !k.stands(c) {
             return Err(Refused::Turning);
         }
         k.no_torque(k.references.current.d, c.injection_axis);

@@ -14,10 +14,7 @@ use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
 use crate::protect::SaliencyCheck;
 use crate::protect::saliency_check::SaliencyCheckAction;
-use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured, PERIOD_S, motion};
-
-/// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
-const STANDING_FREQ: f32 = PERIOD_S;
+use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured, motion};
 
 impl Field {
     /// Without a current yet, for this goal.
@@ -421,7 +418,7 @@ impl Field {
     #[cold]
     fn verify(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
         if k.elapsed >= c.sequence.verify {
-            if !k.stands() {
+            if !k.stands(c) {
                 return Err(Fault::LostLock);
             }
             self.enter(k, FluxPhase::ready());
@@ -440,12 +437,5 @@ impl Field {
     fn not_finite(&self, c: &Coefficients, k: &Kept) -> Option<Fault> {
         let state = (!self.estimator.is_finite()).then_some(Fault::NonFiniteState);
         k.not_finite(c, self.goal.is_finite()).or(state)
-    }
-}
-
-impl Kept {
-    /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
-    pub fn stands(&self) -> bool {
-        self.seen.rotor_freq.abs() <= STANDING_FREQ
     }
 }

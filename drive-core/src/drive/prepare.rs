@@ -152,6 +152,11 @@ impl Kept {
         self.no_torque(i_d, c.injection_axis);
     }
 
+    /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
+    pub fn stands(&self, c: &Coefficients) -> bool {
+        self.seen.rotor_freq.abs() <= c.sequence.standing_freq
+    }
+
     /// References of nothing but this direct current, A.
     pub fn no_torque(&mut self, i_d: f32, injection_axis: UnitVector) {
         let current = Dq::new(i_d, 0.0);
