@@ -27,8 +27,7 @@ fn a_spindle_runs_to_its_rated_speed_and_back() {
     for (plant, seed) in [("a", "1"), ("a", "2"), ("r", "1"), ("g7", "1")] {
         let arguments =
             ["run", &file, "--motor", "spindle-2kw2", "--json", "--quiet", "--seed", seed];
-        let learns = format!("prepare.learn={}", if plant == "a" { "no" } else { "yes" });
-        let more = ["--plant", plant, "--set", &learns];
+        let more = ["--plant", plant];
         let output = hil_sim(&folder, &[&arguments[..], &more].concat());
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let result = object(&output);
