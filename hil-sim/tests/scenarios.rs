@@ -25,10 +25,9 @@ fn a_spindle_runs_to_its_rated_speed_and_back() {
     let folder = folder("scenario-spindle");
     let file = format!("{}/scenarios/spindle.toml", env!("CARGO_MANIFEST_DIR"));
     for (plant, seed) in [("a", "1"), ("a", "2"), ("r", "1"), ("g7", "1")] {
-        let arguments =
-            ["run", &file, "--motor", "spindle-2kw2", "--json", "--quiet", "--seed", seed];
-        let more = ["--plant", plant];
-        let output = hil_sim(&folder, &[&arguments[..], &more].concat());
+        let of = ["--motor", "spindle-2kw2", "--plant", plant, "--seed", seed];
+        let arguments = [&["run", &file, "--json", "--quiet"], &of[..]].concat();
+        let output = hil_sim(&folder, &arguments);
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let result = object(&output);
         let metric = |name: &str| result["metrics"][name].as_f64().unwrap();

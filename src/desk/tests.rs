@@ -165,7 +165,8 @@ fn the_other_side_may_stop_and_nothing_else_that_moves() {
     assert!(!Order::Stop(Stop::Coast).is_for_the_commander(Commander::Bus));
 }
 
-/// What is told of a drive that is off in the report behind one with a state, by who has stopped it: nobody, console, bus, strip.
+/// The announcement of a drive that one report shows in a state and the next one off; a column for each source of the stop: none,
+/// console, bus, strip.
 #[test]
 fn a_stop_between_two_reports_is_told_as_one() {
     let (start, learned, stop) = ("the start has ended", "the learning has ended", "stopped");

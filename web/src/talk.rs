@@ -230,8 +230,8 @@ impl Talk {
         }
     }
 
-    /// What there is for the page: messages as JSON, and [frames](Frames::take). The messages first: the answer to a new stream tells
-    /// what its frames are.
+    /// The messages for the page as JSON, and the [frames](Frames::take). The page reads the messages first: the answer to a new stream
+    /// says what its frames hold.
     pub fn take(&mut self) -> (String, Vec<u8>) {
         let mut texts = std::mem::take(&mut self.texts);
         texts.push(json!({ "tick": self.frames.counts, "flux": self.board.machine.flux() }));

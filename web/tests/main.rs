@@ -181,7 +181,7 @@ fn until_off(session: &mut Session, longest: u32) -> (Option<u32>, f64) {
     (None, largest)
 }
 
-/// What the guide of the page says of a motor without its saliency.
+/// The page's guide states when the drive notices that the saliency is gone; these runs show it.
 #[test]
 fn the_loss_of_the_saliency_is_told_as_soon_as_it_matters() {
     for seed in [1, 3] {

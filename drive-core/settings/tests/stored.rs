@@ -1,4 +1,4 @@
-//! What a host stores comes back to the bit, and what it should not have stored is refused by its name.
+//! Stored settings, commands and states come back to the bit; a name or value that is not allowed is refused by its name.
 
 use drive_core::{Command, Dq, Fault, Mode, State, Stop};
 use induction_drive_core as drive_core;

@@ -230,7 +230,7 @@ impl Rig {
         }
     }
 
-    /// Runs for `seconds`; the statistics of what `of` takes from each sample.
+    /// Runs for `seconds` and returns the statistics of the values that `of` computes from each sample.
     pub fn stats<const N: usize>(
         &mut self,
         seconds: f64,

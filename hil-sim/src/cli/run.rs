@@ -31,7 +31,7 @@ pub struct Output {
     pub csv: Option<PathBuf>,
 }
 
-/// A run: of what, how, and where its results go.
+/// A requested run: its experiment, input, part and output.
 #[derive(Args, Default)]
 pub struct Request {
     /// Name of the experiment, as `list` shows it, or the TOML file of a scenario

@@ -15,7 +15,7 @@ pub struct Case {
     pub speed: f64,
     /// The excitation.
     pub signal: Signal,
-    /// Which of the sampling periods.
+    /// Index of the sampling period.
     pub period: usize,
 }
 
