@@ -1,6 +1,6 @@
 //! One PWM period with the voltages of the inverter averaged over it.
 //!
-//! Between the currents at which a phase's smoothed sign has its kinks, ±20 mA, the equations are
+//! Between the currents at which a phase's smoothed sign has its kinks, ±20 mA by default, the equations are
 //! smooth and few integration steps are enough; a step across a kink would cost accuracy. So a step
 //! that is about to take a phase across one is cut there.
 
@@ -9,15 +9,26 @@ use crate::integrate::MotorModel;
 use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel};
 use crate::terminals::{Source, Terminals};
 
-/// Current, A, beyond which the sign of a phase current counts fully.
-const KINK: f64 = 0.020;
 /// Shortest part of a step that one is cut to.
 const SHORTEST: f64 = 1.0 / 16.0;
 
-/// Sign of a current, smoothed linearly over ±20 mA.
-#[inline]
-pub(crate) fn smooth_sign(i: f64) -> f64 {
-    (i * (1.0 / KINK)).clamp(-1.0, 1.0)
+/// Sign of a phase current, smoothed linearly up to a current of either sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SmoothSign {
+    /// That current, A, and its inverse.
+    pub kink: f64,
+    inverse: f64,
+}
+
+impl SmoothSign {
+    pub(crate) fn new(kink: f64) -> Self {
+        Self { kink, inverse: 1.0 / kink }
+    }
+
+    #[inline]
+    pub(crate) fn of(&self, i: f64) -> f64 {
+        (i * self.inverse).clamp(-1.0, 1.0)
+    }
 }
 
 /// Averages of one period.
@@ -33,6 +44,7 @@ pub(crate) struct Averaged {
     pub residual: f64,
     /// 1 over the current that just swings a leg within the dead time, 1/A; 0 without capacitance.
     pub inverse_knee: f64,
+    pub sign: SmoothSign,
     /// Ohm.
     pub on_resistance: f64,
     /// Further resistance of each phase, ohm.
@@ -59,7 +71,7 @@ impl Source for Averaged {
     fn voltage(&self, i: Complex) -> Complex {
         let currents = phases(i);
         let error = |k: usize| {
-            let sign = smooth_sign(currents[k]);
+            let sign = self.sign.of(currents[k]);
             sign * if sign > 0.0 { self.lost[k] } else { self.gained[k] }
         };
         self.v - clarke([error(0), error(1), error(2)])
@@ -75,7 +87,7 @@ impl Source for RealSwitches {
     fn voltage(&self, i: Complex) -> Complex {
         let legs = &self.0;
         let currents = phases(i);
-        let signs = currents.map(smooth_sign);
+        let signs = currents.map(|i| legs.sign.of(i));
         let shares = match legs.inverse_knee {
             0.0 => signs,
             inverse_knee => currents.map(|i| swung(i * inverse_knee)),
@@ -97,13 +109,14 @@ pub(crate) fn step<M: MachineModel>(
     terminals: &impl Terminals,
     motor: &mut MotorModel<M>,
     h: f64,
+    kink: f64,
 ) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
     loop {
         let first = motor.rates(terminals);
         let i = motor.state.electrical.current();
-        let part = match until_kink(i, first.0.current_rate(), rest) {
+        let part = match until_kink(i, first.0.current_rate(), rest, kink) {
             None => rest,
             Some(time) => time.max(SHORTEST * h).min(rest),
         };
@@ -117,14 +130,14 @@ pub(crate) fn step<M: MachineModel>(
 
 /// Time until the first phase current crosses a kink, if one does within `h` seconds at this rate.
 #[inline]
-fn until_kink(i: Complex, rate: Complex, h: f64) -> Option<f64> {
+fn until_kink(i: Complex, rate: Complex, h: f64, kink: f64) -> Option<f64> {
     let (now, later) = (phases(i), phases(i + rate * h));
     // Which of the three pieces between the kinks a current is on.
-    let piece = |i: f64| (i > -KINK, i > KINK);
+    let piece = |i: f64| (i > -kink, i > kink);
     if (0..3).all(|k| piece(now[k]) == piece(later[k])) {
         return None;
     }
     let rates = phases(rate);
-    let times = (0..3).flat_map(|k| [-KINK, KINK].map(|kink| (kink - now[k]) / rates[k]));
+    let times = (0..3).flat_map(|k| [-kink, kink].map(|kink| (kink - now[k]) / rates[k]));
     Some(times.filter(|t| *t > 0.0).fold(h, f64::min))
 }

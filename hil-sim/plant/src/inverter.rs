@@ -3,7 +3,7 @@
 //! A leg is high for the fraction `c/top` of the period. Its mean voltage falls short of that by
 //! the dead time (section 3.9: while both switches are off the current holds the leg at the rail it
 //! flows from) and by a residual drop of the switches, both against the direction of the current.
-//! That direction is the sign of the actual phase current, smoothed linearly over ±20 mA and
+//! That direction is the sign of the actual phase current, smoothed linearly over ±20 mA by default and
 //! evaluated at every stage of the integration. A leg that does not switch has no dead-time error.
 //!
 //! The propagation delay shifts the pulses within the period; averaged, a fraction delay/T of the
@@ -12,7 +12,7 @@
 
 use drive_core::Compare;
 
-use crate::averaged::Averaged;
+use crate::averaged::{Averaged, SmoothSign};
 use crate::complex::{Complex, clarke, phases, square};
 use crate::error::{PlantError, check};
 use crate::settings::settings;
@@ -37,6 +37,8 @@ settings! {
         /// Capacitance of the output node of each leg, F. During the dead time the current has to
         /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
         node_capacitance: f64 = 0.0, 0.0..=if s.switched { 0.0 } else { 1e-6 }, "F";
+        /// Current up to which the sign of a phase current grows in proportion to it, A.
+        smoothing_a: f64 = 0.020, 1e-5..=10.0, "A";
         /// Resistance of a switch that conducts, ohm.
         on_resistance: f64 = 0.0, 0.0..=100.0, "ohm";
         /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.
@@ -72,6 +74,7 @@ pub struct Inverter {
     pub(crate) residual: f64,
     /// F.
     pub(crate) capacitance: f64,
+    pub(crate) sign: SmoothSign,
     /// Ohm.
     pub(crate) on_resistance: f64,
     /// Resistance of each phase, ohm, and dead time of each leg, s, beyond the common ones.
@@ -103,6 +106,7 @@ impl Inverter {
             propagation: s.propagation_us * 1e-6,
             residual: s.residual_v,
             capacitance: s.node_capacitance,
+            sign: SmoothSign::new(s.smoothing_a),
             on_resistance: s.on_resistance,
             resistances: s.more_ohm,
             more_dead_time: s.more_dead_time_us.map(|us| us * 1e-6),
@@ -176,6 +180,7 @@ impl Inverter {
         Averaged {
             inverse_knee: if charge > 0.0 { self.dead_time.max(1e-9) / charge } else { 0.0 },
             residual: self.residual,
+            sign: self.sign,
             on_resistance: self.on_resistance,
             resistances: self.resistances,
             v: v * self.vdc,

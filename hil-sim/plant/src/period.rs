@@ -100,7 +100,9 @@ impl Around {
         period: f64,
     ) {
         let h = period / f64::from(self.substeps);
-        self.steps(motor, self.substeps, h, |motor, _| averaged::step(terminals, motor, h));
+        self.steps(motor, self.substeps, h, |motor, inverter| {
+            averaged::step(terminals, motor, h, inverter.sign.kink)
+        });
     }
 
     /// With the legs between their edges as the source.

@@ -9,7 +9,7 @@
 
 use drive_core::Compare;
 
-use crate::averaged::smooth_sign;
+use crate::averaged::SmoothSign;
 use crate::complex::{Complex, clarke, phases};
 use crate::inverter::Inverter;
 use crate::terminals::Source;
@@ -156,6 +156,7 @@ fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
 pub(crate) struct Legs {
     /// Leg voltages as a space vector, V.
     v: Complex,
+    sign: SmoothSign,
     residual: f64,
     on_resistance: f64,
 }
@@ -166,6 +167,7 @@ impl Legs {
     pub(crate) fn new(inverter: &Inverter, levels: [Level; 3], i: Complex) -> Self {
         Self {
             v: clarke(leg_voltages(levels, i, inverter.vdc)),
+            sign: inverter.sign,
             residual: inverter.residual,
             on_resistance: inverter.on_resistance,
         }
@@ -175,7 +177,7 @@ impl Legs {
 impl Source for Legs {
     #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
-        let signs = phases(i).map(smooth_sign);
+        let signs = phases(i).map(|i| self.sign.of(i));
         self.v - i * self.on_resistance - clarke(signs) * self.residual
     }
 }

@@ -108,7 +108,7 @@ fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
 
 /// A motor with its inverter and sensors: nameplate log-uniform over its range; circuit in the usual range, per unit, whose rated
 /// current, slip and power are those of the nameplate; inertia constant 0.1 to 1 s (`motulator-2kw2` has 0.08 s, Krause's 3 hp 0.7 s);
-/// teeth, yoke and leakage of iron up to those of the families. Sensors of 2 to 3 times the rated peak current without errors, with 12 bits and the noise of the dissertation's in proportion to the rated current.
+/// teeth, yoke and leakage of iron up to those of the families. Switches of a size that goes with the sensors' range. Sensors of 2 to 3 times the rated peak current without errors, with 12 bits and the noise of the dissertation's in proportion to the rated current.
 fn drawn(seed: u64) -> Config {
     let mut random = seeded(seed);
     let mut between = |low: f64, high: f64| random.random_range(low..=high);
@@ -138,6 +138,7 @@ fn drawn(seed: u64) -> Config {
     config.inverter.dc_link_v = SQRT_2 * volts;
     config.drive.inverter.dc_link_v = config.inverter.dc_link_v as f32;
     let (per_ampere, sensors) = (1.0 / config.amperes(1.0), &mut config.measurement);
+    config.inverter.smoothing_a *= range * SQRT_2 * amperes / sensors.range_a;
     sensors.range_a = range * SQRT_2 * amperes;
     sensors.noise_a = Some(0.005 / per_ampere);
     sensors.dc_link_range_v = Some(1.45 * config.inverter.dc_link_v);
