@@ -8,13 +8,12 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 
 use drive_core::carrier::DemodulatorKind;
 use sim_bench::bode::{Bode, frequencies, largest_pole};
-use sim_bench::prelude::*;
 use sim_bench::steady::{OperatingPoint, steady_run};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use crate::demodulators::tracked;
 use crate::injection_map::PP;
-use crate::recomputed::beside;
+use crate::prelude::*;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};
 
@@ -236,21 +235,8 @@ fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
     let fit = fits(points.get(..TABLE_6_A.len()).unwrap_or_default());
     outcome.metrics.set("literal_fit_least_pct", fit.0);
     outcome.metrics.set("literal_fit_most_pct", fit.1);
-    let claims = [
-        (
-            "Eq. 3.43",
-            "two poles and no zero predict the current difference satisfactorily",
-            fit.0 > 80.0,
-        ),
-        (
-            "section 3.11",
-            "the controller PII is adjusted for the function identified at 1.5 A",
-            largest(Pii::printed()) < 1.0,
-        ),
-    ];
-    outcome
-        .compared
-        .extend(claims.map(|(place, claim, holds)| beside(place, claim).simulated(holds)));
+    outcome.compared.push(named("two_poles_predict").simulated(fit.0 > 80.0));
+    outcome.compared.push(named("pii_for_1_5_a").simulated(largest(Pii::printed()) < 1.0));
 }
 
 /// Controllers in the closed loop: over the steps of Figure 38, and at constant speed.

@@ -2,10 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{AngleSource, Command, Mode};
 use sim_bench::plant::Complex;
-use sim_bench::prelude::*;
-use sim_bench::rig::wrapped_degrees;
+
+use crate::prelude::*;
 
 /// Figures 28 and 29.
 pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
@@ -66,8 +65,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let lost = i.dc_link_v * i.dead_time_s * RATE_HZ;
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
-    let holds = "with the correction the dead time does not distort the voltage at the terminals";
-    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(clean));
+    outcome.compared.push(named("dead_time_corrected").simulated(clean));
     let title = "What the dead time does to voltage and current";
     outcome
         .figures

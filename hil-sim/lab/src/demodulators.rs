@@ -5,10 +5,10 @@ mod signal;
 pub(super) mod tracked;
 
 use rayon::prelude::*;
-use sim_bench::prelude::*;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
+use crate::prelude::*;
 use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
@@ -93,8 +93,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         }
     }
     let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
-    let promising = Compared::with("S1", "section 5.2", "detection of the envelope is promising");
-    outcome.compared.push(promising.simulated(envelope));
+    outcome.compared.push(named("envelope_promising").simulated(envelope));
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)

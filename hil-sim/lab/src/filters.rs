@@ -9,8 +9,8 @@ use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos};
 use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
 use sim_bench::outcome::Style;
-use sim_bench::prelude::*;
 
+use crate::prelude::*;
 use crate::recomputed::CARRIER_HZ;
 use compared::{ComparedFilter, filters};
 use design::{Band, Prototype, butterworth, chebyshev_1, chebyshev_2, elliptic};
@@ -43,9 +43,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          is 0.944, which makes every real current 5.9 % too large; the drive divides by it.",
     );
     let direct = outcome.metrics.get("lpf_direct_1_error_rms_a").unwrap_or(f64::NAN);
-    let sensitive = "the filters are sensitive to the precision of their coefficients";
-    let holds = direct > 1e-3;
-    outcome.compared.push(Compared::with("S1", "Appendix C", sensitive).recomputed(holds));
+    outcome.compared.push(named("filters_sensitive").recomputed(direct > 1e-3));
     outcome.remark(
         "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA come through, as much as \
          the signal that the demodulation of the source looks for (see injection-map).",
@@ -187,17 +185,13 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         outcome.metrics.set(format!("{name}_delay_samples"), delay);
     }
     let fewest = delays[1].1.min(delays[2].1);
-    for (quantity, holds) in [
-        (
-            "the stop band of LPF contains the frequency of injection",
-            (stop[0]..stop[1]).contains(&carrier),
-        ),
-        ("pass band of BPF contains the stop band of LPF", pass[0] < stop[0] && stop[1] < pass[1]),
-        ("elliptic filters have less delay than Butterworth filters", elliptic < delays[0].1),
-        ("elliptic filters have less delay than Chebyshev filters", elliptic < fewest),
-    ] {
-        outcome.compared.push(Compared::with("S1", "section 3.10", quantity).recomputed(holds));
-    }
+    let within = pass[0] < stop[0] && stop[1] < pass[1];
+    outcome.compared.extend([
+        named("stop_band_has_carrier").recomputed((stop[0]..stop[1]).contains(&carrier)),
+        named("pass_band_has_stop_band").recomputed(within),
+        named("less_delay_than_butterworth").recomputed(elliptic < delays[0].1),
+        named("less_delay_than_chebyshev").recomputed(elliptic < fewest),
+    ]);
     outcome.metrics.set("lpf_currents_high_by_pct", 100.0 * (1.0 / LPF_AS_PRINTED.dc_gain() - 1.0));
     outcome.metrics.set("bpf_gain_dc_db", 20.0 * BPF.dc_gain().log10());
     outcome.metrics.set("leak_of_an_ampere_ma", 1e3 * BPF.dc_gain());

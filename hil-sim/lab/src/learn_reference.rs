@@ -2,7 +2,8 @@
 
 use drive_core::learned::Fitted;
 use sim_bench::learning;
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Section 5.2 asks for a detection that works at every operating point.
 pub const EXPERIMENT: Experiment = Experiment::new("learn-reference", run)

@@ -26,7 +26,8 @@ use drive_core::{AlphaBeta, FirstOrder, Motion};
 use drive_settings::Settings;
 use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign};
 use sim_bench::plant::{MachineSettings, MechanicsSettings};
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// A disturbance at time zero.
 #[derive(Clone, Copy, Debug, PartialEq)]

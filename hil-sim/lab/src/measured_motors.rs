@@ -3,15 +3,14 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use num_complex::Complex;
-use serde::Deserialize;
 use sim_bench::config::Value;
 use sim_bench::config::motors::Motor;
 use sim_bench::plant::{
     ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _, Mechanics,
     MechanicsSettings, MotorModel, phases,
 };
-use sim_bench::prelude::*;
 
+use crate::prelude::*;
 use crate::saliency::steady::at_voltage;
 
 /// All comparisons.

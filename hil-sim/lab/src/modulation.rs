@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
 use drive_core::{Abc, AlphaBeta};
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Figures 4, 5 and 11, Table 2.
 pub const EXPERIMENT: Experiment = Experiment::new("modulation", run)

@@ -1,8 +1,7 @@
 //! The tests that gave Table 5, on the simulated motor.
 
-use sim_bench::prelude::*;
-
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
+use crate::prelude::*;
 
 /// Section 3.6, Table 5.
 pub const EXPERIMENT: Experiment = Experiment::new("motor-tests", run)

@@ -5,11 +5,12 @@ pub(super) mod steady;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use num_complex::Complex;
-use sim_bench::config::{PlantModel, check_model, flux_level_a};
+use sim_bench::config::flux_level_a;
 use sim_bench::plant::{EnergyMachine, EnergyState, Machine, MachineSettings, MachineState};
-use sim_bench::prelude::*;
 
 use steady::Listed;
+
+use crate::prelude::*;
 
 /// The map.
 pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)

@@ -3,9 +3,9 @@
 use drive_core::carrier::DemodulatorKind;
 use drive_core::table::ReferenceTable;
 use sim_bench::learning;
-use sim_bench::prelude::*;
 
 use crate::injection_map::PP;
+use crate::prelude::*;
 
 /// A demodulation.
 #[derive(Clone, Copy, Debug)]

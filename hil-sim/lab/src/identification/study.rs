@@ -1,13 +1,14 @@
 //! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
 use rayon::prelude::*;
-use sim_bench::prelude::*;
 
 use super::models::{model_b, model_c, model_d};
 use super::printed::{self, Case};
 use super::structured::model_s;
 use super::trial::Noise;
 use super::{CurrentVoltage, Estimate, Parameters, Trial};
+
+use crate::prelude::*;
 
 /// Models that give the five parameters.
 pub const MODELS: [&str; 4] = ["B", "C", "D", "S"];
