@@ -1,7 +1,13 @@
 //! The names that most experiments use.
 
-pub use drive_core::{AngleSource, Command, Drive, Fault, Mode, State};
+pub use std::f64::consts::TAU;
+
+pub use drive_core::carrier::DemodulatorKind;
+pub use drive_core::{Accepted, AngleSource, Command, Drive, Fault, Mode, State, Stop};
 pub use drive_settings::value::Words;
+pub use drive_settings::{Flux, Settings};
+pub use num_complex::Complex64;
+pub use rayon::prelude::*;
 pub use serde::{Deserialize, Serialize};
 
 pub use crate::columns;

@@ -4,9 +4,8 @@
 mod measure;
 mod model;
 
-use std::f64::consts::{FRAC_2_PI, TAU};
+use std::f64::consts::FRAC_2_PI;
 
-use drive_core::carrier::DemodulatorKind;
 use sim_bench::bode::{Bode, frequencies, largest_pole};
 use sim_bench::steady::{OperatingPoint, steady_run};
 

@@ -5,8 +5,6 @@ mod order;
 mod position;
 mod sources;
 
-use drive_core::carrier::DemodulatorKind;
-
 use crate::prelude::*;
 
 /// Figures 37 to 39, Table 1, section 3.4.

@@ -1,7 +1,5 @@
 //! Dead time and its compensation, section 3.9.
 
-use std::f64::consts::TAU;
-
 use sim_bench::plant::Complex;
 
 use crate::prelude::*;

@@ -4,7 +4,6 @@ pub(super) mod demodulation;
 mod signal;
 pub(super) mod tracked;
 
-use rayon::prelude::*;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};

@@ -6,7 +6,6 @@ mod direct;
 mod precision;
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos};
-use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
 use sim_bench::outcome::Style;
 

@@ -1,10 +1,8 @@
 //! The motor from a recorded trace of a drive: voltages, currents and speed in a CSV file.
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
 use drive_settings::words;
-use rayon::prelude::*;
 use sim_bench::columns::Columns;
 use sim_bench::error::unknown;
 use sim_bench::plant::clarke;

@@ -1,7 +1,5 @@
 //! The current difference over the injection angle, Figure 19.
 
-use drive_core::carrier::DemodulatorKind;
-
 use crate::prelude::*;
 
 /// Gain of the post-processing filter at dc.

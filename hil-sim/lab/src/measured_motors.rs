@@ -1,6 +1,6 @@
 //! Simulated motors beside motors that others have measured: a load test, a saturation curve, a direct start.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::SQRT_2;
 
 use num_complex::Complex;
 use sim_bench::config::Value;

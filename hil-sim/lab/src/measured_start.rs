@@ -1,7 +1,5 @@
 //! A recorded start beside the simulated motor at the recorded voltages.
 
-use std::f64::consts::TAU;
-
 use sim_bench::plant::{
     ElectricalState as _, EnergyMachine, IronSettings, Load, MachineModel as _, Mechanics,
     MotorModel,

@@ -2,8 +2,6 @@
 
 mod carrier;
 
-use std::f64::consts::TAU;
-
 use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
 use drive_core::{Abc, AlphaBeta};

@@ -1,8 +1,6 @@
 //! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
 //! and predicted.
 
-use rayon::prelude::*;
-
 use crate::linear_model::{Disturbance, LinearModel};
 use crate::prelude::*;
 

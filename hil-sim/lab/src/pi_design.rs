@@ -6,7 +6,6 @@ use drive_core::filter::{BPF, LPF};
 use drive_settings::tuning::{
     CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
-use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use sim_bench::outcome::Style;
 

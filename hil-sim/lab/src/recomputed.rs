@@ -2,7 +2,6 @@
 
 use drive_core::FirstOrder;
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_settings::Settings;
 use drive_settings::tuning::rule_3_8;
 use sim_bench::bode::{RATE, fictitious, largest_pole};
 use sim_bench::plant::{InverterSettings, MachineSettings};

@@ -2,7 +2,7 @@
 
 pub(super) mod steady;
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use num_complex::Complex;
 use sim_bench::config::flux_level_a;

@@ -1,7 +1,5 @@
 //! A drive whose rotor warms up, with the online estimate beside it as the idle loop runs it.
 
-use std::f64::consts::TAU;
-
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 
 use crate::identification::models::model_d;

@@ -6,7 +6,6 @@ mod session;
 use drive_commission::{Commissioning, Step};
 use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
-use drive_settings::Settings;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
 
 use super::drawn_machine::{Circuit, drawn};

@@ -7,10 +7,7 @@ mod file;
 mod quantity;
 mod record;
 
-use std::f64::consts::TAU;
 use std::path::Path;
-
-use drive_core::Stop;
 
 pub use file::{Metric, Statistic};
 pub use quantity::{QUANTITIES, Seen};

@@ -1,6 +1,5 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use num_complex::Complex64;
 use sim_bench::bode::{largest_pole, roots};
 
 use super::measure::Record;

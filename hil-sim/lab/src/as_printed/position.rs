@@ -1,7 +1,5 @@
 //! Figure 37: the printed position controller on the plant of Eq. 4.1, and the cascade of the drive on the same shaft.
 
-use std::f64::consts::TAU;
-
 use crate::prelude::*;
 use crate::recomputed::plant;
 

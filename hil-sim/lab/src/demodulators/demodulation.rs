@@ -1,6 +1,5 @@
 //! The demodulations that are compared, and the drives that use them.
 
-use drive_core::carrier::DemodulatorKind;
 use drive_core::table::ReferenceTable;
 use sim_bench::learning;
 

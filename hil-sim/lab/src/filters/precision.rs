@@ -3,7 +3,6 @@
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use rayon::prelude::*;
 use sim_bench::bode::omega_t;
 
 use super::compared::{ComparedFilter, SECTIONS_F32};

@@ -1,7 +1,5 @@
 //! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
-use rayon::prelude::*;
-
 use super::models::{model_b, model_c, model_d};
 use super::printed::{self, Case};
 use super::structured::model_s;

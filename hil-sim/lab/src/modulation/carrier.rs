@@ -1,7 +1,5 @@
 //! Figure 11: the spectrum of the current difference before and behind the band pass.
 
-use std::f64::consts::TAU;
-
 use drive_core::filter::{BPF, SosState};
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,8 +1,5 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
-use drive_core::Accepted;
-use drive_settings::Flux;
-
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
 use crate::prelude::*;

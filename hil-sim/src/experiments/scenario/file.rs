@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use drive_core::Stop;
 use toml::Spanned;
 
 use super::quantity::Named;
