@@ -106,14 +106,8 @@ fn findings(
     let mut isotropic = config.clone();
     injection_map::take_saliency(&mut isotropic);
     let map = |saliency: bool| {
-        let variant = Variant {
-            name: demodulation.name,
-            title: demodulation.name,
-            demodulator: demodulation.demodulator,
-            saliency,
-            inject: true,
-            compensate: !config.drive.ignore_delays,
-        };
+        let (demodulator, compensate) = (demodulation.0, !config.drive.ignore_delays);
+        let variant = Variant { demodulator, saliency, compensate, ..injection_map::LITERAL };
         IQ_A.par_iter()
             .map(|&iq| injection_map::curve(config, seed, variant, iq))
             .collect::<Result<Vec<_>, _>>()
@@ -158,7 +152,7 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
     let rows = all.flat_map(|(demodulation, f)| {
         IQ_A.iter().zip(&f.seen).zip(&f.isotropic).map(|((iq, s), i)| {
             [
-                ("demodulation", Cell::from(demodulation.name)),
+                ("demodulation", Cell::from(demodulation.name())),
                 ("iq (A)", Cell::fixed(*iq, 1)),
                 ("unit", Cell::from(demodulation.unit())),
                 ("signal", Cell::fixed(s.signal * 1e3, 2)),
@@ -197,7 +191,7 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
             let Some(t) = tracked else { continue };
-            let mut row = vec![Cell::from(demodulation.name), Cell::from(*kind), f.delay_text()];
+            let mut row = vec![Cell::from(demodulation.name()), Cell::from(*kind), f.delay_text()];
             let mut add = |values: Option<[f64; 2]>| {
                 row.extend([0, 1].map(|k| values.map_or("lost".into(), |v| Cell::fixed(v[k], 2))));
             };
@@ -216,7 +210,7 @@ fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
         let y = format!("{of} ({})", demodulation.unit());
         injection_map::panel(y, &IQ_A, family)
     };
-    let title = format!("{}: over the injection angle", demodulation.name);
+    let title = format!("{}: over the injection angle", demodulation.name());
     Figure::new(format!("map_{}", demodulation.key()), title, "Figure 19")
         .panel(panel(&f.maps[0], "with saliency"))
         .panel(panel(&f.maps[1], "without"))
@@ -232,7 +226,7 @@ fn steps_figure(found: &[DemodulationResults]) -> Figure {
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (panel, tracked) in panels.iter_mut().zip(&f.tracked) {
             if let Some(t) = tracked {
-                panel.series.push(Series::line(demodulation.name, t.steps.error.clone()));
+                panel.series.push(Series::line(demodulation.name(), t.steps.error.clone()));
             }
         }
     }

@@ -31,7 +31,7 @@ pub(super) struct Variant {
     pub compensate: bool,
 }
 
-const LITERAL: Variant = Variant {
+pub(super) const LITERAL: Variant = Variant {
     name: "literal",
     title: "As printed, motor with saliency",
     demodulator: DemodulatorKind::Literal,
