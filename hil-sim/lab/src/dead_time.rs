@@ -78,7 +78,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// A level over microseconds: where it begins, and the instants at which it changes.
-fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(f64, f64)> {
+pub(super) fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(f64, f64)> {
     let (mut level, mut line) = (f64::from(high), Vec::new());
     line.push((0.0, level + offset));
     for &at in changes {

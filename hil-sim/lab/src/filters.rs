@@ -129,28 +129,18 @@ pub(super) fn edges_hz<const N: usize>(filter: &Sos<N>, level: f64) -> Vec<f64> 
 
 /// The coefficients of Tables 7 and 8 from the specification, and as the drive has them; what else section 3.10 says.
 fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
+    let (lpf, bpf, pp) = (elliptic(4, 0.5, 40.0), elliptic(2, 0.5, 40.0), elliptic(4, 0.5, 60.0));
     let designs = [
-        (
-            "Table 7",
-            elliptic(4, 0.5, 40.0).digital(Band::Stop(450.0, 650.0)),
-            expanded(&LPF_AS_PRINTED.sections),
-        ),
-        (
-            "Table 8",
-            elliptic(2, 0.5, 40.0).digital(Band::Pass(500.0, 700.0)),
-            expanded(&BPF.sections),
-        ),
-        ("Table 8", elliptic(4, 0.5, 60.0).digital(Band::Low(100.0)), expanded(&PP.sections)),
+        ("Table 7", lpf.digital(Band::Stop(450.0, 650.0)), expanded(&LPF_AS_PRINTED.sections)),
+        ("Table 8", bpf.digital(Band::Pass(500.0, 700.0)), expanded(&BPF.sections)),
+        ("Table 8", pp.digital(Band::Low(100.0)), expanded(&PP.sections)),
     ];
     for (filter, (table, design, drive)) in filters.iter().zip(designs) {
         let mut largest = 0.0_f64;
         for (part, name) in ["b", "a"].into_iter().enumerate() {
             for (i, (&value, &used)) in design[part].iter().zip(&drive[part]).enumerate() {
-                let ours = Compared::with(
-                    "S1",
-                    format!("{table}, i = {i}"),
-                    format!("{name} ({})", filter.name),
-                );
+                let quantity = format!("{name} ({})", filter.name);
+                let ours = beside(&format!("{table}, i = {i}"), &quantity);
                 let but = Some(("the digits of the design tool", 1e-4));
                 outcome.compared.push(Compared { but, ..ours }.recomputed(value).used(used));
                 largest = largest.max((value - filter.printed[part][i]).abs());
@@ -159,7 +149,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         let key = filter.name.to_lowercase();
         outcome.metrics.set(format!("{key}_design_differs_by"), largest);
         let order = filter.printed[1].len() - 1;
-        let place = Compared::with("S1", "section 3.10", format!("order of {}", filter.name));
+        let place = beside("section 3.10", &format!("order of {}", filter.name));
         outcome.compared.push(place.recomputed(order as f64));
     }
     let [pass, stop] = [edges_hz(&BPF, -0.6), edges_hz(&LPF_AS_PRINTED, -40.0)];
@@ -172,7 +162,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     let edge = stop_edge(&filters[2]);
     let ratio = warped(edge) / warped(100.0);
     let delay = |prototype: Prototype| group_delay(&prototype.digital(Band::Low(100.0)));
-    let elliptic = delay(elliptic(4, 0.5, 60.0));
+    let elliptic = delay(pp);
     let delays = [
         ("butterworth", delay(butterworth(9, 0.5))),
         ("chebyshev_1", delay(chebyshev_1(6, 0.5))),
