@@ -21,25 +21,13 @@ mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
 
-pub use sim_bench::experiment::{
-    BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
-    assumptions,
-};
+use std::path::Path;
+
+pub use sim_bench::experiment::*;
 use sim_bench::{bode, steady};
 pub use sim_bench::{learning, statistics};
-use sim_lab::{
-    adc_calibration, angle_identification, as_printed, dead_time, demodulators, filters,
-    identify_continuous, identify_discrete, identify_machine, identify_recursive,
-    identify_validate, injection_map, learn_reference, modulation, motor_tests, online_tracking,
-    perturbation, pi_design, plant_identification, recomputed,
-};
-pub use sim_lab::{
-    identify_trace, measured_motors, measured_start, saliency, source, warming_rotor,
-};
-
+pub use sim_lab::*;
 use statistics::Statistical;
-
-use std::path::Path;
 
 use crate::config::Config;
 use crate::error::Error;

@@ -23,7 +23,12 @@ pub struct Context<'a> {
     pub file: Option<&'a Path>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Without a file, as long as the configuration says.
+    pub fn new(config: &'a Config, seed: u64, progress: Progress) -> Self {
+        Self { config, seed, seconds: config.extent.seconds, progress, file: None }
+    }
+
     /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
     ///
     /// # Errors
@@ -91,8 +96,7 @@ impl Experiment {
     /// # Errors
     /// Those of the experiment.
     pub fn outcome(&self, config: &Config, seed: u64) -> Result<Outcome, Error> {
-        let progress = Progress::hidden();
-        (self.run)(&Context { config, seed, seconds: None, progress, file: None })
+        (self.run)(&Context::new(config, seed, Progress::hidden()))
     }
 
     /// Whether a key has an effect on this experiment.

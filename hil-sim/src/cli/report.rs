@@ -61,13 +61,7 @@ pub fn report(of: Of, input: &Input, out: &Path) -> Result<(), Error> {
 fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
     used::check("report", experiments, input)?;
-    let context = Context {
-        config: &config,
-        seed: input.seed,
-        seconds: config.extent.seconds,
-        progress: input.progress(),
-        file: None,
-    };
+    let context = Context::new(&config, input.seed, input.progress());
     let bar = context.progress.bar("report", experiments.len() as u64);
     let running = Running { bar: &bar, names: Mutex::default() };
     let outcomes: Vec<Outcome> =

@@ -198,13 +198,7 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     used::check(name, &chosen, input)?;
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
     for experiment in chosen {
-        let context = Context {
-            config: &config,
-            seed: input.seed,
-            seconds: config.extent.seconds,
-            progress: input.progress(),
-            file,
-        };
+        let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
         let Some(outcome) = part.run(experiment, &context, input.quiet)? else { continue };
         let command = match file {
             Some(_) if own.is_some() => format!("run {name}"),

@@ -75,9 +75,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         return Err(Error::Refused(format!("{number} of {count} shards are missing: {some}")));
     }
     let statistical = statistical(&header.experiment)?;
-    let (seed, seconds) = (header.seed, config.extent.seconds);
-    let context =
-        Context { config: &config, seed, seconds, progress: Progress::hidden(), file: None };
+    let seed = header.seed;
+    let context = Context::new(&config, seed, Progress::hidden());
     let outcome = (statistical.outcome)(&context, records.into_values().collect())?;
     Ok(Merged { experiment: statistical.experiment, config, seed, outcome })
 }
