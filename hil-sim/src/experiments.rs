@@ -83,44 +83,22 @@ pub const EXPERIMENTS: &[Experiment] = &[
 ];
 
 /// The experiments that report printed values of the sources.
+#[rustfmt::skip] // names, side by side
 pub const SOURCES: [&str; 20] = [
-    "printed-numbers",
-    "modulation",
-    "filters",
-    "adc-calibration",
-    "pi-design",
-    "plant-identification",
-    "current-step",
-    "anti-windup",
-    "dead-time",
-    "injection-map",
-    "demodulators",
-    "angle-identification",
-    "as-printed",
-    "sensorless-position",
-    "identify-discrete",
-    "identify-continuous",
-    "identify-recursive",
-    "identify-validate",
-    "identify-machine",
-    "motor-tests",
+    "printed-numbers", "modulation", "filters", "adc-calibration", "pi-design", "plant-identification",
+    "current-step", "anti-windup", "dead-time", "injection-map", "demodulators", "angle-identification", "as-printed",
+    "sensorless-position", "identify-discrete", "identify-continuous", "identify-recursive", "identify-validate",
+    "identify-machine", "motor-tests",
 ];
 
 /// The experiments that need an input file; they are no part of the report.
 pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE, measured_start::EXPERIMENT];
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
+#[rustfmt::skip] // names, side by side
 pub const EVERYDAY: [&str; 10] = [
-    "torque-steps",
-    "speed-profile",
-    "sensorless-position",
-    "profile",
-    "commission",
-    "monte-carlo",
-    "battery",
-    "full-range",
-    "torque-envelope",
-    "lock-monitor",
+    "torque-steps", "speed-profile", "sensorless-position", "profile", "commission", "monte-carlo", "battery",
+    "full-range", "torque-envelope", "lock-monitor",
 ];
 
 /// The experiments of many independent runs, which can be shared between machines and continued.
