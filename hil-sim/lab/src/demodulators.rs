@@ -8,7 +8,7 @@ use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
 use crate::prelude::*;
-use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
+use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
 
@@ -37,7 +37,7 @@ struct DemodulationResults {
     /// Samples; none where the saliency makes no difference.
     delay: Option<f64>,
     /// By kind of reference and controller.
-    tracked: [Option<ClosedLoop>; 3],
+    tracked: Vec<Option<ClosedLoop>>,
 }
 
 impl DemodulationResults {
@@ -79,8 +79,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         m.set(format!("{}_delay_samples", demodulation.key()), f.delay.unwrap_or(f64::NAN));
         m.set(format!("{}_noise_deg", demodulation.key()), degrees(seen.noise / seen.slope));
         m.set(format!("{}_isotropic_share", demodulation.key()), f.isotropic_share());
-        for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
-            let Some(t) = tracked else { continue };
+        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
+            let (Some(t), kind) = (tracked, kind.word()) else { continue };
             let name = |what: &str| format!("{}_{kind}_{what}", demodulation.key());
             m.set(name("steps_lost"), f64::from(u8::from(t.steps.lost)));
             m.set(name("steps_rms_deg"), t.steps.stats.rms());
@@ -130,13 +130,12 @@ fn findings(
         let turning = turning.collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
     };
-    let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
     let mut found = DemodulationResults {
         maps: [map(true)?, map(false)?],
         seen: at_each(config)?,
         isotropic: at_each(&isotropic)?,
         delay: None,
-        tracked: [constant?, with_table?, retuned?],
+        tracked: ReferenceKind::VALUES.iter().map(|&kind| track(kind)).collect::<Result<_, _>>()?,
     };
     if found.isotropic_share() < 0.5 {
         found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
@@ -189,9 +188,9 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
              the motor and the sampling included."
         ));
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
-        for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
-            let Some(t) = tracked else { continue };
-            let mut row = vec![Cell::from(demodulation.name()), Cell::from(*kind), f.delay_text()];
+        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
+            let (Some(t), kind) = (tracked, kind.word()) else { continue };
+            let mut row = vec![Cell::from(demodulation.name()), Cell::from(kind), f.delay_text()];
             let mut add = |values: Option<[f64; 2]>| {
                 row.extend([0, 1].map(|k| values.map_or("lost".into(), |v| Cell::fixed(v[k], 2))));
             };

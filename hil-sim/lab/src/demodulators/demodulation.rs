@@ -1,6 +1,7 @@
 //! The demodulations that are compared, and the drives that use them.
 
 use drive_core::table::ReferenceTable;
+use drive_settings::words;
 use sim_bench::learning;
 
 use crate::injection_map::PP;
@@ -111,24 +112,18 @@ impl Demodulation {
     }
 }
 
-/// Reference of the signal, and the controller behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferenceKind {
-    /// A constant and the gains of the configuration (as printed).
-    Constant,
-    /// A learned table and the same gains.
-    Learned,
-    /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
-    /// own loop.
-    Retuned,
+words! {
+    /// Reference of the signal, and the controller behind it; with the names in tables and metrics.
+    pub enum ReferenceKind {
+        /// A constant and the gains of the configuration (as printed).
+        Constant = "constant",
+        /// A learned table and the same gains.
+        Learned = "learned",
+        /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
+        /// own loop.
+        Retuned = "retuned",
+    }
 }
-
-/// All kinds with their names in tables and metrics.
-pub const KINDS: [(ReferenceKind, &str); 3] = [
-    (ReferenceKind::Constant, "constant"),
-    (ReferenceKind::Learned, "learned"),
-    (ReferenceKind::Retuned, "retuned"),
-];
 
 /// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
 /// crossover, where the printed one has none.
