@@ -61,7 +61,7 @@ impl Part {
             report::write_whole(path, &report::of_table(&shards::rows(&runs))?)?;
         }
         if self.is_shard() {
-            say(&shards::text(&header, &runs)?)?;
+            say(shards::text(&header, &runs)?)?;
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();

@@ -105,7 +105,7 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
     let path = out.join(file);
     let page = report::page(title, &origin, &sections)?;
     report::write_whole(&path, &page)?;
-    say(&format!("Report: {}\n", path.display()))?;
+    say(format!("Report: {}\n", path.display()))?;
 
     let mut names = Vec::new();
     for (experiment, outcome) in experiments.iter().zip(&outcomes) {

@@ -143,7 +143,7 @@ impl Run<'_> {
         if let (Some(path), false) = (path, self.input.quiet) {
             text.push_str(&format!("\nReport: {}\n", path.display()));
         }
-        say(&text).map(|()| String::new())
+        say(text).map(|()| String::new())
     }
 }
 
@@ -246,5 +246,5 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
 /// # Errors
 /// [`Error::Write`].
 pub fn print(objects: &[String], output: &Output) -> Result<(), Error> {
-    if output.json { say(&format!("{}\n", outcome::joined(objects))) } else { Ok(()) }
+    if output.json { say(format!("{}\n", outcome::joined(objects))) } else { Ok(()) }
 }
