@@ -65,9 +65,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
     outcome.compared.push(named("dead_time_corrected").simulated(clean));
     let title = "What the dead time does to voltage and current";
-    outcome
-        .figures
-        .push(Figure::new("dead_time", title, "section 3.9").panel(voltage).panel(current));
+    let figure = Figure::new("dead_time", title, "section 3.9");
+    outcome.figures.push(figure.panel(voltage).panel(current));
     outcome.figures.extend(edges(context));
     outcome.remarks.push(format!(
         "Per phase the dead time takes V_dc t_d / T = {lost:.2} V with the sign of the current. The \

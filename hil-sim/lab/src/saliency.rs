@@ -16,14 +16,10 @@ use crate::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)
     .about("Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.")
     .uses(&[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]])
-    .not(&[&[
-        "iron.slots",
-        "iron.bars",
-        "iron.stator_fixed",
-        "iron.stator_fixed_deg",
-        "motor.inertia",
-        "motor.friction",
-    ]]);
+    .not(&[
+        &["iron.slots", "iron.bars", "iron.stator_fixed", "iron.stator_fixed_deg"],
+        &["motor.inertia", "motor.friction"],
+    ]);
 
 /// Frequency of the carrier, rad/s.
 const CARRIER: f64 = TAU * 600.0;
@@ -230,9 +226,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let points = curve.iter().map(|(e, q)| (*e, 100.0 * q)).collect();
         panel = panel.with(Series::line(format!("iq = {i_q_text} A"), points));
     }
-    outcome
-        .figures
-        .push(Figure::new("map", "Saliency signal over the angle error", "").panel(panel));
+    let figure = Figure::new("map", "Saliency signal over the angle error", "");
+    outcome.figures.push(figure.panel(panel));
     outcome.tables.extend([map, table]);
     Ok(outcome)
 }

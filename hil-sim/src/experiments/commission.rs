@@ -329,13 +329,8 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     built(settings)?;
     let [design, _] = settings.current_loops().map_err(Error::refused)?;
     // In this circuit the leakage lies on the stator's side, all of it.
-    let circuit = EquivalentCircuit {
-        r_s: truth.r_s,
-        r_r: truth.r_r,
-        l_ls: truth.leakage,
-        l_m: truth.coupled,
-        l_lr: 1e-9,
-    };
+    let Circuit { r_s, r_r, leakage: l_ls, coupled: l_m } = *truth;
+    let circuit = EquivalentCircuit { r_s, r_r, l_ls, l_m, l_lr: 1e-9 };
     let period = f64::from(PERIOD_S);
     let plant = motor_plant(&circuit, period).map_err(Error::refused)?;
     let (k_c, z_c) = (design.k_c, design.z_c);
