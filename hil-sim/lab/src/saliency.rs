@@ -208,20 +208,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let at_zero = curve.iter().find(|point| point.0 == 0.0).map(|point| point.1);
         let zeros = at_zero.map(|q| Probe::second_zeros(curve, q)).unwrap_or_default();
         let zeros: Vec<String> = zeros.iter().map(|e| format!("{e:.0}°")).collect();
+        let of_rest = slope.zip(slopes[0].filter(|k0| k0.abs() > NOTHING)).map(|(k, k0)| k / k0);
+        let zeros = if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") };
         table.record([
             ("iq (A)", Cell::from(i_q_text.clone())),
-            ("k (1/rad)", Cell::or_dash(slope.map(|k| Cell::fixed(k, 4)))),
-            (
-                "share of k without load",
-                match (slope, slopes[0]) {
-                    (Some(k), Some(k0)) if k0.abs() > NOTHING => Cell::fixed(k / k0, 2),
-                    _ => Cell::from("-"),
-                },
-            ),
-            (
-                "second zeros",
-                Cell::from(if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") }),
-            ),
+            ("k (1/rad)", Cell::fixed_or_dash(slope, 4)),
+            ("share of k without load", Cell::fixed_or_dash(of_rest, 2)),
+            ("second zeros", Cell::from(zeros)),
         ]);
         let points = curve.iter().map(|(e, q)| (*e, 100.0 * q)).collect();
         panel = panel.with(Series::line(format!("iq = {i_q_text} A"), points));

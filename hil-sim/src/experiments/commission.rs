@@ -78,13 +78,9 @@ pub struct Record {
     /// Errors in percent, as [`Circuit::values`] and of the gain mismatch.
     errors: Vec<f64>,
     /// Time of the steps up to the leakage, of the staircase, and of the current loop, s.
-    #[serde(with = "exact")]
     seconds: f64,
-    #[serde(with = "exact")]
     staircase_seconds: f64,
-    #[serde(with = "exact")]
     loop_seconds: f64,
-    #[serde(with = "exact")]
     shaft_deg: f64,
     /// Largest phase current as a share of the nameplate's peak.
     #[serde(with = "exact")]

@@ -76,11 +76,6 @@ pub fn errors_of(trial: &Trial, case: Case, seed: u64, trials: u64) -> Errors {
     }
 }
 
-/// All twelve columns.
-pub fn all(machine: Parameters, noise: Noise, seed: u64, trials: u64) -> Vec<Errors> {
-    Case::all().into_iter().map(|case| errors(machine, case, noise, seed, trials)).collect()
-}
-
 /// The error of one estimated parameter, as printed (if it is) and as found here.
 #[derive(Clone, Debug)]
 pub struct Entry {

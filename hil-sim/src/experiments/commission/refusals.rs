@@ -8,7 +8,6 @@ use crate::config::{FluxLevel, OpenPhase};
 use crate::experiments::drawn_machine::drawn;
 use crate::plant::{Channel, CurrentFault};
 use crate::prelude::*;
-use crate::stats::exact;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("commission-refusals", whole::<Refusals>)
@@ -125,9 +124,7 @@ pub struct Record {
     /// Whether it names the defect; and whether the outputs are off and the settings as they were.
     named: bool,
     unchanged: bool,
-    #[serde(with = "exact")]
     seconds: f64,
-    #[serde(with = "exact")]
     largest_a: f64,
 }
 
