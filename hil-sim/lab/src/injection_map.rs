@@ -31,21 +31,12 @@ pub(super) struct Variant {
     pub compensate: bool,
 }
 
-pub(super) const LITERAL: Variant = Variant {
-    name: "literal",
-    title: "As printed, motor with saliency",
-    demodulator: DemodulatorKind::Literal,
-    saliency: true,
-    inject: true,
-    compensate: false,
-};
-const RECTIFIED: Variant = Variant {
-    name: "rectified",
-    title: "Rectified, delay compensated, motor with saliency",
-    demodulator: DemodulatorKind::Rectified,
-    compensate: true,
-    ..LITERAL
-};
+#[rustfmt::skip] // a variant a line
+pub(super) const LITERAL: Variant =
+    Variant { name: "literal", title: "As printed, motor with saliency", demodulator: DemodulatorKind::Literal, saliency: true, inject: true, compensate: false };
+#[rustfmt::skip] // a variant a line
+const RECTIFIED: Variant =
+    Variant { name: "rectified", title: "Rectified, delay compensated, motor with saliency", demodulator: DemodulatorKind::Rectified, compensate: true, ..LITERAL };
 #[rustfmt::skip] // a variant a line
 const VARIANTS: [Variant; 7] = [
     LITERAL,

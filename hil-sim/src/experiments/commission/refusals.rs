@@ -34,14 +34,9 @@ struct Defect {
     abort: Option<Step>,
 }
 
-const NONE: Defect = Defect {
-    name: "",
-    make: |_| {},
-    on_bench: |_| {},
-    sensors: |_| {},
-    named: |_| false,
-    abort: None,
-};
+#[rustfmt::skip] // as the rows below
+const NONE: Defect =
+    Defect { name: "", make: |_| {}, on_bench: |_| {}, sensors: |_| {}, named: |_| false, abort: None };
 
 /// Codes of the channels without current.
 const ZERO: [u16; 2] = [2022, 2015];
