@@ -9,18 +9,17 @@ mod run;
 mod used;
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
 use crate::console;
-use crate::error::Error;
 use crate::experiments;
 use crate::first_light;
 use crate::input::{Input, OUT};
 use crate::passport;
+use crate::prelude::*;
 pub use run::json;
 use run::{Output, Request, Trace};
 

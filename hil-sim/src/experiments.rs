@@ -21,17 +21,13 @@ mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
 
-use std::path::Path;
-
 pub use sim_bench::experiment::*;
 use sim_bench::{bode, steady};
 pub use sim_bench::{learning, statistics};
 pub use sim_lab::*;
 use statistics::Statistical;
 
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::Outcome;
+use crate::prelude::*;
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows

@@ -1,20 +1,18 @@
 //! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from what `commission` and `learn` tell at the console.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
 
+use crate::config::Key;
 use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
-use crate::config::{Config, Key};
 use crate::console::answer::split_tag;
-use crate::error::Error;
 use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
-use crate::outcome::Outcome;
+use crate::prelude::*;
 use crate::report;
 
 /// What the twin takes from the settings of the drive beside what every motor file must say; `auto` is left to its rule.

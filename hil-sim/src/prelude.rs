@@ -1,4 +1,6 @@
-//! The names that most experiments use.
+//! The names that most experiments and commands use.
+
+pub use std::path::{Path, PathBuf};
 
 pub use rand::{Rng, RngExt};
 pub use sim_bench::prelude::*;

@@ -1,17 +1,14 @@
 //! All experiments on one page.
 
-use std::path::Path;
 use std::sync::Mutex;
-
-use rayon::prelude::*;
 
 use super::run::Run;
 use super::{say, used};
-use crate::error::Error;
 use crate::experiments::source::evidence::Evidence;
-use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
+use crate::experiments::{self, EXPERIMENTS};
 use crate::input::Input;
-use crate::outcome::{Origin, Outcome};
+use crate::outcome::Origin;
+use crate::prelude::*;
 use crate::progress::Bar;
 use crate::report::{self, Section};
 

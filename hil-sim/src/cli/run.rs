@@ -1,20 +1,16 @@
 //! One experiment, or a group of them.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
-use drive_settings::value::Words as _;
 use trace::Voltages;
 
 use super::part::Part;
 use super::{say, used};
-use crate::config::Config;
-use crate::error::Error;
 use crate::experiments::source::evidence::Evidence;
-use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
+use crate::experiments::{self, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
-use crate::outcome::{self, Origin, Outcome};
+use crate::outcome::{self, Origin};
 use crate::passport;
+use crate::prelude::*;
 use crate::report::{self, Section};
 
 /// Where the results of a run go.

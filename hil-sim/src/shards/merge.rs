@@ -1,17 +1,13 @@
 //! The outcome of a whole run from its shards.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::Header;
 use super::journal::Lines;
-use crate::config::Config;
-use crate::error::Error;
-use crate::experiments::{Context, Experiment, statistical};
-use crate::outcome::Outcome;
-use crate::progress::Progress;
+use crate::experiments::statistical;
+use crate::prelude::*;
 
 /// A whole run, put together.
 pub struct Merged {

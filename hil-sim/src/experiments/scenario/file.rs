@@ -1,7 +1,6 @@
 //! Scenarios as they are written: a TOML file, or the rows of a CSV file.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use toml::Spanned;
 
