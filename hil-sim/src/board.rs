@@ -8,14 +8,13 @@ mod build;
 pub use build::image;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
 use clap::{Args, ValueEnum};
 
-use crate::config::{Config, Value};
-use crate::error::Error;
+use crate::config::Value;
 use crate::input::{Input, OUT};
+use crate::prelude::*;
 
 /// Options of a session with the virtual board.
 #[derive(Args)]

@@ -9,18 +9,17 @@ mod run;
 mod used;
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
 use crate::console;
-use crate::error::Error;
 use crate::experiments;
 use crate::first_light;
 use crate::input::{Input, OUT};
 use crate::passport;
+use crate::prelude::*;
 pub use run::json;
 use run::{Output, Request, Trace};
 
@@ -146,14 +145,10 @@ pub fn main() -> ExitCode {
             let input = Input { seed: 1, ..Input::default() };
             run::run(&Request { name: experiments::DEFAULT.into(), input, ..Request::default() })
         }
-        Some(Command::List { lab, json }) => {
-            lists::experiments(json, lab).and_then(|text| say(&text))
-        }
-        Some(Command::Motors { name, json }) => {
-            lists::motors(name.as_deref(), json).and_then(|text| say(&text))
-        }
+        Some(Command::List { lab, json }) => lists::experiments(json, lab).and_then(say),
+        Some(Command::Motors { name, json }) => lists::motors(name.as_deref(), json).and_then(say),
         Some(Command::Keys { prefix, toml, input }) => {
-            lists::keys(prefix.as_deref(), toml, &input).and_then(|text| say(&text))
+            lists::keys(prefix.as_deref(), toml, &input).and_then(say)
         }
         Some(Command::Run(request)) => run::run(&request),
         Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
@@ -164,9 +159,9 @@ pub fn main() -> ExitCode {
         Some(Command::Completion { shell, command }) => {
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), command, &mut text);
-            say(&String::from_utf8_lossy(&text))
+            say(String::from_utf8_lossy(&text))
         }
-        Some(Command::Passport(options)) => passport::run(&options).and_then(|text| say(&text)),
+        Some(Command::Passport(options)) => passport::run(&options).and_then(say),
         Some(Command::Board(options)) => board::become_board(&options),
         Some(Command::Console(options)) => console::run(&options),
         Some(Command::Update(options)) => console::update::run(&options),
@@ -182,9 +177,9 @@ pub fn main() -> ExitCode {
 }
 
 /// Prints on standard output. A closed pipe, as behind `head`, is no error.
-fn say(text: &str) -> Result<(), Error> {
+fn say(text: impl AsRef<str>) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(text.as_ref().as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::write(Path::new("standard output"))(e))
         }

@@ -21,29 +21,13 @@ mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
 
-pub use sim_bench::experiment::{
-    BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
-    assumptions,
-};
+pub use sim_bench::experiment::*;
 use sim_bench::{bode, steady};
 pub use sim_bench::{learning, statistics};
-use sim_lab::{
-    adc_calibration, angle_identification, as_printed, dead_time, demodulators, filters,
-    identify_continuous, identify_discrete, identify_machine, identify_recursive,
-    identify_validate, injection_map, learn_reference, modulation, motor_tests, online_tracking,
-    perturbation, pi_design, plant_identification, recomputed,
-};
-pub use sim_lab::{
-    identify_trace, measured_motors, measured_start, saliency, source, warming_rotor,
-};
-
+pub use sim_lab::*;
 use statistics::Statistical;
 
-use std::path::Path;
-
-use crate::config::Config;
-use crate::error::Error;
-use crate::outcome::Outcome;
+use crate::prelude::*;
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
@@ -95,44 +79,22 @@ pub const EXPERIMENTS: &[Experiment] = &[
 ];
 
 /// The experiments that report printed values of the sources.
+#[rustfmt::skip] // names, side by side
 pub const SOURCES: [&str; 20] = [
-    "printed-numbers",
-    "modulation",
-    "filters",
-    "adc-calibration",
-    "pi-design",
-    "plant-identification",
-    "current-step",
-    "anti-windup",
-    "dead-time",
-    "injection-map",
-    "demodulators",
-    "angle-identification",
-    "as-printed",
-    "sensorless-position",
-    "identify-discrete",
-    "identify-continuous",
-    "identify-recursive",
-    "identify-validate",
-    "identify-machine",
-    "motor-tests",
+    "printed-numbers", "modulation", "filters", "adc-calibration", "pi-design", "plant-identification",
+    "current-step", "anti-windup", "dead-time", "injection-map", "demodulators", "angle-identification", "as-printed",
+    "sensorless-position", "identify-discrete", "identify-continuous", "identify-recursive", "identify-validate",
+    "identify-machine", "motor-tests",
 ];
 
 /// The experiments that need an input file; they are no part of the report.
 pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE, measured_start::EXPERIMENT];
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
+#[rustfmt::skip] // names, side by side
 pub const EVERYDAY: [&str; 10] = [
-    "torque-steps",
-    "speed-profile",
-    "sensorless-position",
-    "profile",
-    "commission",
-    "monte-carlo",
-    "battery",
-    "full-range",
-    "torque-envelope",
-    "lock-monitor",
+    "torque-steps", "speed-profile", "sensorless-position", "profile", "commission", "monte-carlo", "battery",
+    "full-range", "torque-envelope", "lock-monitor",
 ];
 
 /// The experiments of many independent runs, which can be shared between machines and continued.

@@ -7,18 +7,18 @@ pub mod table;
 pub mod walk;
 pub mod wire;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-use crate::error::Error;
 use person::Terminal;
 use table::Table;
 use walk::Walk;
 use wire::Port;
+
+use crate::prelude::*;
 
 /// Options of a first light.
 #[derive(Args, Clone)]

@@ -1,12 +1,9 @@
 //! The options that all simulating commands share.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
-use crate::config::{Config, Value};
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::config::Value;
+use crate::prelude::*;
 
 /// The options that describe a simulation.
 #[derive(Args, Clone, Default)]

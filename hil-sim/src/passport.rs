@@ -1,20 +1,18 @@
 //! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from what `commission` and `learn` tell at the console.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
 
+use crate::config::Key;
 use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
-use crate::config::{Config, Key};
 use crate::console::answer::split_tag;
-use crate::error::Error;
 use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
-use crate::outcome::Outcome;
+use crate::prelude::*;
 use crate::report;
 
 /// What the twin takes from the settings of the drive beside what every motor file must say; `auto` is left to its rule.
@@ -215,17 +213,17 @@ pub fn of_trace(outcome: &Outcome, config: &Config, file: &Path) -> Passport {
     let of = |name| outcome.metrics.get(name).unwrap_or(f64::NAN);
     let (l_s, tau_r) = (1e-3 * of("l_s_mh"), of("tau_r_s"));
     let l_m = (l_s * (l_s - 1e-3 * of("sigma_l_s_mh"))).sqrt();
-    let mut twin: toml::Table = [
+    let mut twin = toml::Table::new();
+    for (name, value) in [
         ("motor.r_s", of("r_s_ohm")),
         ("motor.r_r", l_s / tau_r),
         ("motor.l_ls", l_s - l_m),
         ("motor.l_lr", l_s - l_m),
         ("motor.l_m", l_m),
         ("inverter.residual_v", of("drop_v")),
-    ]
-    .map(|(name, value)| (name.to_owned(), value.into()))
-    .into_iter()
-    .collect();
+    ] {
+        twin.insert(name.to_owned(), value.into());
+    }
     for key in Key::all().filter(|key| NEEDED.split(' ').any(|name| name == key.name())) {
         if let Number(value) = key.get(config) {
             twin.entry(key.name()).or_insert(value.into());

@@ -9,14 +9,13 @@ mod plot;
 mod prose;
 
 use std::io::Write as _;
-use std::path::Path;
+
+use crate::prelude::*;
 
 pub use console::{paragraph, table, text};
 pub use csv::{csv, of_table};
 pub use page::{Section, page};
 pub use plot::svg;
-
-use crate::error::Error;
 
 /// Writes a file completely or not at all: into a temporary file beside it, which is then renamed.
 /// Missing folders are created.

@@ -14,7 +14,6 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::{Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use header::Header;
@@ -22,9 +21,8 @@ pub use journal::Journal;
 pub use merge::{Merged, merge};
 pub use rows::rows;
 
-use crate::error::Error;
-use crate::experiments::Context;
 use crate::experiments::statistics::Statistical;
+use crate::prelude::*;
 
 /// One of the parts into which the runs are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -199,11 +199,9 @@ fn a4_model_b_inverts_equation_32_and_c_takes_the_minus_root() {
         let theta = FirstOrderTheta {
             t1_minus_1: 1.0 - x,
             t2: -omega_m * h,
-            t1_t3_minus_1: -r_s * h * h / (sigma_l_s * tau_r),
             t2_t4: -r_s * omega_m * h * h / sigma_l_s,
             t5: h / sigma_l_s,
             t5_t6: h * h / (sigma_l_s * tau_r),
-            t7: omega_m * h * h / sigma_l_s,
         };
         let errors = percent(&model_b(&theta, h), &machine);
         assert!(errors.iter().all(|e| e.abs() < 1e-10), "{errors:?}");

@@ -23,7 +23,12 @@ pub struct Context<'a> {
     pub file: Option<&'a Path>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Without a file, as long as the configuration says.
+    pub fn new(config: &'a Config, seed: u64, progress: Progress) -> Self {
+        Self { config, seed, seconds: config.extent.seconds, progress, file: None }
+    }
+
     /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
     ///
     /// # Errors
@@ -91,8 +96,7 @@ impl Experiment {
     /// # Errors
     /// Those of the experiment.
     pub fn outcome(&self, config: &Config, seed: u64) -> Result<Outcome, Error> {
-        let progress = Progress::hidden();
-        (self.run)(&Context { config, seed, seconds: None, progress, file: None })
+        (self.run)(&Context::new(config, seed, Progress::hidden()))
     }
 
     /// Whether a key has an effect on this experiment.
@@ -127,43 +131,21 @@ impl Experiment {
 pub const LOST_DEG: f64 = 45.0;
 
 /// Keys of the simulated motor, inverter and sensors.
+#[rustfmt::skip] // names, side by side
 pub const BENCH: &[&str] = &[
-    "motor.",
-    "saliency.",
-    "plant",
-    "flux_level",
-    "iron.",
-    "warming.",
-    "inverter.",
-    "dc_link.",
-    "measurement.",
+    "motor.", "saliency.", "plant", "flux_level", "iron.", "warming.", "inverter.", "dc_link.", "measurement.",
     "shaft.",
 ];
 /// Keys of the drive.
+#[rustfmt::skip] // names, side by side
 pub const DRIVE: &[&str] = &[
-    "drive.",
-    "nameplate.",
-    "scales.",
-    "angle_source",
-    "current_plant",
-    "current_plant.",
-    "ignore_delays",
-    "injection.",
-    "limits.",
-    "sequence.",
-    "speed.",
-    "observer.",
-    "braking.",
-    "flux.",
-    "vf.",
+    "drive.", "nameplate.", "scales.", "angle_source", "current_plant", "current_plant.", "ignore_delays",
+    "injection.", "limits.", "sequence.", "speed.", "observer.", "braking.", "flux.", "vf.",
 ];
 /// Keys of the speed loop, which a drive that regulates torque does not use.
+#[rustfmt::skip] // names, side by side
 pub const SPEED_LOOP: &[&str] = &[
-    "speed.limit_rpm",
-    "speed.ramp_rpm_per_s",
-    "speed.quick_rpm_per_s",
-    "speed.s_ramp_s",
-    "speed.phase_margin_deg",
+    "speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.quick_rpm_per_s", "speed.s_ramp_s", "speed.phase_margin_deg",
     "drive.motor.inertia",
 ];
 /// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.

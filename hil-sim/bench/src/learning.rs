@@ -1,13 +1,9 @@
 //! A drive that learns its tracking reference on a simulated motor with the shaft locked.
 
-use drive_core::Command;
 use drive_core::learned::Learned;
 use drive_core::table::{Grid, POINTS, ReferenceTable};
 
-use crate::config::{Config, LoadMode};
-use crate::error::Error;
-use crate::rig::Rig;
-use drive_core::carrier::DemodulatorKind;
+use crate::prelude::*;
 
 /// The values that the drive of the configuration learns.
 ///

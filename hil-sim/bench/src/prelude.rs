@@ -1,11 +1,25 @@
 //! The names that most experiments use.
 
-pub use crate::config::{Config, LoadMode, plant_settings};
+pub use std::f64::consts::TAU;
+
+pub use drive_core::carrier::DemodulatorKind;
+pub use drive_core::{Accepted, AngleSource, Command, Drive, Fault, Mode, State, Stop};
+pub use drive_settings::value::Words;
+pub use drive_settings::{Flux, Settings};
+pub use num_complex::Complex64;
+pub use rayon::prelude::*;
+pub use serde::{Deserialize, Serialize};
+
+pub use crate::columns;
+pub use crate::config::{Config, LoadMode, PlantModel, built, check_model, plant_settings};
 pub use crate::error::Error;
 pub use crate::experiment::{
     BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
     assumptions,
 };
-pub use crate::outcome::{Cell, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
-pub use crate::rig::{RATE_HZ, Rig};
+pub use crate::outcome::{Cell, Column, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
+pub use crate::plant::Load;
+pub use crate::progress::Progress;
+pub use crate::rig::{Point, RATE_HZ, Rig, fault_text, tracks, wrapped_degrees};
+pub use crate::statistics::{Study, or_refusal, seed_of, whole};
 pub use crate::stats::{Stats, quantile, sorted};

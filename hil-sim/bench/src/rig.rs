@@ -1,19 +1,12 @@
 //! The bench: a drive, a plant, and the one period between them.
 
-use std::f64::consts::TAU;
-
-use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
-use drive_core::{
-    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
-};
-use drive_settings::Settings;
+use drive_core::{Compare, FrontEndState, Sample};
 
-use crate::config::{self, Config, built, plant_settings};
-use crate::error::Error;
-use crate::plant::{Load, Plant, PlantSettings};
-use crate::stats::Stats;
+use crate::config;
+use crate::plant::{Plant, PlantSettings};
+use crate::prelude::*;
 
 /// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;

@@ -1,17 +1,8 @@
 //! One run at constant torque current and speed, of which statistics consist.
 
-use std::f64::consts::TAU;
-
-use drive_core::{Command, Fault, Mode};
-use serde::{Deserialize, Serialize};
-
-use crate::config::{Config, LoadMode};
-use crate::error::Error;
-use crate::experiment::LOST_DEG;
-use crate::plant::Load;
-use crate::rig::{Rig, fault_text};
+use crate::prelude::*;
 use crate::statistics::fault_code;
-use crate::stats::{Stats, exact};
+use crate::stats::exact;
 
 /// Operating point and seed of a run.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]

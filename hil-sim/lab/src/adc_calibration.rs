@@ -1,8 +1,8 @@
 //! The calibration lines of the current sensors, from the printed readings.
 
-use sim_bench::prelude::*;
 use sim_bench::stats::StraightLine as Line;
 
+use crate::prelude::*;
 use crate::source;
 
 /// Table 4, Figure 17, Eq. 3.5.

@@ -5,11 +5,7 @@ mod order;
 mod position;
 mod sources;
 
-use drive_core::carrier::DemodulatorKind;
-use drive_core::{Command, Mode};
-use sim_bench::prelude::*;
-
-use crate::recomputed::printed;
+use crate::prelude::*;
 
 /// Figures 37 to 39, Table 1, section 3.4.
 pub const EXPERIMENT: Experiment = Experiment::new("as-printed", run)

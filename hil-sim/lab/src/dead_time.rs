@@ -1,11 +1,8 @@
 //! Dead time and its compensation, section 3.9.
 
-use std::f64::consts::TAU;
-
-use drive_core::{AngleSource, Command, Mode};
 use sim_bench::plant::Complex;
-use sim_bench::prelude::*;
-use sim_bench::rig::wrapped_degrees;
+
+use crate::prelude::*;
 
 /// Figures 28 and 29.
 pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
@@ -66,12 +63,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let lost = i.dc_link_v * i.dead_time_s * RATE_HZ;
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
-    let holds = "with the correction the dead time does not distort the voltage at the terminals";
-    outcome.compared.push(Compared::with("S1", "section 3.9", holds).simulated(clean));
+    outcome.compared.push(named("dead_time_corrected").simulated(clean));
     let title = "What the dead time does to voltage and current";
-    outcome
-        .figures
-        .push(Figure::new("dead_time", title, "section 3.9").panel(voltage).panel(current));
+    let figure = Figure::new("dead_time", title, "section 3.9");
+    outcome.figures.push(figure.panel(voltage).panel(current));
     outcome.figures.extend(edges(context));
     outcome.remarks.push(format!(
         "Per phase the dead time takes V_dc t_d / T = {lost:.2} V with the sign of the current. The \
@@ -82,7 +77,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// A level over microseconds: where it begins, and the instants at which it changes.
-fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(f64, f64)> {
+pub(super) fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(f64, f64)> {
     let (mut level, mut line) = (f64::from(high), Vec::new());
     line.push((0.0, level + offset));
     for &at in changes {

@@ -4,12 +4,11 @@ pub(super) mod demodulation;
 mod signal;
 pub(super) mod tracked;
 
-use rayon::prelude::*;
-use sim_bench::prelude::*;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
-use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
+use crate::prelude::*;
+use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality};
 use tracked::StepsRun;
 
@@ -38,7 +37,7 @@ struct DemodulationResults {
     /// Samples; none where the saliency makes no difference.
     delay: Option<f64>,
     /// By kind of reference and controller.
-    tracked: [Option<ClosedLoop>; 3],
+    tracked: Vec<Option<ClosedLoop>>,
 }
 
 impl DemodulationResults {
@@ -80,8 +79,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         m.set(format!("{}_delay_samples", demodulation.key()), f.delay.unwrap_or(f64::NAN));
         m.set(format!("{}_noise_deg", demodulation.key()), degrees(seen.noise / seen.slope));
         m.set(format!("{}_isotropic_share", demodulation.key()), f.isotropic_share());
-        for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
-            let Some(t) = tracked else { continue };
+        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
+            let (Some(t), kind) = (tracked, kind.word()) else { continue };
             let name = |what: &str| format!("{}_{kind}_{what}", demodulation.key());
             m.set(name("steps_lost"), f64::from(u8::from(t.steps.lost)));
             m.set(name("steps_rms_deg"), t.steps.stats.rms());
@@ -93,8 +92,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         }
     }
     let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
-    let promising = Compared::with("S1", "section 5.2", "detection of the envelope is promising");
-    outcome.compared.push(promising.simulated(envelope));
+    outcome.compared.push(named("envelope_promising").simulated(envelope));
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
@@ -108,14 +106,8 @@ fn findings(
     let mut isotropic = config.clone();
     injection_map::take_saliency(&mut isotropic);
     let map = |saliency: bool| {
-        let variant = Variant {
-            name: demodulation.name,
-            title: demodulation.name,
-            demodulator: demodulation.demodulator,
-            saliency,
-            inject: true,
-            compensate: !config.drive.ignore_delays,
-        };
+        let (demodulator, compensate) = (demodulation.0, !config.drive.ignore_delays);
+        let variant = Variant { demodulator, saliency, compensate, ..injection_map::LITERAL };
         IQ_A.par_iter()
             .map(|&iq| injection_map::curve(config, seed, variant, iq))
             .collect::<Result<Vec<_>, _>>()
@@ -138,13 +130,12 @@ fn findings(
         let turning = turning.collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
     };
-    let [constant, with_table, retuned] = KINDS.map(|(kind, _)| track(kind));
     let mut found = DemodulationResults {
         maps: [map(true)?, map(false)?],
         seen: at_each(config)?,
         isotropic: at_each(&isotropic)?,
         delay: None,
-        tracked: [constant?, with_table?, retuned?],
+        tracked: ReferenceKind::VALUES.iter().map(|&kind| track(kind)).collect::<Result<_, _>>()?,
     };
     if found.isotropic_share() < 0.5 {
         found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
@@ -160,7 +151,7 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
     let rows = all.flat_map(|(demodulation, f)| {
         IQ_A.iter().zip(&f.seen).zip(&f.isotropic).map(|((iq, s), i)| {
             [
-                ("demodulation", Cell::from(demodulation.name)),
+                ("demodulation", Cell::from(demodulation.name())),
                 ("iq (A)", Cell::fixed(*iq, 1)),
                 ("unit", Cell::from(demodulation.unit())),
                 ("signal", Cell::fixed(s.signal * 1e3, 2)),
@@ -197,9 +188,9 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
              the motor and the sampling included."
         ));
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
-        for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
-            let Some(t) = tracked else { continue };
-            let mut row = vec![Cell::from(demodulation.name), Cell::from(*kind), f.delay_text()];
+        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
+            let (Some(t), kind) = (tracked, kind.word()) else { continue };
+            let mut row = vec![Cell::from(demodulation.name()), Cell::from(kind), f.delay_text()];
             let mut add = |values: Option<[f64; 2]>| {
                 row.extend([0, 1].map(|k| values.map_or("lost".into(), |v| Cell::fixed(v[k], 2))));
             };
@@ -218,7 +209,7 @@ fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
         let y = format!("{of} ({})", demodulation.unit());
         injection_map::panel(y, &IQ_A, family)
     };
-    let title = format!("{}: over the injection angle", demodulation.name);
+    let title = format!("{}: over the injection angle", demodulation.name());
     Figure::new(format!("map_{}", demodulation.key()), title, "Figure 19")
         .panel(panel(&f.maps[0], "with saliency"))
         .panel(panel(&f.maps[1], "without"))
@@ -234,7 +225,7 @@ fn steps_figure(found: &[DemodulationResults]) -> Figure {
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (panel, tracked) in panels.iter_mut().zip(&f.tracked) {
             if let Some(t) = tracked {
-                panel.series.push(Series::line(demodulation.name, t.steps.error.clone()));
+                panel.series.push(Series::line(demodulation.name(), t.steps.error.clone()));
             }
         }
     }

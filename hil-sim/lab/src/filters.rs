@@ -6,11 +6,10 @@ mod direct;
 mod precision;
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos};
-use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
 use sim_bench::outcome::Style;
-use sim_bench::prelude::*;
 
+use crate::prelude::*;
 use crate::recomputed::CARRIER_HZ;
 use compared::{ComparedFilter, filters};
 use design::{Band, Prototype, butterworth, chebyshev_1, chebyshev_2, elliptic};
@@ -43,9 +42,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          is 0.944, which makes every real current 5.9 % too large; the drive divides by it.",
     );
     let direct = outcome.metrics.get("lpf_direct_1_error_rms_a").unwrap_or(f64::NAN);
-    let sensitive = "the filters are sensitive to the precision of their coefficients";
-    let holds = direct > 1e-3;
-    outcome.compared.push(Compared::with("S1", "Appendix C", sensitive).recomputed(holds));
+    outcome.compared.push(named("filters_sensitive").recomputed(direct > 1e-3));
     outcome.remark(
         "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA come through, as much as \
          the signal that the demodulation of the source looks for (see injection-map).",
@@ -132,28 +129,18 @@ pub(super) fn edges_hz<const N: usize>(filter: &Sos<N>, level: f64) -> Vec<f64> 
 
 /// The coefficients of Tables 7 and 8 from the specification, and as the drive has them; what else section 3.10 says.
 fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
+    let (lpf, bpf, pp) = (elliptic(4, 0.5, 40.0), elliptic(2, 0.5, 40.0), elliptic(4, 0.5, 60.0));
     let designs = [
-        (
-            "Table 7",
-            elliptic(4, 0.5, 40.0).digital(Band::Stop(450.0, 650.0)),
-            expanded(&LPF_AS_PRINTED.sections),
-        ),
-        (
-            "Table 8",
-            elliptic(2, 0.5, 40.0).digital(Band::Pass(500.0, 700.0)),
-            expanded(&BPF.sections),
-        ),
-        ("Table 8", elliptic(4, 0.5, 60.0).digital(Band::Low(100.0)), expanded(&PP.sections)),
+        ("Table 7", lpf.digital(Band::Stop(450.0, 650.0)), expanded(&LPF_AS_PRINTED.sections)),
+        ("Table 8", bpf.digital(Band::Pass(500.0, 700.0)), expanded(&BPF.sections)),
+        ("Table 8", pp.digital(Band::Low(100.0)), expanded(&PP.sections)),
     ];
     for (filter, (table, design, drive)) in filters.iter().zip(designs) {
         let mut largest = 0.0_f64;
         for (part, name) in ["b", "a"].into_iter().enumerate() {
             for (i, (&value, &used)) in design[part].iter().zip(&drive[part]).enumerate() {
-                let ours = Compared::with(
-                    "S1",
-                    format!("{table}, i = {i}"),
-                    format!("{name} ({})", filter.name),
-                );
+                let quantity = format!("{name} ({})", filter.name);
+                let ours = beside(&format!("{table}, i = {i}"), &quantity);
                 let but = Some(("the digits of the design tool", 1e-4));
                 outcome.compared.push(Compared { but, ..ours }.recomputed(value).used(used));
                 largest = largest.max((value - filter.printed[part][i]).abs());
@@ -162,7 +149,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         let key = filter.name.to_lowercase();
         outcome.metrics.set(format!("{key}_design_differs_by"), largest);
         let order = filter.printed[1].len() - 1;
-        let place = Compared::with("S1", "section 3.10", format!("order of {}", filter.name));
+        let place = beside("section 3.10", &format!("order of {}", filter.name));
         outcome.compared.push(place.recomputed(order as f64));
     }
     let [pass, stop] = [edges_hz(&BPF, -0.6), edges_hz(&LPF_AS_PRINTED, -40.0)];
@@ -175,7 +162,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     let edge = stop_edge(&filters[2]);
     let ratio = warped(edge) / warped(100.0);
     let delay = |prototype: Prototype| group_delay(&prototype.digital(Band::Low(100.0)));
-    let elliptic = delay(elliptic(4, 0.5, 60.0));
+    let elliptic = delay(pp);
     let delays = [
         ("butterworth", delay(butterworth(9, 0.5))),
         ("chebyshev_1", delay(chebyshev_1(6, 0.5))),
@@ -187,17 +174,13 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
         outcome.metrics.set(format!("{name}_delay_samples"), delay);
     }
     let fewest = delays[1].1.min(delays[2].1);
-    for (quantity, holds) in [
-        (
-            "the stop band of LPF contains the frequency of injection",
-            (stop[0]..stop[1]).contains(&carrier),
-        ),
-        ("pass band of BPF contains the stop band of LPF", pass[0] < stop[0] && stop[1] < pass[1]),
-        ("elliptic filters have less delay than Butterworth filters", elliptic < delays[0].1),
-        ("elliptic filters have less delay than Chebyshev filters", elliptic < fewest),
-    ] {
-        outcome.compared.push(Compared::with("S1", "section 3.10", quantity).recomputed(holds));
-    }
+    let within = pass[0] < stop[0] && stop[1] < pass[1];
+    outcome.compared.extend([
+        named("stop_band_has_carrier").recomputed((stop[0]..stop[1]).contains(&carrier)),
+        named("pass_band_has_stop_band").recomputed(within),
+        named("less_delay_than_butterworth").recomputed(elliptic < delays[0].1),
+        named("less_delay_than_chebyshev").recomputed(elliptic < fewest),
+    ]);
     outcome.metrics.set("lpf_currents_high_by_pct", 100.0 * (1.0 / LPF_AS_PRINTED.dc_gain() - 1.0));
     outcome.metrics.set("bpf_gain_dc_db", 20.0 * BPF.dc_gain().log10());
     outcome.metrics.set("leak_of_an_ampere_ma", 1e3 * BPF.dc_gain());

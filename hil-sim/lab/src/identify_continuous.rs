@@ -1,12 +1,11 @@
 //! Models B, C, D and S on simulated measurements: Tables 2, 3 and 5 of Jacobina, Lima, Ribeiro
 //! 1996.
 
-use sim_bench::prelude::*;
-
 use crate::identification::printed::{Case, SPEEDS};
 use crate::identification::study::{Entry, MODELS, TRIALS, errors_of, tables};
 use crate::identification::trial::Noise;
 use crate::identification::{Parameters, Signal, Trial};
+use crate::prelude::*;
 
 /// Tables 2, 3 and 5.
 pub const EXPERIMENT: Experiment = Experiment::new("identify-continuous", run)
@@ -73,8 +72,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
             ]);
         }
     }
-    let claim = "from 0 to 200 rad/s the errors of Model C are similar to those of Model B";
-    outcome.compared.push(Compared::with("S0", "section 5", claim).simulated(similar));
+    outcome.compared.push(named("c_similar_to_b").simulated(similar));
     table.note("Half the printed noise, the mean of eight times seven measurements; supply at the speed and 1.8 rad/s of slip.")
 }
 

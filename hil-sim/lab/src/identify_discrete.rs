@@ -1,8 +1,7 @@
 //! Model A on simulated measurements: Tables 1 and 4 of Jacobina, Lima, Ribeiro 1996.
 
-use sim_bench::prelude::*;
-
 use crate::identification::study::tables;
+use crate::prelude::*;
 
 /// Tables 1 and 4.
 pub const EXPERIMENT: Experiment =

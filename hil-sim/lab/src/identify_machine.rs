@@ -1,9 +1,8 @@
 //! Which machine the tables of Jacobina, Lima, Ribeiro 1996 were made with.
 
-use sim_bench::prelude::*;
-
 use crate::identification::ratios::{self, Ratio};
 use crate::identification::{Parameters, claims};
+use crate::prelude::*;
 use crate::source;
 
 /// Numbers that do not depend on the noise.

@@ -1,18 +1,15 @@
 //! The motor from a recorded trace of a drive: voltages, currents and speed in a CSV file.
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
-use drive_settings::value::Words;
 use drive_settings::words;
-use rayon::prelude::*;
 use sim_bench::columns::Columns;
 use sim_bench::error::unknown;
 use sim_bench::plant::clarke;
-use sim_bench::prelude::*;
 
 use crate::identification::output_error::{OutputErrorFit, Record};
 use crate::identification::{Complex, NotIdentifiable, Parameters};
+use crate::prelude::*;
 
 /// A command of its own, for its options; not in the list of experiments.
 pub const EXPERIMENT: Experiment = Experiment::new("identify-trace", |_| Err(Error::Refused("identify-trace is a command of its own".into())))

@@ -1,13 +1,12 @@
 //! Measured against simulated current, with estimated and with classical parameters: Figure 5 and
 //! Tables 6 and 7 of Jacobina, Lima, Ribeiro 1996.
 
-use sim_bench::prelude::*;
-
 use crate::identification::models::model_c;
 use crate::identification::printed::Case;
 use crate::identification::study::errors;
 use crate::identification::trial::Noise;
 use crate::identification::{Complex, Parameters, Signal, Trial};
+use crate::prelude::*;
 use crate::source;
 
 /// Figure 5, Tables 6 and 7.
@@ -25,8 +24,7 @@ const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 /// A printed row of a table.
 fn printed(table: &str, row: &str) -> Parameters {
     let of = |name| source::number("S0", &format!("{table}, {row}"), name);
-    let [r_s, tau_r, sigma_l_s, l_s, omega_m] = Parameters::NAMES.map(of);
-    Parameters { r_s, tau_r, sigma_l_s, l_s, omega_m }
+    Parameters::of(Parameters::NAMES.map(of))
 }
 /// Measured speeds, electrical rad/s.
 const SPEEDS: [f64; 2] = [366.0, 57.6];
@@ -64,30 +62,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let [six_step, both, of_rbv] = ["Sg", "Ss", "rbv"].map(|row| {
         ["Table 6", "Table 7"].map(|table| source::number("S0", &format!("{table}, {row}"), "r_s"))
     });
-    for (place, quantity, holds) in [
-        (
-            "Figure 5",
-            "error of the current is small with the estimated parameters",
-            estimated < 5.0,
-        ),
-        (
-            "Figure 5",
-            "error of the current is much smaller with the estimated parameters than with those of the classical tests",
-            estimated < 0.3 * rbv,
-        ),
-        (
-            "Table 6",
-            "estimates with Sg and Ss are close to each other",
-            (six_step[0] / both[0] - 1.0).abs() < 0.1,
-        ),
-        (
-            "Table 7",
-            "r_s with Sg is far from the value of the classical tests",
-            (six_step[1] / of_rbv[1] - 1.0).abs() > 0.3,
-        ),
-    ] {
-        outcome.compared.push(Compared::with("S0", place, quantity).simulated(holds));
-    }
+    let apart = |a: f64, b: f64| (a / b - 1.0).abs();
+    outcome.compared.extend([
+        named("small_error").simulated(estimated < 5.0),
+        named("much_smaller_error").simulated(estimated < 0.3 * rbv),
+        named("sg_close_to_ss").simulated(apart(six_step[0], both[0]) < 0.1),
+        named("r_s_far_from_classical").simulated(apart(six_step[1], of_rbv[1]) > 0.3),
+    ]);
     // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {
         let case = Case { speed: 375.0, signal, period: 0 };

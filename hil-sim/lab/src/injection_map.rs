@@ -1,10 +1,6 @@
 //! The current difference over the injection angle, Figure 19.
 
-use drive_core::Command;
-use drive_core::carrier::DemodulatorKind;
-use sim_bench::prelude::*;
-
-use crate::recomputed::printed;
+use crate::prelude::*;
 
 /// Gain of the post-processing filter at dc.
 pub(super) const PP: f64 = 0.944_061;
@@ -35,21 +31,12 @@ pub(super) struct Variant {
     pub compensate: bool,
 }
 
-const LITERAL: Variant = Variant {
-    name: "literal",
-    title: "As printed, motor with saliency",
-    demodulator: DemodulatorKind::Literal,
-    saliency: true,
-    inject: true,
-    compensate: false,
-};
-const RECTIFIED: Variant = Variant {
-    name: "rectified",
-    title: "Rectified, delay compensated, motor with saliency",
-    demodulator: DemodulatorKind::Rectified,
-    compensate: true,
-    ..LITERAL
-};
+#[rustfmt::skip] // a variant a line
+pub(super) const LITERAL: Variant =
+    Variant { name: "literal", title: "As printed, motor with saliency", demodulator: DemodulatorKind::Literal, saliency: true, inject: true, compensate: false };
+#[rustfmt::skip] // a variant a line
+const RECTIFIED: Variant =
+    Variant { name: "rectified", title: "Rectified, delay compensated, motor with saliency", demodulator: DemodulatorKind::Rectified, compensate: true, ..LITERAL };
 #[rustfmt::skip] // a variant a line
 const VARIANTS: [Variant; 7] = [
     LITERAL,
@@ -108,29 +95,21 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             .fold(0.0, f64::max)
     };
     let meets = |degrees: f64| if spread(degrees) < 0.05 { degrees } else { f64::NAN };
-    let holds = "the zero of the current difference lies at the arc tangent of i_q,ref/i_d,ref";
     // LPF as printed makes the currents larger than their references by as much as PP takes away.
     let leak = meet[1] / PP;
-    for (quantity, value) in [
-        (
-            "angle of the zero of the current difference without quadrature current",
-            zero(&isotropic[0]),
-        ),
-        ("angle at which the curves meet, positive", meets(90.0)),
-        ("angle at which the curves meet, negative", meets(-90.0)),
-        ("current difference at which the curves meet, about", leak),
-        (holds, f64::from(largest_off < 2.0)),
-    ] {
-        outcome.compared.push(Compared::with("S1", "Figure 19", quantity).simulated(value));
-    }
+    outcome.compared.extend([
+        named("zero_without_iq").simulated(zero(&isotropic[0])),
+        named("curves_meet_plus").simulated(meets(90.0)),
+        named("curves_meet_minus").simulated(meets(-90.0)),
+        named("curves_meet_about").simulated(leak),
+        named("zero_at_arc_tangent").simulated(largest_off < 2.0),
+    ]);
     let rectified = &curves[3 * IQ_A.len()..4 * IQ_A.len()];
     let errors =
         rectified[2..].iter().map(|curve| (at(curve, 90.0) / at(&rectified[2], 90.0) - 1.0).abs());
     let constant = errors.fold(0.0, f64::max);
     outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
-    let constant = Compared::with("S1", "section 3.3", "at the reference of convergence the quadrature current does not affect the current difference")
-        .simulated(constant < 0.2);
-    outcome.compared.push(constant);
+    outcome.compared.push(named("iq_does_not_affect").simulated(constant < 0.2));
     outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
          zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \

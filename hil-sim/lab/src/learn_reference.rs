@@ -2,7 +2,8 @@
 
 use drive_core::learned::Fitted;
 use sim_bench::learning;
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Section 5.2 asks for a detection that works at every operating point.
 pub const EXPERIMENT: Experiment = Experiment::new("learn-reference", run)
@@ -58,11 +59,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("current_saliency_per_a", learned.current_saliency.value.into());
     m.set("current_saliency_misfit", learned.current_saliency.misfit.into());
     m.set("flux_saliency", learned.flux_saliency.into());
-    outcome
-        .figures
-        .push(Figure::new("reference", "Reference over the torque current", "section 3.3").panel(
-            Panel::new("quadrature current (A)", "q").with(Series::line("learned", points)),
-        ));
+    let panel = Panel::new("quadrature current (A)", "q").with(Series::line("learned", points));
+    let figure = Figure::new("reference", "Reference over the torque current", "section 3.3");
+    outcome.figures.push(figure.panel(panel));
     outcome.remarks = assumptions(context.config);
     Ok(outcome)
 }

@@ -17,16 +17,14 @@
 //! The current loop is the drive's: PI, filter, one period of delay, plant of first order. The speed
 //! loop, where there is one, uses the mean of `w_i + (2 + c) w_n g x` over its period.
 
-use std::f64::consts::TAU;
-
 use drive_core::filter::{LPF, LpfState};
 use drive_core::flux::GainSchedule;
 use drive_core::io::PERIOD_S;
 use drive_core::{AlphaBeta, FirstOrder, Motion};
-use drive_settings::Settings;
 use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign};
 use sim_bench::plant::{MachineSettings, MechanicsSettings};
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// A disturbance at time zero.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,17 +1,16 @@
 //! Simulated motors beside motors that others have measured: a load test, a saturation curve, a direct start.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::SQRT_2;
 
 use num_complex::Complex;
-use serde::Deserialize;
 use sim_bench::config::Value;
 use sim_bench::config::motors::Motor;
 use sim_bench::plant::{
     ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _, Mechanics,
     MechanicsSettings, MotorModel, phases,
 };
-use sim_bench::prelude::*;
 
+use crate::prelude::*;
 use crate::saliency::steady::at_voltage;
 
 /// All comparisons.

@@ -1,15 +1,13 @@
 //! A recorded start beside the simulated motor at the recorded voltages.
 
-use std::f64::consts::TAU;
-
 use sim_bench::plant::{
     ElectricalState as _, EnergyMachine, IronSettings, Load, MachineModel as _, Mechanics,
     MotorModel,
 };
-use sim_bench::prelude::*;
 
 use crate::identification::Complex;
 use crate::identify_trace::{Reading, Voltages, read, rms};
+use crate::prelude::*;
 
 /// With a file of the user: columns as those of `identify-trace`, voltages sampled at the terminals, from the switching on.
 pub const EXPERIMENT: Experiment = Experiment::new("measured-start", run)

@@ -2,12 +2,12 @@
 
 mod carrier;
 
-use std::f64::consts::TAU;
-
 use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
 use drive_core::{Abc, AlphaBeta};
-use sim_bench::prelude::*;
+
+use crate::dead_time::steps;
+use crate::prelude::*;
 
 /// Figures 4, 5 and 11, Table 2.
 pub const EXPERIMENT: Experiment = Experiment::new("modulation", run)
@@ -100,15 +100,8 @@ fn sequence(inverter: &Inverter) -> Figure {
         let low = 1.5 * (2 - k) as f64;
         let half = 0.5 * period_us * compare / inverter.top;
         let (on, off) = (0.5 * period_us - half, 0.5 * period_us + half);
-        let corners = [
-            (0.0, low),
-            (on, low),
-            (on, low + 1.0),
-            (off, low + 1.0),
-            (off, low),
-            (period_us, low),
-        ];
-        panel = panel.with(Series::line(format!("leg {name}"), corners.to_vec()));
+        let corners = steps(false, &[on, off], period_us, low);
+        panel = panel.with(Series::line(format!("leg {name}"), corners));
     }
     Figure::new(
         "sequence",

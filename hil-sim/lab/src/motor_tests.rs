@@ -1,8 +1,9 @@
 //! The tests that gave Table 5, on the simulated motor.
 
-use sim_bench::prelude::*;
+use sim_bench::plant::MachineSettings;
 
-use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
+use crate::identification::bench_tests::{Readings, Shaft, measure};
+use crate::prelude::*;
 
 /// Section 3.6, Table 5.
 pub const EXPERIMENT: Experiment = Experiment::new("motor-tests", run)
@@ -21,14 +22,15 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     };
     let (readings, free) = (on_the_bench(Shaft::Driven)?, on_the_bench(Shaft::Free)?);
     let mut outcome = Outcome::default();
-    let motor = Circuit::from(&plant.machine);
-    let names = Circuit::NAMES.iter().zip(["ohm", "ohm", "h", "h", "h"]);
-    let values = readings.as_printed().array().into_iter().zip(readings.exact().array());
-    for ((name, unit), (printed, exact)) in names.zip(values) {
+    let values = |m: MachineSettings| [m.rs, m.rr, m.lls, m.llr, m.lm];
+    let names =
+        ["r_s", "r_r", "l_l1", "l_l2", "l_m"].into_iter().zip(["ohm", "ohm", "h", "h", "h"]);
+    let found = values(readings.as_printed()).into_iter().zip(values(readings.exact()));
+    for ((name, unit), (printed, exact)) in names.zip(found) {
         outcome.metrics.set(format!("{name}_as_printed_{unit}"), printed);
         outcome.metrics.set(format!("{name}_exact_{unit}"), exact);
     }
-    let [r_s, r_r, leakage, _, l_m] = readings.as_printed().array();
+    let [r_s, r_r, leakage, _, l_m] = values(readings.as_printed());
     for (place, quantity, value) in [
         ("section 3.6.1", "voltage", readings.dc.0),
         ("section 3.6.1", "r_s", r_s),
@@ -45,14 +47,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     ] {
         outcome.compared.push(Compared::with("S1", place, quantity).simulated(value));
     }
-    let bias = readings.as_printed().r_r / motor.r_r;
+    let bias = readings.as_printed().rr / plant.machine.rr;
     outcome.remarks.extend([
         format!(
             "The locked-rotor test as section 3.6.2 reads it leaves out the magnetising branch, which \
              at 15 Hz takes part of the current: it gives r_r (L_m/L_r)² and less leakage, here {bias:.2} \
              of r_r. If the printed readings are right, the motor of the source has r_r = {:.2} Ω and \
              not 1.1.",
-            Readings::PRINTED.exact().r_r
+            Readings::PRINTED.exact().rr
         ),
         format!(
             "37.9 V are a sixth of the rated voltage. There the friction assumed here ({} N m s/rad) \
@@ -61,7 +63,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             plant.mechanics.friction,
             free.no_load.2,
             readings.no_load.2,
-            100.0 * (1.0 - free.as_printed().l_m / readings.as_printed().l_m),
+            100.0 * (1.0 - free.as_printed().lm / readings.as_printed().lm),
         ),
     ]);
     Ok(outcome)

@@ -1,9 +1,8 @@
 //! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
-use drive_core::AngleSource;
 use rotor_id::online::RotorEstimate;
-use sim_bench::prelude::*;
 
+use crate::prelude::*;
 use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 
 /// Not in the sources: the recursive estimate in use.

@@ -1,12 +1,8 @@
 //! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
 //! and predicted.
 
-use drive_core::{AngleSource, Command, Mode};
-use rayon::prelude::*;
-use sim_bench::plant::Load;
-use sim_bench::prelude::*;
-
 use crate::linear_model::{Disturbance, LinearModel};
+use crate::prelude::*;
 
 /// Section 5.2 names it as work to be done.
 pub const EXPERIMENT: Experiment = Experiment::new("perturbation", run)

@@ -6,12 +6,11 @@ use drive_core::filter::{BPF, LPF};
 use drive_settings::tuning::{
     CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
-use num_complex::Complex64;
 use sim_bench::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use sim_bench::outcome::Style;
-use sim_bench::prelude::*;
 
-use crate::recomputed::{PERIOD_S, beside, plant, printed};
+use crate::prelude::*;
+use crate::recomputed::{PERIOD_S, plant};
 
 /// Figures 23 to 25, section 3.8.
 pub const EXPERIMENT: Experiment = Experiment::new("pi-design", run)
@@ -67,9 +66,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let at = "gain with the zero at the crossover";
     outcome.compared.push(beside("Figure 24", "crossover, fictitious").recomputed(hz(rule.v)));
     outcome.compared.push(beside("Figure 25", at).recomputed(gain));
-    let below = "the closed current loop crosses over below the lower edge of the pass band of BPF";
-    let holds = hz(rule.v) < edges[0];
-    outcome.compared.push(Compared::with("S1", "section 2.5", below).recomputed(holds));
+    outcome.compared.push(named("loop_below_bpf").recomputed(hz(rule.v) < edges[0]));
     outcome.remarks.push(format!(
         "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
          its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 hold a slip \

@@ -2,12 +2,12 @@
 //! follow from them.
 
 use drive_core::filter::{LPF, LpfState};
-use drive_core::{AlphaBeta, AngleSource, Command, Dq, FirstOrder, Mode};
+use drive_core::{AlphaBeta, Dq, FirstOrder};
 use drive_settings::tuning::{design_current_loop, motor_plant, rule_3_8};
-use sim_bench::prelude::*;
 
 use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
+use crate::prelude::*;
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
 pub const EXPERIMENT: Experiment = Experiment::new("plant-identification", run)
@@ -221,9 +221,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         motor.k, motor.p
     )));
     let constant = fit(&[10.0; 500], &[1.0; 500], Orders { outputs: 1, inputs: 1, delay: 0 });
-    let degrades =
-        Compared::with("S1", "Appendix A", "stretches of constant signals degrade the solution");
-    outcome.compared.push(degrades.simulated(constant.is_err()));
+    outcome.compared.push(named("constants_degrade").simulated(constant.is_err()));
     outcome.remarks.extend(remarks(context)?);
     Ok(outcome)
 }

@@ -2,13 +2,12 @@
 
 use drive_core::FirstOrder;
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_settings::Settings;
 use drive_settings::tuning::rule_3_8;
 use sim_bench::bode::{RATE, fictitious, largest_pole};
 use sim_bench::plant::{InverterSettings, MachineSettings};
-use sim_bench::prelude::*;
 
 use crate::identification::bench_tests::Readings;
+use crate::prelude::*;
 use crate::source;
 
 /// Chapters 2 to 4.
@@ -42,8 +41,8 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let bound = printed("Figure 13", "bound of the relative difference");
     let within = |hz: &f64| 100.0 * (fictitious(*hz) / hz - 1.0) <= bound;
     let limit = (1..30_000).map(|n| 0.1 * f64::from(n)).take_while(within).last();
-    let place = beside("Figure 13", "frequency up to which the difference stays below the bound");
-    outcome.compared.push(place.recomputed(limit.unwrap_or(f64::NAN)));
+    let limit = limit.unwrap_or(f64::NAN);
+    outcome.compared.push(source::named("difference_small_up_to").recomputed(limit));
     outcome.figures.push(figure_13());
     position_loop(&mut outcome);
     Ok(outcome)

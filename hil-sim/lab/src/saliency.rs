@@ -2,27 +2,24 @@
 
 pub(super) mod steady;
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use num_complex::Complex;
-use sim_bench::config::{PlantModel, check_model, flux_level_a};
+use sim_bench::config::flux_level_a;
 use sim_bench::plant::{EnergyMachine, EnergyState, Machine, MachineSettings, MachineState};
-use sim_bench::prelude::*;
 
 use steady::Listed;
+
+use crate::prelude::*;
 
 /// The map.
 pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)
     .about("Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.")
     .uses(&[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]])
-    .not(&[&[
-        "iron.slots",
-        "iron.bars",
-        "iron.stator_fixed",
-        "iron.stator_fixed_deg",
-        "motor.inertia",
-        "motor.friction",
-    ]]);
+    .not(&[
+        &["iron.slots", "iron.bars", "iron.stator_fixed", "iron.stator_fixed_deg"],
+        &["motor.inertia", "motor.friction"],
+    ]);
 
 /// Frequency of the carrier, rad/s.
 const CARRIER: f64 = TAU * 600.0;
@@ -211,27 +208,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let at_zero = curve.iter().find(|point| point.0 == 0.0).map(|point| point.1);
         let zeros = at_zero.map(|q| Probe::second_zeros(curve, q)).unwrap_or_default();
         let zeros: Vec<String> = zeros.iter().map(|e| format!("{e:.0}°")).collect();
+        let of_rest = slope.zip(slopes[0].filter(|k0| k0.abs() > NOTHING)).map(|(k, k0)| k / k0);
+        let zeros = if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") };
         table.record([
             ("iq (A)", Cell::from(i_q_text.clone())),
-            ("k (1/rad)", Cell::or_dash(slope.map(|k| Cell::fixed(k, 4)))),
-            (
-                "share of k without load",
-                match (slope, slopes[0]) {
-                    (Some(k), Some(k0)) if k0.abs() > NOTHING => Cell::fixed(k / k0, 2),
-                    _ => Cell::from("-"),
-                },
-            ),
-            (
-                "second zeros",
-                Cell::from(if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") }),
-            ),
+            ("k (1/rad)", Cell::fixed_or_dash(slope, 4)),
+            ("share of k without load", Cell::fixed_or_dash(of_rest, 2)),
+            ("second zeros", Cell::from(zeros)),
         ]);
         let points = curve.iter().map(|(e, q)| (*e, 100.0 * q)).collect();
         panel = panel.with(Series::line(format!("iq = {i_q_text} A"), points));
     }
-    outcome
-        .figures
-        .push(Figure::new("map", "Saliency signal over the angle error", "").panel(panel));
+    let figure = Figure::new("map", "Saliency signal over the angle error", "");
+    outcome.figures.push(figure.panel(panel));
     outcome.tables.extend([map, table]);
     Ok(outcome)
 }

@@ -43,6 +43,8 @@ pub struct Printed {
     pub chapter: String,
     /// Its short name.
     id: String,
+    /// Its name in the program, where an experiment names it; else empty.
+    name: String,
     /// Where it stands: `Eq. 3.20`, `Table 6, 1.5 A`.
     pub place: String,
     /// Symbol or name.
@@ -76,7 +78,7 @@ struct Chapter {
     /// Short name on the page.
     id: String,
     name: String,
-    /// Place, quantity, unit, value, kind; formula, slip.
+    /// Place, quantity, unit, value, kind and name; formula, slip.
     #[serde(default)]
     printed: Vec<Vec<String>>,
     #[serde(default)]
@@ -103,14 +105,16 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
     let mut all = Vec::new();
     for File { source, chapter, .. } in files() {
         for Chapter { id, name, printed, table } in chapter {
-            let mut add = |texts: [&String; 4], kind, formula: Option<String>, slip| {
-                let [place, quantity, unit, value] = texts.map(Clone::clone);
-                let (source, chapter, id) = (source.clone(), name.clone(), id.clone());
+            let chapter = name;
+            let mut add = |texts: [&str; 5], kind, formula: Option<String>, slip| {
+                let [place, quantity, unit, value, name] = texts.map(str::to_owned);
+                let (source, chapter, id) = (source.clone(), chapter.clone(), id.clone());
                 let taken = AtomicBool::new(false);
                 all.push(Printed {
                     source,
                     chapter,
                     id,
+                    name,
                     place,
                     quantity,
                     unit,
@@ -123,13 +127,13 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
             };
             for row in &printed {
                 let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
-                    panic!("{name}: too few cells in {}", row.join(", "));
+                    panic!("{chapter}: too few cells in {}", row.join(", "));
                 };
-                let kind = toml::Value::from(kind.as_str())
-                    .try_into()
-                    .expect("input, result, graph or claim");
+                let (kind, name) = kind.split_once(' ').unwrap_or((kind, ""));
+                let kind = toml::Value::from(kind).try_into();
+                let kind = kind.expect("input, result, graph or claim");
                 let more = |k: usize| more.get(k).cloned();
-                add([place, quantity, unit, value], kind, more(0), more(1));
+                add([place, quantity, unit, value, name], kind, more(0), more(1));
             }
             for Cells { place, kind, columns, rows } in &table {
                 for row in rows {
@@ -137,7 +141,7 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                     for (column, value) in columns.iter().zip(&row[1..]) {
                         let formula =
                             column.get(2).map(|text| text.replace("{| ", &format!("{{{place} | ")));
-                        add([&place, &column[0], &column[1], value], *kind, formula, None);
+                        add([&place, &column[0], &column[1], value, ""], *kind, formula, None);
                     }
                 }
             }
@@ -199,6 +203,16 @@ pub fn place_of(source: &str, place: &str, quantity: &str) -> Option<usize> {
 pub fn number(source: &str, place: &str, quantity: &str) -> f64 {
     let found = place_of(source, place, quantity).and_then(|found| PRINTED[found].take());
     found.unwrap_or_else(|| panic!("{source} prints no number at {place}, {quantity}"))
+}
+
+/// Ours beside the printed value of this name.
+///
+/// # Panics
+/// When the list has none: the lists are part of the program.
+pub fn named(name: &str) -> Compared {
+    let found = PRINTED.iter().find(|printed| printed.name == name);
+    let found = found.unwrap_or_else(|| panic!("no printed value is called {name}"));
+    Compared::with(&found.source, &*found.place, &*found.quantity)
 }
 
 /// The numbers of a column of a table, from the first row on.

@@ -1,14 +1,10 @@
 //! A drive whose rotor warms up, with the online estimate beside it as the idle loop runs it.
 
-use std::f64::consts::TAU;
-
-use drive_core::{AngleSource, Command, Mode};
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
-use sim_bench::plant::Load;
-use sim_bench::prelude::*;
 
 use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
+use crate::prelude::*;
 
 /// Calls of `refine` per second.
 const REFINES_PER_S: f64 = 10.0;

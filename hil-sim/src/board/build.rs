@@ -2,12 +2,11 @@
 //! progress where standard error is a terminal, and lines of our own elsewhere.
 
 use std::io::{BufRead as _, BufReader, IsTerminal as _};
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Time between two lines of [`while_saying`].
 const INTERVAL: Duration = Duration::from_secs(10);

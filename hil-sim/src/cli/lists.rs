@@ -3,11 +3,10 @@
 use serde_json::json;
 
 use crate::config::motors::Motor;
-use crate::config::{Config, Key, Value, file};
-use crate::error::Error;
-use crate::experiments::{EVERYDAY, EXPERIMENTS, Experiment, WITH_INPUT};
+use crate::config::{Key, Value, file};
+use crate::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
 use crate::input::Input;
-use crate::outcome::{Cell, Table};
+use crate::prelude::*;
 use crate::report;
 
 /// All experiments as JSON; as text those of every day, or the others.

@@ -1,10 +1,8 @@
 //! Shards that are merged.
 
-use std::path::PathBuf;
-
 use super::run::{self, Output, Run};
-use crate::error::Error;
 use crate::input::Input;
+use crate::prelude::*;
 use crate::shards;
 
 /// Merges shards, prints the JSON object of the whole run, and writes its page and its CSV files where wanted.

@@ -1,13 +1,10 @@
 //! A part of the runs of a statistical experiment, and runs that are continued.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use super::say;
-use crate::error::Error;
-use crate::experiments::{self, Context, Experiment};
-use crate::outcome::Outcome;
+use crate::experiments;
+use crate::prelude::*;
 use crate::report;
 use crate::shards::{self, Header, Journal, Shard};
 
@@ -61,7 +58,7 @@ impl Part {
             report::write_whole(path, &report::of_table(&shards::rows(&runs))?)?;
         }
         if self.is_shard() {
-            say(&shards::text(&header, &runs)?)?;
+            say(shards::text(&header, &runs)?)?;
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();

@@ -1,17 +1,14 @@
 //! All experiments on one page.
 
-use std::path::Path;
 use std::sync::Mutex;
-
-use rayon::prelude::*;
 
 use super::run::Run;
 use super::{say, used};
-use crate::error::Error;
 use crate::experiments::source::evidence::Evidence;
-use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
+use crate::experiments::{self, EXPERIMENTS};
 use crate::input::Input;
-use crate::outcome::{Origin, Outcome};
+use crate::outcome::Origin;
+use crate::prelude::*;
 use crate::progress::Bar;
 use crate::report::{self, Section};
 
@@ -61,13 +58,7 @@ pub fn report(of: Of, input: &Input, out: &Path) -> Result<(), Error> {
 fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
     used::check("report", experiments, input)?;
-    let context = Context {
-        config: &config,
-        seed: input.seed,
-        seconds: config.extent.seconds,
-        progress: input.progress(),
-        file: None,
-    };
+    let context = Context::new(&config, input.seed, input.progress());
     let bar = context.progress.bar("report", experiments.len() as u64);
     let running = Running { bar: &bar, names: Mutex::default() };
     let outcomes: Vec<Outcome> =
@@ -111,7 +102,7 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
     let path = out.join(file);
     let page = report::page(title, &origin, &sections)?;
     report::write_whole(&path, &page)?;
-    say(&format!("Report: {}\n", path.display()))?;
+    say(format!("Report: {}\n", path.display()))?;
 
     let mut names = Vec::new();
     for (experiment, outcome) in experiments.iter().zip(&outcomes) {

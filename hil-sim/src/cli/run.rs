@@ -1,20 +1,16 @@
 //! One experiment, or a group of them.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
-use drive_settings::value::Words as _;
 use trace::Voltages;
 
 use super::part::Part;
 use super::{say, used};
-use crate::config::Config;
-use crate::error::Error;
 use crate::experiments::source::evidence::Evidence;
-use crate::experiments::{self, Context, Experiment, identify_trace as trace, scenario};
+use crate::experiments::{self, identify_trace as trace, scenario};
 use crate::input::{Input, OUT};
-use crate::outcome::{self, Origin, Outcome};
+use crate::outcome::{self, Origin};
 use crate::passport;
+use crate::prelude::*;
 use crate::report::{self, Section};
 
 /// Where the results of a run go.
@@ -143,7 +139,7 @@ impl Run<'_> {
         if let (Some(path), false) = (path, self.input.quiet) {
             text.push_str(&format!("\nReport: {}\n", path.display()));
         }
-        say(&text).map(|()| String::new())
+        say(text).map(|()| String::new())
     }
 }
 
@@ -198,13 +194,7 @@ fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     used::check(name, &chosen, input)?;
     let (mut objects, mut lost) = (Vec::new(), Ok(()));
     for experiment in chosen {
-        let context = Context {
-            config: &config,
-            seed: input.seed,
-            seconds: config.extent.seconds,
-            progress: input.progress(),
-            file,
-        };
+        let context = Context { file, ..Context::new(&config, input.seed, input.progress()) };
         let Some(outcome) = part.run(experiment, &context, input.quiet)? else { continue };
         let command = match file {
             Some(_) if own.is_some() => format!("run {name}"),
@@ -252,5 +242,5 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
 /// # Errors
 /// [`Error::Write`].
 pub fn print(objects: &[String], output: &Output) -> Result<(), Error> {
-    if output.json { say(&format!("{}\n", outcome::joined(objects))) } else { Ok(()) }
+    if output.json { say(format!("{}\n", outcome::joined(objects))) } else { Ok(()) }
 }

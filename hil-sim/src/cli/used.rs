@@ -1,9 +1,8 @@
 //! Refusal of keys that an experiment does not use.
 
-use crate::config::{Config, assigned, file, keys_of};
-use crate::error::Error;
-use crate::experiments::Experiment;
+use crate::config::{assigned, file, keys_of};
 use crate::input::Input;
+use crate::prelude::*;
 
 /// Checks that each key set by `--set` or `--seconds` is used by one of the experiments that `name` stands for. A
 /// configuration file may describe more than one experiment needs: its unused keys are only named on standard error,

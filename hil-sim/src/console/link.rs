@@ -10,7 +10,7 @@ use std::time::Duration;
 use drive_stream::{Frame, Piece, Splitter};
 
 use super::answer::{self, Meaning, is_error};
-use super::trace::{Collector, Trace};
+use super::trace::Trace;
 
 /// Longest silence within an answer: a setting is designed for seconds, on a virtual board at a fraction of real time.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -62,13 +62,13 @@ struct Route {
     /// Or to the person.
     show: Box<dyn FnMut(&str) + Send>,
     frames: Box<dyn FnMut(Option<Frame>) + Send>,
-    traces: Collector,
+    trace: Trace,
     closed: bool,
 }
 
 impl Route {
     fn line(&mut self, line: String) {
-        self.traces.push(&line);
+        self.trace.push(&line);
         match &self.asked {
             Some(asked) => drop(asked.send(line)),
             None => self.unawaited(&line),
@@ -143,8 +143,7 @@ impl Link {
         frames: impl FnMut(Option<Frame>) + Send + 'static,
     ) -> Self {
         let (show, frames) = (Box::new(show), Box::new(frames));
-        let route =
-            Route { asked: None, show, frames, traces: Collector::default(), closed: false };
+        let route = Route { asked: None, show, frames, trace: Trace::default(), closed: false };
         let route = Arc::new(Mutex::new(route));
         let to = route.clone();
         std::thread::spawn(move || read_lines(reader, &to));
@@ -234,7 +233,7 @@ impl Link {
 
     /// The last trace that the drive has printed.
     pub fn last_trace(&self) -> Option<Trace> {
-        locked(&self.route).traces.last()
+        Some(locked(&self.route).trace.clone()).filter(|trace| trace.records() > 0)
     }
 }
 

@@ -1,12 +1,11 @@
 //! A line is entered: a command of this program is done, all others go to the drive.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::link::{Link, LinkError};
 use super::own::{HELP, Own};
 use super::transfer;
-use crate::error::Error;
+use crate::prelude::*;
 use crate::report;
 
 /// Time between two lines about the progress of a restore.

@@ -6,41 +6,28 @@ use crate::outcome::{Figure, Panel, Series};
 /// Names of the first column: the time from the trigger, or the number of the record.
 const HEADS: [&str; 2] = ["t_s", "record"];
 
-/// A table of numbers whose first column is the time or the number of the record.
+/// A table of numbers whose first column is the time or the number of the record: the last among the lines of a drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
 }
 
-/// Finds traces among the lines of a drive.
-#[derive(Clone, Debug, Default)]
-pub struct Collector {
-    trace: Trace,
-}
-
-impl Collector {
+impl Trace {
     /// Takes a line: the head of a trace, one of its rows, or anything else.
     pub fn push(&mut self, line: &str) {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let numbers: Result<Vec<f64>, _> = fields.iter().map(|field| field.parse()).collect();
         match numbers {
-            Ok(row) if row.len() == self.trace.names.len() => self.trace.rows.push(row),
+            Ok(row) if row.len() == self.names.len() => self.rows.push(row),
             Err(_) if HEADS.contains(&fields[0]) => {
                 let names = fields.into_iter().map(str::to_owned).collect();
-                self.trace = Trace { names, rows: Vec::new() };
+                *self = Self { names, rows: Vec::new() };
             }
             _ => {}
         }
     }
 
-    /// The last trace with rows.
-    pub fn last(&self) -> Option<Trace> {
-        (!self.trace.rows.is_empty()).then(|| self.trace.clone())
-    }
-}
-
-impl Trace {
     /// A panel for every unit, in the order of the columns.
     pub fn figure(&self) -> Figure {
         let (x, columns) = match self.names.split_first() {
@@ -82,9 +69,9 @@ mod tests {
     use super::*;
 
     fn trace(lines: &[&str]) -> Option<Trace> {
-        let mut collector = Collector::default();
-        lines.iter().for_each(|line| collector.push(line));
-        collector.last()
+        let mut trace = Trace::default();
+        lines.iter().for_each(|line| trace.push(line));
+        (trace.records() > 0).then_some(trace)
     }
 
     #[test]

@@ -6,7 +6,6 @@
 //! Own code for the protocol: no crate of it is maintained, and it is nine commands of a few bytes.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -15,7 +14,7 @@ use serialport::Parity;
 
 use super::Port;
 use crate::board;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Options of an update.
 #[derive(Args)]

@@ -2,10 +2,10 @@
 
 use drive_core::current::{Pi, PiState};
 
+use sim_lab::source::named;
+
 use super::bode::largest_pole;
-use super::{Context, Experiment};
-use crate::error::Error;
-use crate::outcome::{Cell, Compared, Figure, Outcome, Panel, Series, Table};
+use crate::prelude::*;
 
 /// Figure 40, Eq. B.1 to B.3.
 pub const EXPERIMENT: Experiment = Experiment::new("anti-windup", run)
@@ -154,15 +154,8 @@ fn compared(outcome: &mut Outcome) {
     let late = Response::of(literal(LIMIT), LIMIT).y.split_off(SAMPLES - 40);
     let swing = highest(&late) - late.iter().copied().fold(f64::INFINITY, f64::min);
     outcome.metrics.set("printed_anti_windup_swing", swing);
-    for (quantity, value) in [
-        ("calculated effort when the output reaches the reference, almost", plain.u_at_crossing()),
-        (
-            "without anti-windup the system is saturated most of the time",
-            f64::from(plain.saturated() > 0.5),
-        ),
-    ] {
-        outcome.compared.push(Compared::with("S1", "Figure 40", quantity).recomputed(value));
-    }
+    outcome.compared.push(named("effort_at_reference").recomputed(plain.u_at_crossing()));
+    outcome.compared.push(named("mostly_saturated").recomputed(plain.saturated() > 0.5));
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@ mod session;
 use drive_commission::{Commissioning, Step};
 use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
-use drive_settings::Settings;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
 
 use super::drawn_machine::{Circuit, drawn};
@@ -79,13 +78,9 @@ pub struct Record {
     /// Errors in percent, as [`Circuit::values`] and of the gain mismatch.
     errors: Vec<f64>,
     /// Time of the steps up to the leakage, of the staircase, and of the current loop, s.
-    #[serde(with = "exact")]
     seconds: f64,
-    #[serde(with = "exact")]
     staircase_seconds: f64,
-    #[serde(with = "exact")]
     loop_seconds: f64,
-    #[serde(with = "exact")]
     shaft_deg: f64,
     /// Largest phase current as a share of the nameplate's peak.
     #[serde(with = "exact")]
@@ -330,13 +325,8 @@ fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     built(settings)?;
     let [design, _] = settings.current_loops().map_err(Error::refused)?;
     // In this circuit the leakage lies on the stator's side, all of it.
-    let circuit = EquivalentCircuit {
-        r_s: truth.r_s,
-        r_r: truth.r_r,
-        l_ls: truth.leakage,
-        l_m: truth.coupled,
-        l_lr: 1e-9,
-    };
+    let Circuit { r_s, r_r, leakage: l_ls, coupled: l_m } = *truth;
+    let circuit = EquivalentCircuit { r_s, r_r, l_ls, l_m, l_lr: 1e-9 };
     let period = f64::from(PERIOD_S);
     let plant = motor_plant(&circuit, period).map_err(Error::refused)?;
     let (k_c, z_c) = (design.k_c, design.z_c);

@@ -1,12 +1,11 @@
 //! Step of the current loop on the identified plant.
 
 use drive_core::FirstOrder;
+use sim_lab::recomputed::{plant, printed};
+use sim_lab::source::named;
 
 use super::bode::largest_pole;
-use super::{Context, Experiment};
-use crate::error::Error;
-use crate::outcome::{Compared, Figure, Outcome, Panel, Series};
-use sim_lab::recomputed::{plant, printed};
+use crate::prelude::*;
 
 /// Figures 26 and 27, Eq. 3.34, 3.39, 3.40.
 pub const EXPERIMENT: Experiment =
@@ -85,16 +84,11 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(figure);
     let [plain, filtered] = [false, true].map(|filtered| step(larger, filtered));
     let longer = settling(&step(nominal, true)) > settling(&step(nominal, false));
-    for (quantity, holds) in [
-        (
-            "without reference filter the response to a step overshoots with the altered plant",
-            overshoot(&plain) > 0.01,
-        ),
-        ("the reference filter removes the overshoot", overshoot(&filtered) < 0.001),
-        ("the reference filter makes the settling time longer", longer),
-    ] {
-        outcome.compared.push(Compared::with("S1", "Figure 27", quantity).recomputed(holds));
-    }
+    outcome.compared.extend([
+        named("overshoots_unfiltered").recomputed(overshoot(&plain) > 0.01),
+        named("filter_removes_overshoot").recomputed(overshoot(&filtered) < 0.001),
+        named("filter_settles_later").recomputed(longer),
+    ]);
     outcome.remark(
         "The identified plant has no delay and no current filter in it; with those the same rule \
          leaves less margin (see pi-design).",

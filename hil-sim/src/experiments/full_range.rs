@@ -10,8 +10,6 @@ mod trial;
 
 use std::sync::OnceLock;
 
-use drive_settings::Flux;
-
 use case::Case;
 use trial::Run;
 

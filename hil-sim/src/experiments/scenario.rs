@@ -7,11 +7,6 @@ mod file;
 mod quantity;
 mod record;
 
-use std::f64::consts::TAU;
-use std::path::Path;
-
-use drive_core::Stop;
-
 pub use file::{Metric, Statistic};
 pub use quantity::{QUANTITIES, Seen};
 pub use record::Record;
@@ -19,7 +14,6 @@ pub use record::Record;
 use self::file::{Ramp, Text};
 use crate::config::{Key, Value};
 use crate::prelude::*;
-use crate::progress::Progress;
 
 /// Experiments that are scenarios of the program, each with the name of its file, what it stands for, the keys that it uses,
 /// those that it does not, and a sentence about it.

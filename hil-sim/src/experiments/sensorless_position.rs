@@ -1,7 +1,5 @@
 //! Position without an encoder: the step of section 4.1, and how far the position drifts.
 
-use std::f64::consts::TAU;
-
 use super::learning;
 use super::scenario::{Metric, Record, Statistic, position_step};
 use crate::prelude::*;

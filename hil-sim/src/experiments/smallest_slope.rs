@@ -4,7 +4,6 @@
 use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
 use crate::prelude::*;
-use crate::progress::Progress;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("smallest-slope", whole::<SmallestSlope>)

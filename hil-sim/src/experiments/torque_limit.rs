@@ -1,8 +1,6 @@
 //! The largest torque of a drive at rest: how much it is, which limit binds, and what raises it.
 
-use std::f64::consts::{SQRT_2, TAU};
-
-use drive_settings::Flux;
+use std::f64::consts::SQRT_2;
 
 use super::battery::{allowed_a, torque_limit_a, torque_nm};
 use super::full_range::learned_drive;

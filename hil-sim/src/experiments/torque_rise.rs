@@ -2,9 +2,7 @@
 
 mod rise;
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
-use num_complex::Complex64;
+use std::f64::consts::FRAC_PI_2;
 
 use self::rise::{Response, Rise};
 use super::full_range::for_the_range;

@@ -1,10 +1,6 @@
 //! The evidence: a TOML file that says which board did what, step by step. It is written whole before and after every step.
 
-use std::path::Path;
-
-use serde::{Deserialize, Serialize};
-
-use crate::error::Error;
+use crate::prelude::*;
 use crate::report;
 
 /// Version of the file.

@@ -3,10 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
-
 use super::evidence::{Evidence, Verdict};
-use crate::error::Error;
+
+use crate::prelude::*;
 
 /// First words of the lines after which every gate stays off. Any other line counts as one that switches the stage on.
 #[rustfmt::skip]

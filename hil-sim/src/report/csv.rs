@@ -2,9 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::error::Error;
 use crate::outcome::name::{snake, unique};
-use crate::outcome::{Cell, Figure, Outcome, Table};
+use crate::prelude::*;
 
 /// The files of an outcome, each with its name without folder and without the experiment's name: one a figure,
 /// `levels.csv`, and one a table, `table-1.csv` and so on.

@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use super::Shard;
-use crate::config::{Config, Key, Value};
-use crate::error::Error;
+use crate::config::{Key, Value};
 use crate::outcome::{Origin, SCHEMA_VERSION};
+use crate::prelude::*;
 
 /// Origin of the records of a shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

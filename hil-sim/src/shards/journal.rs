@@ -3,11 +3,11 @@
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
-use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use super::{Header, Run};
-use crate::error::Error;
+
+use crate::prelude::*;
 
 /// A file that is read.
 pub struct Lines {

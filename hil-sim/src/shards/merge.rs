@@ -1,17 +1,13 @@
 //! The outcome of a whole run from its shards.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::Header;
 use super::journal::Lines;
-use crate::config::Config;
-use crate::error::Error;
-use crate::experiments::{Context, Experiment, statistical};
-use crate::outcome::Outcome;
-use crate::progress::Progress;
+use crate::experiments::statistical;
+use crate::prelude::*;
 
 /// A whole run, put together.
 pub struct Merged {
@@ -75,9 +71,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         return Err(Error::Refused(format!("{number} of {count} shards are missing: {some}")));
     }
     let statistical = statistical(&header.experiment)?;
-    let (seed, seconds) = (header.seed, config.extent.seconds);
-    let context =
-        Context { config: &config, seed, seconds, progress: Progress::hidden(), file: None };
+    let seed = header.seed;
+    let context = Context::new(&config, seed, Progress::hidden());
     let outcome = (statistical.outcome)(&context, records.into_values().collect())?;
     Ok(Merged { experiment: statistical.experiment, config, seed, outcome })
 }

@@ -3,8 +3,8 @@
 use serde_json::Value;
 
 use super::Run;
-use crate::outcome::{Cell, Table};
-use crate::stats::Stats;
+
+use crate::prelude::*;
 
 /// The table: the number of the run, and the fields of its record by their names; fields of fields behind an underscore, values
 /// of a list with their number from 1. Statistics are those of the angle error, in degrees. Lists of lists, which are curves and

@@ -83,23 +83,10 @@ fn plain(text: &str) -> String {
 }
 
 fn spelled(letter: char) -> Option<&'static str> {
+    #[rustfmt::skip] // as above
     const WORDS: [(char, &str); 16] = [
-        ('°', "deg"),
-        ('%', "pct"),
-        ('Ω', "ohm"),
-        ('Δ', "delta"),
-        ('γ', "gamma"),
-        ('θ', "theta"),
-        ('λ', "lambda"),
-        ('σ', "sigma"),
-        ('τ', "tau"),
-        ('φ', "phi"),
-        ('ψ', "psi"),
-        ('ω', "omega"),
-        ('±', "plus_minus"),
-        ('₁', "1"),
-        ('₂', "2"),
-        ('²', "2"),
+        ('°', "deg"), ('%', "pct"), ('Ω', "ohm"), ('Δ', "delta"), ('γ', "gamma"), ('θ', "theta"), ('λ', "lambda"), ('σ', "sigma"),
+        ('τ', "tau"), ('φ', "phi"), ('ψ', "psi"), ('ω', "omega"), ('±', "plus_minus"), ('₁', "1"), ('₂', "2"), ('²', "2"),
     ];
     WORDS.iter().find(|(known, _)| *known == letter).map(|(_, word)| *word)
 }

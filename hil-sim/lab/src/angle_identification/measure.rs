@@ -1,10 +1,7 @@
 //! Turning the injection axis, alone or with the current, while the encoder holds the orientation.
 
-use drive_core::Command;
-use sim_bench::prelude::*;
-use sim_bench::rig::wrapped_degrees;
-
 use crate::identification::signals::Prbs;
+use crate::prelude::*;
 
 /// Samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no

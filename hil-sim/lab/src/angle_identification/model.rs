@@ -1,11 +1,10 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use num_complex::Complex64;
 use sim_bench::bode::{largest_pole, roots};
-use sim_bench::prelude::*;
 
 use super::measure::Record;
 use crate::identification::arx::{Orders, fit};
+use crate::prelude::*;
 use crate::source;
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).

@@ -3,10 +3,10 @@
 use drive_core::AlphaBeta;
 use drive_core::filter::{LPF, LpfState};
 use drive_settings::tuning::motor_plant;
-use sim_bench::prelude::*;
 
 use crate::identification::Complex;
-use crate::recomputed::{PERIOD_S, printed};
+use crate::prelude::*;
+use crate::recomputed::PERIOD_S;
 
 /// Speeds of the frame, Hz.
 const FRAME_HZ: [f64; 4] = [0.0, 5.0, 25.0, 48.0];
@@ -34,22 +34,11 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
          the frame of the stator (filter before the rotation) or in that of the flux.",
     ));
     outcome.metrics.set("orders_that_settle", f64::from(u8::from(settles) + u8::from(all)));
-    for (quantity, holds) in [
-        (
-            "the order of filter and rotation matters for the viability of the method",
-            settles != all,
-        ),
-        (
-            "with the rotation before the filter LPF the currents settle at their references",
-            settles,
-        ),
-        (
-            "with the rotation before the filter LPF the direct current oscillates about its reference",
-            !settles,
-        ),
-    ] {
-        outcome.compared.push(Compared::with("S1", "section 3.4", quantity).simulated(holds));
-    }
+    outcome.compared.extend([
+        named("order_matters").simulated(settles != all),
+        named("currents_settle").simulated(settles),
+        named("direct_current_oscillates").simulated(!settles),
+    ]);
     Ok(())
 }
 

@@ -1,11 +1,7 @@
 //! Figure 37: the printed position controller on the plant of Eq. 4.1, and the cascade of the drive on the same shaft.
 
-use std::f64::consts::TAU;
-
-use drive_core::{AngleSource, Command, Mode};
-use sim_bench::prelude::*;
-
-use crate::recomputed::{plant, printed};
+use crate::prelude::*;
+use crate::recomputed::plant;
 
 /// Length of the runs, s.
 const SECONDS: f64 = 3.0;
@@ -37,16 +33,12 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     outcome.metrics.set("figure_37_ours_swing_deg", swing(&ours));
     outcome.metrics.set("figure_37_ours_current_zero_from_ms", zero_from(&ours));
     let unknown = "the limit of the current, and a controller that comes to rest on its plant";
-    let at = Compared::with("S1", "Figure 37", "time at which the quadrature current is zero");
-    outcome.compared.push(at.unknown(unknown).simulated(zero_from(&ours)));
     let at_start = literal.current.first().is_some_and(|(_, i)| *i >= LIMIT_A - 1e-9);
-    let rests = swing(&ours) < 5.0;
-    for (quantity, holds) in [
-        ("the quadrature current saturates at its largest value at the start", at_start),
-        ("the motor works as a servo with encoder", rests),
-    ] {
-        outcome.compared.push(Compared::with("S1", "Figure 37", quantity).simulated(holds));
-    }
+    outcome.compared.extend([
+        named("current_zero_at").unknown(unknown).simulated(zero_from(&ours)),
+        named("current_saturates").simulated(at_start),
+        named("works_as_servo").simulated(swing(&ours) < 5.0),
+    ]);
     let target = vec![(0.0, 1800.0), (SECONDS, 1800.0)];
     let stop = printed("Figure 37", "time at which the quadrature current is zero") / 1e3;
     let figure = Figure::new(

@@ -1,8 +1,8 @@
 //! Table 1 as runs: encoder, fundamental model and injection at rest, near it and far from it.
 
-use drive_core::{AngleSource, Command};
-use sim_bench::prelude::*;
 use sim_bench::steady::{OperatingPoint, bring_up, prepared};
+
+use crate::prelude::*;
 
 /// Row of the table and speed, rpm.
 const SPEEDS: [(&str, f64); 3] = [

@@ -1,25 +1,15 @@
 //! The demodulations that are compared, and the drives that use them.
 
-use drive_core::carrier::DemodulatorKind;
 use drive_core::table::ReferenceTable;
+use drive_settings::words;
 use sim_bench::learning;
-use sim_bench::prelude::*;
 
 use crate::injection_map::PP;
+use crate::prelude::*;
 
 /// A demodulation.
 #[derive(Clone, Copy, Debug)]
-pub struct Demodulation {
-    /// How the configuration names it.
-    pub name: &'static str,
-    /// Which.
-    pub demodulator: DemodulatorKind,
-    /// How much larger its signal is than that of the rectified chain for the same saliency, by the
-    /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
-    pub gain: f64,
-    /// Constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
-    pub constant_a: f64,
-}
+pub struct Demodulation(pub DemodulatorKind);
 
 /// Gain of the band-pass at 600 Hz.
 pub const BPF: f64 = 0.9452;
@@ -30,53 +20,52 @@ const RECTIFIED_GAIN: f64 = BPF * RECTIFIER * PP;
 const PRINTED_REFERENCE_A: f64 = 0.010;
 
 /// The chain as printed.
-pub const LITERAL: Demodulation =
-    Demodulation::new("literal", DemodulatorKind::Literal, 1.0, PRINTED_REFERENCE_A);
+pub const LITERAL: Demodulation = Demodulation(DemodulatorKind::Literal);
 /// The printed chain with a rectifier that works.
-pub const RECTIFIED: Demodulation =
-    Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, ..LITERAL };
+pub const RECTIFIED: Demodulation = Demodulation(DemodulatorKind::Rectified);
+const RMS_IMPEDANCE: Demodulation = Demodulation(DemodulatorKind::RmsImpedance);
+const ENVELOPE: Demodulation = Demodulation(DemodulatorKind::Envelope);
 /// The drive's own.
-pub const SYNCHRONOUS: Demodulation =
-    Demodulation::new("synchronous", DemodulatorKind::Synchronous, 1.0, 0.0);
+pub const SYNCHRONOUS: Demodulation = Demodulation(DemodulatorKind::Synchronous);
 
 /// All of them.
-pub const DEMODULATIONS: [Demodulation; 5] = [
-    LITERAL,
-    RECTIFIED,
-    Demodulation::new(
-        "rms-impedance",
-        DemodulatorKind::RmsImpedance,
-        PP / BPF / RECTIFIED_GAIN,
-        0.0,
-    ),
-    Demodulation::new(
-        "envelope",
-        DemodulatorKind::Envelope,
-        BPF / RECTIFIED_GAIN,
-        PRINTED_REFERENCE_A * BPF / RECTIFIED_GAIN,
-    ),
-    SYNCHRONOUS,
-];
+pub const DEMODULATIONS: [Demodulation; 5] =
+    [LITERAL, RECTIFIED, RMS_IMPEDANCE, ENVELOPE, SYNCHRONOUS];
 
 impl Demodulation {
-    const fn new(
-        name: &'static str,
-        demodulator: DemodulatorKind,
-        gain: f64,
-        constant_a: f64,
-    ) -> Self {
-        Self { name, demodulator, gain, constant_a }
+    /// How the configuration names it.
+    pub fn name(&self) -> &'static str {
+        self.0.word()
+    }
+
+    /// How much larger its signal is than that of the rectified chain for the same saliency, by the
+    /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
+    fn gain(&self) -> f64 {
+        match self.0 {
+            DemodulatorKind::RmsImpedance => PP / BPF / RECTIFIED_GAIN,
+            DemodulatorKind::Envelope => BPF / RECTIFIED_GAIN,
+            _ => 1.0,
+        }
+    }
+
+    /// Constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
+    fn constant_a(&self) -> f64 {
+        match self.0 {
+            DemodulatorKind::RmsImpedance | DemodulatorKind::Synchronous => 0.0,
+            DemodulatorKind::Envelope => PRINTED_REFERENCE_A * BPF / RECTIFIED_GAIN,
+            _ => PRINTED_REFERENCE_A,
+        }
     }
 
     /// The name in metrics and file names.
     pub fn key(&self) -> String {
-        self.name.replace('-', "_")
+        self.name().replace('-', "_")
     }
 
     /// The configuration with this demodulation.
     pub fn config(&self, config: &Config) -> Config {
         let mut config = config.clone();
-        config.drive.injection.demodulator = self.demodulator;
+        config.drive.injection.demodulator = self.0;
         // A motor without saliency must be measured, not refused.
         config.drive.injection.synchronous.check = false;
         config
@@ -84,7 +73,7 @@ impl Demodulation {
 
     /// Unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
-        if self.demodulator == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
+        if self.0 == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
     }
 
     /// The reference that it learns on this motor.
@@ -93,7 +82,7 @@ impl Demodulation {
     /// As [`learning::reference_of`].
     pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
         let config = self.config(config);
-        learning::reference_of(self.demodulator, &config, seed)
+        learning::reference_of(self.0, &config, seed)
     }
 
     /// The configuration with the drive of this kind, if the demodulation has one.
@@ -105,42 +94,36 @@ impl Demodulation {
     ) -> Option<Config> {
         let mut config = self.config(config);
         let drive = &mut config.drive;
-        if self.demodulator == DemodulatorKind::Synchronous {
+        if self.0 == DemodulatorKind::Synchronous {
             drive.injection.synchronous.reference = Some(learned);
             return (kind == ReferenceKind::Retuned).then_some(config);
         }
         let printed = &mut drive.injection.printed;
         if kind == ReferenceKind::Constant {
-            printed.reference_a = self.constant_a as f32;
+            printed.reference_a = self.constant_a() as f32;
         } else {
             printed.learned = Some(learned);
         }
         if kind == ReferenceKind::Retuned {
             (printed.k_s, printed.z_s) = RETUNED;
         }
-        printed.k_s /= self.gain as f32;
+        printed.k_s /= self.gain() as f32;
         Some(config)
     }
 }
 
-/// Reference of the signal, and the controller behind it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferenceKind {
-    /// A constant and the gains of the configuration (as printed).
-    Constant,
-    /// A learned table and the same gains.
-    Learned,
-    /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
-    /// own loop.
-    Retuned,
+words! {
+    /// Reference of the signal, and the controller behind it; with the names in tables and metrics.
+    pub enum ReferenceKind {
+        /// A constant and the gains of the configuration (as printed).
+        Constant = "constant",
+        /// A learned table and the same gains.
+        Learned = "learned",
+        /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
+        /// own loop.
+        Retuned = "retuned",
+    }
 }
-
-/// All kinds with their names in tables and metrics.
-pub const KINDS: [(ReferenceKind, &str); 3] = [
-    (ReferenceKind::Constant, "constant"),
-    (ReferenceKind::Learned, "learned"),
-    (ReferenceKind::Retuned, "retuned"),
-];
 
 /// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
 /// crossover, where the printed one has none.

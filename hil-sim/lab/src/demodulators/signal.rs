@@ -1,8 +1,8 @@
 //! Signal of a demodulation while the encoder holds the angle: mean, slope, noise, delay.
 
-use drive_core::Command;
 use sim_bench::plant::MeasurementSettings;
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Half of the turn over which the slope is taken, degrees.
 const TURN_DEG: f64 = 4.0;

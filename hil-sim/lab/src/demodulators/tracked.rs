@@ -1,8 +1,8 @@
 //! Angle error of a drive without a position sensor, with each demodulation.
 
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_core::{Command, Mode};
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Levels of Figure 38, A, and the time at each, s.
 const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];

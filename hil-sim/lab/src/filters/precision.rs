@@ -3,11 +3,11 @@
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use rayon::prelude::*;
 use sim_bench::bode::omega_t;
-use sim_bench::prelude::*;
 
 use super::compared::{ComparedFilter, SECTIONS_F32};
+
+use crate::prelude::*;
 
 /// The inputs of the error measurement, A.
 const INPUTS: [&str; 3] = ["white, ±3 A", "3 A dc", "3 A 3.7 Hz + 0.26 A 600 Hz"];

@@ -153,8 +153,7 @@ impl Data {
             if row.is_multiple_of(2) { x.re } else { x.im }
         });
         let theta = least_squares(a, parts(rows.iter().map(|row| &row.0)))?.theta;
-        let [t1_minus_1, t2, t1_t3_minus_1, t2_t4, t5, t5_t6, t7] =
-            std::array::from_fn(|k| theta[k]);
-        Ok(FirstOrderTheta { t1_minus_1, t2, t1_t3_minus_1, t2_t4, t5, t5_t6, t7 })
+        let [t1_minus_1, t2, _, t2_t4, t5, t5_t6, _] = std::array::from_fn(|k| theta[k]);
+        Ok(FirstOrderTheta { t1_minus_1, t2, t2_t4, t5, t5_t6 })
     }
 }

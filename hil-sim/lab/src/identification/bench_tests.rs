@@ -40,17 +40,17 @@ impl Readings {
 
     /// The circuit as section 3.6 reads it off: no current in the magnetising branch while the rotor is
     /// locked, no voltage at the stator resistance without load, two equal leakages.
-    pub fn as_printed(&self) -> Circuit {
+    pub fn as_printed(&self) -> MachineSettings {
         let r_s = 0.5 * self.dc.0 / self.dc.1;
         let z = self.locked_impedance();
         let leakage = z.im / (2.0 * TAU * self.locked.0);
         let l_s = self.no_load_impedance() / (TAU * self.no_load.0);
-        Circuit { r_s, r_r: z.re - r_s, l_l1: leakage, l_l2: leakage, l_m: l_s - leakage }
+        circuit([r_s, z.re - r_s, leakage, l_s - leakage])
     }
 
     /// The circuit that has these readings with a magnetising branch, and the stator resistance in the
     /// no-load test: Z - r_s - j w L_s = (w L_m)² / (r_r + j w L_r), L_r = L_s.
-    pub fn exact(&self) -> Circuit {
+    pub fn exact(&self) -> MachineSettings {
         let r_s = 0.5 * self.dc.0 / self.dc.1;
         let z = self.no_load_impedance();
         let l_s = (z * z - r_s * r_s).sqrt() / (TAU * self.no_load.0);
@@ -58,42 +58,13 @@ impl Readings {
         let rotor = (self.locked_impedance() - Complex::new(r_s, w * l_s)).inv();
         let l_m = (l_s / (rotor.im * w)).sqrt();
         let r_r = rotor.re * (w * l_m).powi(2);
-        Circuit { r_s, r_r, l_l1: l_s - l_m, l_l2: l_s - l_m, l_m }
+        circuit([r_s, r_r, l_s - l_m, l_m])
     }
 }
 
-/// The equivalent circuit (Figure 21), SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Circuit {
-    /// Stator resistance.
-    pub r_s: f64,
-    /// Rotor resistance.
-    pub r_r: f64,
-    /// Stator leakage inductance.
-    pub l_l1: f64,
-    /// Rotor leakage inductance.
-    pub l_l2: f64,
-    /// Magnetising inductance.
-    pub l_m: f64,
-}
-
-impl Circuit {
-    /// Names of the five, in the order of Table 5 and of [`Self::array`].
-    pub const NAMES: [&str; 5] = ["r_s", "r_r", "l_l1", "l_l2", "l_m"];
-
-    /// Table 5.
-    pub const TABLE_5: Self = Self { r_s: 5.4, r_r: 1.1, l_l1: 0.0276, l_l2: 0.0276, l_m: 0.1771 };
-
-    /// The five in the order of [`Self::NAMES`].
-    pub const fn array(&self) -> [f64; 5] {
-        [self.r_s, self.r_r, self.l_l1, self.l_l2, self.l_m]
-    }
-}
-
-impl From<&MachineSettings> for Circuit {
-    fn from(m: &MachineSettings) -> Self {
-        Self { r_s: m.rs, r_r: m.rr, l_l1: m.lls, l_l2: m.llr, l_m: m.lm }
-    }
+/// The circuit of resistances of stator and rotor, of the leakage of each, and of the magnetising inductance.
+fn circuit([rs, rr, leakage, lm]: [f64; 4]) -> MachineSettings {
+    MachineSettings { rs, rr, lls: leakage, llr: leakage, lm, ..MachineSettings::default() }
 }
 
 /// Steps of the simulation in a period of the supply.

@@ -5,6 +5,7 @@ use sim_bench::outcome::{Compared, Metrics};
 use super::models::model_c;
 use super::printed::{Case, PERIODS, SPEEDS, error};
 use super::{CurrentVoltage, Parameters, Signal};
+use crate::source::named;
 
 /// A row of the tables: model, speed, parameter.
 type Row = (&'static str, f64, &'static str);
@@ -47,35 +48,18 @@ pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
     let (_, c_most) = at_50(&c_slow, &ss, &["r_s"]);
     let r_s = over_h(("C", slow, "r_s"), Signal::Schroeder)[0];
     let h_1b = Signal::ALL.map(|signal| over_h(("A", fast, "h_1b"), signal)[0]);
-    let (these, others) = (
-        "tau_r, sigma_l_s, l_s and omega_m are below",
-        "the discrete parameters but h_1b and h_0b",
-    );
-    let procedure = |what: String| format!("with the procedure, {what}");
-    for (quantity, holds) in [
-        ("h_1b can be estimated".to_owned(), h_1b.iter().all(|error| *error < 100.0)),
-        (
-            "errors of Tables 1 to 5 are in general smaller with Ss than with Sg".to_owned(),
-            2 * better > pairs,
-        ),
-        (
-            "errors of Tables 1 to 5 grow in general with the sampling period".to_owned(),
-            2 * grow > steps,
-        ),
-        (procedure(format!("errors of {others} are below 1 % at high speed")), discrete < 1.0),
-        (procedure(format!("errors of {others} reach at most 10 % at low speed")), most < 10.0),
-        (
-            procedure(
-                "the smallest error of the discrete parameters is below 1 % at low speed"
-                    .to_owned(),
-            ),
-            least < 1.0,
-        ),
-        (procedure(format!("errors of {these} 4 % at high speed")), continuous < 4.0),
-        (procedure(format!("errors of {these} 6 % at low speed")), c_most < 6.0),
-        (procedure("the error of r_s is at most 20 % at low speed".to_owned()), r_s <= 20.0),
+    for (name, holds) in [
+        ("h_1b_estimated", h_1b.iter().all(|error| *error < 100.0)),
+        ("ss_better", 2 * better > pairs),
+        ("errors_grow", 2 * grow > steps),
+        ("discrete_fast", discrete < 1.0),
+        ("discrete_slow", most < 10.0),
+        ("smallest_slow", least < 1.0),
+        ("continuous_fast", continuous < 4.0),
+        ("continuous_slow", c_most < 6.0),
+        ("r_s_slow", r_s <= 20.0),
     ] {
-        compared.push(Compared::with("S0", "section 5", quantity).recomputed(holds));
+        compared.push(named(name).recomputed(holds));
     }
 
     // f_1b and the speed are proportional (Eq. 42).

@@ -5,19 +5,31 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::Complex;
 
-/// The parameters of a symmetric machine that its terminals determine, as Eq. 9 needs them.
+/// The parameters of a symmetric machine that its terminals determine, as Eq. 9 needs them; or of each its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters {
+pub struct Parameters<T = f64> {
     /// Stator resistance, ohm.
-    pub r_s: f64,
+    pub r_s: T,
     /// Rotor time constant l_r / r_r, s.
-    pub tau_r: f64,
+    pub tau_r: T,
     /// Transient inductance of the stator l_s - l_m² / l_r, H.
-    pub sigma_l_s: f64,
+    pub sigma_l_s: T,
     /// Inductance of the stator, H.
-    pub l_s: f64,
+    pub l_s: T,
     /// Speed of the rotor, electrical rad/s.
-    pub omega_m: f64,
+    pub omega_m: T,
+}
+
+impl<T: Copy> Parameters<T> {
+    /// Of the five in the order of [`Parameters::NAMES`].
+    pub const fn of([r_s, tau_r, sigma_l_s, l_s, omega_m]: [T; 5]) -> Self {
+        Self { r_s, tau_r, sigma_l_s, l_s, omega_m }
+    }
+
+    /// The five in the order of [`Parameters::NAMES`].
+    pub const fn array(&self) -> [T; 5] {
+        [self.r_s, self.tau_r, self.sigma_l_s, self.l_s, self.omega_m]
+    }
 }
 
 impl Parameters {
@@ -43,11 +55,6 @@ impl Parameters {
     /// The same machine at another speed, electrical rad/s.
     pub const fn at(self, omega_m: f64) -> Self {
         Self { omega_m, ..self }
-    }
-
-    /// The five in the order of [`Self::NAMES`].
-    pub const fn array(&self) -> [f64; 5] {
-        [self.r_s, self.tau_r, self.sigma_l_s, self.l_s, self.omega_m]
     }
 
     /// Eq. 9 with the numbers in.
@@ -260,7 +267,7 @@ impl Delta {
     }
 }
 
-/// The seven unknowns of Model B (Eq. 32), the first, third, fourth and sixth of them as the small
+/// The unknowns of Model B (Eq. 32) from which a machine follows, the first, third, fourth and sixth of them as the small
 /// differences and sums that Eq. 34 to 37 use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrderTheta {
@@ -268,30 +275,18 @@ pub struct FirstOrderTheta {
     pub t1_minus_1: f64,
     /// theta_2.
     pub t2: f64,
-    /// theta_1 + theta_3 - 1.
-    pub t1_t3_minus_1: f64,
     /// theta_2 + theta_4.
     pub t2_t4: f64,
     /// theta_5, S.
     pub t5: f64,
     /// theta_5 + theta_6, S.
     pub t5_t6: f64,
-    /// theta_7, S.
-    pub t7: f64,
 }
 
 impl From<Delta> for FirstOrderTheta {
     /// Reads Eq. 32 off the coefficients of Model A; their part of h_1b is left out.
     fn from(delta: Delta) -> Self {
         let Delta { g1, g0, h1, u0 } = delta;
-        Self {
-            t1_minus_1: g1.re,
-            t2: -g1.im,
-            t1_t3_minus_1: g0.re,
-            t2_t4: -g0.im,
-            t5: h1.re,
-            t5_t6: u0.re,
-            t7: h1.im - u0.im,
-        }
+        Self { t1_minus_1: g1.re, t2: -g1.im, t2_t4: -g0.im, t5: h1.re, t5_t6: u0.re }
     }
 }

@@ -48,30 +48,12 @@ pub type Value = Result<f64, NotIdentifiable>;
 
 /// An estimate of [`Parameters`], each on its own: noise can make one unidentifiable and leave the
 /// others. A number can come out negative; that is the noise, not a machine.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// Stator resistance, ohm.
-    pub r_s: Value,
-    /// Rotor time constant, s.
-    pub tau_r: Value,
-    /// Transient inductance of the stator, H.
-    pub sigma_l_s: Value,
-    /// Inductance of the stator, H.
-    pub l_s: Value,
-    /// Speed of the rotor, electrical rad/s.
-    pub omega_m: Value,
-}
+pub type Estimate = Parameters<Value>;
 
 impl Estimate {
     /// No estimate, for this reason.
     pub const fn none(reason: NotIdentifiable) -> Self {
-        let none = Err(reason);
-        Self { r_s: none, tau_r: none, sigma_l_s: none, l_s: none, omega_m: none }
-    }
-
-    /// The five in the order of [`Parameters::NAMES`].
-    pub fn array(&self) -> [Value; 5] {
-        [self.r_s, self.tau_r, self.sigma_l_s, self.l_s, self.omega_m]
+        Self::of([Err(reason); 5])
     }
 
     /// All five, if all are identifiable.
@@ -79,25 +61,14 @@ impl Estimate {
     /// # Errors
     /// The reason of the first that is not.
     pub fn parameters(&self) -> Result<Parameters, NotIdentifiable> {
-        Ok(Parameters {
-            r_s: self.r_s?,
-            tau_r: self.tau_r?,
-            sigma_l_s: self.sigma_l_s?,
-            l_s: self.l_s?,
-            omega_m: self.omega_m?,
-        })
+        let [r_s, tau_r, sigma_l_s, l_s, omega_m] = self.array();
+        Ok(Parameters::of([r_s?, tau_r?, sigma_l_s?, l_s?, omega_m?]))
     }
 }
 
 impl From<Parameters> for Estimate {
     fn from(p: Parameters) -> Self {
-        Self {
-            r_s: Ok(p.r_s),
-            tau_r: Ok(p.tau_r),
-            sigma_l_s: Ok(p.sigma_l_s),
-            l_s: Ok(p.l_s),
-            omega_m: Ok(p.omega_m),
-        }
+        Self::of(p.array().map(Ok))
     }
 }
 
@@ -114,7 +85,7 @@ fn ratio(x: f64, y: f64, reason: NotIdentifiable) -> Value {
 /// Model B (Eq. 33 to 37): first order in `h` s. Exact on Eq. 32; on a real machine tau_r and l_s
 /// are 18 to 48 % low at 375 rad/s.
 pub fn model_b(theta: &FirstOrderTheta, h: f64) -> Estimate {
-    let FirstOrderTheta { t1_minus_1, t2, t2_t4, t5, t5_t6, .. } = *theta;
+    let FirstOrderTheta { t1_minus_1, t2, t2_t4, t5, t5_t6 } = *theta;
     let sigma_l_s = ratio(h, t5, NotIdentifiable::NoGain);
     let tau_r = ratio(h * t5, t5_t6, NotIdentifiable::NoGain);
     let speed = ratio(t2_t4, t2, NotIdentifiable::NoSpeed);

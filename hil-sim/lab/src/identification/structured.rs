@@ -47,13 +47,8 @@ fn unknowns(p: &Parameters) -> Unknowns {
 
 fn machine(x: &Unknowns) -> Parameters {
     let sigma_l_s = x[2].exp();
-    Parameters {
-        r_s: x[0].exp(),
-        tau_r: x[1].exp(),
-        sigma_l_s,
-        l_s: sigma_l_s * (1.0 + x[3].exp()),
-        omega_m: SLOW * x[4].sinh(),
-    }
+    let (l_s, omega_m) = (sigma_l_s * (1.0 + x[3].exp()), SLOW * x[4].sinh());
+    Parameters { r_s: x[0].exp(), tau_r: x[1].exp(), sigma_l_s, l_s, omega_m }
 }
 
 fn is_machine(p: &Parameters, h: f64) -> bool {
@@ -168,13 +163,8 @@ pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
     let omega_m = delta.g1.im / h;
     if sigma_l_s.is_finite() && sigma_l_s > 0.0 && omega_m.is_finite() {
         for (rate, tau_r) in [(100.0, 0.1), (30.0, 0.3), (300.0, 0.03)] {
-            starts.push(Parameters {
-                r_s: rate * sigma_l_s,
-                tau_r,
-                sigma_l_s,
-                l_s: 10.0 * sigma_l_s,
-                omega_m,
-            });
+            let (r_s, l_s) = (rate * sigma_l_s, 10.0 * sigma_l_s);
+            starts.push(Parameters { r_s, tau_r, sigma_l_s, l_s, omega_m });
         }
     }
     starts

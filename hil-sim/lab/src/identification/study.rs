@@ -1,13 +1,12 @@
 //! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
-use rayon::prelude::*;
-use sim_bench::prelude::*;
-
 use super::models::{model_b, model_c, model_d};
 use super::printed::{self, Case};
 use super::structured::model_s;
 use super::trial::Noise;
 use super::{CurrentVoltage, Estimate, Parameters, Trial};
+
+use crate::prelude::*;
 
 /// Models that give the five parameters.
 pub const MODELS: [&str; 4] = ["B", "C", "D", "S"];
@@ -75,11 +74,6 @@ pub fn errors_of(trial: &Trial, case: Case, seed: u64, trials: u64) -> Errors {
             })
         }),
     }
-}
-
-/// All twelve columns.
-pub fn all(machine: Parameters, noise: Noise, seed: u64, trials: u64) -> Vec<Errors> {
-    Case::all().into_iter().map(|case| errors(machine, case, noise, seed, trials)).collect()
 }
 
 /// The error of one estimated parameter, as printed (if it is) and as found here.

@@ -1,7 +1,5 @@
 //! Figure 11: the spectrum of the current difference before and behind the band pass.
 
-use std::f64::consts::TAU;
-
 use drive_core::filter::{BPF, SosState};
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -9,9 +7,8 @@ use rand_xoshiro::rand_core::SeedableRng;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use sim_bench::bode::{RATE, omega_t};
-use sim_bench::prelude::*;
 
-use crate::recomputed::beside;
+use crate::prelude::*;
 
 /// Samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
 const SAMPLES: usize = RATE as usize;
@@ -40,8 +37,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     outcome.metrics.set("sideband_over_signal", sideband);
     let lower = at(&p, CARRIER_HZ - middle) / at(&a, middle);
     let holds = (sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01;
-    let bands = "the spectrum of A reappears in two side bands about the frequency of injection";
-    outcome.compared.push(beside("Figure 11", bands).recomputed(holds));
+    outcome.compared.push(named("side_bands").recomputed(holds));
     for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {
         for (side, hz) in
             [("lower", CARRIER_HZ - f64::from(offset)), ("upper", CARRIER_HZ + f64::from(offset))]

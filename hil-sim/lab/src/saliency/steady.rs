@@ -4,7 +4,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use sim_bench::plant::{
     EnergyMachine, EnergyRate, EnergyState, Machine, MachineModel, MachineState, Rate,
 };
-use sim_bench::prelude::*;
+
+use crate::prelude::*;
 
 /// Step of the numeric derivatives, relative to the size of a state.
 const STEP: f64 = 1e-6;

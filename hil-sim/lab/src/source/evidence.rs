@@ -293,29 +293,22 @@ impl Evidence {
         };
         let difference =
             |value: f64| printed.number().map(|printed| 100.0 * (value / printed - 1.0));
+        let is_number = printed.kind != Kind::Claim;
         let difference = ours.and_then(Compared::value).and_then(difference);
-        let number = printed.number().filter(|_| printed.kind != Kind::Claim);
+        let difference = difference.filter(|d| is_number && d.is_finite());
+        let text = || printed.value.clone();
+        let value = printed.number().filter(|_| is_number);
+        let value =
+            value.map_or_else(|| text().into(), |value| Cell::Number { value, text: text() });
         [
             ("place", Cell::from(printed.place.as_str())),
             ("quantity", printed.quantity.as_str().into()),
             ("unit", printed.unit.as_str().into()),
-            (
-                "printed",
-                number.map_or(printed.value.as_str().into(), |value| Cell::Number {
-                    value,
-                    text: printed.value.clone(),
-                }),
-            ),
+            ("printed", value),
             ("recomputed", shown(ours.and_then(|ours| ours.recomputed))),
             ("by", printed.formula.as_deref().map_or("-".into(), Cell::from)),
             ("simulated", shown(ours.and_then(|ours| ours.simulated))),
-            (
-                "difference (%)",
-                Cell::fixed_or_dash(
-                    difference.filter(|d| printed.kind != Kind::Claim && d.is_finite()),
-                    2,
-                ),
-            ),
+            ("difference (%)", Cell::fixed_or_dash(difference, 2)),
             ("verdict", self.verdict(place).text().into()),
         ]
     }

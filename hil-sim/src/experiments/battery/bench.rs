@@ -1,9 +1,5 @@
 //! A drive and a plant in a run of the battery, and what is seen of them.
 
-use std::f64::consts::TAU;
-
-use drive_core::Accepted;
-
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::open_phase;
 use crate::plant::{Complex, Plant};

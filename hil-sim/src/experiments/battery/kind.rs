@@ -1,8 +1,5 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
-use drive_core::Accepted;
-use drive_settings::Flux;
-
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
 use crate::prelude::*;
@@ -46,19 +43,10 @@ pub enum Kind {
 }
 
 /// The twelve kinds, in the order of the runs.
+#[rustfmt::skip] // kinds, side by side
 pub const KINDS: [Kind; 12] = [
-    Kind::Constant(0),
-    Kind::Constant(30),
-    Kind::Constant(150),
-    Kind::Constant(-150),
-    Kind::Constant(300),
-    Kind::Constant(-300),
-    Kind::Steps,
-    Kind::Reversals,
-    Kind::Ramp,
-    Kind::Speed(150),
-    Kind::Speed(-150),
-    Kind::Load,
+    Kind::Constant(0), Kind::Constant(30), Kind::Constant(150), Kind::Constant(-150), Kind::Constant(300), Kind::Constant(-300),
+    Kind::Steps, Kind::Reversals, Kind::Ramp, Kind::Speed(150), Kind::Speed(-150), Kind::Load,
 ];
 
 /// The kinds that a configuration asks for, and how many runs there are unless it says.

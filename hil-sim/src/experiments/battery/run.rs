@@ -1,7 +1,5 @@
 //! One run of the battery.
 
-use std::f64::consts::TAU;
-
 use super::bench::Bench;
 use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{Refused, Trial};

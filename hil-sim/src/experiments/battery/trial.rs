@@ -1,7 +1,5 @@
 //! The result of a run of the battery.
 
-use std::fmt;
-
 use super::kind::Kind;
 use crate::prelude::*;
 
@@ -15,24 +13,17 @@ pub const LARGEST_CLASS: usize = (180.0 * CLASSES_PER_DEG) as usize;
 const LIMITED_SHARE: f64 = 0.999;
 
 /// Why a run has not begun.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum Refused {
     /// The drive refused to start with the fault of this number.
+    #[error("fault {0}")]
     Start(u8),
     /// It refused to learn before.
+    #[error("fault {0} while it learned")]
     Learning(u8),
     /// It refused the command, or did not get as far as to regulate.
+    #[error("{0}")]
     Otherwise(String),
-}
-
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Start(fault) => write!(f, "fault {fault}"),
-            Self::Learning(fault) => write!(f, "fault {fault} while it learned"),
-            Self::Otherwise(why) => f.write_str(why),
-        }
-    }
 }
 
 /// The result of a run of the battery or of the whole range; what the experiment does not give is at its default.

@@ -8,7 +8,6 @@ use crate::config::{FluxLevel, OpenPhase};
 use crate::experiments::drawn_machine::drawn;
 use crate::plant::{Channel, CurrentFault};
 use crate::prelude::*;
-use crate::stats::exact;
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("commission-refusals", whole::<Refusals>)
@@ -35,14 +34,9 @@ struct Defect {
     abort: Option<Step>,
 }
 
-const NONE: Defect = Defect {
-    name: "",
-    make: |_| {},
-    on_bench: |_| {},
-    sensors: |_| {},
-    named: |_| false,
-    abort: None,
-};
+#[rustfmt::skip] // as the rows below
+const NONE: Defect =
+    Defect { name: "", make: |_| {}, on_bench: |_| {}, sensors: |_| {}, named: |_| false, abort: None };
 
 /// Codes of the channels without current.
 const ZERO: [u16; 2] = [2022, 2015];
@@ -125,9 +119,7 @@ pub struct Record {
     /// Whether it names the defect; and whether the outputs are off and the settings as they were.
     named: bool,
     unchanged: bool,
-    #[serde(with = "exact")]
     seconds: f64,
-    #[serde(with = "exact")]
     largest_a: f64,
 }
 

@@ -1,10 +1,7 @@
 //! A commissioning on the bench.
 
-use std::f64::consts::TAU;
-
 use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{AlphaBeta, Excitation, Motor, Sample, Stop};
-use drive_settings::Settings;
+use drive_core::{AlphaBeta, Excitation, Motor, Sample};
 
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
 use crate::prelude::*;

@@ -18,14 +18,6 @@ fn is_lost(case: &Case, run: &Trial) -> bool {
     run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
 }
 
-fn is_refused(_: &Case, run: &Trial) -> bool {
-    run.refused.is_some()
-}
-
-fn is_silent(_: &Case, run: &Trial) -> bool {
-    run.is_wrong()
-}
-
 /// A run with its case and number.
 pub type Done = (Case, usize, Trial);
 
@@ -47,9 +39,9 @@ fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize
     vec![
         ("runs", "runs", done.len() as f64, None),
         ("lost_runs", "lost", count(done, is_lost), None),
-        ("refused_runs", "refused", count(done, is_refused), None),
+        ("refused_runs", "refused", count(done, |_, run| run.refused.is_some()), None),
         ("stopped_runs", "stopped", count(done, |_, run| run.trip.is_some()), None),
-        ("silent_runs", "silent", count(done, is_silent), None),
+        ("silent_runs", "silent", count(done, |_, run| run.is_wrong()), None),
         ("angle_error_rms_deg", "rms (°)", error.rms(), Some(2)),
         ("angle_error_max_deg", "largest (°)", largest_deg, Some(2)),
         ("current_peak_a", "current (A)", largest(|run| run.peak_a), Some(2)),
@@ -91,8 +83,8 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
     let m = &mut outcome.metrics;
     m.set("runs", all.len() as f64);
     m.set("lost_runs", count(&all, is_lost));
-    m.set("refused_runs", count(&all, is_refused));
-    m.set("silent_runs", count(&all, is_silent));
+    m.set("refused_runs", count(&all, |_, run| run.refused.is_some()));
+    m.set("silent_runs", count(&all, |_, run| run.is_wrong()));
     outcome.tables.push(table);
     outcome.faults.extend(done.iter().filter_map(|(case, number, run)| {
         let reason = failure(case, run)?;

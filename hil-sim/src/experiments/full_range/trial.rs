@@ -1,9 +1,5 @@
 //! One run, and what is recorded of it.
 
-use std::f64::consts::TAU;
-
-use drive_core::Stop;
-
 use super::case::Case;
 use crate::config::RangeKind;
 use crate::experiments::battery::{

@@ -1,7 +1,5 @@
 //! The trials of the experiment, each from a seed alone.
 
-use std::f64::consts::TAU;
-
 use drive_settings::words;
 
 use crate::experiments::statistics::fault_code;

@@ -1,7 +1,5 @@
 //! Torque held on a shaft that a dynamometer turns.
 
-use std::f64::consts::TAU;
-
 use crate::plant::Plant;
 use crate::prelude::*;
 

@@ -1,9 +1,7 @@
 //! Scenarios as they are written: a TOML file, or the rows of a CSV file.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use drive_core::Stop;
 use toml::Spanned;
 
 use super::quantity::Named;

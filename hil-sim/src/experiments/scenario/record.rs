@@ -1,9 +1,6 @@
 //! The record of a run, and what is made of it.
 
-use std::f64::consts::TAU;
-
-use drive_core::Accepted;
-use drive_core::carrier::{CARRIER_SAMPLES, DemodulatorKind};
+use drive_core::carrier::CARRIER_SAMPLES;
 
 use super::file::{Metric, Over, Statistic};
 use super::quantity::{Named, QUANTITIES, Quantity, Seen};

@@ -6,14 +6,10 @@ use super::SCALE;
 use crate::outcome::Style;
 
 /// Colours that can be told apart with any colour vision (Okabe and Ito).
+#[rustfmt::skip] // colours, side by side
 pub const PALETTE: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
+    RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167), RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233), RGBColor(0, 0, 0),
 ];
 pub const INK: RGBColor = RGBColor(51, 51, 51);
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
