@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{self, Target};
-use crate::{control, paths, run, seal, sections, sources, stack};
+use crate::{paths, run, seal, sections, sources, stack};
 
 /// The name that probe-rs has for the controller of the board.
 pub const CHIP: &str = "STM32G474RETx";
@@ -60,7 +60,6 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
 /// Checks an image: what the control interrupt calls, paths of this machine, sections.
 fn check(elf: &Path) -> Result<()> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
-    control::check(&bytes).context("the control interrupt")?;
     stack::check_interrupts(&bytes).context("the interrupts")?;
     paths::check(&bytes)?;
     sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)

@@ -23,18 +23,14 @@ const OTHERS: [(&str, &str); 3] = [("js", "//"), ("py", "#"), ("toml", "#")];
 pub fn report() -> Result<()> {
     let rooms = budget::read()?.lines;
     let mut rows = vec![Counts::default(); rooms.len()];
-    let mut tally = |path: &Path, counts: fn(&Path, &str) -> Counts| -> Result<()> {
-        let room = room_of(&rooms, path).with_context(|| path.display().to_string())?;
-        add(&mut rows[room], counts(path, &sources::read(path)?));
-        Ok(())
-    };
-    sources::files("rs")?.iter().try_for_each(|path| tally(path, count))?;
     let ours = |path: &&PathBuf| {
         !path.ends_with("Cargo.toml") && !path.to_string_lossy().ends_with(".min.js")
     };
-    for (ending, _) in OTHERS {
-        let files = sources::files(ending)?;
-        files.iter().filter(ours).try_for_each(|path| tally(path, count_other))?;
+    for ending in OTHERS.map(|(ending, _)| ending).into_iter().chain(["rs"]) {
+        for path in sources::files(ending)?.iter().filter(ours) {
+            let room = room_of(&rooms, path).with_context(|| path.display().to_string())?;
+            add(&mut rows[room], count(path, &sources::read(path)?));
+        }
     }
     let mut all = Counts::default();
     rows.iter().for_each(|counts| add(&mut all, *counts));
@@ -71,24 +67,19 @@ fn add(sum: &mut Counts, counts: Counts) {
     sum.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
 }
 
-/// The lines of another language.
-fn count_other(path: &Path, text: &str) -> Counts {
-    let is_it = |(ending, _): &(&str, &str)| path.extension().is_some_and(|found| found == *ending);
+fn count(path: &Path, text: &str) -> Counts {
     let mut counts = Counts::default();
+    let is_it = |(ending, _): &(&str, &str)| path.extension().is_some_and(|found| found == *ending);
     if let Some(language) = OTHERS.iter().position(is_it) {
         let comment = OTHERS[language].1;
         let lines = text.lines().map(str::trim_start);
         counts[5 + language] =
             lines.filter(|line| !line.is_empty() && !line.starts_with(comment)).count();
+        return counts;
     }
-    counts
-}
-
-fn count(path: &Path, text: &str) -> Counts {
     let is_test_file = path.file_name().is_some_and(|name| name == "tests.rs")
         || path.iter().any(|part| part == "tests" || part == "benches");
     let mut in_test_item = false;
-    let mut counts = Counts::default();
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {
         if line == "#[cfg(test)]" {
@@ -138,8 +129,8 @@ mod tests {
     #[test]
     fn blank_lines_and_comments_of_other_languages_do_not_count() {
         let text = "# One\n\n[motor]\nr_s = 5.4 # ohm\n";
-        assert_eq!(count_other(Path::new("motors/a.toml"), text), [0, 0, 0, 0, 0, 0, 0, 2]);
-        assert_eq!(count_other(Path::new("a.js"), "// One\nf();\n"), [0, 0, 0, 0, 0, 1, 0, 0]);
+        assert_eq!(count(Path::new("motors/a.toml"), text), [0, 0, 0, 0, 0, 0, 0, 2]);
+        assert_eq!(count(Path::new("a.js"), "// One\nf();\n"), [0, 0, 0, 0, 0, 1, 0, 0]);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 mod board;
 mod budget;
 mod by_name;
-mod control;
 mod dist;
 mod elf;
 mod files;

@@ -6,6 +6,10 @@
 //! the value, buffer). The nesting is an assumption about `core::fmt`: nothing here proves it.
 //! Recursion and a stack that grows by a register are refused: there would be no bound.
 //!
+//! From the same graph follows where the control interrupt goes: it and all it calls lie in CCM. That is 128 MiB away from the flash,
+//! further than a call instruction reaches: a call out of it needs a veneer of the linker in CCM (`Thunk`), or a register. The register is
+//! refused; a veneer may lead to the cold code of the control alone, which `memory.x` gathers in a section of its own.
+//!
 //! Own code, since cargo-call-stack needs a nightly compiler.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -39,11 +43,20 @@ const PRINTERS: [&str; 3] =
 /// Parts of the names of the outputs' functions.
 const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write_char"];
 /// Part of the name of a veneer, which ends with the name of its target.
-pub const VENEER: &str = "LongThunk_";
+const VENEER: &str = "LongThunk_";
 /// Sections with code.
 const SECTIONS: [&str; 5] = [".start", ".text", ".ccm", ".design", ".background"];
-/// The section with code in the bank that is written: no interrupt may need it.
-const WRITTEN_BANK: &str = ".background";
+/// The control interrupt.
+const CONTROL: &str = "ADC1_2";
+
+/// The sections that decide where an interrupt may go.
+struct Places {
+    /// Code in the bank that is written: no interrupt may need it.
+    written_bank: Range<u32>,
+    /// Code in CCM, and the cold code in the flash that it may call.
+    ccm: Range<u32>,
+    cold: Range<u32>,
+}
 
 /// One function.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -74,15 +87,20 @@ fn most(mut depths: impl Iterator<Item = Result<u32>>) -> Result<u32> {
 }
 
 /// Fails if an interrupt can come to a panic, to code in the bank of the flash that is written, or to a call through a
-/// register, of which nobody knows the target.
+/// register, of which nobody knows the target; or if the control interrupt is not in CCM, or leads out of it.
 pub fn check_interrupts(image: &[u8]) -> Result<()> {
     let elf: ElfFile32 = ElfFile32::parse(image)?;
-    let section = elf.section_by_name(WRITTEN_BANK).context(WRITTEN_BANK)?;
-    let begin = section.address() as u32;
-    check_reach(&functions(image)?, begin..begin + section.size() as u32)
+    let place = |name| -> Result<Range<u32>> {
+        let section = elf.section_by_name(name).context(name)?;
+        let begin = section.address() as u32;
+        Ok(begin..begin + section.size() as u32)
+    };
+    let (written_bank, ccm, cold) = (place(".background")?, place(".ccm")?, place(".design")?);
+    check_reach(&functions(image)?, &Places { written_bank, ccm, cold })
 }
 
-fn check_reach(functions: &Functions, written_bank: Range<u32>) -> Result<()> {
+fn check_reach(functions: &Functions, places: &Places) -> Result<()> {
+    ensure!(places.ccm.contains(&find(functions, CONTROL)?), "{CONTROL} is not in CCM");
     let interrupts = INTERRUPTS.concat().into_iter();
     let first = interrupts.map(|name| anyhow::Ok((find(functions, name)?, String::new())));
     let mut left = first.collect::<Result<Vec<_>>>()?;
@@ -95,9 +113,14 @@ fn check_reach(functions: &Functions, written_bank: Range<u32>) -> Result<()> {
             functions.get(&at).with_context(|| format!("no function at {at:#x}:{path}"))?;
         let path = format!("{path} {}", function.name);
         ensure!(!is_named(function, &PANICS), "an interrupt can panic:{path}");
-        ensure!(!written_bank.contains(&at), "in the bank that is written:{path}");
+        ensure!(!places.written_bank.contains(&at), "in the bank that is written:{path}");
         match function.name.split_once(VENEER) {
-            Some((_, target)) => left.push((find(functions, target)?, path.clone())),
+            Some((_, target)) => {
+                let target = find(functions, target)?;
+                let stays = !places.ccm.contains(&at) || places.cold.contains(&target);
+                ensure!(stays, "out of CCM:{path}");
+                left.push((target, path.clone()));
+            }
             None => ensure!(!function.calls_through_register, "a call through a register:{path}"),
         }
         left.extend(function.calls.iter().map(|to| (*to, path.clone())));
@@ -302,10 +325,18 @@ mod tests {
 
     #[test]
     fn an_interrupt_reaches_no_panic_no_unknown_target_and_not_the_written_bank() {
-        let error =
-            |functions: &Functions| check_reach(functions, 1000..2000).unwrap_err().to_string();
+        // The control interrupt and its veneer in CCM, which leads to cold code.
+        let places = |ccm, cold| Places { written_bank: 1000..2000, ccm, cold };
+        let (ccm, cold) = (20..50, 50..60);
+        let check =
+            |functions: &Functions| check_reach(functions, &places(ccm.clone(), cold.clone()));
+        let error = |functions: &Functions| check(functions).unwrap_err().to_string();
         let mut sound = interrupts("leaf", 60);
-        check_reach(&sound, 1000..2000).unwrap();
+        check(&sound).unwrap();
+        let out = check_reach(&sound, &places(20..50, 60..70)).unwrap_err().to_string();
+        assert!(out.starts_with("out of CCM: ADC1_2"), "{out}");
+        let elsewhere = check_reach(&sound, &places(30..50, 50..60)).unwrap_err().to_string();
+        assert_eq!(elsewhere, "ADC1_2 is not in CCM");
         assert!(error(&interrupts("leaf", 1500)).starts_with("in the bank that is written"));
         for name in ["_RNvNtCs_4core9panicking5panic", "_RNvNtCs_4core6option13unwrap_failed"] {
             let reached = error(&interrupts(name, 60));
@@ -321,7 +352,7 @@ mod tests {
         // Not reached.
         let mut other = interrupts("core::panicking", 60);
         other.get_mut(&50).unwrap().calls.clear();
-        check_reach(&other, 1000..2000).unwrap();
+        check(&other).unwrap();
     }
 
     #[test]

@@ -78,7 +78,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
     ensure!(
         all.iter().any(chosen),
         "no class of faults has {class:?} in its name: {}",
-        all.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
+        all.iter().map(|c| &*c.name).collect::<Vec<_>>().join("; ")
     );
     ensure!(
         rpm.is_none_or(|rpm| SPEEDS_RPM.contains(&rpm)),
@@ -100,7 +100,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             let outcome = one(&mut scene, &all[which], seed / classes, seed, without);
             let outcome = outcome.and_then(|outcome| {
                 // A damaged program may break the chip's rules; one that is whole may not.
-                let whole = !matches!(all[which].run, Run::Regulating(_));
+                let whole = !matches!(all[which].run, Run::Regulating);
                 let broken = scene.board.violations().first().filter(|_| whole);
                 broken.map_or(Ok(outcome), |broken| Err(anyhow!("{broken}")))
             });
@@ -143,13 +143,13 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
     let source = class.sources[(turn % class.sources.len() as u64) as usize];
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
     match class.run {
-        Run::Regulating(inject) => {
+        Run::Regulating => {
             scene.regulating(source, turn)?;
-            cut(&mut scene.board, class.name, "");
+            cut(&mut scene.board, &class.name, "");
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
-            let what = inject(&mut scene.board, &scene.target, &mut rng);
-            cut(&mut scene.board, class.name, &what);
+            let what = class.inject(&mut scene.board, &scene.target, &mut rng)?;
+            cut(&mut scene.board, &class.name, &what);
             let (promised, bound) = (class.bound.0.is_finite(), class.bound.0);
             let trip_a = scene.target.settings.trip_a().into();
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
@@ -286,7 +286,7 @@ fn table(all: &[Class], runs: &Runs) -> (String, usize) {
         let most = |of: fn(&Outcome) -> f64| ended.iter().map(|end| of(end)).fold(0.0, f64::max);
         let off = ended.iter().filter(|end| end.off_ms.is_some()).count();
         let carried_on = runs - off - failed.min(runs - off);
-        let (name, bound) = (class.name, class.bound.0);
+        let (name, bound) = (&class.name, class.bound.0);
         let latest_off = most(|end| end.off_ms.unwrap_or(0.0));
         let (wrong, peak) = (most(|end| end.wrong_ms), most(|end| end.peak_a));
         text += &format!(

@@ -132,13 +132,13 @@ defaults! {
         /// CRC unit.
         pub crc: CrcUnit,
         /// Backup registers.
-        pub tamp: Store = Store::new(plain::TAMP),
+        pub tamp: Store = Store::of("TAMP"),
         /// Ports A to G.
         pub gpio: [Gpio; 7] = std::array::from_fn(Gpio::new),
         /// System configuration.
-        pub syscfg: Store = Store::new(plain::SYSCFG),
+        pub syscfg: Store = Store::of("SYSCFG"),
         /// Interrupts of pins and comparators.
-        pub exti: Store = Store::new(plain::EXTI),
+        pub exti: Store = Store::of("EXTI"),
         /// Timer of the power stage.
         pub tim1: Tim1,
         /// Timer of the brake chopper.
@@ -166,7 +166,7 @@ defaults! {
         /// Window watchdog.
         pub wwdg: Wwdg,
         /// Debug support.
-        pub debug: Store = Store::new(plain::DEBUG),
+        pub debug: Store = Store::of("DBGMCU"),
         /// The power stage at the pins of the gates.
         pub gates: GateWatch =
             GateWatch::new(&power_stage::REFERENCE, &[0, 1, 2, 3, 4, 5, 6].map(Gpio::new), &Tim1::default()),

@@ -17,7 +17,9 @@ pub mod time_base;
 pub mod uart;
 pub mod wwdg;
 
+use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::LazyLock;
 
 /// Time of an event that does not come, ticks.
 pub const NEVER: u64 = u64::MAX;
@@ -56,52 +58,47 @@ pub enum Effect {
     Reset,
 }
 
-/// A register without behaviour: offset, value after reset, bits that can be written.
-pub type Plain = (u32, u32, u32);
-
-/// The registers of a peripheral as `KNOWN`, a row each: name (`_`: of no meaning to the model), offset, value after reset,
-/// bits that can be written. The names become constants.
-macro_rules! registers {
-    ($($name:tt = $offset:expr, $reset:expr, $mask:expr;)*) => {
-        $(pub(crate) const $name: u32 = $offset;)*
-        const KNOWN: &[$crate::periph::Plain] = &[$(($offset, $reset, $mask)),*];
-    };
+/// Offsets of registers.
+macro_rules! offsets {
+    ($($name:ident = $offset:literal),*) => { $(pub(crate) const $name: u32 = $offset;)* };
 }
-use registers;
+use offsets;
 
 /// Bits of a register, each by its number.
 macro_rules! bits {
     ($($seen:vis $name:ident = $number:literal),*) => { $($seen const $name: u32 = 1 << $number;)* };
 }
-use bits;
+pub(crate) use bits;
+
+/// A register whose value is kept: offset, value, and the bits that can be written.
+type Register = (u32, u32, u32);
+
+/// All of them after a reset, by peripheral and name.
+static AT_RESET: LazyLock<BTreeMap<String, BTreeMap<String, Register>>> = LazyLock::new(|| {
+    toml::from_str(include_str!("periph/registers.toml")).expect("the table of registers")
+});
 
 /// Registers without behaviour.
 #[derive(Clone, Debug)]
-pub struct Store {
-    known: &'static [Plain],
-    values: Vec<u32>,
-}
+pub struct Store(Vec<Register>);
 
 impl Store {
-    /// These registers as after reset.
-    pub fn new(known: &'static [Plain]) -> Self {
-        Self { known, values: known.iter().map(|register| register.1).collect() }
-    }
-
-    fn place(&self, offset: u32) -> Option<usize> {
-        self.known.iter().position(|register| register.0 == offset)
+    /// The registers of a peripheral of `periph/registers.toml` as after reset.
+    pub fn of(peripheral: &str) -> Self {
+        let mut registers: Vec<_> = AT_RESET[peripheral].values().copied().collect();
+        registers.sort_unstable();
+        Self(registers)
     }
 
     /// Reads one.
     pub fn read(&self, offset: u32) -> Option<u32> {
-        self.place(offset).map(|place| self.values[place])
+        self.0.iter().find(|register| register.0 == offset).map(|register| register.1)
     }
 
     /// Writes one.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        let place = self.place(offset)?;
-        let mask = self.known[place].2;
-        self.values[place] = self.values[place] & !mask | value & mask;
+        let (_, kept, mask) = self.0.iter_mut().find(|register| register.0 == offset)?;
+        *kept = *kept & !*mask | value & *mask;
         Some(Effect::None)
     }
 

@@ -2,7 +2,7 @@
 
 mod mpu;
 
-use crate::periph::{Effect, Plain, Store};
+use crate::periph::{Effect, Store};
 pub use mpu::Mpu;
 
 /// Exception numbers.
@@ -69,7 +69,7 @@ defaults! {
         pub hfsr: u32,
         /// Address of a bus fault.
         pub bfar: u32,
-        plain: Store = Store::new(PLAIN),
+        plain: Store = Store::of("SCS"),
         /// Memory protection.
         pub mpu: Mpu,
         demcr: u32,
@@ -81,18 +81,6 @@ defaults! {
         pub systick: SysTick = SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
     }
 }
-
-/// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
-const PLAIN: &[Plain] = &[
-    (0xe000_ed14, 0x200, u32::MAX),
-    (0xe000_ed24, 0, u32::MAX),
-    (0xe000_ed88, 0, u32::MAX),
-    (0xe000_ed10, 0, u32::MAX),
-    (0xe000_ed34, 0, u32::MAX),
-    (0xe000_ed3c, 0, u32::MAX),
-    (0xe000_ef38, 0, u32::MAX),
-    (0xe000_ef34, 0xc000_0000, u32::MAX),
-];
 
 impl Scs {
     /// The vector of an exception.

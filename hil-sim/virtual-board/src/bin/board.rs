@@ -17,7 +17,7 @@ use virtual_board::interactive::flash_file::FlashFile;
 use virtual_board::interactive::page;
 use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::Script;
-use virtual_board::interactive::session::{End, Inputs, Session};
+use virtual_board::interactive::session::{Inputs, Session};
 use virtual_board::{Board, Image, PowerStage};
 
 /// Runs the firmware's image on an emulated board, with a simulated motor and a serial port.
@@ -92,10 +92,7 @@ fn run(mut options: Options) -> Result<()> {
     let end = session.run(|line| say(&line.to_string()));
     let path = write(options, &config, &session)?;
     say(&format!("Report: {}", path.display()));
-    match end {
-        End::Failed(error) => Err(error),
-        _ => Ok(()),
-    }
+    end
 }
 
 fn image(stage: &PowerStage, elf: Option<&Path>) -> Result<Image> {

@@ -9,6 +9,7 @@ use hil_sim::config::{Value, assigned};
 use hil_sim::{Config, experiments::full_range::for_the_range, plant::Load};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Loaded, Saved};
+use serde::Deserialize;
 
 use crate::board::{Board, Options};
 use crate::memory::{Region, STORED};
@@ -35,7 +36,8 @@ const LEARNING: u64 = 3_600_000;
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
 /// The source of the flux angle, and the speed of the shaft unless the campaign has one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
 pub enum Source {
     /// No encoder: the injection, with the shaft locked; at speed the observer.
     Sensorless,

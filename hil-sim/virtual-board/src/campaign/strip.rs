@@ -3,6 +3,7 @@
 use anyhow::{Result, ensure};
 use hil_sim::plant::Load;
 use rand::{Rng, RngExt};
+use serde::Deserialize;
 
 use super::judge::{Outcome, wait};
 use super::scene::Scene;
@@ -10,7 +11,8 @@ use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 
 /// A fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
 pub enum Fault {
     /// A wire breaks, and is mended.
     Open,

@@ -1,26 +1,18 @@
 //! A debugger at the debug port: it halts the core and lets it go, and sets and clears bits of DBGMCU.
 
 use super::{Chip, TICKS_PER_PERIOD};
+use crate::periph::bits;
 use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
 use crate::rules::Rule;
 
+// DBGMCU: the clock of the core goes on while it sleeps; the watchdogs and timers stop while the core is halted.
+bits! { SLEEP = 0 }
+bits! { pub(crate) TIM5_STOP = 3, pub(super) WWDG_STOP = 11, pub(super) IWDG_STOP = 12 }
+bits! { TIM1_STOP = 11, TIM8_STOP = 13 }
 /// DBGMCU: clocks go on in sleep, stop and standby.
 pub const LOW_POWER: u32 = 7;
-/// DBGMCU: clock of the core goes on while it sleeps.
-const SLEEP: u32 = 1;
-/// DBGMCU: the watchdog stops while the core is halted.
-pub(super) const IWDG_STOP: u32 = 1 << 12;
-/// DBGMCU: the window watchdog stops while the core is halted.
-pub(super) const WWDG_STOP: u32 = 1 << 11;
 /// DBGMCU: both watchdogs stop while the core is halted.
 pub const WATCHDOG_STOPS: u32 = IWDG_STOP | WWDG_STOP;
-/// DBGMCU: TIM5 stops while the core is halted.
-pub const TIM5_STOP: u32 = 1 << 3;
-/// DBGMCU: TIM1 stops while the core is halted.
-const TIM1_STOP: u32 = 1 << 11;
-
-/// DBGMCU: TIM8 stops while the core is halted.
-const TIM8_STOP: u32 = 1 << 13;
 
 /// The program may take this long to switch off outputs that come back as the core goes on, ticks: two periods.
 const NOTICED: u64 = 2 * TICKS_PER_PERIOD;

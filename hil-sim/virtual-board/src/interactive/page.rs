@@ -3,7 +3,7 @@
 use hil_sim::outcome::{Figure, Panel, Series};
 use hil_sim::{Config, Outcome};
 
-use super::record::{Quantity, Record};
+use super::record::{CURVES, Record};
 use super::session::Session;
 use super::transcript::{Source, events, faults};
 
@@ -49,29 +49,17 @@ pub fn outcome(config: &Config, session: &Session) -> Outcome {
 }
 
 fn figure(record: &Record) -> Figure {
-    let x = "time (s)";
-    let line = |name: &str, quantity| Series::line(name, record.curve(quantity));
-    Figure::new("session", "A session with the drive", "")
-        .panel(
-            Panel::new(x, "angle error (° electrical)")
-                .with(Series::line("true minus estimated flux angle", record.error_deg())),
-        )
-        .panel(
-            Panel::new(x, "quadrature current (A)")
-                .with(line("measured", Quantity::CurrentQ))
-                .with(Series::reference("reference", record.curve(Quantity::ReferenceQ))),
-        )
-        .panel(Panel::new(x, "torque (Nm)").with(line("", Quantity::Torque)))
-        .panel(Panel::new(x, "rotor flux (Wb)").with(line("", Quantity::Flux)))
-        .panel(
-            Panel::new(x, "speed (rpm)")
-                .with(line("rotor", Quantity::Speed))
-                .with(line("estimated", Quantity::SpeedEstimate)),
-        )
-        .panel(
-            Panel::new(x, "dc link (V)")
-                .with(line("inverter", Quantity::DcLink))
-                .with(Series::reference("as measured", record.curve(Quantity::DcLinkSeen))),
-        )
-        .panel(Panel::new(x, "outputs on").with(line("", Quantity::Outputs)).switch())
+    let panel = |axis: &str, series| Panel::new("time (s)", axis).with(series);
+    let error = Series::line("true minus estimated flux angle", record.error_deg());
+    let mut panels = vec![panel("angle error (° electrical)", error)];
+    for (place, (axis, name, drawn, ..)) in CURVES.into_iter().enumerate() {
+        let series = drawn(name, record.curve(place));
+        match panels.last_mut() {
+            Some(same) if same.y_label == axis => same.series.push(series),
+            _ => panels.push(panel(axis, series)),
+        }
+    }
+    panels.push(panel("outputs on", Series::line("", record.outputs())).switch());
+    let figure = Figure::new("session", "A session with the drive", "");
+    panels.into_iter().fold(figure, Figure::panel)
 }

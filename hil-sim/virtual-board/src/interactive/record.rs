@@ -3,50 +3,45 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Telemetry, carrier::CARRIER_SAMPLES};
+use hil_sim::outcome::Series;
 use hil_sim::plant::{Complex, Plant};
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 use hil_sim::stats::Stats;
 
 use crate::board::Period;
 
-/// A quantity that is recorded, in the order of `Means`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Filtered reference on the quadrature axis, A.
-    ReferenceQ,
-    /// Current on the quadrature axis as the drive sees it, A.
-    CurrentQ,
-    /// Torque of the motor, Nm.
-    Torque,
-    /// Length of the rotor flux, Wb.
-    Flux,
-    /// Speed of the rotor, rpm.
-    Speed,
-    /// The same as the drive estimates it, rpm.
-    SpeedEstimate,
-    /// Dc-link voltage as the drive sees it, V.
-    DcLinkSeen,
-    /// Dc-link voltage, V.
-    DcLink,
-    /// Whether the outputs are on, 0 or 1.
-    Outputs,
-}
+/// A curve of the page: the axis of its panel, its name there, how it is drawn, whether the drive reports it, so that it stands still
+/// while the outputs are off, and its value in a control interrupt.
+pub type Curve = (&'static str, &'static str, Drawn, bool, fn(&Plant, &Telemetry) -> f64);
+type Drawn = fn(&'static str, Vec<(f64, f64)>) -> Series;
 
-impl Quantity {
-    /// Whether the drive reports it: it stands still while the outputs are off.
-    fn is_estimated(self) -> bool {
-        matches!(self, Self::ReferenceQ | Self::CurrentQ | Self::SpeedEstimate | Self::DcLinkSeen)
-    }
-}
+/// Rpm of a radian per second.
+const RPM: f64 = 60.0 / TAU;
 
-type Means = [f64; 9];
+/// All curves; those of a panel follow each other.
+#[rustfmt::skip]
+pub const CURVES: [Curve; 8] = [
+    ("quadrature current (A)", "measured", Series::line, true, |_, drive| drive.current.q.into()),
+    // Filtered.
+    ("quadrature current (A)", "reference", Series::reference, true, |_, drive| drive.reference.q.into()),
+    ("torque (Nm)", "", Series::line, false, |plant, _| plant.torque()),
+    ("rotor flux (Wb)", "", Series::line, false, |plant, _| plant.rotor_flux().norm()),
+    ("speed (rpm)", "rotor", Series::line, false, |plant, _| plant.mechanical_speed() * RPM),
+    ("speed (rpm)", "estimated", Series::line, true, |plant, drive| {
+        f64::from(drive.rotor_freq) * (RATE_HZ * 60.0 / plant.pole_pairs())
+    }),
+    ("dc link (V)", "inverter", Series::line, false, |plant, _| plant.dc_link()),
+    ("dc link (V)", "as measured", Series::reference, true, |_, drive| drive.dc_link.into()),
+];
 
 /// Means over some control periods.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bucket {
     periods: f64,
     time: f64,
-    sums: Means,
+    /// Of these, with the outputs on.
+    on: f64,
+    sums: [f64; CURVES.len()],
     /// Sum of unit vectors that show the angle error: angles have no mean of their own.
     error: Complex,
 }
@@ -55,6 +50,7 @@ impl Bucket {
     fn add(&mut self, other: &Self) {
         self.periods += other.periods;
         self.time += other.time;
+        self.on += other.on;
         self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
         self.error += other.error;
     }
@@ -85,30 +81,17 @@ pub struct Record {
 impl Record {
     /// Takes a control interrupt: the plant at its sample, and the telemetry of the drive after it.
     pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, drive: &Telemetry) {
-        let rpm = 60.0 / TAU;
-        let turns_to_rpm = RATE_HZ * 60.0 / plant.pole_pairs();
         let on = period.compare.enabled;
-        let flux = plant.rotor_flux().norm();
-        let mut bucket = Bucket { periods: 1.0, time, ..Bucket::default() };
-        for (quantity, value) in [
-            (Quantity::ReferenceQ, drive.reference.q.into()),
-            (Quantity::CurrentQ, drive.current.q.into()),
-            (Quantity::Torque, plant.torque()),
-            (Quantity::Flux, flux),
-            (Quantity::Speed, plant.mechanical_speed() * rpm),
-            (Quantity::SpeedEstimate, f64::from(drive.rotor_freq) * turns_to_rpm),
-            (Quantity::DcLinkSeen, drive.dc_link.into()),
-            (Quantity::DcLink, plant.dc_link()),
-            (Quantity::Outputs, f64::from(u8::from(on))),
-        ] {
-            let counts = on || !quantity.is_estimated();
-            bucket.sums[quantity as usize] = if counts { value } else { 0.0 };
+        let counted = f64::from(u8::from(on));
+        let mut bucket = Bucket { periods: 1.0, time, on: counted, ..Bucket::default() };
+        for ((.., estimated, value), sum) in CURVES.iter().zip(&mut bucket.sums) {
+            *sum = if on || !estimated { value(plant, drive) } else { 0.0 };
         }
         self.interrupts += 1;
         self.worst_cycles = self.worst_cycles.max(period.cycles);
         let currents = plant.phase_currents();
         self.peak_current = currents.into_iter().fold(self.peak_current, |m, i| m.max(i.abs()));
-        if on && flux > FLUX_WB {
+        if on && plant.rotor_flux().norm() > FLUX_WB {
             let error = plant.rotor_flux_angle() - f64::from(drive.phi.to_turns()) * TAU;
             bucket.error = Complex::cis(error);
             self.error.push(wrapped_degrees(error));
@@ -128,14 +111,17 @@ impl Record {
         }
     }
 
-    /// Curve of a quantity over time, s; quantities that the drive reports are not-a-numbers while the outputs
-    /// are off.
-    pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
+    /// Points over time, s, of the curve with this place in [`CURVES`]; where the drive reports it, not-a-numbers while the outputs are
+    /// off.
+    pub fn curve(&self, place: usize) -> Vec<(f64, f64)> {
         self.points(|bucket| {
-            let on = bucket.sums[Quantity::Outputs as usize];
-            let counted = if quantity.is_estimated() { on } else { bucket.periods };
-            bucket.sums[quantity as usize] / counted
+            bucket.sums[place] / if CURVES[place].3 { bucket.on } else { bucket.periods }
         })
+    }
+
+    /// Whether the outputs are on, 0 to 1, over time, s.
+    pub fn outputs(&self) -> Vec<(f64, f64)> {
+        self.points(|bucket| bucket.on / bucket.periods)
     }
 
     /// True minus estimated rotor-flux angle over time, electrical degrees; a not-a-number where it is

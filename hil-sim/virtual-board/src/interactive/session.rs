@@ -29,20 +29,8 @@ const LATE: Duration = Duration::from_millis(100);
 /// A session without a person shows its time after this long without a line.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
-/// Why a session has ended.
-#[derive(Debug)]
-pub enum End {
-    /// Its time is over.
-    Time,
-    /// `quit`.
-    Quit,
-    /// Ctrl-C, or a request to terminate.
-    Signal,
-    /// The script has ended.
-    Script,
-    /// The board cannot go on, or the script cannot.
-    Failed(anyhow::Error),
-}
+/// Why a session has ended, in words.
+type End = &'static str;
 
 /// Inputs of a session besides the pseudo-terminal.
 pub struct Inputs {
@@ -111,15 +99,18 @@ impl Session {
     }
 
     /// Goes on until something ends it; every line is shown when it comes.
-    pub fn run(&mut self, mut show: impl FnMut(&Line)) -> End {
+    ///
+    /// # Errors
+    /// The board cannot go on, or the script cannot.
+    pub fn run(&mut self, mut show: impl FnMut(&Line)) -> Result<()> {
         let (mut clock, mut since) = (Instant::now(), self.board.time());
         let mut said = Instant::now();
         let alone = self.inputs.script.is_some() || !self.inputs.paced;
         let end = loop {
             let shown = self.lines.len();
-            let end = self.slice().unwrap_or_else(|error| Some(End::Failed(error)));
+            let end = self.slice();
             self.lines[shown..].iter().for_each(&mut show);
-            if let Some(end) = end {
+            if let Some(end) = end.transpose() {
                 break end;
             }
             if self.lines.len() > shown {
@@ -140,35 +131,29 @@ impl Session {
             }
         };
         // The flash may have changed in the last slice.
-        let end = self.keep_flash().err().map_or(end, End::Failed);
+        let end = self.keep_flash().and(end);
         let shown = self.lines.len();
         for (rest, source) in [(self.typed.rest(), Source::Typed), (self.said.rest(), Source::Said)]
         {
             rest.into_iter().for_each(|text| self.add(source, text));
         }
-        let why = match &end {
-            End::Time => "end: the time is over".to_owned(),
-            End::Quit => "end: quit".to_owned(),
-            End::Signal => "end: interrupted".to_owned(),
-            End::Script => "end: of the script".to_owned(),
-            End::Failed(error) => format!("end: {error:#}"),
-        };
-        self.add(Source::Board, why);
+        let why = end.as_ref().map_or_else(|error| format!("{error:#}"), |end| (*end).to_owned());
+        self.add(Source::Board, format!("end: {why}"));
         self.lines[shown..].iter().for_each(&mut show);
-        end
+        end.map(drop)
     }
 
     /// Takes the inputs, goes on for a slice and shows the outputs; the reason of the end, if the session ends.
     fn slice(&mut self) -> Result<Option<End>> {
         let now = self.board.time();
         if self.inputs.stop.load(Ordering::Relaxed) {
-            return Ok(Some(End::Signal));
+            return Ok(Some("interrupted"));
         }
         if self.inputs.seconds.is_some_and(|seconds| now >= seconds) {
             if let Some(why) = self.inputs.script.as_mut().and_then(Script::cut_short) {
                 bail!(why);
             }
-            return Ok(Some(End::Time));
+            return Ok(Some("the time is over"));
         }
         let typed = self.pty.read()?;
         self.send(&typed);
@@ -176,20 +161,20 @@ impl Session {
         self.board.send_bus(&asked);
         // Without the terminal, script and pseudo-terminal go on.
         while let Ok(line) = self.inputs.terminal.try_recv() {
-            if let Some(end) = self.enter(&line) {
+            if let Some(end) = self.enter(&line)? {
                 return Ok(Some(end));
             }
         }
         if let Some(script) = &mut self.inputs.script {
             match script.due(now)? {
                 Due::Type(line) => {
-                    if let Some(end) = self.enter(&line) {
+                    if let Some(end) = self.enter(&line)? {
                         return Ok(Some(end));
                     }
                 }
                 Due::Note(text) => self.add(Source::Board, text),
                 // An end given by the time is later.
-                Due::End if self.inputs.seconds.is_none() => return Ok(Some(End::Script)),
+                Due::End if self.inputs.seconds.is_none() => return Ok(Some("of the script")),
                 Due::End | Due::Nothing => {}
             }
         }
@@ -206,36 +191,26 @@ impl Session {
     }
 
     /// Does a command of the board, or sends the line to the console; the reason of the end, if the session ends.
-    fn enter(&mut self, line: &str) -> Option<End> {
-        let own = match Own::parse(line) {
-            Ok(Some(own)) => own,
+    fn enter(&mut self, line: &str) -> Result<Option<End>> {
+        match Own::parse(line) {
             Ok(None) => {
                 self.send(line.as_bytes());
                 self.send(b"\n");
-                return None;
             }
-            Err(why) => {
-                self.add(Source::Board, format!("error: {why}"));
-                return None;
-            }
-        };
-        match own {
-            Own::Quit => return Some(End::Quit),
-            Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
-            Own::Reset => self.board.reset(Reset::Pin),
-            Own::Unplug => self.board.unplug(),
-            Own::Wires(wires) => {
+            Err(why) => self.add(Source::Board, format!("error: {why}")),
+            Ok(Some(Own::Quit)) => return Ok(Some("quit")),
+            Ok(Some(Own::Help)) => Own::help().for_each(|line| self.add(Source::Board, line)),
+            Ok(Some(Own::Reset)) => self.board.reset(Reset::Pin),
+            Ok(Some(Own::Unplug)) => self.board.unplug(),
+            Ok(Some(Own::Wires(wires))) => {
                 let set = self.board.set_wires(&wires);
                 set.err().into_iter().for_each(|why| self.add(Source::Board, why.to_string()));
             }
-            Own::Stage(on) => {
-                let volts = if on { self.dc_link_v } else { 1.0 };
-                if let Err(why) = self.board.supply_stage(on, volts) {
-                    return Some(End::Failed(why));
-                }
+            Ok(Some(Own::Stage(on))) => {
+                self.board.supply_stage(on, if on { self.dc_link_v } else { 1.0 })?;
             }
         }
-        None
+        Ok(None)
     }
 
     fn keep_flash(&mut self) -> Result<()> {

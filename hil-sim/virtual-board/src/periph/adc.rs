@@ -3,40 +3,16 @@
 
 mod converter;
 
-use super::{Effect, NEVER, Store, bits, registers};
+use super::{Effect, NEVER, Store, bits, offsets};
 use crate::rules::{Rule, Rules};
 use converter::{Converter, EOC, JEOC, JEOS, Sequence};
 
-registers! {
-    ISR = 0x00, 0, 0;
-    IER = 0x04, 0, 0x7ff;
-    CR = 0x08, 0x2000_0000, 0;
-    CFGR = 0x0c, 0x8000_0000, 0xffff_fffb;
-    _ = 0x10, 0, 0x0e01_07ff;
-    SMPR1 = 0x14, 0, 0xbfff_ffff;
-    _ = SMPR1 + 4, 0, 0x07ff_ffff;
-    TR1 = 0x20, 0x0fff_0000, 0x0fff_7fff;
-    _ = 0x24, 0x00ff_0000, 0x00ff_00ff;
-    _ = 0x28, 0x00ff_0000, 0x00ff_00ff;
-    SQR1 = 0x30, 0, 0x1f7d_f7cf;
-    _ = SQR1 + 4, 0, 0x1f7d_f7df;
-    _ = SQR1 + 8, 0, 0x1f7d_f7df;
-    _ = SQR1 + 12, 0, 0x7df;
-    DR = 0x40, 0, 0;
-    JSQR = 0x4c, 0, 0xfbef_bfff;
-    JDR1 = 0x80, 0, 0;
-    _ = 0x84, 0, 0;
-    _ = 0x88, 0, 0;
-    _ = 0x8c, 0, 0;
-    _ = 0xa0, 0, 0x7_ffff;
-    _ = 0xa4, 0, 0x7_ffff;
-    _ = 0xb0, 0, 0x7_ffff;
-    _ = 0xb4, 0, 0x7f_007f;
-    _ = 0xc0, 0, 0x3fff;
+offsets! {
+    ISR = 0x00, IER = 0x04, CR = 0x08, CFGR = 0x0c, SMPR1 = 0x14, TR1 = 0x20, SQR1 = 0x30, DR = 0x40, JSQR = 0x4c, JDR1 = 0x80,
+    JDR4 = 0x8c
 }
-/// Common control register of both.
-const CCR: u32 = 0x308;
-const CSR: u32 = 0x300;
+// Common to both.
+offsets! { CSR = 0x300, CCR = 0x308 }
 const VREFEN: u32 = 1 << 22;
 
 /// Codes at the pins by channel, 0 to 18.

@@ -1,18 +1,9 @@
 //! Two of the converters to analog (RM0440, section 22), 12 bits right-aligned, without triggers: 1 and 3.
 
-use super::{Effect, NEVER, Store, registers};
+use super::{Effect, NEVER, Store, offsets};
 use crate::rules::{Rule, Rules};
 
-registers! {
-    CR = 0x00, 0, 0x7fff_7fff;
-    _ = DHR[0], 0, 0x0fff_0fff;
-    _ = DHR[1], 0, 0x0fff_0fff;
-    _ = DOR[0], 0, 0;
-    _ = DOR[1], 0, 0;
-    SR = 0x34, 0, 0;
-    _ = 0x38, 0, 0x1f_001f;
-    MCR = 0x3c, 0, 0x0307_c307;
-}
+offsets! { CR = 0x00, SR = 0x34, MCR = 0x3c }
 const DHR: [u32; 2] = [0x08, 0x14];
 const DOR: [u32; 2] = [0x2c, 0x30];
 /// DACxRDY of channel 1; the bits of channel 2 are 16 places higher.
@@ -52,7 +43,7 @@ defaults! {
     /// One converter.
     #[derive(Clone, Debug)]
     struct Dac {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("DAC"),
         channels: [Channel; 2],
     }
 }

@@ -1,28 +1,15 @@
 //! TIM2 as counter of the encoder (RM0440, section 30): counts with the plant's, from 0 at its start,
 //! in encoder mode 3 only.
 
-use super::{Effect, Store, registers};
+use super::{Effect, Store, offsets};
 
-const ALL: u32 = u32::MAX;
-registers! {
-    CR1 = 0x00, 0, 0x1bff;
-    _ = 0x04, 0, 0x02f5_fffd;
-    SMCR = 0x08, 0, 0x0331_ffff;
-    _ = 0x0c, 0, 0x00f0_7fff;
-    _ = 0x10, 0, 0;
-    _ = 0x18, 0, 0x0101_ffff;
-    _ = 0x1c, 0, 0x0101_ffff;
-    _ = 0x20, 0, 0x0033_ffff;
-    CNT = 0x24, 0, 0;
-    _ = 0x28, 0, 0xffff;
-    _ = 0x2c, ALL, ALL;
-}
+offsets! { CR1 = 0x00, SMCR = 0x08, CNT = 0x24 }
 
 defaults! {
     /// The timer; by default after a reset, with the encoder at 0.
     #[derive(Clone, Debug)]
     pub struct EncoderTimer {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("TIM2"),
         /// Where the encoder is, counts.
         pub position: u32,
         from: u32,

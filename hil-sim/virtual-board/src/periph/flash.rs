@@ -8,24 +8,11 @@
 
 use std::ops::Range;
 
-use super::{Effect, Store, bits, registers};
+use super::{Effect, Store, bits, offsets};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE, STORED};
 use crate::rules::{Rule, Rules};
 
-registers! {
-    ACR = 0x00, 0x0004_0600, 0x4_7f0f;
-    _ = 0x04, 0, 0;
-    KEYR = 0x08, 0, 0;
-    _ = 0x0c, 0, 0;
-    SR = 0x10, 0, 0;
-    // OBL_LAUNCH and OPTSTRT need the option bytes unlocked.
-    CR = 0x14, 0xc000_0000, 0xf701_8bff;
-    ECCR = 0x18, 0, 0;
-    OPTR = 0x20, 0, 0;
-    _ = 0x24, 0xffff_0000, 0;
-    _ = 0x2c, 0, 0;
-    _ = 0x30, 0, 0;
-}
+offsets! { ACR = 0x00, KEYR = 0x08, SR = 0x10, CR = 0x14, ECCR = 0x18, OPTR = 0x20 }
 
 // ACR, CR, SR, ECCR.
 bits! { DCEN = 10 }
@@ -53,7 +40,7 @@ defaults! {
     /// The flash; by default erased.
     #[derive(Clone, Debug)]
     pub struct Flash {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("FLASH"),
         /// Option bytes, as FLASH_OPTR shows them.
         pub options: u32 = OPTIONS,
         status: u32,

@@ -1,21 +1,8 @@
 //! Pins (RM0440, section 9). Inputs are as they are pulled.
 
-use super::{Effect, Store, registers};
+use super::{Effect, Store, offsets};
 
-const ALL: u32 = u32::MAX;
-registers! {
-    MODER = 0x00, ALL, ALL;
-    OTYPER = 0x04, 0, 0xffff;
-    OSPEEDR = 0x08, 0, ALL;
-    PUPDR = 0x0c, 0, ALL;
-    IDR = 0x10, 0, 0;
-    ODR = 0x14, 0, 0xffff;
-    BSRR = 0x18, 0, 0;
-    _ = 0x1c, 0, 0x1_ffff;
-    AFRL = 0x20, 0, ALL;
-    _ = 0x24, 0, ALL;
-    BRR = 0x28, 0, 0;
-}
+offsets! { MODER = 0x00, OTYPER = 0x04, OSPEEDR = 0x08, PUPDR = 0x0c, IDR = 0x10, ODR = 0x14, BSRR = 0x18, AFRL = 0x20, BRR = 0x28 }
 
 /// What a port does with a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,12 +24,12 @@ pub struct Gpio(Store);
 impl Gpio {
     /// Port A is 0.
     pub fn new(port: usize) -> Self {
-        let mut store = Store::new(KNOWN);
+        let mut store = Store::of("GPIO");
         // The debug port's pins.
         let values = match port {
             0 => [0x0c00_0000, 0xabff_ffff, 0x6400_0000],
             1 => [0x0000_00c0, 0xffff_febf, 0x0000_0100],
-            _ => [0, ALL, 0],
+            _ => [0, u32::MAX, 0],
         };
         for (register, value) in [OSPEEDR, MODER, PUPDR].into_iter().zip(values) {
             store.write(register, value);

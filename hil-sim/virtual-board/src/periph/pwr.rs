@@ -1,21 +1,8 @@
 //! Supply (RM0440, section 6): voltage range, supply monitor. The regulator is always ready.
 
-use super::{Effect, Store, bits, registers};
+use super::{Effect, Store, bits, offsets};
 
-registers! {
-    CR1 = 0x00, 0x200, 0x4707;
-    CR2 = 0x04, 0, 0xcf;
-    _ = 0x08, 0x8000, 0xe51f;
-    _ = 0x0c, 0, 0x31f;
-    _ = 0x10, 0, 0;
-    SR2 = 0x14, 0, 0;
-    _ = 0x18, 0, 0;
-    _ = 0x20, 0, 0xbfff;
-    _ = 0x24, 0, 0x5fff;
-    _ = 0x28, 0, 0xffff;
-    _ = 0x2c, 0, 0xffef;
-    CR5 = 0x80, 0x100, 0x100;
-}
+offsets! { CR1 = 0x00, CR2 = 0x04, SR2 = 0x14, CR5 = 0x80 }
 bits! { PVDE = 0, DBP = 8, PVDO = 11 }
 /// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last is a pin.
 const LEVELS: [f64; 7] = [2.05, 2.2, 2.36, 2.52, 2.64, 2.81, 2.9];
@@ -51,7 +38,7 @@ defaults! {
     /// The supply.
     #[derive(Clone, Debug)]
     pub struct Pwr {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("PWR"),
         /// Supply of the chip, V.
         pub supply_v: f64 = 3.3,
     }

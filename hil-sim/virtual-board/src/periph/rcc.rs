@@ -1,39 +1,12 @@
 //! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, but for
 //! a crystal that is dead.
 
-use super::{Effect, NEVER, Reset, Store, bits, registers};
+use super::{Effect, NEVER, Reset, Store, bits, offsets};
 use induction_drive::board::{CLOCK_HZ, HSE_HZ, HSI_HZ};
 
-registers! {
-    CR = 0x00, 0x100, 0x010d_0300;
-    _ = 0x04, 0x4000_0000, 0x7f00_0000;
-    CFGR = 0x08, 0x5, 0x7f00_3ff3;
-    PLLCFGR = 0x0c, 0x1000, 0xff73_7ff3;
-    _ = 0x18, 0, 0x63b;
-    CIFR = 0x1c, 0, 0;
-    CICR = 0x20, 0, 0;
-    _ = 0x28, 0, 0x111f;
-    _ = 0x2c, 0, 0x050f_607f;
-    _ = 0x30, 0, 0x101;
-    _ = 0x38, 0, 0xd2fe_c13f;
-    _ = 0x3c, 0, 0x103;
-    _ = 0x40, 0, 0x0437_f801;
-    AHB1ENR = 0x48, 0x100, 0x111f;
-    AHB2ENR = 0x4c, 0, 0x050f_607f;
-    _ = 0x50, 0, 0x101;
-    APB1ENR1 = 0x58, 0x400, 0xd2fe_cd3f;
-    APB1ENR2 = 0x5c, 0, 0x103;
-    APB2ENR = 0x60, 0, 0x0437_f801;
-    _ = 0x68, 0x130f, 0x131f;
-    _ = 0x6c, 0x050f_667f, 0x050f_667f;
-    _ = 0x78, 0xd2fe_cd3f, 0xd2fe_cd3f;
-    _ = 0x7c, 0x103, 0x103;
-    _ = 0x80, 0x0437_f801, 0x0437_f801;
-    CCIPR = 0x88, 0, u32::MAX;
-    _ = 0x90, 0, 0;
-    CSR = 0x94, 0, 1;
-    _ = 0x98, 0, 1;
-    _ = 0x9c, 0, 0x0030_0003;
+offsets! {
+    CR = 0x00, CFGR = 0x08, PLLCFGR = 0x0c, CIFR = 0x1c, CICR = 0x20, AHB1ENR = 0x48, AHB2ENR = 0x4c, APB1ENR1 = 0x58,
+    APB1ENR2 = 0x5c, APB2ENR = 0x60, CCIPR = 0x88, CSR = 0x94, CRRCR = 0x98
 }
 
 // CR, CIFR.
@@ -56,7 +29,7 @@ defaults! {
     /// The clocks; by default after power-on.
     #[derive(Clone, Debug)]
     pub struct Rcc {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("RCC"),
         /// Flags of resets, which stay until they are cleared.
         pub flags: u32 = BOR | PIN,
         cifr: u32,
@@ -161,7 +134,7 @@ impl Rcc {
             CFGR => value & !0xc | (value & 3) << 2,
             CIFR => self.cifr,
             CSR => value & 1 | (value & 1) << 1 | self.flags,
-            0x98 => value | (value & 1) << 1,
+            CRRCR => value | (value & 1) << 1,
             _ => value,
         })
     }

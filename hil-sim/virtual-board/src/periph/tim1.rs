@@ -7,34 +7,12 @@ mod outputs;
 
 pub use outputs::{Output, Wave};
 
-use super::{Effect, NEVER, Store, bits, registers};
+use super::{Effect, NEVER, Store, bits, offsets};
 use crate::rules::{Rule, Rules};
 
-registers! {
-    CR1 = 0x00, 0, 0x1bff;
-    CR2 = 0x04, 0, 0x02f5_fffd;
-    _ = 0x08, 0, 0x0331_ffff;
-    _ = 0x0c, 0, 0x00f0_7fff;
-    SR = 0x10, 0, 0;
-    EGR = 0x14, 0, 0;
-    CCMR1 = 0x18, 0, 0x0101_ffff;
-    CCMR2 = 0x1c, 0, 0x0101_ffff;
-    CCER = 0x20, 0, 0x0033_ffff;
-    CNT = 0x24, 0, 0;
-    PSC = 0x28, 0, 0xffff;
-    ARR = 0x2c, 0xffff, 0xf_ffff;
-    RCR = 0x30, 0, 0xffff;
-    CCR1 = 0x34, 0, 0xf_ffff;
-    _ = 0x38, 0, 0xf_ffff;
-    _ = 0x3c, 0, 0xf_ffff;
-    CCR4 = 0x40, 0, 0xf_ffff;
-    BDTR = 0x44, 0, 0x3fff_ffff;
-    _ = 0x48, 0, 0xe00f_ffff;
-    CCR6 = 0x4c, 0, 0xf_ffff;
-    CCMR3 = 0x50, 0, 0x0101_fcfc;
-    _ = 0x54, 0, 0x300ff;
-    AF1 = 0x60, 1, 0x3_ffff;
-    _ = 0x64, 1, 0x7_3fff;
+offsets! {
+    CR1 = 0x00, CR2 = 0x04, SR = 0x10, EGR = 0x14, CCMR1 = 0x18, CCMR2 = 0x1c, CCER = 0x20, CNT = 0x24, PSC = 0x28, ARR = 0x2c,
+    RCR = 0x30, CCR1 = 0x34, CCR4 = 0x40, BDTR = 0x44, CCR6 = 0x4c, CCMR3 = 0x50, AF1 = 0x60
 }
 
 // SR, BDTR.
@@ -56,7 +34,7 @@ defaults! {
     /// The timer.
     #[derive(Clone, Debug)]
     pub struct Tim1 {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("TIM1"),
         /// Counter at rest.
         held: u32,
         /// When the counter was last at 0, on its way up.

@@ -1,17 +1,8 @@
 //! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, upwards. Other modes are off here.
 
-use super::{Store, bits, registers};
+use super::{Store, bits, offsets};
 
-registers! {
-    CR1 = 0x00, 0, 0x1bff;
-    _ = 0x14, 0, 0;
-    CCMR1 = 0x18, 0, 0x0101_ffff;
-    CCER = 0x20, 0, 0x0033_ffff;
-    ARR = 0x2c, 0xffff, 0x000f_ffff;
-    CCR1 = 0x34, 0, 0x000f_ffff;
-    BDTR = 0x44, 0, 0x3fff_ffff;
-    _ = 0x60, 1, 0x0003_ffff;
-}
+offsets! { CR1 = 0x00, CCMR1 = 0x18, CCER = 0x20, ARR = 0x2c, CCR1 = 0x34, BDTR = 0x44 }
 
 // CR1, CCER, BDTR.
 bits! { CEN = 0 }
@@ -28,7 +19,7 @@ pub struct Tim8(pub Store);
 impl Tim8 {
     /// After a reset.
     pub fn at_reset() -> Self {
-        Self(Store::new(KNOWN))
+        Self(Store::of("TIM8"))
     }
 
     /// Share of a period in which its first output is high. A new compare value counts at once, not from the next period on.

@@ -1,21 +1,9 @@
 //! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well. Channel 1
 //! captures every eighth edge of the LSI oscillator.
 
-use super::{Effect, Store, bits, registers};
+use super::{Effect, Store, bits, offsets};
 
-const ALL: u32 = u32::MAX;
-registers! {
-    CR1 = 0x00, 0, 0x1bff;
-    SR = 0x10, 0, 0;
-    EGR = 0x14, 0, 0;
-    CCMR1 = 0x18, 0, 0x0101_ffff;
-    CCER = 0x20, 0, 0x0033_ffff;
-    CNT = 0x24, 0, 0;
-    _ = 0x28, 0, 0xffff;
-    _ = 0x2c, ALL, ALL;
-    CCR1 = 0x34, 0, 0;
-    TISEL = 0x5c, 0, 0x0f0f_0f0f;
-}
+offsets! { CR1 = 0x00, SR = 0x10, EGR = 0x14, CCMR1 = 0x18, CCER = 0x20, CNT = 0x24, CCR1 = 0x34, TISEL = 0x5c }
 // Of SR: a capture that was not read, and another one behind it.
 bits! { CC1IF = 1, CC1OF = 9 }
 /// Edges of the oscillator to a capture.
@@ -38,7 +26,7 @@ defaults! {
     /// The timer.
     #[derive(Clone, Debug)]
     pub struct TimeBase {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("TIM5"),
         /// Time at which the counter was 0.
         from: u64,
         captures: Captures,

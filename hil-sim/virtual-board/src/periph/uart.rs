@@ -3,52 +3,23 @@
 
 use std::collections::VecDeque;
 
-use super::{Effect, NEVER, Plain, Store, bits};
+use super::{Effect, NEVER, Store, bits, offsets};
 
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const CR3: u32 = 0x08;
-const BRR: u32 = 0x0c;
-const RTOR: u32 = 0x14;
-const ISR: u32 = 0x1c;
-const ICR: u32 = 0x20;
-const RDR: u32 = 0x24;
-/// Offset of the register that sends.
-pub const TDR: u32 = 0x28;
+offsets! { CR1 = 0x00, CR2 = 0x04, CR3 = 0x08, BRR = 0x0c, RTOR = 0x14, ISR = 0x1c, ICR = 0x20, RDR = 0x24, TDR = 0x28 }
 
 /// What the two differ in.
 #[derive(Debug)]
 pub struct Kind {
-    known: &'static [Plain],
+    name: &'static str,
     /// Least value of BRR, and its units in a tick.
     least: u32,
     units: u64,
 }
 
-/// Registers with what can be written to the first four; those that USART3 alone has come last.
-const fn known(cr1: u32, cr2: u32, cr3: u32, brr: u32) -> [Plain; 12] {
-    [
-        (CR1, 0, cr1),
-        (CR2, 0, cr2),
-        (CR3, 0, cr3),
-        (BRR, 0, brr),
-        (0x18, 0, 0),
-        (ISR, 0, 0),
-        (ICR, 0, 0),
-        (RDR, 0, 0),
-        (TDR, 0, 0),
-        (0x2c, 0, 0xf),
-        (0x10, 0, 0xffff),
-        (RTOR, 0, u32::MAX),
-    ]
-}
-const OF_LPUART1: [Plain; 12] = known(0xf3ff_7fff, 0xff0f_b010, 0xfef0_f7c9, 0xf_ffff);
-const OF_USART3: [Plain; 12] = known(u32::MAX, 0xffff_ff79, 0xfffe_ffff, 0xffff);
-
 /// LPUART1.
-pub const LPUART1: Kind = Kind { known: OF_LPUART1.split_at(10).0, least: 0x300, units: 256 };
+pub const LPUART1: Kind = Kind { name: "LPUART1", least: 0x300, units: 256 };
 /// USART3.
-pub const USART3: Kind = Kind { known: &OF_USART3, least: 16, units: 1 };
+pub const USART3: Kind = Kind { name: "USART3", least: 16, units: 1 };
 
 // CR1; PEIE asks for PE.
 bits! { UE = 0, RE = 2, TE = 3, PEIE = 8, PCE = 10, M0 = 12, RTOIE = 26, FIFOEN = 29, TXFEIE = 30 }
@@ -86,7 +57,7 @@ defaults! {
     #[derive(Clone, Debug)]
     pub struct Uart {
         kind: &'static Kind = &LPUART1,
-        store: Store = Store::new(LPUART1.known),
+        store: Store = Store::of(LPUART1.name),
         /// ISR but for the flags that follow from the FIFOs.
         status: u32 = TC,
         received: VecDeque<u8>,
@@ -103,7 +74,7 @@ defaults! {
 impl Uart {
     /// A port after a reset.
     pub fn new(kind: &'static Kind) -> Self {
-        Self { kind, store: Store::new(kind.known), ..Self::default() }
+        Self { kind, store: Store::of(kind.name), ..Self::default() }
     }
 
     fn on(&self, which: u32) -> bool {

@@ -1,7 +1,7 @@
 //! One converter.
 
 use super::{
-    CFGR, CR, DR, IER, ISR, Inputs, JDR1, JSQR, KNOWN, NEVER, Named, SMPR1, SQR1, Store, TR1, bits,
+    CFGR, CR, DR, IER, ISR, Inputs, JDR1, JDR4, JSQR, NEVER, Named, SMPR1, SQR1, Store, TR1, bits,
 };
 use crate::rules::Rule;
 
@@ -57,7 +57,7 @@ defaults! {
     /// A converter.
     #[derive(Clone, Debug)]
     pub(super) struct Converter {
-        store: Store = Store::new(KNOWN),
+        store: Store = Store::of("ADC"),
         /// ISR.
         pub status: u32,
         control: u32 = DEEPPWD,
@@ -240,7 +240,7 @@ impl Converter {
                 self.status &= !EOC;
                 u32::from(self.regular)
             }
-            JDR1 | 0x84 | 0x88 | 0x8c => u32::from(self.data[(offset - JDR1) as usize / 4]),
+            JDR1..=JDR4 => u32::from(self.data[(offset - JDR1) as usize / 4]),
             _ => return self.store.read(offset),
         })
     }
