@@ -38,7 +38,7 @@ settings! {
         /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
         node_capacitance: f64 = 0.0, 0.0..=if s.switched { 0.0 } else { 1e-6 }, "F";
         /// Current up to which the sign of a phase current grows in proportion to it, A.
-        smoothing_a: f64 = 0.020, 1e-5..=10.0, "A";
+        smoothing_a: f64 = 0.020, 1e-5..=100.0, "A";
         /// Resistance of a switch that conducts, ohm.
         on_resistance: f64 = 0.0, 0.0..=100.0, "ohm";
         /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.

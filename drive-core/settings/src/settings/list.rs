@@ -351,7 +351,7 @@ settings! {
         /// leakage inductance of the fundamental wave at no current, as a share of that of motor.*
         leakage_share: f32 = 1.0, 63: number().from_to(0.5, 2.0);
         /// change of that share per ampere of stator current, peak
-        leakage_slope: f32 = 0.0, 64: number("1/A").from_to(-1.0, 1.0);
+        leakage_slope: f32 = 0.0, 64: number("1/A").from_to(-10.0, 10.0);
     }
 
     /// Limits and protections. Unset ones follow [`rules`](super::rules).

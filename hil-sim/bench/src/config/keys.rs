@@ -223,7 +223,7 @@ keys! {
         /// Capacitance of the output node of each leg; not with switched.
         node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F" => plant.inverter.node_capacitance;
         /// Current up to which what goes with the sign of a phase current grows in proportion to it.
-        smoothing_a: f64 = 0.02, [1e-5 .. 10], "A" => plant.inverter.smoothing_a;
+        smoothing_a: f64 = 0.02, [1e-5 .. 100], "A" => plant.inverter.smoothing_a;
         /// Resistance of a switch that conducts.
         on_resistance: f64 = 0.0, [0 .. 100], "ohm" => plant.inverter.on_resistance;
         /// Resistance of line and winding of phase b beyond that of phase a; not with switched.
