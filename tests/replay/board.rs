@@ -91,17 +91,17 @@ fn torque_steps_without_a_sensor() {
         hashes,
         [
             0x04f2_7a53_cf5c_d181,
-            0x5758_53b9_f41e_f9c0,
-            0xc3a1_59e5_b0a3_4047,
-            0xafe2_0198_5050_bec8,
-            0xd922_b24a_7bbc_662c,
-            0x7297_711a_663d_b17f,
-            0xebfc_ee16_866a_4f1c,
-            0x69b9_ac43_a94d_3266,
-            0x4a38_bdd9_a87c_021c,
-            0x98ab_ab85_0bd3_b76d,
-            0xc6dc_3bb4_9250_8459,
-            0x8fdc_7090_22fd_957d
+            0x00a1_8581_ffe5_dd2f,
+            0xd98b_436e_109b_5d57,
+            0xfeb9_f48a_8d96_205e,
+            0xab0f_fe2c_b499_ae0c,
+            0x294c_0bba_d4fb_0c22,
+            0xa1a9_af67_b5fe_43cf,
+            0x6617_5dd0_3bad_21b3,
+            0x96ea_0eca_ca25_8761,
+            0x0ac1_3eeb_bb43_09a5,
+            0x0639_aca0_4cee_6b7d,
+            0x68d7_3ff8_9071_f9eb
         ],
         "{hashes:#018x?}"
     );

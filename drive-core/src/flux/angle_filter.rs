@@ -43,12 +43,12 @@ const N: usize = 5;
 const T: f32 = CARRIER_S;
 /// Clamp of the angle error that the saliency shows, rad.
 const LARGEST_ERROR: f32 = 0.6;
-/// Variance of the speed that comes in a second, (rad/s)^2, up to 60 Hz rated: slip by another rotor resistance.
+/// Variance of the speed that comes in a second, (rad/s)^2: slip by another rotor resistance.
 const SPEED_NOISE: f32 = 4.0;
 /// Variance of the resistance that comes in a second: heating by 1 %.
 const RESISTANCE_NOISE: f32 = 0.01 * 0.01;
 /// Deviation and time constant of the slow error, rad/s and s: slip by another rotor resistance, and the voltage of the inverter, a
-/// thousandth of the dc link over the flux. Up to 60 Hz rated; it goes with the rated frequency.
+/// thousandth of the dc link over the flux. Motors of one rated frequency have about the same.
 const SLOW: f32 = 1.5;
 const SLOW_S: f32 = 2.0;
 /// Share of the largest change of the current that still counts after a carrier period.
@@ -75,8 +75,6 @@ pub struct AngleFilter {
     pub speed_per_a: f32,
     /// Change of the seen speed per angle error, torque current and speed of the rotor, `k/(tau_r i_d)`, 1/(s A).
     pub flux_by_angle: f32,
-    /// Square of the rated frequency in units of 60 Hz, and 1 below: with it grow the variances of speed and slow error.
-    pub by_rated: f32,
 }
 
 /// State of the filter.
@@ -170,7 +168,7 @@ impl AngleFilter {
         *ae += T * *aw;
         *re = r_kept * (*re + T * *rw);
         *be = KEPT * (*be + T * *bw);
-        *ww += T * (2.0 * *aw + T * *aa + SPEED_NOISE * self.by_rated);
+        *ww += T * (2.0 * *aw + T * *aa + SPEED_NOISE);
         *aw += T * *aa;
         *rw = r_kept * (*rw + T * *ra);
         *ra *= r_kept;
@@ -179,7 +177,7 @@ impl AngleFilter {
         *ba *= KEPT;
         *rr = r_kept * r_kept * *rr + T * RESISTANCE_NOISE;
         *br *= KEPT * r_kept;
-        *bb = KEPT * KEPT * *bb + T * (2.0 / SLOW_S * SLOW * SLOW) * self.by_rated;
+        *bb = KEPT * KEPT * *bb + T * (2.0 / SLOW_S * SLOW * SLOW);
         state.slow *= KEPT;
     }
 
@@ -244,7 +242,6 @@ mod tests {
         speed: 4.1,
         speed_per_a: 14.4,
         flux_by_angle: 1.95,
-        by_rated: 1.0,
     };
     const PER_SALIENCY: f32 = -14.3;
     /// -300 rpm, generating.

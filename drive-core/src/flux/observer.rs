@@ -35,10 +35,6 @@ use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
 /// Gains `s_0` and `c`. Values of `c` from 0.2 to 0.7 differ by 0.1 degrees.
 const AT_REST: f32 = 1.0;
 const WITH_SPEED: f32 = 0.4;
-/// Share by which the gains follow the speed in a carrier period: 33 ms. At once, they would follow the ripple of the tracked speed, six
-/// times the stator frequency, and turn it into a lasting error of angle and resistance (`g7`, torque limit, warm: 1.5 degrees rms in
-/// place of 0.9).
-const GAIN_SHARE: f32 = 0.05;
 /// Most that the flux may turn in a period, as a tangent.
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
@@ -277,7 +273,7 @@ impl Observer {
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
-        state.gain += (Dq { d: gain * a, q: gain * w } - state.gain) * GAIN_SHARE;
+        state.gain = Dq { d: gain * a, q: gain * w };
         state.flux_saliency = self.flux_saliency * (state.flux / self.nominal);
     }
 

@@ -22,6 +22,9 @@ use drive_core::{
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
+/// Rated frequency, Hz, up to which 1 Hz counts as standing, 30 rpm of four poles; in proportion above it. An angle that is right to some
+/// degrees turns a shaft that nothing holds.
+const STANDING_OF_HZ: f32 = 60.0;
 /// Rotor time constants in which flux decays before the asymmetry is measured: the saliency, in its square, to 0.25 %.
 const DECAY_T: f32 = 3.0;
 /// Time between two steps of the thermal loads, s.
@@ -168,16 +171,10 @@ impl Settings {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),
                 verify: periods(VERIFY_S),
-                standing_freq: PERIOD_S * self.over_60_hz(),
+                standing_freq: PERIOD_S * (self.nameplate.frequency_hz / STANDING_OF_HZ).max(1.0),
                 stop_ramp: self.stop_a_per_s() * PERIOD_S,
             },
         })
-    }
-
-    /// Rated frequency in units of 60 Hz, and 1 below. 1 Hz times this counts as standing, 30 rpm of four poles: an angle that is right to
-    /// some degrees turns a shaft that nothing holds.
-    fn over_60_hz(&self) -> f32 {
-        (self.nameplate.frequency_hz / 60.0).max(1.0)
     }
 
     /// The learning with these settings; they must be [valid](Self::check).

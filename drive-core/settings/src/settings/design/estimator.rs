@@ -51,7 +51,9 @@ impl Settings {
         speed_limit: f32,
         (carrier_v, carrier_a): (f32, f32),
     ) -> Estimator {
-        let (inj, p) = (&self.injection, &self.injection.printed);
+        let limit = 1.5 * speed_limit;
+        let inj = &self.injection;
+        let p = &inj.printed;
         let some_v = if carrier_v > 0.0 { carrier_v } else { f32::INFINITY };
         let angle_loop = if inj.demodulator == DemodulatorKind::Synchronous {
             AngleLoop::Filter {
@@ -69,7 +71,7 @@ impl Settings {
                         from: self.full_reference_iq_a(),
                     }),
                 },
-                tracker: Tracker::new(p.k_s, p.z_s, 1.5 * speed_limit),
+                tracker: Tracker::new(p.k_s, p.z_s, limit),
             }
         };
         Estimator {
@@ -85,17 +87,19 @@ impl Settings {
 
     /// The variances of the filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the carrier current, A.
     fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
-        let carrier_s = CARRIER_SAMPLES as f32 * PERIOD_S;
+        const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
         let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
+        let flux = m.coupled_inductance() * i_d;
         // Speed that the observer sees for a change of the current.
-        let per_a = m.sigma_l_s() / (m.coupled_inductance() * i_d * carrier_s);
+        let per_a = m.sigma_l_s() / (flux * CARRIER_S);
         let saliency = AVERAGED_NOISE * noise_a / carrier_a;
         let rate = if self.uses_observer() {
             let rated = self.nameplate.power_w / (TAU / 60.0 * self.nameplate.speed_rpm);
             LOAD_STEP * rated * f32::from(m.pole_pairs) / m.inertia
         } else {
+            let angle = saliency / self.slope().at_rest();
             let w = TAU * self.injection.synchronous.bandwidth_hz;
-            saliency / self.slope().at_rest() * libm::sqrtf(carrier_s) * w * w * w
+            angle * libm::sqrtf(CARRIER_S) * w * w * w
         };
         let square = |x: f32| x * x;
         AngleFilter {
@@ -105,7 +109,6 @@ impl Settings {
             speed: square(SEEN_NOISE * noise_a * per_a),
             speed_per_a: LEAKAGE_ERROR * per_a,
             flux_by_angle: FLUX_SHARE / (m.tau_r() * i_d),
-            by_rated: square(self.over_60_hz()),
         }
     }
 }
