@@ -21,12 +21,12 @@ pub struct Parameters<T = f64> {
 }
 
 impl<T: Copy> Parameters<T> {
-    /// Of the five in the order of [`Parameters::NAMES`].
+    /// The parameters with these five values, in the order of [`Parameters::NAMES`].
     pub const fn of([r_s, tau_r, sigma_l_s, l_s, omega_m]: [T; 5]) -> Self {
         Self { r_s, tau_r, sigma_l_s, l_s, omega_m }
     }
 
-    /// The five in the order of [`Parameters::NAMES`].
+    /// The five values, in the order of [`Parameters::NAMES`].
     pub const fn array(&self) -> [T; 5] {
         [self.r_s, self.tau_r, self.sigma_l_s, self.l_s, self.omega_m]
     }
