@@ -11,8 +11,6 @@ use crate::{budget, run};
 
 /// Modules below this many seconds are not listed.
 const LISTED: f64 = 3.0;
-/// Seconds of a module beyond this multiple of its budget fail: no load of the machine explains them.
-const GROSS: f64 = 10.0;
 
 /// Runs a command `cargo test` that has no options for the tests themselves; lists the slow modules.
 pub fn test(name: &str, mut command: Command) -> Result<()> {
@@ -41,8 +39,6 @@ pub fn test(name: &str, mut command: Command) -> Result<()> {
     }
     println!("    {name}: done in {:.0} s", began.elapsed().as_secs_f64());
     ensure!(status.success(), "{name}, {status}\n    {command:?}");
-    let slow = modules.iter().find(|(_, seconds)| *seconds > GROSS * budget);
-    ensure!(slow.is_none(), "far above the budget of {budget} s: {slow:?}");
     Ok(())
 }
 

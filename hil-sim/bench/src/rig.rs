@@ -1,12 +1,19 @@
 //! The bench: a drive, a plant, and the one period between them.
 
+use std::f64::consts::TAU;
+
+use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
-use drive_core::{Compare, FrontEndState, Sample};
+use drive_core::{
+    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
+};
+use drive_settings::Settings;
 
-use crate::config;
-use crate::plant::{Plant, PlantSettings};
-use crate::prelude::*;
+use crate::config::{self, Config, built, plant_settings};
+use crate::error::Error;
+use crate::plant::{Load, Plant, PlantSettings};
+use crate::stats::Stats;
 
 /// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;
@@ -85,8 +92,7 @@ impl Rig {
     /// # Errors
     /// [`Error::Refused`] with the setting that the plant or the drive refuses.
     pub fn new(plant: &PlantSettings, drive: &Settings, seed: u64) -> Result<Self, Error> {
-        let plant = Plant::new(plant, seed).map_err(Error::refused)?;
-        Ok(Self::of(plant, Drive::new(built(drive)?)))
+        Ok(Self::of(Plant::new(plant, seed).map_err(Error::refused)?, Drive::new(built(drive)?)))
     }
 
     /// A drive that is off, connected to a motor at rest, both made already.

@@ -2,5 +2,4 @@
 
 pub use sim_bench::prelude::*;
 
-pub use crate::recomputed::{beside, printed};
-pub use crate::source::named;
+pub use crate::source::{beside, named, printed};

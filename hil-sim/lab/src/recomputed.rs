@@ -20,19 +20,9 @@ pub const PERIOD_S: f64 = 1.0 / RATE;
 /// The carrier, Hz.
 pub const CARRIER_HZ: f64 = RATE / CARRIER_SAMPLES as f64;
 
-/// A printed number of S1.
-pub fn printed(place: &str, quantity: &str) -> f64 {
-    source::number("S1", place, quantity)
-}
-
 /// A printed plant: gain and pole.
 pub fn plant(place: &str) -> FirstOrder {
     FirstOrder { k: printed(place, "gain"), p: printed(place, "pole") }
-}
-
-/// Ours beside a printed value of S1.
-pub fn beside(place: &str, quantity: &str) -> Compared {
-    Compared::with("S1", place, quantity)
 }
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {

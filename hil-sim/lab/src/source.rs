@@ -205,6 +205,16 @@ pub fn number(source: &str, place: &str, quantity: &str) -> f64 {
     found.unwrap_or_else(|| panic!("{source} prints no number at {place}, {quantity}"))
 }
 
+/// A printed number of S1.
+pub fn printed(place: &str, quantity: &str) -> f64 {
+    number("S1", place, quantity)
+}
+
+/// Ours beside a printed value of S1.
+pub fn beside(place: &str, quantity: &str) -> Compared {
+    Compared::with("S1", place, quantity)
+}
+
 /// Ours beside the printed value of this name.
 ///
 /// # Panics

@@ -1,8 +1,9 @@
 //! Step of the current loop on the identified plant.
 
 use drive_core::FirstOrder;
-use sim_lab::recomputed::{plant, printed};
+use sim_lab::recomputed::plant;
 use sim_lab::source::named;
+use sim_lab::source::printed;
 
 use super::bode::largest_pole;
 use crate::prelude::*;
