@@ -1,8 +1,7 @@
 //! Learned values as lines of text, which `backup` prints and a paste restores.
 //!
 //! `learned INDEX WORD ...` gives up to eight of the words of [`crate::store::learned`], from an index on, in
-//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them. Earlier
-//! firmware had fewer words.
+//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them.
 
 use core::fmt;
 
@@ -38,6 +37,9 @@ pub enum RestoreError {
     /// Learned with another choice of the zero vectors, this word.
     #[error("learned: with scales.both_zero_vectors = {0}; set it so before, or learn again")]
     ZeroVectors(&'static str),
+    /// Learned by a firmware with other rules.
+    #[error("learned: with the rules of an earlier firmware; learn again")]
+    Rules,
     /// No result that a learning accepts.
     #[error("learned: no result that a learning accepts")]
     Unbelievable,
@@ -73,18 +75,20 @@ impl Restore {
     /// Words are missing or damaged, make no result, or one for the other.
     pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
         let Self { words, present } = core::mem::take(self);
-        let count = present.trailing_ones() as usize;
-        if !learned::is_whole(present) {
-            return Err(RestoreError::Missing(count));
+        if learned::is_of_other_rules(&words, present) {
+            return Err(RestoreError::Rules);
         }
-        let right = checksum(words.get(..count).unwrap_or_default());
+        if present != learned::ALL {
+            return Err(RestoreError::Missing(present.trailing_ones() as usize));
+        }
+        let right = checksum(&words);
         if right != check {
             return Err(RestoreError::Checksum(right));
         }
         if learned::in_both(&words) != both {
             return Err(RestoreError::ZeroVectors((!both).word()));
         }
-        learned::from_words(&words, present).ok_or(RestoreError::Unbelievable)
+        learned::from_words(&words).ok_or(RestoreError::Unbelievable)
     }
 }
 

@@ -172,13 +172,12 @@ pub fn settings(
     if settings.board != defaults.board {
         return Err(Rejected::Board(settings.board.name));
     }
-    if present > 0 {
+    // Else the drive has to learn again.
+    if present > 0 && !learned::is_of_other_rules(&words, present) {
         let same = learned::in_both(&words) == settings.drive.scales.both_zero_vectors;
-        let learned = learned::from_words(&words, present).filter(|_| same);
-        let learned = learned.ok_or(Rejected::Value(learned::NAME))?;
-        // Else the drive has to learn again.
-        let current = learned::of_todays_rules(&words, settings.drive.sequence.flux);
-        settings.learned = current.then_some(learned);
+        let is_sound = same && present == learned::ALL;
+        let learned = learned::from_words(&words).filter(|_| is_sound);
+        settings.learned = Some(learned.ok_or(Rejected::Value(learned::NAME))?);
     }
     Ok(settings)
 }

@@ -8,15 +8,15 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, today's rules of the torque; rotor positions in the third byte, 0 counts as 1 |
-//! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, two of earlier firmware's and of today's rules; rotor positions in the third byte |
+//! | 37 | distance of the points, A |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
 //! | 55 to 57 | asymmetry: constant, sine, cosine |
 //! | 58 to 60 | the same at the start, 0 where it was not seen |
 //!
-//! All but number 36 are in single precision. An earlier firmware had none from 38 on; a drive with such a record has to learn
-//! again before it starts without an encoder. A later one had none from 58 on.
+//! All but number 36 are in single precision. What was learned with other rules of the torque, or another compensation of the dead
+//! time, is of another drive: it is left out, and the drive has to learn again.
 
 use core::mem::offset_of;
 
@@ -24,7 +24,6 @@ use bytemuck::{Pod, Zeroable, must_cast};
 use drive_core::carrier::Asymmetry;
 use drive_core::learned::{Fitted, Learned, Verdict};
 use drive_core::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
-use drive_settings::Flux;
 
 use crate::hash;
 
@@ -48,12 +47,8 @@ struct Stored {
 
 /// Number of values.
 pub const WORDS: usize = size_of::<Stored>() / 4;
-/// A bit for each value that every firmware writes.
-const NEEDED: u64 = bits_before(offset_of!(Stored, step_a));
-/// The same of those that wrote the distance of the points, of those that wrote the asymmetry, and of all.
-const WITH_STEP: u64 = bits_before(offset_of!(Stored, slope));
-const WITH_ASYMMETRY: u64 = bits_before(offset_of!(Stored, at_start));
-const ALL: u64 = bits_before(size_of::<Stored>());
+/// A bit for each value.
+pub const ALL: u64 = (1 << WORDS) - 1;
 /// The name that their ids derive from, and that a rejection states.
 pub const NAME: &str = "learned";
 
@@ -66,12 +61,8 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
-const TODAYS_RULES: u32 = 1 << 14;
-
-/// A bit for each value before this offset, in bytes.
-const fn bits_before(offset: usize) -> u64 {
-    (1 << (offset / 4)) - 1
-}
+/// Bit 14 were the rules of the torque with the dead time compensated by the sign of a mean current.
+const TODAYS_RULES: u32 = 1 << 15;
 
 /// The id of a value: the hash of the name plus its index.
 pub fn id(index: usize) -> u32 {
@@ -84,20 +75,14 @@ pub fn index(id: u32) -> Option<usize> {
     (index < WORDS).then_some(index)
 }
 
-/// Whether these values, a bit for each, are all that this or an earlier firmware writes.
-pub fn is_whole(present: u64) -> bool {
-    [NEEDED, WITH_STEP, WITH_ASYMMETRY, ALL].contains(&present)
-}
-
 /// Whether a result with these values was learned with the currents of both zero vectors.
 pub fn in_both(words: &[u32; WORDS]) -> bool {
     words[FLAGS] & IN_BOTH != 0
 }
 
-/// Whether a result with these values is of the rules in force, which give direct current, current limit and table with high flux: it is
-/// of no use with those of another firmware.
-pub fn of_todays_rules(words: &[u32; WORDS], flux: Flux) -> bool {
-    flux == Flux::Low || words[FLAGS] & TODAYS_RULES != 0
+/// Whether these values, with a bit for each that is present, were learned with other rules than those in force: they are of no use.
+pub fn is_of_other_rules(words: &[u32; WORDS], present: u64) -> bool {
+    present & 1 << FLAGS != 0 && words[FLAGS] & TODAYS_RULES == 0
 }
 
 /// The values of a result, and of whether it was learned with the currents of both zero vectors.
@@ -131,16 +116,11 @@ pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     })
 }
 
-/// The result with these values, if it is one that a learning accepts. `present` has a bit for each value that was
-/// read.
-pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
+/// The result with these values, if it is one that a learning accepts.
+pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
     let stored: Stored = must_cast(*words);
     let has = |flag: u32| stored.flags & flag != 0;
-    let with_slope = present >= WITH_ASYMMETRY;
-    if !is_whole(present) || (has(HAS_SLOPE) && !with_slope) {
-        return None;
-    }
-    let grid = if present == NEEDED { Grid::REFERENCE } else { Grid::of_step(stored.step_a)? };
+    let grid = Grid::of_step(stored.step_a)?;
     let fitted = |[value, misfit]: [f32; 2], flag| Fitted { value, misfit, accepted: has(flag) };
     let asymmetry = |[constant, sin, cos]: [f32; 3]| Asymmetry { constant, sin, cos };
     let carrier = CarrierTable::from_points(grid, from_zero(1.0, &stored.carrier));
@@ -149,19 +129,18 @@ pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
         return None;
     }
     let slope = slope.filter(|_| has(HAS_SLOPE));
-    let points = (stored.flags & 0xff) as usize;
     let learned = Learned {
         reference: ReferenceTable::from_points(grid, from_zero(0.0, &stored.reference))?,
         carrier: carrier.filter(|_| has(HAS_CARRIER)),
-        points,
+        points: (stored.flags & 0xff) as usize,
         slope,
         slope_at_rest: slope.map_or(0.0, |slope| slope.at_rest()),
-        limit_a: if with_slope { stored.limit_a } else { grid.current(points) },
+        limit_a: stored.limit_a,
         spread: stored.spread,
         ripple: 0.0,
-        asymmetry: if with_slope { asymmetry(stored.asymmetry) } else { Asymmetry::default() },
-        at_start: (present == ALL && has(HAS_START)).then(|| asymmetry(stored.at_start)),
-        positions: ((stored.flags >> POSITIONS) as u8).max(1),
+        asymmetry: asymmetry(stored.asymmetry),
+        at_start: has(HAS_START).then(|| asymmetry(stored.at_start)),
+        positions: (stored.flags >> POSITIONS) as u8,
         gain_mismatch: fitted(stored.gain_mismatch, HAS_GAINS),
         current_saliency: fitted(stored.current_saliency, HAS_CURRENT),
         flux_saliency: stored.flux_saliency,

@@ -1,8 +1,6 @@
 //! Records that older firmware has saved.
 
-use drive_core::{AngleSource, Command, Drive, Mode, Refused};
-
-use drive_settings::Flux;
+use drive_core::{Command, Drive, Mode, Refused};
 
 use super::*;
 
@@ -55,84 +53,29 @@ fn records_saved_by_commit_1abee12_are_read() {
         let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
         key.set(&mut expected, key.parse(value).unwrap());
     }
-    let fitted = |value, misfit| Fitted { value, misfit, accepted: true };
-    // No slope and no asymmetry yet: without an encoder the drive has to learn again.
-    expected.learned = Some(Learned {
-        reference: ReferenceTable::default(),
-        slope: None,
-        slope_at_rest: 0.0,
-        limit_a: Grid::REFERENCE.current(13),
-        carrier: Some(CarrierTable::default()),
-        points: 13,
-        spread: 0.001,
-        ripple: 0.0,
-        asymmetry: Asymmetry::default(),
-        at_start: None,
-        positions: 1,
-        gain_mismatch: fitted(0.01, 0.0002),
-        current_saliency: fitted(0.03, 0.02),
-        flux_saliency: -0.035,
-        verdict: Verdict::Sound,
-    });
+    // What it learned is of other rules.
     assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
 }
 
-/// With high flux, direct current, current limit and table follow from rules that an earlier firmware had not: what it learned is of another
-/// drive, which has to learn again. Its settings stay. The dissertation's flux has the rules that it had.
+/// What an earlier firmware learned is of other rules, by which direct current, current limit, table and the dead time's compensation follow:
+/// it is left out, whatever it lacks, and the settings stay. Without an encoder the drive has to learn again.
 #[test]
-fn a_result_of_other_rules_is_left_out_with_high_flux() {
-    for (flux, is_kept) in [(Flux::Low, true), (Flux::High, false)] {
-        let mut new = with_learned();
-        new.drive.sequence.flux = flux;
+fn a_result_of_other_rules_is_left_out() {
+    let new = with_learned();
+    let flags = 2 + keys::COUNT + 36;
+    for lacks in [0, 3, 20] {
         let mut record = codec::record(&new, 3);
         let mut fake = Fake::new();
         fake.hold(0, record);
         assert_eq!(load(&mut fake), Loaded::Settings(new));
-        // The bit that an earlier firmware did not write.
-        record[2 + keys::COUNT + 36] &= !(1 << (32 + 14));
+        // The bit that it did not write, and the last values.
+        record[flags] &= !(1 << (32 + 15));
+        record[codec::WORDS - lacks as usize..].fill(u64::MAX);
+        record[0] -= lacks << 48;
         fake.hold(0, resealed(record));
-        new.learned = new.learned.filter(|_| is_kept);
-        assert_eq!(load(&mut fake), Loaded::Settings(new), "{flux:?}");
+        let expected = FirmwareSettings { learned: None, ..new };
+        assert_eq!(load(&mut fake), Loaded::Settings(expected), "{lacks}");
+        let mut drive = Drive::new(expected.build().unwrap());
+        assert_eq!(drive.command(&Command::Start(Mode::Torque)), Err(Refused::NotLearned));
     }
-}
-
-/// Later firmware wrote the distance of the points, too, but no slope yet.
-#[test]
-fn records_without_a_slope_are_read_and_the_drive_has_to_learn_again() {
-    /// Values of a learned result that were written first.
-    const WITH_STEP: usize = 38;
-    let mut new = with_learned();
-    let learned = new.learned.as_mut().unwrap();
-    (learned.slope, learned.slope_at_rest, learned.verdict) = (None, 0.0, Verdict::Sound);
-    let mut record = codec::record(&new, 3);
-    let missing = (learned_words::WORDS - WITH_STEP) as u64;
-    record[codec::WORDS - missing as usize..].fill(u64::MAX);
-    record[0] -= missing << 48;
-    // That firmware had one rotor position.
-    let flags = 2 + keys::COUNT + 36;
-    record[flags] &= !(0xff << 48);
-    let mut fake = Fake::new();
-    fake.hold(0, resealed(record));
-    let learned = new.learned.as_mut().unwrap();
-    (learned.limit_a, learned.asymmetry, learned.positions) =
-        (Grid::REFERENCE.current(13), Asymmetry::default(), 1);
-    let Loaded::Settings(loaded) = load(&mut fake) else { panic!("not loaded") };
-    assert_eq!(loaded, new);
-    let mut drive = Drive::new(loaded.build().unwrap());
-    let start = Command::Start(Mode::Torque);
-    assert_eq!(drive.command(&start), Err(Refused::NotLearned));
-    // With the encoder nothing has to be learned.
-    let mut loaded = loaded;
-    loaded.drive.angle_source = AngleSource::Encoder;
-    assert!(Drive::new(loaded.build().unwrap()).command(&start).is_ok());
-    // One value less than that is no result.
-    record[flags + 1] = u64::MAX;
-    record[0] -= 1 << 48;
-    let mut fake = Fake::new();
-    fake.hold(0, resealed(record));
-    assert!(matches!(load(&mut fake), Loaded::Settings(_)), "as commit 1abee12 wrote it");
-    record[flags] = u64::MAX;
-    record[0] -= 1 << 48;
-    fake.hold(0, resealed(record));
-    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")));
 }
