@@ -37,12 +37,13 @@ impl Learning {
         let ripple = fpu_sqrt::sqrtf(state.ripple);
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
+        } else if self.normalised && !Verdict::of_slope(slope_at_rest).is_accepted() {
+            // No lock of the shaft cures that.
+            Verdict::SlopeTooSmall
         } else if !(spread <= SPREAD && self.points > 0) {
             Verdict::Uneven
         } else if !self.normalised {
             Verdict::Sound
-        } else if !Verdict::of_slope(slope_at_rest).is_accepted() {
-            Verdict::SlopeTooSmall
         } else if ripple > RIPPLE * slope_at_rest.abs() {
             Verdict::Bent
         } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.is_none() {

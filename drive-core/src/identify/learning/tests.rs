@@ -182,6 +182,10 @@ fn what_does_not_fit_is_not_accepted() {
     assert!(!result(&|_| f64::NAN).verdict.is_accepted());
     let uneven = result(&|i_q| reference(i_q) + 0.002 * i_q * i_q);
     assert_eq!(uneven.verdict, Verdict::Uneven, "{uneven:?}");
+    // Where the slope is too small, too, that is said: no lock of the shaft cures it.
+    let q = |i_q, lead, _| reference(i_q) + 0.002 * i_q * i_q + 0.1 * slope(i_q) * lead;
+    let both = learning().result(&learn(q, locked).1, &start());
+    assert_eq!(both.verdict, Verdict::SlopeTooSmall, "{both:?}");
     // A sensor that is not linear: the signal repeats four times in a turn, here at large currents.
     let bent = |size: f64| {
         let q = |i_q: f64, lead: f64, theta: f64| {
