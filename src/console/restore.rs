@@ -72,7 +72,7 @@ impl Restore {
     /// The result of the words that came in, for currents of `both` zero vectors or of one; the next begins anew.
     ///
     /// # Errors
-    /// Words are missing or damaged, make no result, or one for the other.
+    /// Words are missing or damaged, make no result, or one of other rules or zero vectors.
     pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
         let Self { words, present } = core::mem::take(self);
         if learned::is_of_other_rules(&words, present) {

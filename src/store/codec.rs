@@ -172,7 +172,7 @@ pub fn settings(
     if settings.board != defaults.board {
         return Err(Rejected::Board(settings.board.name));
     }
-    // Else the drive has to learn again.
+    // A result of other rules is left out: the drive has to learn again.
     if present > 0 && !learned::is_of_other_rules(&words, present) {
         let same = learned::in_both(&words) == settings.drive.scales.both_zero_vectors;
         let is_sound = same && present == learned::ALL;

@@ -8,15 +8,15 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, two of earlier firmware's and of today's rules; rotor positions in the third byte |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, a bit that earlier firmware set, today's rules; rotor positions in the third byte |
 //! | 37 | distance of the points, A |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
 //! | 55 to 57 | asymmetry: constant, sine, cosine |
 //! | 58 to 60 | the same at the start, 0 where it was not seen |
 //!
-//! All but number 36 are in single precision. What was learned with other rules of the torque, or another compensation of the dead
-//! time, is of another drive: it is left out, and the drive has to learn again.
+//! All but number 36 are in single precision. Earlier firmware learned with other rules of the torque or another compensation of the
+//! dead time. Its results do not fit this drive: they are left out, and the drive has to learn again.
 
 use core::mem::offset_of;
 
@@ -61,7 +61,7 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
-/// Bit 14 were the rules of the torque with the dead time compensated by the sign of a mean current.
+/// The firmware that set bit 14 compensated the dead time by the sign of the mean current of a period.
 const TODAYS_RULES: u32 = 1 << 15;
 
 /// The id of a value: the hash of the name plus its index.
@@ -80,7 +80,7 @@ pub fn in_both(words: &[u32; WORDS]) -> bool {
     words[FLAGS] & IN_BOTH != 0
 }
 
-/// Whether these values, with a bit for each that is present, were learned with other rules than those in force: they are of no use.
+/// Whether a result with these values was learned by earlier firmware with other rules. `present` has a bit for each value that was read.
 pub fn is_of_other_rules(words: &[u32; WORDS], present: u64) -> bool {
     present & 1 << FLAGS != 0 && words[FLAGS] & TODAYS_RULES == 0
 }

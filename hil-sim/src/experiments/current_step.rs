@@ -2,8 +2,7 @@
 
 use drive_core::FirstOrder;
 use sim_lab::recomputed::plant;
-use sim_lab::source::named;
-use sim_lab::source::printed;
+use sim_lab::source::{named, printed};
 
 use super::bode::largest_pole;
 use crate::prelude::*;

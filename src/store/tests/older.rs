@@ -1,6 +1,6 @@
 //! Records that older firmware has saved.
 
-use drive_core::{Command, Drive, Mode, Refused};
+use drive_core::{AngleSource, Command, Drive, Mode, Refused};
 
 use super::*;
 
@@ -53,12 +53,12 @@ fn records_saved_by_commit_1abee12_are_read() {
         let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
         key.set(&mut expected, key.parse(value).unwrap());
     }
-    // What it learned is of other rules.
+    // That firmware learned with other rules: its result is left out.
     assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
 }
 
-/// What an earlier firmware learned is of other rules, by which direct current, current limit, table and the dead time's compensation follow:
-/// it is left out, whatever it lacks, and the settings stay. Without an encoder the drive has to learn again.
+/// Earlier firmware had other rules for direct current, current limit, table and dead time. The drive leaves out what it learned, complete or
+/// not, and keeps its settings. A start without an encoder then needs a learning.
 #[test]
 fn a_result_of_other_rules_is_left_out() {
     let new = with_learned();
@@ -76,6 +76,17 @@ fn a_result_of_other_rules_is_left_out() {
         let expected = FirmwareSettings { learned: None, ..new };
         assert_eq!(load(&mut fake), Loaded::Settings(expected), "{lacks}");
         let mut drive = Drive::new(expected.build().unwrap());
-        assert_eq!(drive.command(&Command::Start(Mode::Torque)), Err(Refused::NotLearned));
+        let start = Command::Start(Mode::Torque);
+        assert_eq!(drive.command(&start), Err(Refused::NotLearned));
+        // With the encoder nothing has to be learned.
+        let mut loaded = expected;
+        loaded.drive.angle_source = AngleSource::Encoder;
+        assert!(Drive::new(loaded.build().unwrap()).command(&start).is_ok());
+        // Without the word that holds the rules it is no result.
+        record[codec::WORDS - lacks as usize - 1] = u64::MAX;
+        record[flags] = record[flags - 1];
+        record[0] -= 1 << 48;
+        fake.hold(0, resealed(record));
+        assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")), "{lacks}");
     }
 }

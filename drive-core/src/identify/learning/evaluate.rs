@@ -38,7 +38,7 @@ impl Learning {
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
         } else if self.normalised && !Verdict::of_slope(slope_at_rest).is_accepted() {
-            // No lock of the shaft cures that.
+            // A better lock of the shaft does not raise the slope.
             Verdict::SlopeTooSmall
         } else if !(spread <= SPREAD && self.points > 0) {
             Verdict::Uneven

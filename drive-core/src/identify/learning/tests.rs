@@ -182,7 +182,7 @@ fn what_does_not_fit_is_not_accepted() {
     assert!(!result(&|_| f64::NAN).verdict.is_accepted());
     let uneven = result(&|i_q| reference(i_q) + 0.002 * i_q * i_q);
     assert_eq!(uneven.verdict, Verdict::Uneven, "{uneven:?}");
-    // Where the slope is too small, too, that is said: no lock of the shaft cures it.
+    // An uneven reference and too small a slope: the verdict is the slope, which a better lock of the shaft does not raise.
     let q = |i_q, lead, _| reference(i_q) + 0.002 * i_q * i_q + 0.1 * slope(i_q) * lead;
     let both = learning().result(&learn(q, locked).1, &start());
     assert_eq!(both.verdict, Verdict::SlopeTooSmall, "{both:?}");
