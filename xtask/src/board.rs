@@ -7,7 +7,6 @@ use std::process::Command;
 use anyhow::Result;
 use clap::Args;
 
-use crate::toolchain::Target;
 use crate::{budget, image, run, times, toolchain};
 
 /// Environment variable by which the tests find the image.
@@ -19,14 +18,9 @@ const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 /// Faults of a whole campaign; `cargo xtask test` injects a twentieth.
 pub const CAMPAIGN: u32 = 2000;
 
-/// Builds the images of all boards and runs the tests of the virtual board with them.
-pub fn test(target: &Target) -> Result<()> {
+/// Runs the tests of the virtual board with the images of all boards: this one of the reference board, the others from their folder.
+pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    for board in image::boards()?.iter().filter(|board| *board != image::REFERENCE) {
-        image::build_for(target, board)?;
-    }
-    // Last: the others leave their image at its path.
-    let elf = image::build_for(target, image::REFERENCE)?;
     let mut command = cargo("test --release --tests --no-fail-fast")?;
     command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
     times::test("the images on the virtual board", command)

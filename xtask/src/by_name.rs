@@ -29,8 +29,8 @@ pub fn pages() -> Result<()> {
     let (elf, web) = (image::build()?, web::build()?);
     // One after the other: the virtual board keeps pace with the clock.
     let options = "--ignored --nocapture --test-threads=1";
-    let mut test =
-        run::cargo(&format!("test --release --package drive-live --test page -- {options}"));
+    // Of the whole workspace, as the host tests: nothing is built again.
+    let mut test = run::cargo(&format!("test --workspace --test page -- {options}"));
     run::step(
         "pages in Chromium",
         test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web),

@@ -31,6 +31,15 @@ pub fn build() -> Result<PathBuf> {
     build_for(&toolchain::for_target()?, REFERENCE)
 }
 
+/// Builds and checks the images of all boards; returns the path of that of the reference board.
+pub fn build_all(target: &Target) -> Result<PathBuf> {
+    // The reference last: each leaves its image at the same path.
+    for board in boards()?.iter().filter(|board| *board != REFERENCE) {
+        build_for(target, board)?;
+    }
+    build_for(target, REFERENCE)
+}
+
 /// Builds and checks the image of a board. The path of the last image built is always the same; images of other boards
 /// than the reference are copied to `target/boards/NAME/`, and that path is returned.
 pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {

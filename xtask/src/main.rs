@@ -137,7 +137,7 @@ fn run(task: Task) -> Result<()> {
         Task::Quick => quick(),
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
-        Task::Board => board::test(&toolchain::for_target()?),
+        Task::Board => board::test(&image::build_all(&toolchain::for_target()?)?),
         Task::BenchDump(which) => by_name::bench_dump(&which.image()?, &which.board),
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
@@ -199,13 +199,13 @@ fn test() -> Result<()> {
     steps.with(target, "control crates for the controller", |target| {
         let core =
             ["--package=induction-drive-commission", "--features=induction-drive-core/defmt"];
-        run::step("control crates for the controller", target.cargo("build")?.args(core))
+        run::step("control crates for the controller", target.cargo("check")?.args(core))
     });
     steps.with(target, "lints of the firmware", |target| {
         let lints = ["--package", "induction-drive", "--no-deps", "--", "-D", "warnings"];
         run::step("lints of the firmware", target.cargo("clippy")?.args(lints))
     });
-    let elf = steps.with(target, "firmware", |target| image::build_for(target, image::REFERENCE));
+    let elf = steps.with(target, "firmware", image::build_all);
     let elf = elf.as_deref();
     steps.with(elf, "size", size::report);
 
@@ -216,7 +216,7 @@ fn test() -> Result<()> {
         let faults = board::Faults { count, seed: 1, class, rpm: None };
         board::campaign(elf, image::REFERENCE, &faults)
     });
-    steps.with(target.filter(|_| elf.is_some()), "the image on the virtual board", board::test);
+    steps.with(elf, "the image on the virtual board", board::test);
     steps.with(elf, "cycles of the control interrupt", board::cycles);
 
     steps.end()?;

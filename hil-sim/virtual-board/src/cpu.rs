@@ -12,7 +12,9 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 pub use unicorn_engine::RegisterARM as Register;
-use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
+use unicorn_engine::unicorn_const::{
+    Arch, HookType, MemType, Mode, Permission, TlbEntry, TlbType, uc_error,
+};
 use unicorn_engine::{Context, UcHookId, Unicorn};
 
 use crate::chip::Chip;
@@ -125,6 +127,7 @@ impl Cpu {
         } else {
             let mut lengths = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |_| 1);
             let mut costs = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |i| i.cycles);
+            let mut last = 0;
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
                 if fetched(uc, address, size) {
                     return;
@@ -136,14 +139,14 @@ impl Cpu {
                     return;
                 }
                 let instructions = cost_of(&mut lengths, uc, address as u32, size);
-                let watched = uc.get_data().watched.as_ref();
-                if let Some(watched) = watched {
-                    let own = watched.counts(address as u32);
-                    let cycles =
-                        if own { cost_of(&mut costs, uc, address as u32, size) } else { 0 };
-                    uc.get_data_mut().watch(address as u32, size, cycles);
-                }
                 uc.get_data_mut().instructions(u64::from(instructions));
+                if uc.get_data().watched.is_some() {
+                    let cycles = cost_of(&mut costs, uc, address as u32, size);
+                    uc.get_data_mut().watch(address as u32, size, cycles);
+                } else if size == 4 && last == address {
+                    skip_delay(uc, address);
+                }
+                last = address;
             })?;
         }
         if counting.cycles {
@@ -172,10 +175,19 @@ impl Cpu {
             uc.emu_stop().ok();
         })?;
         let faulted = Rc::new(Cell::new(None));
-        let note = Rc::clone(&faulted);
-        uc.add_mem_hook(HookType::MEM_INVALID, 0, u64::MAX, move |_, _, address, _, _| {
-            note.set(Some(address as u32));
-            false
+        // Writes to a page are slow if a hook is there, also one of this kind, or if the emulator believes that it may be executed.
+        for (from, to) in [(0, ram.0 - 1), (ram.1 + 1, u64::MAX)] {
+            let note = Rc::clone(&faulted);
+            uc.add_mem_hook(HookType::MEM_INVALID, from, to, move |_, _, address, _, _| {
+                note.set(Some(address as u32));
+                false
+            })?;
+        }
+        uc.ctl_tlb_type(TlbType::VIRTUAL)?;
+        uc.add_tlb_hook(0, u64::MAX, |_, paddr, access| {
+            let data = Permission::READ | Permission::WRITE;
+            let perms = if access == MemType::FETCH { Permission::ALL } else { data };
+            Some(TlbEntry { paddr, perms })
         })?;
         Ok(Self { uc, faulted, trapped, guard: None, flash_reads: None })
     }
@@ -314,17 +326,9 @@ impl Cpu {
 
     /// Sets the registers as after a reset, stack pointer and program counter from the vector table.
     pub fn reset(&mut self, vectors: u32) {
-        for register in BASIC.into_iter().take(6) {
-            self.uc.reg_write(register, 0).ok();
-        }
-        for register in [
-            Register::CONTROL,
-            Register::PRIMASK,
-            Register::BASEPRI,
-            Register::FAULTMASK,
-            Register::FPSCR,
-        ] {
-            self.uc.reg_write(register, 0).ok();
+        use Register::{BASEPRI, CONTROL, FAULTMASK, FPSCR, PRIMASK};
+        for register in BASIC[..6].iter().chain(&[CONTROL, PRIMASK, BASEPRI, FAULTMASK, FPSCR]) {
+            self.set(*register, 0);
         }
         self.set_exception(1 << 24);
         let (sp, pc) = (self.word(vectors), self.word(vectors + 4));
@@ -354,6 +358,18 @@ fn fetched(uc: &mut Unicorn<Chip>, address: u64, size: u32) -> bool {
         return true;
     }
     stopped(uc, address)
+}
+
+/// Takes at once the rounds of a loop that only counts a register down, `subs rN, #1` and `bne`, which surely begin before an event.
+fn skip_delay(uc: &mut Unicorn<Chip>, address: u64) {
+    let code = uc.mem_read_as_vec(address, 4);
+    if let Ok([1, subtract @ 0x38..=0x3f, 0xfd, 0xd1]) = code.as_deref() {
+        let register = Register::R0 as i32 + i32::from(subtract & 7);
+        let left = uc.reg_read(register).unwrap_or(0);
+        let rounds = (uc.get_data().instructions_before_event() / 2).min(left.saturating_sub(2));
+        uc.reg_write(register, left - rounds).ok();
+        uc.get_data_mut().instructions(2 * rounds);
+    }
 }
 
 /// Cycles of a block.

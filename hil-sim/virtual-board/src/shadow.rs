@@ -80,27 +80,25 @@ impl Shadow {
     /// # Errors
     /// Its settings make no drive.
     pub fn new(options: &Options) -> Result<Self> {
-        let mut settings = confirmed::settings(options)?;
-        if !options.confirmed {
-            settings = FirmwareSettings::of(settings.board);
-        }
+        let settings = confirmed::settings(options)?;
+        let fresh = FirmwareSettings::of(settings.board);
+        Self::with(if options.confirmed { settings } else { fresh }, 0)
+    }
+
+    /// The drive that a board starts with which has these settings, after as many control interrupts.
+    fn with(mut settings: FirmwareSettings, compared: u64) -> Result<Self> {
         let timer = Timer::of(&settings.drive.inverter);
+        let session = Session::new(&settings.drive);
+        let (waiting, state, periods) = (VecDeque::new(), State::Off, compared as u32);
         Ok(Self {
             drive: Drive::new(settings.build_for(&timer)?),
             front_end: FrontEndState::default(),
             output: Output::default(),
             tracking: Tracking::new(&settings.drive),
             desk: Desk::new(settings),
-            orders: Orders {
-                waiting: VecDeque::new(),
-                state: State::Off,
-                periods: 0,
-                timer,
-                learned: None,
-                session: Session::new(&settings.drive),
-            },
+            orders: Orders { waiting, state, periods, timer, learned: None, session },
             tau_r: None,
-            compared: 0,
+            compared,
         })
     }
 
@@ -133,12 +131,8 @@ impl Shadow {
     ///
     /// # Errors
     /// They make no drive.
-    pub fn restart(&mut self, mut settings: FirmwareSettings) -> Result<()> {
-        self.orders.timer = Timer::of(&settings.drive.inverter);
-        self.desk = Desk::new(settings);
-        self.drive = Drive::new(settings.build_for(&self.orders.timer)?);
-        self.front_end = FrontEndState::default();
-        self.orders.waiting.clear();
+    pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
+        *self = Self::with(settings, self.compared)?;
         Ok(())
     }
 

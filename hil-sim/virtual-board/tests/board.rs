@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use virtual_board::cpu::Register;
+use virtual_board::memory;
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
@@ -65,6 +66,16 @@ fn a_hanging_core_is_off_within_three_periods() -> Result<()> {
 /// A main loop that hangs while the control interrupt goes on: the independent watchdog is not fed.
 #[test]
 fn a_hanging_main_loop_is_off_within_six_milliseconds() -> Result<()> {
+    hang_main_loop(|at| at)
+}
+
+/// The same where no code is: time goes on there too.
+#[test]
+fn a_main_loop_lost_in_ram_is_off_within_six_milliseconds() -> Result<()> {
+    hang_main_loop(|_| memory::RAM + memory::RAM_SIZE - 4096)
+}
+
+fn hang_main_loop(place: impl Fn(u32) -> u32) -> Result<()> {
     let mut board = common::regulating(2)?.board;
     // A jump to itself where the main loop sleeps, or would go on.
     let sleep = board.image.symbol("induction_drive::chip::sleep::until_interrupt")?;
@@ -77,7 +88,9 @@ fn a_hanging_main_loop_is_off_within_six_milliseconds() -> Result<()> {
         }
     }
     assert!(at >= sleep.address, "it never sleeps");
-    board.cpu.write(at, &0xe7fe_u16.to_le_bytes());
+    let place = place(at);
+    board.cpu.write(place, &0xe7fe_u16.to_le_bytes());
+    board.cpu.set(Register::PC, place);
     board.run_periods(6)?;
     assert!(board.chip().tim1.outputs_on());
     board.run_periods(30)?;

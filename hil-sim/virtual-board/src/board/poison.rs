@@ -42,11 +42,9 @@ impl Board {
 
     /// Remembers the state before a control interrupt.
     pub(super) fn remember(&mut self) {
-        let Some(top) = self.poison.as_ref().map(|poison| poison.top) else { return };
-        let before = self.preempted(self.cpu.get(Register::SP), top);
-        if let Some(poison) = &mut self.poison {
-            poison.before = Some(before);
-        }
+        let Some(mut poison) = self.poison.take() else { return };
+        poison.before = Some(self.preempted(self.cpu.get(Register::SP), poison.top));
+        self.poison = Some(poison);
     }
 
     /// Compares the state after a control interrupt with that before it.

@@ -25,15 +25,9 @@ impl Watched {
         Self { function, ..Self::default() }
     }
 
-    /// Whether the block at this address belongs to a call.
-    #[inline]
-    pub fn counts(&self, address: u32) -> bool {
-        address == self.function.address || !self.present.is_empty()
-    }
-
-    /// A block of the flash is about to be executed; `cycles` if it [counts](Self::counts).
+    /// A block of the flash is about to be executed, perhaps outside a call.
     fn block(&mut self, address: u32, size: u32, cycles: u32) {
-        if !self.counts(address) {
+        if address != self.function.address && self.present.is_empty() {
             self.returns_to = address + size;
             return;
         }
@@ -99,7 +93,13 @@ impl Chip {
         self.last_block = None;
     }
 
-    /// A block in the flash is about to be executed, of this size and cost if it is watched.
+    /// Instructions from the flash that surely begin before the next event.
+    pub fn instructions_before_event(&self) -> u64 {
+        let ticks = self.rcc.ticks_per_cycle * self.flash_cycles;
+        if self.attention { 0 } else { self.deadline.saturating_sub(self.now) / ticks }
+    }
+
+    /// A block in the flash is about to be executed, of this size and cost.
     #[inline]
     pub fn watch(&mut self, address: u32, size: u32, cycles: u32) {
         let in_main = self.scs.running() == scs::THREAD;
