@@ -4,6 +4,8 @@
 
 use std::sync::{LazyLock, OnceLock};
 
+use drive_core::learned::{Learned, Verdict};
+use drive_core::{Drive, Measured, State};
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
 use induction_drive::console::line::UNASKED;
 use induction_drive::front::Front;
@@ -11,8 +13,6 @@ use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
 use libfuzzer_sys::fuzz_target;
-use drive_core::learned::{Learned, Verdict};
-use drive_core::{Drive, Measured, State};
 
 #[path = "../../src/console/tests/doubles.rs"]
 mod doubles;
@@ -72,10 +72,8 @@ fn words() -> Vec<&'static str> {
     let settings = keys::all().map(|key| key.name());
     let levels = LEVELS.iter().map(|(name, _)| *name);
     let signals = SIGNALS.iter().map(|signal| signal.name);
-    let others = [
-        "encoder", "injection", "learning", "again", "yes", "no", "synchronous", "rectified", "motor", "auto", "on",
-        "above", "fault", "now", "check", "00000000",
-    ];
+    let others = "encoder injection learning again yes no synchronous rectified motor auto on above fault now check 00000000";
+    let others = others.split(' ');
     let words: Vec<_> =
         COMMANDS.split(' ').chain(settings).chain(levels).chain(others).chain(signals).collect();
     assert!(words.len() <= 256, "{} words", words.len());

@@ -14,7 +14,7 @@ fuzz_target!(|bytes: &[u8]| {
                 let length = frame.write(&mut wire);
                 let again = Frame::read(&wire[1..length - 1]).expect("a frame");
                 assert_eq!((again.sequence, again.period), (frame.sequence, frame.period));
-                let bits = |frame: &Frame| frame.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+                let bits = |f: &Frame| f.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
                 assert_eq!(bits(&again), bits(&frame));
             }
             Piece::Nothing | Piece::Damaged => {}
