@@ -201,8 +201,8 @@ fn test() -> Result<()> {
     steps.with(target, "lints of the firmware", |target| {
         // With a log in the control crates, which the firmware has none in.
         let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
-        let lints = target.cargo("clippy")?.args(log).args(["--", "-D", "warnings"]);
-        run::step("lints of the firmware", lints)
+        let mut lints = target.cargo("clippy")?;
+        run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))
     });
     let elf = steps.with(target, "firmware", image::build_all);
     let elf = elf.as_deref();
