@@ -12,8 +12,10 @@ use crate::browser::{pictures, state};
 use crate::chromium::{Browser, Page};
 
 const PATIENCE: Duration = Duration::from_secs(30);
-/// First picture, ms behind the beginning of the load.
+/// First picture, ms behind the beginning of the load, on a computer that runs the drive so many times as fast as the clock; a slower
+/// one has longer in proportion.
 const FIRST_PICTURE_MS: f64 = 700.0;
+const QUIET: f64 = 250.0;
 /// Least speed, of the clock's, and the simulated time that is measured, ms, in parts of which the fastest counts: the computer
 /// has other things to do.
 const FASTER: f64 = 60.0;
@@ -153,7 +155,8 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     here.advance(MEASURED_MS);
     let fingerprint = here.board.machine.fingerprint.to_string();
     assert_eq!(page.value("measured[1]"), fingerprint.as_str());
-    assert!(first < FIRST_PICTURE_MS, "{first} ms");
+    let longest = FIRST_PICTURE_MS * (QUIET / faster).max(1.0);
+    assert!(first < longest, "{first} ms, {longest} here");
     assert!(faster > FASTER, "{faster}");
 }
 
