@@ -18,7 +18,7 @@ const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 /// Faults of a whole campaign; `cargo xtask test` injects a twentieth.
 pub const CAMPAIGN: u32 = 2000;
 
-/// Runs the tests of the virtual board with the images of all boards: this one of the reference board, the others from their folder.
+/// Runs the tests of the virtual board with this image of the reference board and the images of the other boards in `target/boards`.
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let mut command = cargo("test --release --tests --no-fail-fast")?;

@@ -29,7 +29,7 @@ pub fn pages() -> Result<()> {
     let (elf, web) = (image::build()?, web::build()?);
     // One after the other: the virtual board keeps pace with the clock.
     let options = "--ignored --nocapture --test-threads=1";
-    // Of the whole workspace, as the host tests: nothing is built again.
+    // Cargo builds nothing again: the selection of packages is that of the host tests.
     let mut test = run::cargo(&format!("test --workspace --test page -- {options}"));
     run::step(
         "pages in Chromium",

@@ -199,7 +199,7 @@ fn test() -> Result<()> {
     let target = steps.run("compiler for the controller", toolchain::for_target);
     let target = target.as_ref();
     steps.with(target, "lints of the firmware", |target| {
-        // With a log in the control crates, which the firmware has none in.
+        // The firmware itself does not enable this feature of the control crates.
         let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
         let mut lints = target.cargo("clippy")?;
         run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))

@@ -175,7 +175,8 @@ impl Cpu {
             uc.emu_stop().ok();
         })?;
         let faulted = Rc::new(Cell::new(None));
-        // Writes to a page are slow if a hook is there, also one of this kind, or if the emulator believes that it may be executed.
+        // The emulator writes slowly to a page with a hook, even one of this kind, and to a page that it takes for executable. So this
+        // hook leaves RAM out, and a page becomes executable with its first fetch.
         for (from, to) in [(0, ram.0 - 1), (ram.1 + 1, u64::MAX)] {
             let note = Rc::clone(&faulted);
             uc.add_mem_hook(HookType::MEM_INVALID, from, to, move |_, _, address, _, _| {
@@ -360,7 +361,7 @@ fn fetched(uc: &mut Unicorn<Chip>, address: u64, size: u32) -> bool {
     stopped(uc, address)
 }
 
-/// Takes at once the rounds of a loop that only counts a register down, `subs rN, #1` and `bne`, which surely begin before an event.
+/// Executes at once the rounds of a delay loop, `subs rN, #1` and `bne` to it, that begin before the next event; all but the last.
 fn skip_delay(uc: &mut Unicorn<Chip>, address: u64) {
     let code = uc.mem_read_as_vec(address, 4);
     if let Ok([1, subtract @ 0x38..=0x3f, 0xfd, 0xd1]) = code.as_deref() {

@@ -85,7 +85,7 @@ impl Shadow {
         Self::with(if options.confirmed { settings } else { fresh }, 0)
     }
 
-    /// The drive that a board starts with which has these settings, after as many control interrupts.
+    /// The drive of a board that starts with these settings, after so many control interrupts.
     fn with(mut settings: FirmwareSettings, compared: u64) -> Result<Self> {
         let timer = Timer::of(&settings.drive.inverter);
         let session = Session::new(&settings.drive);

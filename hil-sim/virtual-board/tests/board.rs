@@ -75,9 +75,10 @@ fn a_main_loop_lost_in_ram_is_off_within_six_milliseconds() -> Result<()> {
     hang_main_loop(|_| memory::RAM + memory::RAM_SIZE - 4096)
 }
 
+/// Hangs the main loop by a jump to itself at this place, given the address where the loop is.
 fn hang_main_loop(place: impl Fn(u32) -> u32) -> Result<()> {
     let mut board = common::regulating(2)?.board;
-    // A jump to itself where the main loop sleeps, or would go on.
+    // Where the main loop sleeps, or would go on.
     let sleep = board.image.symbol("induction_drive::chip::sleep::until_interrupt")?;
     let mut at = 0;
     for _ in 0..100_000 {

@@ -93,7 +93,7 @@ impl Chip {
         self.last_block = None;
     }
 
-    /// Instructions from the flash that surely begin before the next event.
+    /// Number of instructions from the flash that begin before the next event.
     pub fn instructions_before_event(&self) -> u64 {
         let ticks = self.rcc.ticks_per_cycle * self.flash_cycles;
         if self.attention { 0 } else { self.deadline.saturating_sub(self.now) / ticks }
