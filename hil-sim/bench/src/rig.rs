@@ -183,7 +183,6 @@ impl Rig {
     }
 
     /// One PWM period.
-    #[inline]
     pub fn step(&mut self) {
         let sample = self.plant.sample();
         self.step_with(&sample);
@@ -191,7 +190,7 @@ impl Rig {
 
     /// One PWM period in which the drive is given `sample` instead of the sample of the plant. This is all that the control
     /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
-    #[inline]
+    #[inline(never)] // compiled once, not in every crate that runs a rig
     pub fn step_with(&mut self, sample: &Sample) {
         let (compare, output) = self.drive.period(&mut self.front_end, sample, &mut |_| {});
         if !compare.enabled {
@@ -208,25 +207,30 @@ impl Rig {
     /// Runs for `seconds` and passes the point of every sample to `look`.
     pub fn run(&mut self, seconds: f64, mut look: impl FnMut(&Point)) {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
-            // The truth at the instant of the sample, and the estimates of the drive from that sample.
-            let mut point = self.truth();
-            let phi = self.plant.rotor_flux_angle();
-            self.step();
-            let telemetry = self.drive.telemetry();
-            let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
-            point.iq_ref = telemetry.reference.q.into();
-            point.id = telemetry.current.d.into();
-            point.iq = telemetry.current.q.into();
-            point.delta_i = telemetry.delta_i.into();
-            point.saliency = telemetry.saliency.into();
-            point.loss = telemetry.saliency_loss.into();
-            point.carrier = f64::from(telemetry.carrier_squared).sqrt();
-            point.speed_estimate_rpm = rpm(telemetry.rotor_freq);
-            point.turns_estimate = telemetry.turns.into();
-            let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
-            point.angle_error_deg = wrapped_degrees(error);
-            look(&point);
+            look(&self.point());
         }
+    }
+
+    /// One PWM period: the truth at the instant of its sample, and the estimates of the drive from that sample.
+    #[inline(never)] // compiled once, not with every closure that looks at points
+    fn point(&mut self) -> Point {
+        let mut point = self.truth();
+        let phi = self.plant.rotor_flux_angle();
+        self.step();
+        let telemetry = self.drive.telemetry();
+        let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
+        point.iq_ref = telemetry.reference.q.into();
+        point.id = telemetry.current.d.into();
+        point.iq = telemetry.current.q.into();
+        point.delta_i = telemetry.delta_i.into();
+        point.saliency = telemetry.saliency.into();
+        point.loss = telemetry.saliency_loss.into();
+        point.carrier = f64::from(telemetry.carrier_squared).sqrt();
+        point.speed_estimate_rpm = rpm(telemetry.rotor_freq);
+        point.turns_estimate = telemetry.turns.into();
+        let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
+        point.angle_error_deg = wrapped_degrees(error);
+        point
     }
 
     /// Runs for `seconds` and returns the statistics of the values that `of` computes from each sample.

@@ -154,7 +154,7 @@ impl Plant {
 
     /// The present readings of converters, counter and hardware. Each call draws new noise and clears the
     /// reported hardware events.
-    #[inline]
+    #[inline(never)]
     pub fn sample(&mut self) -> Sample {
         let [current_a, current_b] = self.around.sensors.currents(&mut self.rng);
         Sample {
@@ -170,7 +170,7 @@ impl Plant {
     }
 
     /// One PWM period of `period_s` seconds with these compare values, delayed already.
-    #[inline]
+    #[inline(never)] // its models are compiled once, not in every crate that runs a plant
     pub fn advance(&mut self, compare: &Compare, period_s: f64) {
         let around = &mut self.around;
         whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
