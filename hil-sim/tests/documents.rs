@@ -1,4 +1,4 @@
-//! The pages in `docs/`: tables of the results of long runs, of motors and of experiments; words, links and anchors.
+//! The pages in `docs/`: tables of the results of long runs, of motors and of experiments; links and anchors.
 //!
 //! A file `results/NAME.json` holds the figures of one table with the commit that was measured and the commands. The ignored test
 //! `measure` runs the commands of a file again and writes it.
@@ -15,11 +15,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::generated;
-
-/// Most words of the pages that are written by hand, of the whole book, and of the README.
-const BY_HAND: usize = 28_000;
-const BOOK: usize = 38_000;
-const README: usize = 900;
 
 /// A table of measured figures.
 #[derive(Deserialize, Serialize)]
@@ -287,29 +282,6 @@ fn rows_of(text: &str) -> Vec<Vec<Value>> {
     let cell =
         |cell: &str| cell.trim().parse::<f64>().map_or_else(|_| cell.trim().into(), Value::from);
     rows.map(|row| row.trim().trim_matches('|').split('|').map(cell).collect()).collect()
-}
-
-/// A word holds a letter: numbers and signs are none. Blocks between the markers of a generated table are not written by hand.
-#[test]
-fn the_book_is_short() {
-    let words = |text: &str| {
-        text.split_whitespace().filter(|word| word.contains(char::is_alphabetic)).count()
-    };
-    let (mut by_hand, mut all) = (0, 0);
-    for (name, text) in pages() {
-        let blocks = text.split("<!-- generated: ").skip(1);
-        let generated: usize =
-            blocks.map(|block| words(block.split_once("<!-- end -->").expect(&name).0)).sum();
-        println!("{:6} {generated:6} {name}", words(&text) - generated);
-        if name.starts_with("docs/") {
-            by_hand += words(&text) - generated;
-            all += words(&text);
-        } else {
-            assert!(words(&text) <= README, "{name}: {} words", words(&text));
-        }
-    }
-    println!("{by_hand:6} by hand, {all} in all");
-    assert!(by_hand <= BY_HAND && all <= BOOK, "{by_hand} words by hand, {all} in all");
 }
 
 /// The anchor that a heading gets, on GitHub and by mdbook alike.

@@ -1,5 +1,7 @@
 //! The budgets of the project, `xtask/budgets.toml`.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
@@ -12,29 +14,37 @@ const FILE: &str = "xtask/budgets.toml";
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budgets {
-    /// Lines of code by room.
-    pub lines: Vec<Room>,
+    pub lines: Lines,
+    pub part: Vec<Part>,
     pub bytes: Bytes,
     pub seconds: Seconds,
     pub cycles: Cycles,
 }
 
+/// Lines of Rust without blanks, comments and documentation, of all parts.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lines {
+    pub code: usize,
+    pub test_code: usize,
+}
+
 /// A part of the sources.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Room {
+pub struct Part {
     pub name: String,
-    /// Lines.
-    pub budget: usize,
     /// Beginnings of the paths of its files.
     pub paths: Vec<String>,
 }
 
-/// Time of tests on two quiet cores.
+/// Seconds on two quiet cores.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
     pub test_module: f64,
+    /// From a cold clone, by the command.
+    pub commands: BTreeMap<String, u32>,
 }
 
 /// Memory of the image, bytes.
