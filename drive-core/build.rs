@@ -3,14 +3,17 @@
 use std::path::Path;
 use std::{env, fs};
 
-/// A link to `docs/faults.md`: a package of this crate holds the page, too.
-const PAGE: &str = "faults.txt";
+/// The page of the faults: in the repository, and in a package of this crate, where the link `faults.txt` becomes the page itself. A
+/// clone may hold a text in place of the link, so the repository's own page comes first.
+const PAGES: [&str; 2] = ["../docs/faults.md", "faults.txt"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed={PAGE}");
+    let path = PAGES.into_iter().find(|path| Path::new(path).is_file());
+    let path = path.ok_or("the page of the faults is missing: docs/faults.md")?;
+    println!("cargo::rerun-if-changed={path}");
     // The console prints the names of settings without the marks of the page.
-    let page = fs::read_to_string(PAGE)?.replace('`', "");
+    let page = fs::read_to_string(path)?.replace('`', "");
     let mut arms = String::new();
     for section in page.split("\n## ") {
         let cure = section.lines().find_map(|line| line.strip_prefix("Cure: ")?.strip_suffix('.'));
@@ -19,8 +22,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             section.lines().filter_map(|line| line.strip_prefix("* ")).collect();
         let heading = section.lines().next().unwrap_or_default();
         let codes =
-            codes(heading).ok_or_else(|| format!("{PAGE}: no fault numbers in: {heading}"))?;
+            codes(heading).ok_or_else(|| format!("{path}: no fault numbers in: {heading}"))?;
         arms += &format!("{} => (&{causes:?}, {cure:?}),\n", codes);
+    }
+    if arms.is_empty() {
+        return Err(format!("{path} describes no fault: it holds {page:?}").into());
     }
     let out = Path::new(&env::var("OUT_DIR")?).join("remedies.rs");
     Ok(fs::write(out, format!("match code {{\n{arms}_ => (&[], \"\"),\n}}\n"))?)

@@ -5,7 +5,7 @@
 //! commands. Here the board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
 //! one producer and one consumer, such as `heapless::spsc::Queue`.
 //!
-//! `cargo run -p drive-core --example port`
+//! `cargo run -p induction-drive-core --example port`
 
 use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};

@@ -4,7 +4,7 @@ use std::f64::consts::SQRT_2;
 
 use num_complex::Complex;
 use sim_bench::config::Value;
-use sim_bench::config::motors::Motor;
+use sim_bench::config::motors::{self, Motor};
 use sim_bench::plant::{
     ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _, Mechanics,
     MechanicsSettings, MotorModel, phases,
@@ -17,10 +17,6 @@ use crate::saliency::steady::at_voltage;
 pub const EXPERIMENT: Experiment = Experiment::new("measured-motors", run)
     .about("Simulated motors beside measured ones: load test of an 18.5 kW, saturation curve of a 2.2 kW, direct start of a 4 kW motor.");
 
-const LOAD_TEST: &str = include_str!("../measured/modelica-18kw5.csv");
-const LARGE: &str = include_str!("../measured/modelica-18kw5.toml");
-const SMALL: &str = include_str!("../measured/motulator-2kw2.toml");
-const STARTED: &str = include_str!("../measured/laboratory-4kw.toml");
 /// The linear circuit of the same motor, from its locked rotor and its current without load; its inertia fits the start, too.
 const CIRCUIT: [(&str, f64); 6] = [
     ("motor.r_r", 1.287),
@@ -57,8 +53,9 @@ pub struct LoadPoint {
 /// # Errors
 /// [`Error::Internal`] when the table that comes with the program is broken.
 pub fn measured() -> Result<Vec<LoadPoint>, Error> {
+    let load_test = motors::measured("modelica-18kw5.csv")?;
     let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(LOAD_TEST.as_bytes());
+        csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(load_test.as_bytes());
     reader.deserialize().map(|row| row.map_err(|e| Error::Internal(e.to_string()))).collect()
 }
 
@@ -144,7 +141,7 @@ impl Supplied {
 /// # Errors
 /// As those of the steady state.
 pub fn started(linear: bool) -> Result<[f64; 4], Error> {
-    let mut config = config("dissertation", STARTED)?;
+    let mut config = config("dissertation", "laboratory-4kw.toml")?;
     if linear {
         CIRCUIT.iter().try_for_each(|(key, value)| config.set(key, &Value::Number(*value)))?;
         (config.iron.leakage_saturation, config.iron.rotor_leakage_saturation) = (None, None);
@@ -167,7 +164,7 @@ fn config(motor: &str, iron: &str) -> Result<Config, Error> {
 /// # Errors
 /// As those of the steady state.
 pub fn simulated(measured: &[LoadPoint]) -> Result<Vec<LoadPoint>, Error> {
-    let mut motor = Supplied::new(&config("modelica-18kw5", LARGE)?)?;
+    let mut motor = Supplied::new(&config("modelica-18kw5", "modelica-18kw5.toml")?)?;
     motor.stray_w = STRAY.0;
     measured.iter().map(|point| motor.at(point.power_w, |p| p.power_w)).collect()
 }
@@ -177,7 +174,7 @@ pub fn simulated(measured: &[LoadPoint]) -> Result<Vec<LoadPoint>, Error> {
 /// # Errors
 /// As those of the steady state.
 pub fn no_load(voltage_v: f64) -> Result<(f64, f64), Error> {
-    let mut motor = Supplied::new(&config("motulator-2kw2", SMALL)?)?;
+    let mut motor = Supplied::new(&config("motulator-2kw2", "motulator-2kw2.toml")?)?;
     motor.v = voltage_v * (2.0_f64 / 3.0).sqrt();
     let x = motor.state(motor.w_s)?;
     Ok((x.psi_s.norm(), x.current().norm()))

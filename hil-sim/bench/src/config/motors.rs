@@ -12,11 +12,22 @@ use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
 use crate::error::Error;
 
-static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
+/// The folder `motors`, which `build.rs` finds.
+static FILES: Dir<'static> = include_dir!("$MOTORS");
 
 /// What a file of one's own must say, because no rule gives it and nothing of another motor may stand in for it.
 pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
+
+/// The text of a file of `motors/measured`: what others have measured on a motor.
+///
+/// # Errors
+/// [`Error::Internal`] if there is no such file.
+pub fn measured(name: &str) -> Result<&'static str, Error> {
+    let file = FILES.get_file(Path::new("measured").join(name));
+    let text = file.and_then(|file| file.contents_utf8());
+    text.ok_or_else(|| Error::Internal(format!("motors/measured/{name} is missing")))
+}
 
 /// Where numbers of a motor come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
