@@ -38,12 +38,14 @@ use clap::{Args, Parser};
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask")]
 enum Task {
-    /// Everything a change must pass: format, modules, lints, host tests, documentation, firmware, the
+    /// Everything a change must pass beside `cargo test`: format, modules, lints, documentation, page, firmware, and the
     /// firmware on the virtual board. All of it runs; what failed is named at the end. Installs missing
     /// programs, or prints the command to type
     Test,
     /// Before a commit: format, modules, lines, lints, unit tests, procedures. All that needs neither image nor emulator
     Quick,
+    /// Lints the firmware, builds and checks the images of all boards, prints the memory that the first one uses
+    Images,
     /// Builds and checks the image for a board (also: cargo firmware)
     Firmware(Which),
     /// Builds the image of a board, writes it through a debug probe and shows its log
@@ -75,7 +77,7 @@ enum Task {
     },
     /// Prints the use of each memory by the image; fails above the budgets
     Size,
-    /// Counts lines of code, documentation, comments and tests by room; fails above the budgets
+    /// Counts lines of code, documentation, comments and tests; fails above the budgets
     Lines,
     /// Fails if modules of a crate refer to each other in a circle
     Rooms,
@@ -135,6 +137,7 @@ fn run(task: Task) -> Result<()> {
     match task {
         Task::Test => test(),
         Task::Quick => quick(),
+        Task::Images => images(),
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&image::build_all(&toolchain::for_target()?)?),
@@ -160,12 +163,12 @@ fn run(task: Task) -> Result<()> {
 
 /// What most changes break, without image and emulator.
 fn quick() -> Result<()> {
-    let mut steps = run::Steps::default();
+    let mut steps = run::Steps::new();
     before_tests(&mut steps);
-    let unit = run::cargo("test --workspace --lib --bins --no-fail-fast");
+    let unit = run::cargo("test --lib --bins --no-fail-fast");
     steps.run("unit tests", || times::test("unit tests", unit));
     steps.run("procedures", || times::test("procedures", run::cargo("test --test procedures")));
-    steps.end()
+    steps.end("cargo xtask quick", None)
 }
 
 /// Format, modules, lines and lints of the main workspace.
@@ -179,46 +182,53 @@ fn before_tests(steps: &mut run::Steps) {
     steps.command("lints", run::cargo("clippy --workspace --all-targets -- -D warnings"));
 }
 
-/// Everything a change must pass, the quick things first. All of it runs, also when a step fails.
+/// Lints the firmware, builds and checks the images of all boards, and prints the memory that the reference board's uses.
+fn images() -> Result<()> {
+    let target = toolchain::for_target()?;
+    // The firmware itself does not enable this feature of the control crates.
+    let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
+    let mut lints = target.cargo("clippy")?;
+    run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))?;
+    size::report(&image::build_all(&target)?)
+}
+
+/// What `cargo test` leaves out, the quick things first. All of it runs, also when a step fails.
 fn test() -> Result<()> {
-    let mut steps = run::Steps::default();
+    let mut steps = run::Steps::new();
+    // One after the other: they are installed.
+    let target = steps.run("compiler for the controller", toolchain::for_target);
+    let compiler = steps.run("compiler for the emulator", toolchain::ensure_c_compiler);
+    // An image is linked on one core.
+    let images = run::Steps::beside("images", &["images"])?;
     before_tests(&mut steps);
-    let host = |what| run::cargo(&format!("test --workspace --no-fail-fast {what}"));
-    steps.run("host tests", || times::test("host tests", host("--tests")));
-    steps.command("examples in documentation", host("--doc"));
+    let crates = "clippy --package induction-drive-core --package induction-drive-settings";
+    let features = run::cargo(&format!("{crates} --all-features -- -D warnings"));
+    steps.command("lints with all features", features);
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
-    let crates = "check --package induction-drive-core --package induction-drive-settings";
-    steps.command("features", run::cargo(&format!("{crates} --all-features")));
 
+    let rest = run::cargo("test --package drive-live --package xtask --no-fail-fast");
+    steps.run("tests of page and tasks", || times::test("tests of page and tasks", rest));
     let commands = "commands_of_the_documents -- --ignored --nocapture";
-    let commands = run::cargo(&format!("test --workspace --test simulator {commands}"));
+    let commands = run::cargo(&format!("test --test simulator {commands}"));
     steps.command("commands of the documents", commands);
 
-    let target = steps.run("compiler for the controller", toolchain::for_target);
-    let target = target.as_ref();
-    steps.with(target, "lints of the firmware", |target| {
-        // The firmware itself does not enable this feature of the control crates.
-        let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
-        let mut lints = target.cargo("clippy")?;
-        run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))
-    });
-    let elf = steps.with(target, "firmware", image::build_all);
+    let check = "format, lints, documentation of the virtual board";
+    steps.with(compiler, check, |()| board::check());
+    let built = steps.joined(images);
+    let elf = target.zip(built).map(|(target, ())| target.image()).transpose()?;
     let elf = elf.as_deref();
-    steps.with(elf, "size", size::report);
-
-    let compiler = steps.run("compiler for the emulator", toolchain::ensure_c_compiler);
-    steps.with(compiler, "format, lints, documentation of the virtual board", |()| board::check());
+    steps.with(elf, "the image on the virtual board", board::test);
     steps.with(elf, "campaign of faults", |elf| {
         let (count, class) = (board::CAMPAIGN / 20, String::new());
         let faults = board::Faults { count, seed: 1, class, rpm: None };
         board::campaign(elf, image::REFERENCE, &faults)
     });
-    steps.with(elf, "the image on the virtual board", board::test);
     steps.with(elf, "cycles of the control interrupt", board::cycles);
 
-    steps.end()?;
-    println!("\nPASSED: everything");
+    let command = "cargo xtask test";
+    steps.end(command, budget::read()?.seconds.commands.get(command).copied())?;
+    println!("\nPASSED: everything but the host tests, which are `cargo test`");
     Ok(())
 }

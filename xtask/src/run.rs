@@ -2,8 +2,10 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
+use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 use std::{env, fs};
 
@@ -19,10 +21,15 @@ pub const PROFILE: &str = "firmware";
 /// Profile of the programs and the wheel of a release.
 pub const SHIPPED: &str = "shipped";
 
-/// The root of the workspace.
+/// The root of the workspace. Cargo names the folder of this package when it starts the program: a program that was built in another
+/// clone, into a folder that both share, works on the clone that it is started in.
 pub fn root() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
+    static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
+        let package = env::var_os("CARGO_MANIFEST_DIR");
+        let package = package.unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+        PathBuf::from(package).parent().map(PathBuf::from).unwrap_or_default()
+    });
+    &ROOT
 }
 
 /// The directory of build results.
@@ -71,12 +78,51 @@ pub fn step(name: &str, command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// The steps of a task that goes on when one fails: name, time, and how it ended; `None` if it was not run, because a
-/// step that it needs failed.
-#[derive(Default)]
-pub struct Steps(Vec<(&'static str, Duration, Option<Result<()>>)>);
+/// A task of this program that runs beside the steps of another one, see [`Steps::beside`].
+pub struct Beside {
+    name: &'static str,
+    began: Instant,
+    child: Result<Child>,
+    output: PathBuf,
+}
+
+/// The steps of a task that goes on when one fails.
+pub struct Steps {
+    began: Instant,
+    /// Name, time, and how it ended; `None` if it was not run, because a step that it needs failed.
+    ended: Vec<(&'static str, Duration, Option<Result<()>>)>,
+}
 
 impl Steps {
+    /// A task that begins now.
+    pub fn new() -> Self {
+        Self { began: Instant::now(), ended: Vec::new() }
+    }
+
+    /// Starts a task of this program, which uses one core while the next steps use the other. [`Self::joined`] waits for it and
+    /// prints what it printed.
+    pub fn beside(name: &'static str, task: &[&str]) -> Result<Beside> {
+        println!("\n==> {name}: cargo xtask {}, beside the next steps", task.join(" "));
+        let output = folder("beside")?.join(name.replace(' ', "-"));
+        let file = File::create(&output).with_context(|| output.display().to_string())?;
+        let mut command = command(env::current_exe()?);
+        command.args(task).stdin(Stdio::null()).stderr(file.try_clone()?).stdout(file);
+        let child = command.spawn().with_context(|| format!("cannot run: {command:?}"));
+        Ok(Beside { name, began: Instant::now(), child, output })
+    }
+
+    /// Waits for a task that runs beside the steps; whether it passed.
+    pub fn joined(&mut self, beside: Beside) -> Option<()> {
+        let Beside { name, began, child, output } = beside;
+        let status = child.and_then(|mut child| Ok(child.wait()?));
+        let result = status.and_then(|status| {
+            println!("\n==> {name}: what it printed\n{}", fs::read_to_string(output)?);
+            ensure!(status.success(), "{name}, {status}");
+            Ok(())
+        });
+        self.note(name, began, Some(result))
+    }
+
     /// Runs a step; its result, if it passes.
     pub fn run<T>(&mut self, name: &'static str, step: impl FnOnce() -> Result<T>) -> Option<T> {
         self.with(Some(()), name, |()| step())
@@ -94,24 +140,44 @@ impl Steps {
         name: &'static str,
         step: impl FnOnce(N) -> Result<T>,
     ) -> Option<T> {
+        println!("\n===== {name}");
         let began = Instant::now();
-        let (passed, ended) = match needed.map(step) {
+        self.note(name, began, needed.map(step))
+    }
+
+    /// Notes and prints how a step ended; its result, if it passed.
+    fn note<T>(
+        &mut self,
+        name: &'static str,
+        began: Instant,
+        ended: Option<Result<T>>,
+    ) -> Option<T> {
+        let (time, how) = (
+            began.elapsed(),
+            match &ended {
+                Some(Ok(_)) => "ok",
+                Some(Err(_)) => "FAILED",
+                None => "not run",
+            },
+        );
+        println!("===== {name}: {how} after {:.0} s", time.as_secs_f64());
+        let (passed, ended) = match ended {
             Some(Ok(passed)) => (Some(passed), Some(Ok(()))),
             Some(Err(error)) => (None, Some(Err(error))),
             None => (None, None),
         };
-        self.0.push((name, began.elapsed(), ended));
+        self.ended.push((name, time, ended));
         passed
     }
 
-    /// Prints how every step ended.
+    /// Prints how every step ended, and the seconds that the whole command may take.
     ///
     /// # Errors
     /// The steps that failed or were not run, with the reasons.
-    pub fn end(&self) -> Result<()> {
+    pub fn end(&self, command: &str, budget: Option<u32>) -> Result<()> {
         println!("\n{:<34}{:>8}  result", "step", "seconds");
         let mut failed = Vec::new();
-        for (name, time, ended) in &self.0 {
+        for (name, time, ended) in &self.ended {
             let result = match ended {
                 Some(Ok(())) => "ok",
                 Some(Err(error)) => {
@@ -125,9 +191,11 @@ impl Steps {
             };
             println!("{name:<34}{:>8.0}  {result}", time.as_secs_f64());
         }
-        let all: Duration = self.0.iter().map(|(_, time, _)| time).sum();
-        println!("{:<34}{:>8.0}", "all", all.as_secs_f64());
-        let all = self.0.len();
+        let seconds = self.began.elapsed().as_secs_f64();
+        let of =
+            budget.map(|budget| format!("  of {budget}, from a cold clone")).unwrap_or_default();
+        println!("{command:<34}{seconds:>8.0}{of}");
+        let all = self.ended.len();
         ensure!(failed.is_empty(), "{} of {all} steps:\n{}", failed.len(), failed.join("\n"));
         Ok(())
     }
@@ -186,7 +254,7 @@ mod tests {
 
     #[test]
     fn all_steps_run_and_those_that_failed_are_named() {
-        let mut steps = Steps::default();
+        let mut steps = Steps::new();
         assert_eq!(steps.run("one", || Ok(1)), Some(1));
         let image = steps.run("image", || -> Result<u8> { bail!("no linker") });
         assert_eq!(steps.with(image, "size", |_| -> Result<()> { unreachable!() }), None);
@@ -196,9 +264,9 @@ mod tests {
             Ok(())
         });
         assert!(ran);
-        let names: Vec<_> = steps.0.iter().map(|(name, ..)| *name).collect();
+        let names: Vec<_> = steps.ended.iter().map(|(name, ..)| *name).collect();
         assert_eq!(names, ["one", "image", "size", "last"]);
-        let error = steps.end().unwrap_err().to_string();
+        let error = steps.end("a task", None).unwrap_err().to_string();
         assert_eq!(error, "2 of 4 steps:\nimage: no linker\nsize: not run");
     }
 
