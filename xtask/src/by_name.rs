@@ -5,11 +5,14 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::{board, image, run, toolchain, web};
+use crate::{board, image, python, run, toolchain, web};
 
 /// Pages, by the arguments of `cargo sim run` that make them.
 const PAGES: [&str; 4] =
     ["torque-steps", "speed-profile", "monte-carlo --set runs=12", "identify-machine"];
+
+/// The client of the field bus from PyPI.
+const PYMODBUS: &str = "pymodbus>=3.10,<4";
 
 /// Makes pages of the simulator in `target/pages`, measures them in Chromium, and drives the live page on the virtual board.
 pub fn pages() -> Result<()> {
@@ -17,7 +20,7 @@ pub fn pages() -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let folder = run::folder("pages")?;
     for arguments in PAGES {
-        let mut command = run::cargo("run --quiet --release --package hil-sim -- run");
+        let mut command = run::cargo("run --quiet --package hil-sim -- run");
         let command = command.args(arguments.split(' ')).arg("--out").arg(&folder);
         run::step(arguments, command.stdout(std::process::Stdio::null()))?;
     }
@@ -29,8 +32,7 @@ pub fn pages() -> Result<()> {
     let (elf, web) = (image::build()?, web::build()?);
     // One after the other: the virtual board keeps pace with the clock.
     let options = "--ignored --nocapture --test-threads=1";
-    // Cargo builds nothing again: the selection of packages is that of the host tests.
-    let mut test = run::cargo(&format!("test --workspace --test page -- {options}"));
+    let mut test = run::cargo(&format!("test --package drive-live --test page -- {options}"));
     run::step(
         "pages in Chromium",
         test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web),
@@ -47,8 +49,12 @@ pub fn bench_dump(elf: &Path, name: &str) -> Result<()> {
     run::step("registers of the board", &mut test)
 }
 
-/// Runs the clients of the field bus, those that are installed, with this image.
+/// Runs the clients of the field bus with this image. Gets those that are missing.
 pub fn bus(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    run::step("clients of the bus", board::ignored_test("bus_clients")?.env(board::ELF, elf))
+    toolchain::ensure_bus_clients()?;
+    let python = python::environment("bus", &[PYMODBUS, "pyserial"])?;
+    let mut test = board::ignored_test("bus_clients")?;
+    test.env(board::ELF, elf).env("PYTHON", python.get_program());
+    run::step("clients of the bus", &mut test)
 }

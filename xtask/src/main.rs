@@ -58,7 +58,7 @@ enum Task {
     Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above the budgets
     Cycles,
-    /// Runs mbpoll, pymodbus and LinuxCNC's vfdb_vfd, where they are installed, on the bus of the virtual board
+    /// Runs mbpoll, pymodbus and LinuxCNC's vfdb_vfd on the bus of the virtual board. Gets them from Debian and PyPI
     Bus,
     /// Injects faults into the image on the virtual board
     Campaign {

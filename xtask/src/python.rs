@@ -39,7 +39,7 @@ pub fn test() -> Result<()> {
 }
 
 /// The Python of a new environment with these packages, on Linux and macOS.
-fn environment(name: &str, packages: &[&str]) -> Result<Command> {
+pub fn environment(name: &str, packages: &[&str]) -> Result<Command> {
     let folder = run::folder("python")?.join(name);
     run::step(name, run::command("python3").args(["-m", "venv", "--clear"]).arg(&folder))?;
     let python = folder.join("bin/python");

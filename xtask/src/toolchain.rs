@@ -135,6 +135,16 @@ pub fn ensure_chromium() -> Result<()> {
     provide("chromium", || answers("chromium"), "", "chromium")
 }
 
+/// Finds or gets the clients of the field bus that are programs of Debian: mbpoll, and LinuxCNC with its `vfdb_vfd`.
+pub fn ensure_bus_clients() -> Result<()> {
+    let there = || {
+        [("mbpoll", "-V"), ("halcmd", "-V"), ("vfdb_vfd", "-h")]
+            .into_iter()
+            .all(|(program, option)| run::said(run::command(program).arg(option)).is_ok())
+    };
+    provide("mbpoll or LinuxCNC", there, "", "mbpoll linuxcnc-uspace")
+}
+
 /// Installs something that is not there, by a command of rustup or as packages of Debian.
 fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -> Result<()> {
     if there() {
