@@ -1,7 +1,11 @@
 //! Numbers that the first pages print are those of the run that they name.
 
 use hil_sim::Config;
+use hil_sim::config::motors::Motor;
 use hil_sim::experiments::{DEFAULT, run};
+use sim_bench::rig::Rig;
+
+use crate::cli_common::{folder, hil_sim, text};
 
 /// Numbers of an experiment.
 fn numbers<const N: usize>(experiment: &str, seed: u64, names: [&str; N]) -> [f64; N] {
@@ -36,6 +40,46 @@ fn the_angle_error_of_the_first_command_is_the_printed_one() {
         "angle error {rms:.1}° rms, {most:.0}° at most; seeds 1 to 8: {a:.1}° to {b:.1}° rms, {c:.1}° to {d:.1}° at most"
     );
     assert!(figures.contains(&row), "{row}");
+}
+
+/// The README shows what its first command prints.
+#[test]
+fn the_readme_shows_what_the_first_command_prints() {
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md"));
+    let readme = readme.unwrap();
+    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
+    let output = hil_sim(&folder("first-command"), &[]);
+    assert_eq!(shown.expect("a block `text`").trim(), text(&output.stdout).trim());
+}
+
+/// Largest deviation of the torque from its mean at rest without load, in percent of the rated torque: the injection's.
+fn ripple_pct(motor: &str, set: &[&str]) -> f64 {
+    let config = Config::load(Some(motor), None, set).unwrap();
+    let mut rig = Rig::oriented(&config, 1, 0.0, 1.0).unwrap();
+    let mut torque = Vec::new();
+    rig.run(0.1, |p| torque.push(p.torque));
+    let mean = torque.iter().sum::<f64>() / torque.len() as f64;
+    let most = torque.iter().fold(0.0, |most: f64, torque| most.max((torque - mean).abs()));
+    100.0 * most / config.rated_nm()
+}
+
+#[test]
+fn the_readme_states_the_torque_ripple_of_the_injection() {
+    let [low, high] =
+        ["low", "high"].map(|flux| ripple_pct("dissertation", &[&format!("sequence.flux={flux}")]));
+    let spindle = ripple_pct("spindle-2kw2", &[]);
+    let others = Motor::all().into_iter().map(|motor| motor.name);
+    let others = others.filter(|name| !["dissertation", "spindle-2kw2"].contains(&name.as_str()));
+    let mut others: Vec<f64> = others.map(|name| ripple_pct(&name, &[])).collect();
+    others.sort_by(f64::total_cmp);
+    let sentence = format!(
+        "its peak is {low:.0} to {high:.0} % of the rated torque on the dissertation's motor, {:.0} to {:.0} % on {} other \
+         [motors](docs/motors.md), and {spindle:.0} % on the spindle",
+        others[0],
+        others[others.len() - 1],
+        others.len()
+    );
+    assert!(page("README.md").contains(&sentence), "README.md: {sentence}");
 }
 
 #[test]
