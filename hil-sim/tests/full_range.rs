@@ -187,12 +187,11 @@ fn a_turning_shaft_is_caught_with_the_current_loop_of_a_commissioned_drive() {
 /// Iron: a drive that has measured its motor is right to a degree where the voltage gives the angle, also where the main flux
 /// saturates (`m4b`), which the mean leakage along and across the flux mistakes for a leakage that falls with the current:
 /// with that, 7 of 16 reversals above 2700 rpm were lost, and constant torque erred by 3 degrees.
-#[test]
-fn a_drive_that_measured_its_motor_is_right_on_iron() {
+fn measured_on_iron(runs: &str) {
     for family in ["m4b", "g7"] {
         let plant = format!("plant={family}");
         for kind in ["constant", "reversals"] {
-            let outcome = full_range(kind, &[&plant, "prepare.commission=yes"]);
+            let outcome = full_range(kind, &[&plant, "prepare.commission=yes", runs]);
             for region in ["750_1200", "1200_1800", "1800_2700", "2700_3600"] {
                 let rms = get(&outcome, &format!("{kind}_{region}_angle_error_rms_deg"));
                 assert!(rms < 1.0, "{family}, {kind}, {region}: {rms}");
@@ -202,6 +201,17 @@ fn a_drive_that_measured_its_motor_is_right_on_iron() {
             }
         }
     }
+}
+
+#[test]
+fn a_drive_that_measured_its_motor_is_right_on_iron() {
+    measured_on_iron("runs=1");
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn a_drive_that_measured_its_motor_is_right_on_iron_in_two_runs() {
+    measured_on_iron("runs=2");
 }
 
 /// Parameters that changed after the learning by 5 % of the leakage, 30 % of the stator resistance and 10 % of the main
@@ -221,11 +231,10 @@ fn wrong_parameters_are_borne() {
 /// Large motors, commissioned by their drives: reversals of the whole torque, and starts on a turning shaft, with and without flux, up to
 /// 2700 rpm (on four poles). Where flux was left the start waits until it drives no more current than is borne. (With the whole
 /// current and no limit of the flux, and a feed-forward that changes in steps, these were over-current trips.)
-#[test]
-fn large_motors_reverse_and_start_while_they_turn() {
+fn large_motors(runs: &str) {
     for motor in ["krause-3hp", "buildings-7kw5", "modelica-18kw5"] {
         for kind in ["reversals", "turning-start", "residual-start"] {
-            let set = [&format!("full_range.kind={kind}"), "runs=4", "prepare.commission=yes"];
+            let set = [&format!("full_range.kind={kind}"), runs, "prepare.commission=yes"];
             let outcome = outcome_of(Some(motor), "full-range", &set, 183);
             for none in ["lost_runs", "silent_runs"] {
                 assert_eq!(get(&outcome, none), 0.0, "{motor}, {kind}: {none}");
@@ -238,6 +247,17 @@ fn large_motors_reverse_and_start_while_they_turn() {
             }
         }
     }
+}
+
+#[test]
+fn large_motors_reverse_and_start_while_they_turn() {
+    large_motors("runs=1");
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn large_motors_reverse_and_start_while_they_turn_in_four_runs() {
+    large_motors("runs=4");
 }
 
 /// A leakage that is believed 5 % too small at the largest torque of the highest speed is near the point from which on more torque current
