@@ -121,7 +121,7 @@ mod tests {
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(2.0)).unwrap();
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         assert!(rig.drive.tracks_rotor());
         (rig, Tracking::new(&settings).unwrap())
     }

@@ -22,7 +22,7 @@ fn mean_error(changes: &[&str], i_q: f32) -> f64 {
     let mut rig = changed(changes);
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(i_q)).unwrap();
-    rig.run(2.0, |_| {});
+    rig.wait(2.0);
     let (mut sum, mut points) = (0.0, 0.0);
     rig.run(1.0, |point| (sum, points) = (sum + point.angle_error_deg, points + 1.0));
     assert_eq!(rig.drive.state(), State::Torque, "{changes:?}");

@@ -46,7 +46,7 @@ impl Bench {
             Mode::Speed | Mode::VoltsPerHertz => drop(rig.command(&Command::Speed(30.0)).unwrap()),
             Mode::Position | Mode::Learning | Mode::Commissioning => {}
         }
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         let settings = &config.drive;
         let commands = vec![
             Command::Start(mode),
@@ -100,7 +100,7 @@ impl Bench {
         assert_eq!(state.fault(), None, "{name}");
         if answer.is_err() || *command == Command::Clear {
             // It has changed nothing: to the last bit.
-            undisturbed.run(BEHIND_S, |_| {});
+            undisturbed.wait(BEHIND_S);
             assert_eq!(rig.drive.telemetry(), undisturbed.drive.telemetry(), "{name}");
         }
         if state.regulates() {
@@ -162,7 +162,7 @@ fn settings_are_taken_while_off() {
     let config = config(&[FREE, "angle.source=encoder"]);
     for turn in 0..CARRIER_SAMPLES {
         let mut rig = Rig::from_config(&config, 1).unwrap();
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         (0..turn).for_each(|_| rig.step());
         let settings = config.drive.build().unwrap();
         assert_eq!(rig.drive.command(&Command::Configure(settings)), Ok(Accepted::AsGiven));

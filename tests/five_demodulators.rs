@@ -44,7 +44,7 @@ fn all_but_the_literal_chain_see_the_saliency() {
         let mut rig = demodulating(name, &[], 1.5);
         let here = signal(&mut rig);
         rig.command(&Command::TurnInjection(5.0)).unwrap();
-        rig.run(0.1, |_| {});
+        rig.wait(0.1);
         let slope = (signal(&mut rig) - here) / 5f64.to_radians();
         let without = signal(&mut demodulating(name, &[&ISOTROPIC], 1.5));
         println!("{name}: {here:.5}, slope {slope:.4}, without saliency {without:.5}");
@@ -92,7 +92,7 @@ fn tracked(drive: &Settings, config: &Config) -> [(f64, f64); 2] {
     [0.0, 150.0].map(|rpm: f64| {
         let mut rig = regulating_with(&held(config), drive, 11, 1.5, 0.5);
         bring_to(&mut rig, rpm);
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         error(&mut rig)
     })
 }
@@ -109,7 +109,7 @@ fn bring_to(rig: &mut Rig, rpm: f64) {
     for n in 1..=25 {
         let speed = rpm / 60.0 * std::f64::consts::TAU * f64::from(n) / 25.0;
         rig.set_load(Load::Speed { speed }).unwrap();
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
     }
 }
 
@@ -164,10 +164,10 @@ fn without_torque_the_retuned_rectified_chain_does_not_follow_the_shaft() {
         for seed in 1..=6 {
             let mut rig = regulating_with(&held(&config), &drive, seed, 0.0, 0.5);
             bring_to(&mut rig, 150.0);
-            rig.run(0.3, |_| {});
+            rig.wait(0.3);
             let (_, without) = error(&mut rig.clone());
             rig.command(&Command::Torque(1.5)).unwrap();
-            rig.run(1.0, |_| {});
+            rig.wait(1.0);
             let (rms, worst) = error(&mut rig);
             println!("{name}, seed {seed}: {without:.2} deg without torque; {rms:.2} {worst:.2}");
             if *name == "rectified" {

@@ -74,7 +74,7 @@ fn the_stop_becomes_position_0() {
             let wrong = turns(&mut rig) - stop - f64::from(rig.drive.telemetry().turns);
             // Away from it by a turn, and there.
             rig.command(&Command::Position(-rpm.signum())).unwrap();
-            rig.run(4.0, |_| {});
+            rig.wait(4.0);
             let there = turns(&mut rig) - stop + f64::from(rpm.signum());
             println!(
                 "{source} {heavier:?} {rpm} rpm {i_q} A: {wrong:.4} turns, a turn away {there:.4}"
@@ -101,12 +101,12 @@ fn position_0_outlives_a_stop_with_the_encoder() {
         let mut rig = rig(&[&format!("angle.source={source}")], 3);
         home(&mut rig, Plan { rpm: 60.0, i_q: 0.6, turns: 3.0 }).0.unwrap();
         rig.command(&Command::Position(-1.0)).unwrap();
-        rig.run(4.0, |_| {});
+        rig.wait(4.0);
         rig.command(&Command::Stop(Stop::Coast)).unwrap();
-        rig.run(2.0, |_| {});
+        rig.wait(2.0);
         let before = turns(&mut rig);
         rig.start(Mode::Position).unwrap();
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         let (after, says) = (turns(&mut rig), f64::from(rig.drive.telemetry().turns));
         println!("{source}: {before:.4} {after:.4}, {says:.4}");
         assert!((after - before).abs() < moved, "{before} {after}");

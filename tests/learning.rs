@@ -86,12 +86,12 @@ fn a_shaft_that_moves_is_refused() {
 fn learning_takes_stop_and_no_other_reference() {
     let mut rig = Rig::from_config(&config(&[]), 6).unwrap();
     rig.start(Mode::Learning).unwrap();
-    rig.run(5.0, |_| {});
+    rig.wait(5.0);
     assert!(rig.command(&Command::Torque(1.0)).is_err());
     assert!(rig.command(&Command::Magnetising(1.0)).is_err());
     assert_eq!(rig.drive.state(), State::Learning);
     rig.command(&Command::Stop(Stop::Coast)).unwrap();
-    rig.run(0.5, |_| {});
+    rig.wait(0.5);
     assert_eq!(rig.drive.state(), State::Off);
     assert!(rig.drive.learned().is_none());
 
@@ -116,14 +116,14 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
         for i_q in [1.0, 2.0, 3.0, -0.75, -1.5, -2.5] {
             rig.start(Mode::Torque).unwrap();
             rig.command(&Command::Torque(i_q)).unwrap();
-            rig.run(1.0, |_| {});
+            rig.wait(1.0);
             rig.run(1.0, |p| {
                 squares += p.angle_error_deg.powi(2);
                 count += 1.0;
                 largest = largest.max(p.angle_error_deg.abs());
             });
             rig.command(&Command::Stop(Stop::Coast)).unwrap();
-            rig.run(1.5, |_| {}); // until the flux is gone
+            rig.wait(1.5); // until the flux is gone
         }
         let rms: f64 = (squares / count).sqrt();
         println!("seed {seed}: {rms:.2} rms, {largest:.2} largest");

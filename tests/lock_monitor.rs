@@ -49,12 +49,12 @@ fn a_lost_lock_is_found_again_after_a_clear_and_a_start() {
     for (seed, i_q) in [(1, 1.0), (2, -2.0), (3, 0.5)] {
         let mut rig = regulating(&config(&[]), seed, i_q, 1.0);
         rig.plant.turn_rotor_flux(std::f64::consts::PI);
-        rig.run(1.5, |_| {});
+        rig.wait(1.5);
         assert_eq!(rig.drive.state(), State::Fault(Fault::LostLock));
         rig.command(&Command::Clear).unwrap();
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(i_q)).unwrap();
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         let worst = worst(&mut rig);
         assert!(worst < 12.0, "seed {seed}: {worst}");
     }
@@ -79,7 +79,7 @@ fn a_relock_on_request_goes_on_without_torque() {
         assert!(verified && rig.drive.state() == State::Torque, "{}", rig.drive.state());
         assert!(rig.drive.telemetry().reference.q.abs() < 1e-6);
         rig.command(&Command::Torque(i_q)).unwrap();
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         let worst = worst(&mut rig);
         assert!(worst < 12.0, "seed {seed}: {worst}");
     }

@@ -17,7 +17,7 @@ fn sensed() -> Config {
 fn read(rig: &mut Rig, reading: Result<f32, Fault>) {
     for _ in 0..10 {
         rig.command(&Command::MotorTemperature(reading)).unwrap();
-        rig.run(0.1, |_| {});
+        rig.wait(0.1);
     }
 }
 
@@ -69,9 +69,9 @@ fn a_defect_switches_off() {
         let mut rig = Rig::from_config(&sensed(), 2).unwrap();
         read(&mut rig, Ok(60.0));
         rig.start(mode).unwrap();
-        rig.run(1.5, |_| {});
+        rig.wait(1.5);
         rig.command(&Command::Speed(rpm)).unwrap();
-        rig.run(4.0, |_| {});
+        rig.wait(4.0);
         let found = rig.plant.mechanical_speed() * 9.549;
         assert!(
             (found - f64::from(rpm)).abs() < 20.0,
@@ -82,7 +82,7 @@ fn a_defect_switches_off() {
             let mut rig = rig.clone();
             rig.command(&Command::MotorTemperature(reading)).unwrap();
             assert_eq!(rig.drive.state(), State::Fault(fault), "{mode:?} {rpm}");
-            rig.run(1.0, |_| {});
+            rig.wait(1.0);
             assert!(rig.plant.current().norm() < 1e-3, "{}", rig.plant.current().norm());
             // A sound reading takes no latched fault back.
             rig.command(&Command::MotorTemperature(Ok(60.0))).unwrap();
@@ -114,12 +114,12 @@ fn the_torque_falls_with_the_temperature() {
     }
     // Settings without a sensor take the limit away.
     rig.command(&Command::Stop(Stop::Coast)).unwrap();
-    rig.run(1.0, |_| {});
+    rig.wait(1.0);
     let mut without = sensed();
     without.drive.motor_sensor.sensor = SensorKind::None;
     rig.command(&Command::Configure(without.drive.build().unwrap())).unwrap();
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(3.4)).unwrap();
-    rig.run(1.0, |_| {});
+    rig.wait(1.0);
     assert_eq!((rig.drive.state(), rig.drive.limiting()), (State::Torque, Limiting::None));
 }

@@ -107,7 +107,7 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
     for n in 1..=100 {
         let speed = speed_rpm * TAU / 60.0 * f64::from(n) / 100.0;
         rig.set_load(Load::Speed { speed }).unwrap();
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
     }
     let mut online = Online::new(&settings).unwrap();
     let truth = rig.plant.tau_r();

@@ -62,7 +62,7 @@ fn turn(rig: &mut Rig, from: f64, to: f64) {
     for n in 1..=1000 {
         let rpm = from + (to - from) * f64::from(n) * 1e-3;
         rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
-        rig.run(1e-3, |_| {});
+        rig.wait(1e-3);
     }
 }
 
@@ -120,7 +120,7 @@ fn the_power_is_held_over_all_speeds() {
     for i_q in [2.5_f32, -2.5] {
         let mut rig = driven(&[A, &limits].concat(), 1, 0.0);
         rig.command(&Command::Torque(i_q)).unwrap();
-        rig.run(0.1, |_| {});
+        rig.wait(0.1);
         for (from, to) in [(0.0, 1700.0), (1700.0, -1700.0)] {
             for step in 0..100 {
                 let at = |n: i32| from + (to - from) * f64::from(n) / 100.0;
@@ -156,7 +156,7 @@ fn at_rest_torque_is_not_reversed() {
     for (torque, rpm) in [(1.0, 0.0), (-1.0, 0.0), (1.0, -60.0), (-1.0, -60.0)] {
         rig.command(&Command::Speed(rpm as f32)).unwrap();
         rig.set_load(Load::Free { torque }).unwrap();
-        rig.run(1.5, |_| {});
+        rig.wait(1.5);
         let found = rig.plant.mechanical_speed() * 60.0 / TAU;
         assert!((found - rpm).abs() < 5.0, "{torque} Nm, {rpm} rpm: {found}");
     }
@@ -165,7 +165,7 @@ fn at_rest_torque_is_not_reversed() {
     let changes = [A, &[few[0].as_str(), few[1].as_str()]].concat();
     let mut rig = driven(&changes, 1, 0.0);
     rig.command(&Command::Torque(2.0)).unwrap();
-    rig.run(0.3, |_| {});
+    rig.wait(0.3);
     let seen = watch(&mut rig, 0.5);
     assert!(seen.i_q.abs() < 0.4 && seen.i_q_least > -0.01 && seen.limited > 0.99, "{seen:?}");
     let mut settings = config(A).drive;

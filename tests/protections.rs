@@ -89,11 +89,11 @@ fn nothing_trips_without_reason() {
             rig.start(Mode::Torque).unwrap();
             for i_q in [3.0, -3.0, 3.0, -2.0, 0.5, -0.5, 0.0] {
                 rig.command(&Command::Torque(i_q)).unwrap();
-                rig.run(0.25, |_| {});
+                rig.wait(0.25);
                 assert_eq!(rig.drive.state(), State::Torque, "seed {seed}, i_q {i_q}");
             }
             rig.command(&Command::Stop(Stop::Coast)).unwrap();
-            rig.run(0.5, |_| {});
+            rig.wait(0.5);
             assert_eq!(rig.drive.state(), State::Off, "seed {seed}");
             // Off is off: the motor is without current before it is started again.
             assert!(rig.plant.current().norm() < 1e-6);
@@ -106,7 +106,7 @@ fn nothing_trips_without_reason() {
         rig.start(Mode::Torque).unwrap();
         for i_q in [1.0, 2.0, 3.0, -3.0, -1.0, 1.5] {
             rig.command(&Command::Torque(i_q)).unwrap();
-            rig.run(0.4, |_| {});
+            rig.wait(0.4);
             assert_eq!(rig.drive.state(), State::Torque, "sensorless, seed {seed}, i_q {i_q}");
         }
     }
@@ -117,13 +117,13 @@ fn nothing_trips_without_reason() {
 fn a_cleared_drive_works_again() {
     let mut rig = regulating(&config(&[]), 1, 1.5, 0.4);
     rig.plant.set_dc_link(420.0).unwrap();
-    rig.run(0.5, |_| {});
+    rig.wait(0.5);
     assert!(matches!(rig.drive.state(), State::Fault(_)));
     rig.plant.set_dc_link(311.0).unwrap();
     rig.command(&Command::Clear).unwrap();
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(1.5)).unwrap();
-    rig.run(0.5, |_| {});
+    rig.wait(0.5);
     let mut worst = 0.0_f64;
     rig.run(0.5, |p| worst = worst.max(p.angle_error_deg.abs()));
     assert!(worst < 16.0, "{worst}");

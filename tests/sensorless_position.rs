@@ -45,9 +45,9 @@ fn a_step_arrives_without_an_encoder() {
 #[test]
 fn a_minute_at_rest_costs_a_few_degrees() {
     let mut rig = started(&config(&["load.mode=free"]), 4);
-    rig.run(2.0, |_| {});
+    rig.wait(2.0);
     let before = degrees(&rig);
-    rig.run(60.0, |_| {});
+    rig.wait(60.0);
     let drift = degrees(&rig) - before;
     println!("{drift:.2} degrees in a minute");
     assert!(drift.abs() < 25.0, "{drift}");
@@ -67,7 +67,7 @@ fn under_load_the_drift_is_the_error_of_the_slip() {
         ];
         let mut rig = started(&config(&keys.each_ref().map(String::as_str)), seed);
         rig.set_load(Load::Free { torque: 0.3 }).unwrap();
-        rig.run(2.0, |_| {});
+        rig.wait(2.0);
         let before = degrees(&rig);
         let (mut i_q, mut n) = (0.0, 0.0);
         rig.run(10.0, |p| {

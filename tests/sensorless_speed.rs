@@ -13,7 +13,7 @@ fn regulating(config: &Config, seed: u64, rpm: f64) -> Rig {
     let mut rig = Rig::from_config(config, seed).unwrap();
     rig.start(Mode::Speed).unwrap();
     rig.command(&Command::Speed(rpm as f32)).unwrap();
-    rig.run(1.5 + rpm.abs() / 300.0, |_| {});
+    rig.wait(1.5 + rpm.abs() / 300.0);
     rig
 }
 

@@ -23,9 +23,9 @@ fn at_speed(rpm: f64) -> Rig {
     for n in 1..=100 {
         let speed = rpm * TAU / 60.0 * f64::from(n) / 100.0;
         rig.set_load(Load::Speed { speed }).unwrap();
-        rig.run(0.01 * (rpm / 1000.0).abs(), |_| {});
+        rig.wait(0.01 * (rpm / 1000.0).abs());
     }
-    rig.run(0.3, |_| {});
+    rig.wait(0.3);
     rig
 }
 
@@ -47,7 +47,7 @@ fn a_silent_sensor_is_noticed_at_speed() {
                 let mut rig = rig.clone();
                 let i_q = 6.0 * spread(n, 0.618_034) - 3.0;
                 rig.command(&Command::Torque(i_q as f32)).unwrap();
-                rig.run(0.1 + 0.1 * spread(n, 0.414_214), |_| {});
+                rig.wait(0.1 + 0.1 * spread(n, 0.414_214));
                 assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {i_q} A");
                 let channel = if n % 2 == 0 { Channel::A } else { Channel::B };
                 let fault = if open {

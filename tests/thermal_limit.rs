@@ -27,7 +27,7 @@ fn settles(
     });
     assert_eq!(rig.drive.state(), State::Torque, "{changes:?}");
     let limits = |_: &u32| {
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
         rig.drive.limiting() == why
     };
     let limited = (0..100).filter(limits).count();
@@ -66,6 +66,6 @@ fn what_cannot_fall_back_trips() {
         ["limits.motor_a=0.5", "limits.motor_s=1", "angle.source=encoder", "load.mode=locked"];
     let mut rig = Rig::from_config(&config(&changes), 1).unwrap();
     rig.command(&Command::Start(Mode::Torque)).unwrap();
-    rig.run(3.0, |_| {});
+    rig.wait(3.0);
     assert_eq!(rig.drive.state(), State::Fault(drive_core::Fault::MotorOverload));
 }

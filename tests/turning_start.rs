@@ -22,20 +22,20 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
         for n in 1..=20 {
             let speed = rpm * f64::from(n) / 20.0 * TAU / 60.0;
             rig.set_load(Load::Speed { speed }).unwrap();
-            rig.run(0.01, |_| {});
+            rig.wait(0.01);
         }
         rig.command(&Command::Torque(torque)).unwrap();
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         assert_eq!(rig.drive.state(), State::Torque, "{rpm} rpm, {torque} A");
         let before = rig.drive.stator_resistance().unwrap();
         rig.command(&Command::Stop(Stop::Coast)).unwrap();
         while rig.drive.state() != State::Off {
-            rig.run(0.001, |_| {});
+            rig.wait(0.001);
         }
         let stopped = rig;
         for pause in [0.05, 0.15, 0.25, 0.37, 1.5] {
             let mut rig = stopped.clone();
-            rig.run(pause, |_| {});
+            rig.wait(pause);
             // The residual flux and the flux of the search can cancel. The drive then takes the shaft for standing, and the
             // saliency check refuses the start.
             if rig.start(Mode::Torque).is_err() {
@@ -44,7 +44,7 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
                 rig.command(&Command::Clear).unwrap();
                 rig.start(Mode::Torque).unwrap();
             }
-            rig.run(0.01, |_| {});
+            rig.wait(0.01);
             let (state, more) = (rig.drive.state(), rig.drive.stator_resistance().unwrap());
             println!(
                 "{rpm} rpm after {pause} s: resistance {:.2} %, {:.2} % before",
@@ -74,7 +74,7 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(torque)).unwrap();
         let mut largest = 0.0_f64;
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         rig.run(1.5, |p| largest = largest.max(p.angle_error_deg.abs()));
         println!("{plant} {rpm} rpm: {}, {largest:.1} degrees", rig.drive.state());
         assert_eq!(rig.drive.state(), State::Torque);
@@ -130,7 +130,7 @@ fn a_shaft_that_turns_too_fast_is_refused() {
         let expected = if caught { State::Torque } else { State::Fault(Fault::NotCaught) };
         assert_eq!(state, expected, "{rpm} rpm");
         if !caught {
-            rig.run(0.01, |_| {});
+            rig.wait(0.01);
             rig.run(0.2, |p| assert!(p.torque.abs() < 0.01, "{} Nm", p.torque));
         }
     }

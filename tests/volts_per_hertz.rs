@@ -26,9 +26,9 @@ fn turning(config: &Config, rpm: f64, seed: u64) -> Rig {
     let mut rig = Rig::new(&plant_settings(config), &settings, seed).unwrap();
     rig.set_load(Load::Free { torque: 0.0 }).unwrap();
     rig.start(Mode::VoltsPerHertz).unwrap();
-    rig.run(BUILT_S, |_| {});
+    rig.wait(BUILT_S);
     rig.command(&Command::Speed(rpm as f32)).unwrap();
-    rig.run(rpm.abs() / f64::from(settings.ramp_rpm_per_s()) + 1.0, |_| {});
+    rig.wait(rpm.abs() / f64::from(settings.ramp_rpm_per_s()) + 1.0);
     rig
 }
 
@@ -67,7 +67,7 @@ fn motors_turn_by_their_nameplates() {
             let mut rig = turning(&config, rpm, seed);
             let (free, peak) = seen(&mut rig);
             rig.set_load(Load::Free { torque: sign * torque }).unwrap();
-            rig.run(1.0, |_| {});
+            rig.wait(1.0);
             let (loaded, loaded_peak) = seen(&mut rig);
             println!(
                 "{motor:?} {rpm:.0} rpm: {free:.1}, loaded {loaded:.1}; {peak:.2} A of {limit:.2}"
@@ -106,21 +106,21 @@ fn a_sensor_or_a_phase_that_opens_is_seen() {
     for (seed, channel) in [(1, Channel::A), (2, Channel::B)] {
         let mut rig = turning(&config, 600.0, seed);
         rig.plant.set_current_fault(channel, CurrentFault::Open);
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         let state = rig.drive.state();
         assert!(matches!(state, State::Fault(_)), "{channel:?}: {state}");
     }
     for phase in 0..3 {
         let mut rig = turning(&config, 600.0, phase as u64);
         rig.plant.set_open_phase(Some(phase)).unwrap();
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         let state = rig.drive.state();
         assert!(matches!(state, State::Fault(_)), "phase {phase}: {state}");
     }
     let mut rig = Rig::new(&plant_settings(&config), &unidentified(&config), 1).unwrap();
     rig.plant.set_open_phase(Some(0)).unwrap();
     rig.drive.command(&Command::Start(Mode::VoltsPerHertz)).unwrap();
-    rig.run(5.0, |_| {});
+    rig.wait(5.0);
     assert_eq!(rig.drive.state(), State::Fault(Fault::WiringNoCurrent));
 }
 
@@ -130,10 +130,10 @@ fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
     let config = Config::of_motor(Some("motulator-2kw2")).unwrap();
     let mut rig = turning(&config, 600.0, 1);
     rig.command(&Command::Stop(Stop::Ramp)).unwrap();
-    rig.run(0.5, |_| {});
+    rig.wait(0.5);
     assert_eq!(rig.drive.state(), State::BrakingByFrequency);
     assert!(rig.drive.command(&Command::Speed(100.0)).is_err());
-    rig.run(3.0, |_| {});
+    rig.wait(3.0);
     let rpm = seen(&mut rig).0;
     assert!(rig.drive.state() == State::Off && rpm.abs() < 20.0, "{rpm} {}", rig.drive.state());
     let mut rig = turning(&config, 600.0, 1);
@@ -146,11 +146,11 @@ fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
 fn braking_keeps_the_link_below_its_limit() {
     let config = config(&["motor.inertia=0.06", "load.mode=free"]);
     let mut rig = turning(&config, 1500.0, 3);
-    rig.run(6.0, |_| {});
+    rig.wait(6.0);
     rig.command(&Command::Speed(0.0)).unwrap();
     let mut most = 0.0_f64;
     for _ in 0..2500 {
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
         most = most.max(f64::from(rig.drive.telemetry().dc_link));
     }
     let rpm = seen(&mut rig).0;
@@ -169,7 +169,7 @@ fn a_hot_heat_sink_takes_torque_and_is_named() {
         rig.set_load(Load::Free { torque: 6.0 }).unwrap();
         let mut limiting = 0;
         for _ in 0..200 {
-            rig.run(0.01, |_| {});
+            rig.wait(0.01);
             limiting += u32::from(rig.drive.limiting() == why);
         }
         println!("{celsius} degC: {limiting} of 200, {}", rig.drive.state());
@@ -184,7 +184,7 @@ fn a_power_limit_takes_speed() {
     config.drive.limits.motoring_w = 210.0;
     let mut rig = turning(&config, 900.0, 1);
     rig.set_load(Load::Free { torque: 4.0 }).unwrap();
-    rig.run(2.0, |_| {});
+    rig.wait(2.0);
     let (mut watts, mut limiting) = (0.0, 0);
     for _ in 0..6000 {
         rig.step();

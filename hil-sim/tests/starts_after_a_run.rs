@@ -49,7 +49,7 @@ fn as_expected(motor: Option<&str>, flux: f64, share: f64, shorted: bool) {
 fn regulates(rig: &mut Rig) {
     rig.command(&Command::Torque(1.0)).expect("a torque");
     let mut largest = 0.0_f64;
-    rig.run(0.3, |_| {});
+    rig.wait(0.3);
     rig.run(0.5, |point| largest = largest.max(point.angle_error_deg.abs()));
     assert_eq!(rig.drive.state(), State::Torque);
     assert!(largest < 3.0, "{largest} degrees");
@@ -63,11 +63,11 @@ fn a_start_that_was_stopped_in_its_search_is_repeated() {
         rig.start(Mode::Torque).expect("a start");
         for n in 1..=100 {
             turn(&mut rig, RPM * f64::from(n) / 100.0);
-            rig.run(0.02, |_| {});
+            rig.wait(0.02);
         }
         rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
         start(&mut rig, State::Catching);
-        rig.run(0.015, |_| {});
+        rig.wait(0.015);
         rig.settle(&Command::Stop(Stop::Coast), 0.005).expect("a stop");
         let flux = rig.plant.rotor_flux().norm();
         let (largest, shorted) = start(&mut rig, State::Torque);

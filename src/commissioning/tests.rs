@@ -183,7 +183,7 @@ fn the_plants_of_the_current_loop_are_identified_on_request() {
         play(&mut rig, &mut session, |_, _| false);
         let parameters = session.found(&settings).unwrap();
         assert_eq!(parameters.current_plant.source, PlantSource::Motor);
-        rig.run(1.0, |_| {});
+        rig.wait(1.0);
         session.begin(Step::Plant, Step::Plant);
         let told = play(&mut rig, &mut session, |_, _| false);
         assert_eq!(told.last(), Some(&News::Ended { sound: true, step: Step::Plant }), "{told:?}");

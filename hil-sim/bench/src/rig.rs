@@ -115,7 +115,7 @@ impl Rig {
             rig.set_load(Load::Locked)?;
             rig.learn()?;
             // The flux decays.
-            rig.run(REST_T * f64::from(config.drive.motor.tau_r()), |_| {});
+            rig.wait(REST_T * f64::from(config.drive.motor.tau_r()));
             rig.set_load(plant.mechanics.load)?;
             rig.periods = 0;
         }
@@ -130,7 +130,7 @@ impl Rig {
         let began = self.time();
         self.command(&Command::Start(Mode::Learning))?;
         for _ in 0..LONGEST_LEARNING_S {
-            self.run(1.0, |_| {});
+            self.wait(1.0);
             match (self.drive.state(), self.drive.learned()) {
                 (State::Off, Some(learned)) => {
                     self.learning_s = self.time() - began;
@@ -202,6 +202,13 @@ impl Rig {
         self.plant.advance(&self.pending, f64::from(PERIOD_S));
         self.pending = compare;
         self.periods += 1;
+    }
+
+    /// Runs for `seconds`. The truth, which nobody looks at, is not computed.
+    pub fn wait(&mut self, seconds: f64) {
+        for _ in 0..(seconds * RATE_HZ).round() as u64 {
+            self.step();
+        }
     }
 
     /// Runs for `seconds` and passes the point of every sample to `look`.
@@ -277,7 +284,7 @@ impl Rig {
     /// When the drive refuses it.
     pub fn settle(&mut self, command: &Command, seconds: f64) -> Result<(), Error> {
         self.command(command)?;
-        self.run(seconds, |_| {});
+        self.wait(seconds);
         Ok(())
     }
 

@@ -78,9 +78,9 @@ pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     for n in 1..=steps {
         let speed = rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
         rig.set_load(Load::Speed { speed })?;
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
     }
-    rig.run(0.3, |_| {});
+    rig.wait(0.3);
     Ok(())
 }
 

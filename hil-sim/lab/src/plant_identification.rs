@@ -263,7 +263,7 @@ fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) ->
 
 fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
     let mut rig = bench(context)?;
-    rig.run(1.0, |_| {});
+    rig.wait(1.0);
     let mut still = Record::default();
     for _ in 0..500 {
         still.push(&mut rig, Axis::Q);

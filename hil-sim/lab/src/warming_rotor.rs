@@ -65,9 +65,9 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
     for n in 1..=steps {
         let rpm = case.speed_rpm * f64::from(n) / f64::from(steps);
         rig.set_load(Load::Speed { speed: config.rpm(rpm) * TAU / 60.0 })?;
-        rig.run(0.01, |_| {});
+        rig.wait(0.01);
     }
-    rig.run(1.0, |_| {});
+    rig.wait(1.0);
 
     let (pole_pairs, i_d) = (f64::from(plant.machine.pole_pairs), f64::from(config.drive.i_d()));
     let encoder = config.drive.angle_source == AngleSource::Encoder;

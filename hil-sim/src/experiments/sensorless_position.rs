@@ -71,7 +71,7 @@ fn hold(
     let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
     rig.start(Mode::Position)?;
     rig.set_load(Load::Free { torque: load_nm })?;
-    rig.run(3.0, |_| {});
+    rig.wait(3.0);
     let start = rig.time();
     let origin = rig.plant.mechanical_angle() / TAU;
     let mut held = HeldPosition { load_nm, belief, ..HeldPosition::default() };

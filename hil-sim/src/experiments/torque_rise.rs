@@ -56,7 +56,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn step(config: &Config, rig: &Rig, (rpm, sign): Case) -> Result<Seen, Error> {
     let mut rig = rig.clone();
     bring_up(&mut rig, rpm)?;
-    rig.run(SETTLING_S, |_| {});
+    rig.wait(SETTLING_S);
     if let Some(fault) = rig.fault() {
         return Err(Error::Refused(format!("the drive stops at {rpm:.0} rpm: {fault}")));
     }

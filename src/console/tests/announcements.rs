@@ -34,7 +34,7 @@ fn in_state(state: State) -> Rig {
             rig.step();
         }
         rig.drive.command(&Command::Torque(2.0)).unwrap();
-        rig.run(0.1, |_| {});
+        rig.wait(0.1);
         rig.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     }
     for _ in 0..60_000 {
@@ -193,7 +193,7 @@ fn a_learning_tells_its_progress_and_its_end() {
     let (mut told, mut lines) = (0, Vec::new());
     // 80 ms at a time.
     while rig.drive.state() == State::Learning {
-        rig.run(0.08, |_| {});
+        rig.wait(0.08);
         talk.drive.drive = rig.drive.clone();
         talk.drive.found = rig.drive.learned().copied();
         talk.now_ms += 80;

@@ -27,7 +27,7 @@ fn pushed(rpm: f64, volts: f64, sign: f32) -> (Rig, f64) {
     rig.start(Mode::Torque).unwrap();
     rig.plant.set_dc_link(volts).unwrap();
     rig.command(&Command::Torque(sign * 10.0)).unwrap();
-    rig.run(2.0, |_| {});
+    rig.wait(2.0);
     let (mut sum, mut count) = (0.0, 0.0);
     rig.run(0.2, |point| (sum, count) = (sum + point.torque, count + 1.0));
     (rig, sum / count)

@@ -82,7 +82,7 @@ pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
         Ok((signal, side * 0.5 * size))
     })?;
     turn(&mut rig, 0.0)?;
-    rig.run(0.3, |_| {});
+    rig.wait(0.3);
     let mut offset = 0_u32;
     let with_current = alternate(&mut rig, |rig, side, k| {
         if k == 0 {

@@ -74,7 +74,7 @@ impl Trial {
 pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Trial, Error> {
     let mut random = seeded(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
-    rig.run(0.8 + random.random_range(0.0..0.2), |_| {});
+    rig.wait(0.8 + random.random_range(0.0..0.2));
     if let Some(fault) = fault(&rig) {
         return Err(Error::Refused(format!(
             "seed {}: fault {} before the angle was forced off",
@@ -189,12 +189,12 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error
     case.rpm = 0.7 * limit.copysign(case.rpm);
     let rpm_per_s = 10.0_f64.powf(random.random_range(1.7..3.3));
     let mut rig = at_speed(config, case)?;
-    rig.run(0.5, |_| {});
+    rig.wait(0.5);
     let (mut rpm, mut late_s) = (case.rpm.abs(), 0.0);
     while fault(&rig).is_none() && late_s < OVER_SPEED_S {
         rpm += rpm_per_s * 0.001;
         rig.set_load(Load::Speed { speed: rpm.copysign(case.rpm) * TAU / 60.0 })?;
-        rig.run(0.001, |_| {});
+        rig.wait(0.001);
         late_s = (rpm - limit) / rpm_per_s;
     }
     Ok(Trial { case, rpm_per_s, late_s, fault: fault(&rig), ..Trial::default() })
@@ -209,7 +209,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
     let mut result = Trial { case, ..Trial::default() };
     let mut rig = if relock {
         let mut rig = at_speed(config, case)?;
-        rig.run(0.5, |_| {});
+        rig.wait(0.5);
         // Refused while the shaft turns.
         if rig.command(&Command::Relock).is_err() {
             return Ok(result);

@@ -54,7 +54,7 @@ impl Rise {
         let (mut peak_a, mut angle_deg) = (0.0_f64, 0.0_f64);
         for wait in 0..CARRIER_SAMPLES {
             let mut rig = rig.clone();
-            rig.run(wait as f64 / RATE_HZ, |_| {});
+            rig.wait(wait as f64 / RATE_HZ);
             rig.command(&Command::Torque(i_q as f32))?;
             for current in &mut currents {
                 peak_a = rig.plant.phase_currents().into_iter().fold(peak_a, |a, i| a.max(i.abs()));
