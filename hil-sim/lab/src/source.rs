@@ -5,12 +5,12 @@
 
 pub mod errata;
 pub mod evidence;
+mod formula;
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use exmex::Express;
 use serde::Deserialize;
 use sim_bench::outcome::Compared;
 
@@ -175,15 +175,10 @@ static NAMES: LazyLock<HashMap<String, HashMap<String, f64>>> = LazyLock::new(||
 
 /// The value of a formula of a source: of printed values, `{PLACE | QUANTITY}`, and of names.
 fn evaluate(source: &str, formula: &str, names: &HashMap<String, f64>) -> Option<f64> {
-    let parsed = exmex::parse::<f64>(formula).ok()?;
-    let value = |name: &String| match name.split_once(" | ") {
-        Some((place, quantity)) => {
-            place_of(source, place, quantity).and_then(|k| PRINTED[k].take())
-        }
+    formula::evaluate(formula, &|name| match name.split_once(" | ") {
+        Some((place, quantity)) => PRINTED[place_of(source, place, quantity)?].take(),
         None => names.get(name).copied(),
-    };
-    let values = parsed.var_names().iter().map(value).collect::<Option<Vec<_>>>()?;
-    parsed.eval(&values).ok()
+    })
 }
 
 /// The value of a formula of a source.
@@ -239,7 +234,7 @@ impl Printed {
         match &*self.value {
             "yes" => Some(1.0),
             "no" => Some(0.0),
-            value => value.parse().ok().or_else(|| exmex::parse::<f64>(value).ok()?.eval(&[]).ok()),
+            value => value.parse().ok().or_else(|| formula::evaluate(value, &|_| None)),
         }
     }
 
