@@ -8,13 +8,12 @@ use hil_sim::identification::recursive::Reference;
 use hil_sim::identification::signals::{Filter, noise};
 use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Delta, Parameters, Signal, Trial};
-use num_complex::Complex32;
+use num_complex::{Complex as Of, Complex32};
+use num_traits::Float;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use rotor_id::rls::{Rls, RlsSettings};
-use rustfft::num_complex::Complex as Of;
-use rustfft::num_traits::Float;
 
 const H: f64 = 50e-6;
 const CURRENT: f64 = 30.0;
