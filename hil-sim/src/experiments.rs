@@ -22,7 +22,7 @@ pub mod torque_limit;
 mod torque_rise;
 
 pub use sim_bench::experiment::*;
-use sim_bench::{bode, steady};
+use sim_bench::steady;
 pub use sim_bench::{learning, statistics};
 pub use sim_lab::*;
 use statistics::Statistical;

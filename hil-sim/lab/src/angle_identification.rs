@@ -6,12 +6,13 @@ mod model;
 
 use std::f64::consts::FRAC_2_PI;
 
-use sim_bench::bode::{Bode, frequencies, largest_pole};
+use sim_bench::bode::{Bode, frequencies};
 use sim_bench::steady::{OperatingPoint, steady_run};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use crate::demodulators::tracked;
 use crate::injection_map::PP;
+use crate::poles::largest_pole;
 use crate::prelude::*;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};

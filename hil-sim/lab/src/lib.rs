@@ -26,6 +26,7 @@ pub mod online_tracking;
 pub mod perturbation;
 pub mod pi_design;
 pub mod plant_identification;
+pub mod poles;
 mod prelude;
 pub mod recomputed;
 pub mod saliency;

@@ -3,10 +3,11 @@
 use drive_core::FirstOrder;
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_settings::tuning::rule_3_8;
-use sim_bench::bode::{RATE, fictitious, largest_pole};
+use sim_bench::bode::{RATE, fictitious};
 use sim_bench::plant::{InverterSettings, MachineSettings};
 
 use crate::identification::bench_tests::Readings;
+use crate::poles::largest_pole;
 use crate::prelude::*;
 use crate::source;
 

@@ -4,7 +4,7 @@ use drive_core::current::{Pi, PiState};
 
 use sim_lab::source::named;
 
-use super::bode::largest_pole;
+use super::poles::largest_pole;
 use crate::prelude::*;
 
 /// Figure 40, Eq. B.1 to B.3.

@@ -4,7 +4,7 @@ use drive_core::FirstOrder;
 use sim_lab::recomputed::plant;
 use sim_lab::source::{named, printed};
 
-use super::bode::largest_pole;
+use super::poles::largest_pole;
 use crate::prelude::*;
 
 /// Figures 26 and 27, Eq. 3.34, 3.39, 3.40.

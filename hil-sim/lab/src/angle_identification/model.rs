@@ -1,9 +1,8 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use sim_bench::bode::{largest_pole, roots};
-
 use super::measure::Record;
 use crate::identification::arx::{Orders, fit};
+use crate::poles::{largest_pole, roots};
 use crate::prelude::*;
 use crate::source;
 

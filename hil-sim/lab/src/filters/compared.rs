@@ -2,10 +2,10 @@
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
 use num_complex::Complex64;
-use sim_bench::bode::largest_pole;
 use sim_bench::stats::Stats;
 
 use super::direct::{self, Form};
+use crate::poles::largest_pole;
 
 /// A filter whose forms are compared: responses, and the error of each form.
 pub struct ComparedFilter {
