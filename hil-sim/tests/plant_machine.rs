@@ -45,7 +45,12 @@ fn exact_step(w: f64, h: f64) -> (Matrix4<f64>, Matrix4x2<f64>) {
     let mut augmented = SMatrix::<f64, 6, 6>::zeros();
     augmented.fixed_view_mut::<4, 4>(0, 0).copy_from(&(a * h));
     augmented.fixed_view_mut::<4, 2>(0, 4).copy_from(&(b * h));
-    let exp = augmented.exp();
+    // The series of the exponential: nalgebra's own needs a feature that compiles SIMD types.
+    let (mut exp, mut term) = (SMatrix::<f64, 6, 6>::identity(), SMatrix::<f64, 6, 6>::identity());
+    for n in 1..=20 {
+        term = term * augmented / f64::from(n);
+        exp += term;
+    }
     (exp.fixed_view::<4, 4>(0, 0).into(), exp.fixed_view::<4, 2>(0, 4).into())
 }
 
