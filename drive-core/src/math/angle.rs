@@ -2,7 +2,6 @@
 
 use core::f32::consts::{PI, TAU};
 
-use derive_more::{Add, AddAssign, Neg, Sub, SubAssign};
 use fixed::Wrapping;
 use fixed::types::I0F32;
 
@@ -20,8 +19,10 @@ use fixed::types::I0F32;
 /// let axis = Angle::QUARTER.unit_vector();
 /// assert!(axis.cos.abs() < 2e-5 && (axis.sin - 1.0).abs() < 2e-5);
 /// ```
-#[derive(Add, AddAssign, Clone, Copy, Debug, Default, Eq, Neg, PartialEq, Sub, SubAssign)]
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct Angle(pub Wrapping<I0F32>);
+
+super::field_by_field!(Angle { 0 });
 
 /// 2^32: units in the last place of an [`Angle`] per turn.
 const UNITS_PER_TURN: f32 = 4_294_967_296.0;

@@ -12,7 +12,6 @@
 //! assert!((dq.d - 1.732).abs() < 1e-3 && (dq.q + 1.0).abs() < 1e-3);
 //! ```
 
-use derive_more::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 use num_complex::Complex32;
 
 use crate::math::angle::UnitVector;
@@ -20,11 +19,21 @@ use crate::math::angle::UnitVector;
 macro_rules! frame {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
         $(#[$doc])*
-        #[derive(Add, AddAssign, Clone, Copy, Debug, Default, Mul, Neg, PartialEq, Sub, SubAssign)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[repr(C)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: f32,)+
+        }
+
+        super::field_by_field!($name { $($field),+ });
+
+        impl core::ops::Mul<f32> for $name {
+            type Output = Self;
+            #[inline]
+            fn mul(self, factor: f32) -> Self {
+                Self { $($field: self.$field * factor),+ }
+            }
         }
 
         impl $name {
