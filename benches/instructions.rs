@@ -1,6 +1,6 @@
 //! Instructions of one control step and of one sample of the recursive least squares, counted by
 //! valgrind: exact and repeatable, where wall time is not:
-//! `cargo bench --bench instructions --features instructions`.
+//! `cargo bench -p induction-drive-benches --bench instructions --features instructions`.
 //!
 //! Needs valgrind and `cargo install gungraun-runner --version =0.20.0`. The counts are those of the
 //! host's instruction set: they tell one version of the code from another, not the cycles of the target.

@@ -1,5 +1,5 @@
-//! Wall time of the control step, alone and with the motor: `cargo bench`. The motor alone is in
-//! `hil-sim/benches/plant.rs`.
+//! Wall time of the control step, alone and with the motor: `cargo bench -p induction-drive-benches`.
+//! The motor alone is in `plant.rs`.
 //!
 //! The machines it runs on are noisy: compare figures of one run only. Real time is 6000 periods a
 //! second, so `real time / (time of "drive and motor")` is how many times faster than real time a
