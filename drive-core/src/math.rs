@@ -1,6 +1,7 @@
 //! Angles, vectors with their reference frames, and decimal output.
 
-/// Sum, difference and negative of a type, field by field.
+/// Sum, difference and negative of a type, field by field. It stands in for a crate of derive macros: that one and its parser were
+/// compiled before the control, which everything else waits for.
 macro_rules! field_by_field {
     ($name:ident { $($field:tt),+ }) => {
         impl core::ops::Add for $name {
