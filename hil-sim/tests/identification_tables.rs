@@ -21,8 +21,7 @@ fn share(entries: &[Entry]) -> f64 {
 }
 
 /// All twelve columns of the machine PX with seed 1 and half the printed noise.
-static HALF: LazyLock<Vec<Errors>> =
-    LazyLock::new(|| all(Parameters::PX, Noise::HALF, 1, TRIALS));
+static HALF: LazyLock<Vec<Errors>> = LazyLock::new(|| all(Parameters::PX, Noise::HALF, 1, TRIALS));
 
 /// All twelve columns.
 fn all(machine: Parameters, noise: Noise, seed: u64, trials: u64) -> Vec<Errors> {

@@ -51,15 +51,14 @@ fn written(folder: &Path, name: &str, text: &str) -> String {
     path.to_str().expect("a path of letters").to_owned()
 }
 
-/// Neither is lost nor stopped, with eight seeds each.
-#[test]
-fn nameplate_and_circuit_are_enough() {
+/// Neither is lost nor stopped.
+fn nameplate_and_circuit(seeds: u64) {
     let folder = folder("own-motor");
     for (name, text) in [("large.toml", LARGE), ("small.toml", SMALL)] {
         let motor = written(&folder, name, text);
         let config = Config::of_motor(Some(&motor)).expect("a motor");
         for experiment in ["torque-steps", "speed-profile"] {
-            for seed in 1..=8 {
+            for seed in 1..=seeds {
                 let outcome = experiments::run(experiment, &config, seed);
                 let outcome = outcome.unwrap_or_else(|e| panic!("{name} {experiment} {seed}: {e}"));
                 let largest = outcome.metrics.get("angle_error_max_deg").expect("an angle");
@@ -69,6 +68,17 @@ fn nameplate_and_circuit_are_enough() {
             }
         }
     }
+}
+
+#[test]
+fn nameplate_and_circuit_are_enough() {
+    nameplate_and_circuit(3);
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn nameplate_and_circuit_are_enough_with_eight_seeds() {
+    nameplate_and_circuit(8);
 }
 
 /// The sensors of the dissertation's bench reach 1.24 times the rated current of its motor, and so do those of a motor of

@@ -155,7 +155,7 @@ pub fn started(linear: bool) -> Result<[f64; 4], Error> {
 
 fn config(motor: &str, iron: &str) -> Result<Config, Error> {
     let mut config = Config::of_motor(Some(motor))?;
-    Motor::from_text(motor, iron)?.apply(&mut config)?;
+    Motor::from_text(motor, motors::measured(iron)?)?.apply(&mut config)?;
     Ok(config)
 }
 

@@ -1,7 +1,14 @@
 //! The tests of the plant: one program, a module a subject.
 
+mod bridge;
 mod common;
 mod dc_link;
 mod effects_board;
 mod effects_motor;
 mod energy;
+mod inverter;
+mod machine;
+mod outputs_off;
+mod phase_model;
+mod saliency;
+mod sensors;

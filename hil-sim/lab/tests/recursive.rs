@@ -3,17 +3,17 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use hil_sim::identification::models::model_c;
-use hil_sim::identification::recursive::Reference;
-use hil_sim::identification::signals::{Filter, noise};
-use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
-use hil_sim::identification::{Complex, Delta, Parameters, Signal, Trial};
 use num_complex::{Complex as Of, Complex32};
 use num_traits::Float;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use rotor_id::rls::{Rls, RlsSettings};
+use sim_lab::identification::models::model_c;
+use sim_lab::identification::recursive::Reference;
+use sim_lab::identification::signals::{Filter, noise};
+use sim_lab::identification::trial::{Noise, VOLTAGE, peaks};
+use sim_lab::identification::{Complex, Delta, Parameters, Signal, Trial};
 
 const H: f64 = 50e-6;
 const CURRENT: f64 = 30.0;

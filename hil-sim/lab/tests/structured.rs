@@ -1,11 +1,11 @@
 //! Model S: the speed, the parameters beside Model C, and starts far from the machine (S1).
 
-use hil_sim::identification::models::{NotIdentifiable, model_c};
-use hil_sim::identification::structured::{fit_from, model_s, starts};
-use hil_sim::identification::trial::Noise;
-use hil_sim::identification::{Complex, Estimate, Parameters, Signal, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use sim_lab::identification::models::{NotIdentifiable, model_c};
+use sim_lab::identification::structured::{fit_from, model_s, starts};
+use sim_lab::identification::trial::Noise;
+use sim_lab::identification::{Complex, Estimate, Parameters, Signal, Trial};
 
 const PERIODS: [f64; 3] = [50e-6, 100e-6, 200e-6];
 const TRIALS: u64 = 20;

@@ -1,8 +1,8 @@
 //! The general ARX fit of appendix A (Barroso 2017).
 
-use hil_sim::identification::NotIdentifiable;
-use hil_sim::identification::arx::{Orders, fit};
-use hil_sim::identification::signals::Prbs;
+use sim_lab::identification::NotIdentifiable;
+use sim_lab::identification::arx::{Orders, fit};
+use sim_lab::identification::signals::Prbs;
 
 /// The plant of Eq. 3.34, A per V.
 const P: f64 = 0.93916;

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use hil_sim::plant::{
+use motor_plant::{
     Complex, Load, Machine, MachineModel, MachineSettings, Mechanics, MechanicsSettings,
     MotorModel, SaliencySettings, clarke, phases,
 };

@@ -1,7 +1,7 @@
 //! The plant that the tests of the inverter share.
 
 use drive_core::Compare;
-use hil_sim::plant::{
+use motor_plant::{
     Complex, InverterSettings, Load, MeasurementSettings, Plant, PlantSettings, phases,
 };
 

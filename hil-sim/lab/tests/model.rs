@@ -1,13 +1,13 @@
 //! The sampled machine and the least squares on it: assertions A1 to A4, and the exact inverse.
 
-use hil_sim::identification::batch::{least_squares, parts};
-use hil_sim::identification::models::{model_b, model_c, model_d, time_constant_roots};
-use hil_sim::identification::trial::Noise;
-use hil_sim::identification::{
+use nalgebra::DMatrix;
+use sim_lab::identification::batch::{least_squares, parts};
+use sim_lab::identification::models::{model_b, model_c, model_d, time_constant_roots};
+use sim_lab::identification::trial::Noise;
+use sim_lab::identification::{
     Complex, CurrentVoltage, Data, Delta, Estimate, FirstOrderTheta, NotIdentifiable, Parameters,
     Signal, Step, Trial,
 };
-use nalgebra::DMatrix;
 
 const PERIODS: [f64; 3] = [50e-6, 100e-6, 200e-6];
 const SPEEDS: [f64; 2] = [375.0, 61.0];

@@ -1,6 +1,6 @@
 //! The machine model against the exact solution of the textbook machine, and its power balance.
 
-use hil_sim::plant::{
+use motor_plant::{
     Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
     MechanicsSettings, MotorModel, SaliencySettings,
 };

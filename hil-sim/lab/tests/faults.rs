@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use hil_sim::identification::signals::noise;
-use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
-use hil_sim::identification::{Complex, Parameters, Signal, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rotor_id::rls::{Rls, RlsError, RlsSettings};
+use sim_lab::identification::signals::noise;
+use sim_lab::identification::trial::{Noise, VOLTAGE, peaks};
+use sim_lab::identification::{Complex, Parameters, Signal, Trial};
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;

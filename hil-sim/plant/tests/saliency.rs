@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-use hil_sim::plant::{
+use motor_plant::{
     Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
     MechanicsSettings, MotorModel, Plant, PlantSettings, SaliencySettings,
 };

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::common::{PERIOD, TOP, duties, plant, settings, voltage};
+use crate::bridge::{PERIOD, TOP, duties, plant, settings, voltage};
 use drive_core::Compare;
-use hil_sim::plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
+use motor_plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Compare, Hardware};
-use hil_sim::plant::{
+use motor_plant::{
     Channel, Complex, CurrentFault, EncoderFault, InverterSettings, Load, MeasurementSettings,
     Plant, PlantSettings, Sensors, phases,
 };

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::common::{PERIOD, plant, settings, voltage};
+use crate::bridge::{PERIOD, plant, settings, voltage};
 use drive_core::Compare;
-use hil_sim::plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
+use motor_plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
 
 /// A motor at a held speed after 0.3 s of a voltage of this many volts that turns with it, from `start`;
 /// and how far they turn in a period, rad.
