@@ -225,6 +225,3 @@ fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, Value)>) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

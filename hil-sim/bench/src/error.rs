@@ -148,17 +148,3 @@ pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&
         .min()
         .map(|(_, candidate)| candidate)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_name_is_found_and_a_far_one_is_not() {
-        let known = ["motor.rs", "motor.rr", "inverter.vdc"];
-        assert_eq!(nearest("motor.sr", known.into_iter()), Some("motor.rr"));
-        assert_eq!(nearest("inverter.vcd", known.into_iter()), Some("inverter.vdc"));
-        assert_eq!(nearest("xylophone", known.into_iter()), None);
-        assert_eq!(nearest("MOTOR.RS", known.into_iter()), Some("motor.rs"));
-    }
-}

@@ -122,25 +122,3 @@ pub fn upper_bound_95(events: u64, trials: u64) -> f64 {
     }
     high / trials as f64
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bounds_of_a_rate() {
-        // Exact Poisson limits: 2.996, 4.744, 6.296, 16.962.
-        for (events, mean) in [(0, 2.9957), (1, 4.7439), (2, 6.2958), (10, 16.962)] {
-            assert!((upper_bound_95(events, 1000) * 1e3 - mean).abs() < 1e-3, "{events}");
-        }
-    }
-
-    #[test]
-    fn of_a_few_values() {
-        let s = Stats::of([3.0, -4.0, 1.0]);
-        assert_eq!(s.mean(), 0.0);
-        assert_eq!(s.largest(), 4.0);
-        assert!((s.rms() - (26.0_f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert!((s.deviation() - s.rms()).abs() < 1e-12);
-    }
-}

@@ -1,8 +1,8 @@
 //! The plant of the angle estimation, identified with the encoder as reference, and the controller made
 //! from it (section 3.11).
 
-mod measure;
-mod model;
+pub mod measure;
+pub mod model;
 
 use std::f64::consts::FRAC_2_PI;
 

@@ -157,18 +157,3 @@ fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
     }
     table.note("Without dead-time compensation. The limited angle is off where pulses are dropped or extended because they are too short to be made.")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use sim_bench::config::Config;
-
-    #[test]
-    fn the_modulator_gives_the_voltage_asked_for() {
-        let outcome = EXPERIMENT.outcome(&Config::default(), 1).unwrap();
-        let metric = |name: &str| outcome.metrics.get(name).unwrap();
-        assert!(metric("voltage_error_max_v") < 0.05);
-        assert!(metric("on_time_difference_max_us") < 0.03);
-        assert!((metric("sideband_over_signal") - 0.5).abs() < 1e-6);
-    }
-}

@@ -1,7 +1,8 @@
-//! The tests of the identification of the 1996 paper: one program, a module a subject.
+//! The tests of the laboratory: one program, a module a subject.
 
 mod arx;
 mod faults;
+mod laboratory;
 mod model;
 mod recursive;
 mod structured;

@@ -14,10 +14,11 @@ pub const TURN: f64 = 0.052_36;
 
 /// Half of the encoder's step, counts of 0.072° electrical: 2° either way.
 const STEP_COUNTS: i32 = 28;
-/// Samples at each side of a step, steps either way, and where the slow gain is read: the current has
-/// followed, the flux (186 ms) hardly.
+/// Samples at each side of a step.
 pub const STEP_SAMPLES: usize = 360;
+/// Steps either way.
 const STEPS: usize = 200;
+/// Samples where the slow gain is read: the current has followed, the flux (186 ms) hardly.
 pub const SLOW: std::ops::Range<usize> = 240..360;
 
 /// The identification experiment: input and output over one period of the sequence, averaged.
@@ -127,38 +128,4 @@ fn alternate(
     // From -y to y for angles from -x to x; before the step the signal is that of the other side.
     let end = SLOW.map(|k| signal[k]).sum::<f64>() / SLOW.len() as f64;
     Ok(signal.iter().map(|y| 0.5 * (y + end) / angle).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use drive_core::carrier::DemodulatorKind;
-
-    use super::*;
-
-    /// Slow gain with the axis alone and with the current, by the demodulation.
-    fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
-        let mut config = Config::default();
-        config.drive.injection.demodulator = demodulator;
-        let responses = steps(Rig::oriented(&config, 5, iq, 0.8).unwrap()).unwrap();
-        [&responses.alone, &responses.with_current]
-            .map(|r| r[SLOW].iter().sum::<f64>() / SLOW.len() as f64)
-    }
-
-    #[test]
-    fn the_leak_turns_with_the_current_and_the_flux_does_not() {
-        // The leak: sqrt2 * 0.01 * 0.944 * iq while the current is held, nothing when it turns along.
-        let [held, slow] = gains(DemodulatorKind::Literal, 2.0);
-        let leak = 2f64.sqrt() * 0.01 * 0.944_061 * 2.0;
-        assert!((held / leak - 1.0).abs() < 0.03, "{held} {leak}");
-        assert!(slow.abs() < 0.05 * leak, "{slow}");
-
-        // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and the part that dead time
-        // and noise leave take some tenths.
-        let [held, slow] = gains(DemodulatorKind::Synchronous, 2.0);
-        let cos_2_gamma = (4.0 - 0.49) / (4.0 + 0.49);
-        let fast = 2.0 * (0.035 + 0.036 * 4.49_f64.sqrt() * cos_2_gamma);
-        println!("held {held} of {fast}, slow {slow} of 0.07");
-        assert!((held / fast - 1.0).abs() < 0.2, "{held} {fast}");
-        assert!((slow / 0.07 - 1.0).abs() < 0.25, "{slow}");
-    }
 }

@@ -44,7 +44,7 @@ pub fn six_step_and_schroeder(amplitude: f64, hz: f64, t: f64) -> Complex {
 /// A pseudo-random binary sequence of a shift register of 8 bits with linear feedback: +1 or -1 with the longest period,
 /// [`Self::PERIOD`].
 #[derive(Clone, Copy, Debug)]
-pub struct Prbs(u8);
+pub struct Prbs(pub u8);
 
 impl Default for Prbs {
     fn default() -> Self {
@@ -99,52 +99,4 @@ impl Filter {
 pub fn noise(rng: &mut impl Rng, largest: f64) -> Complex {
     let mut component = || largest * (2.0 * rng.random::<f64>() - 1.0);
     Complex::new(component(), component())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sequence_has_the_longest_period() {
-        let mut prbs = Prbs::default();
-        let states = [(); Prbs::PERIOD].map(|()| {
-            prbs.step();
-            prbs.0
-        });
-        assert!((1..=255).all(|state| states.contains(&state)), "each state once");
-        assert_eq!((0..Prbs::PERIOD).map(|_| prbs.step()).sum::<f64>(), 1.0, "one more +1 than -1");
-    }
-
-    #[test]
-    fn six_steps_per_period_and_a_jump_on_the_sample() {
-        for k in 0..2000u32 {
-            let v = six_step(2.0, 60.0, f64::from(k) * 50e-6);
-            // 60 Hz at 50 us: a jump every 55.5 samples, exactly on every 500th sample.
-            let sector = (k * 9 / 500) % 6;
-            assert!((v - Complex::from_polar(2.0, FRAC_PI_3 * f64::from(sector))).norm() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn schroeder_peaks_lower_than_cosines_and_is_flat() {
-        let values: Vec<f64> = (0..1000).map(|n| schroeder(1.0, f64::from(n) / 1000.0)).collect();
-        let peak = values.iter().fold(0.0f64, |peak, r| peak.max(r.abs()));
-        assert!((peak - 2.83).abs() < 0.01, "{peak}");
-        let power = values.iter().map(|r| r * r).sum::<f64>() / 1000.0;
-        assert!((power - 2.5).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_filter_has_its_corner() {
-        // At omega_n a third-order section of this kind has |1/(1+j)|³ = 2^(-3/2); Tustin warps
-        // omega_n h = 0.1 by h² omega_n² / 12.
-        let (omega, h) = (1000.0, 1e-4);
-        let mut filter = Filter::new(omega, h);
-        let mut gain = 0.0;
-        for n in 0..10_000 {
-            gain = filter.step(Complex::from_polar(1.0, omega * h * f64::from(n))).norm();
-        }
-        assert!((gain - 0.5f64.powf(1.5)).abs() < 1e-3, "{gain}");
-    }
 }

@@ -1,4 +1,9 @@
-use super::*;
+//! Keys, files and motors of the configuration.
+
+use hil_sim::config::motors::Motor;
+use hil_sim::config::{Allowed, BENCH, Key, Value, flattened, plant_settings};
+use hil_sim::error::nearest;
+use hil_sim::{Config, Error};
 
 fn set(assignment: &str) -> Result<Config, Error> {
     let mut config = Config::default();
@@ -157,4 +162,62 @@ fn the_scales_of_the_drive_follow_the_sensors() {
     let config = set("inverter.dc_link_v=540").unwrap();
     assert!((config.drive.dc_link_range_v() - 450.45 * 540.0 / 311.0).abs() < 0.1);
     assert!((config.drive.dc_over_v() - 400.0 * 540.0 / 311.0).abs() < 0.1);
+}
+
+#[test]
+fn every_file_is_a_motor_whose_numbers_all_have_one_source() {
+    let all = Motor::all();
+    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/bench/motors")).unwrap();
+    let files = folder.filter(|file| file.as_ref().unwrap().path().is_file());
+    assert_eq!(all.len(), files.count());
+    assert!(all.len() >= 9);
+    for motor in all {
+        let mut config = Config::default();
+        motor.apply(&mut config).unwrap();
+        let named: Vec<&String> = motor.source.iter().flat_map(|source| &source.keys).collect();
+        assert_eq!(named.len(), motor.settings().len(), "{}", motor.name);
+        assert!(config.drive.check().is_ok(), "{}: {:?}", motor.name, config.drive.check());
+        assert!(config.drive.build().is_ok(), "{}", motor.name);
+        let implied: Vec<_> = motor.implied(&config).into_iter().map(|(key, ..)| key).collect();
+        let high: &[&str] =
+            if motor.name == "dissertation" { &[] } else { &["current_plant", "sequence.flux"] };
+        assert_eq!(implied, high, "{}", motor.name);
+        assert!(!motor.title.is_empty());
+        assert!(!motor.about.trim().is_empty() && motor.console_lines().len() < 20);
+    }
+}
+
+#[test]
+fn the_default_is_the_dissertations() {
+    let mut config = Config::default();
+    Motor::find("dissertation").unwrap().apply(&mut config).unwrap();
+    assert_eq!(config.changes(), [""; 0]);
+}
+
+#[test]
+fn errors_name_motor_key_and_file() {
+    let error = Motor::find("motulator").unwrap_err().to_string();
+    assert!(error.contains("did you mean `motulator-2kw2`"), "{error}");
+    let error = Motor::find("missing.toml").unwrap_err().to_string();
+    assert!(error.starts_with("missing.toml: "), "{error}");
+    let text = "title = \"x\"\nabout = \"y\"\nsource = []\n[motor]\nr_s = 1\n";
+    let error = Motor::from_text("mine", text).unwrap().apply(&mut Config::default()).unwrap_err();
+    assert!(error.to_string().contains("motor mine: motor.r_s has 0 sources"), "{error}");
+}
+
+#[test]
+fn the_console_is_set_to_the_motor() {
+    let lines = Motor::find("motulator-2kw2").unwrap().console_lines();
+    for line in ["set motor.r_s 3.7", "set nameplate.current_a 5", "set sequence.flux high"] {
+        assert!(lines.iter().any(|found| found == line), "{line} in {lines:?}");
+    }
+}
+
+#[test]
+fn the_nearest_name_is_found_and_a_far_one_is_not() {
+    let known = ["motor.rs", "motor.rr", "inverter.vdc"];
+    assert_eq!(nearest("motor.sr", known.into_iter()), Some("motor.rr"));
+    assert_eq!(nearest("inverter.vcd", known.into_iter()), Some("inverter.vdc"));
+    assert_eq!(nearest("xylophone", known.into_iter()), None);
+    assert_eq!(nearest("MOTOR.RS", known.into_iter()), Some("motor.rs"));
 }
