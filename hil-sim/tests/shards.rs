@@ -74,10 +74,14 @@ fn every_statistical_experiment_is_in_the_list() {
     }
 }
 
+/// Whether even its smallest run takes ten seconds.
+fn is_long(name: &str) -> bool {
+    ["smallest-slope", "foreign-motors"].contains(&name)
+}
+
 /// Three shards, merged in another order, against one run: percentiles, tables, figures and all.
-#[test]
-fn merged_shards_are_the_whole_run_byte_for_byte() {
-    for (name, options) in SMALL {
+fn merged_shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
+    for (name, options) in SMALL.into_iter().filter(|(name, _)| which(name)) {
         let folder = folder(&format!("shards-{name}"));
         let whole = run(&folder, name, options, &["--json", "--seed", "5"]);
         let arguments = [&["run", name, "-q", "--seed", "5"], options].concat();
@@ -85,11 +89,22 @@ fn merged_shards_are_the_whole_run_byte_for_byte() {
         let merged = merge(&folder, &["3.json", "1.json", "2.json"]);
         assert_eq!(text(&merged.stdout), text(&whole), "{name}");
     }
+}
+
+#[test]
+fn merged_shards_are_the_whole_run_byte_for_byte() {
+    merged_shards_are_the_whole_run(|name| !is_long(name));
     // A single shard, of a cheap one.
     let folder = folder("shards-one");
     let whole = run(&folder, "monte-carlo", &MONTE_CARLO[2..6], &["--json"]);
     let one = shards(&folder, MONTE_CARLO, 1);
     assert_eq!(text(&merge(&folder, &[&one[0]]).stdout), text(&whole));
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn merged_shards_of_the_long_experiments_are_the_whole_run() {
+    merged_shards_are_the_whole_run(is_long);
 }
 
 #[test]
