@@ -9,6 +9,7 @@ mod options;
 mod outside;
 pub mod poison;
 pub mod rom;
+pub mod simulated;
 pub mod snapshot;
 mod terminals;
 
@@ -67,6 +68,8 @@ pub struct Board {
     pub longest_to_compares: LongestPath,
     /// Longest from there to its first instruction, ticks.
     pub latest_start: u64,
+    /// Simulated time that snapshots took back, ticks.
+    gone_back: u64,
 }
 
 /// What passes while a board runs.
@@ -122,6 +125,7 @@ impl Board {
             longest: LongestPath::default(),
             longest_to_compares: LongestPath::default(),
             latest_start: 0,
+            gone_back: 0,
         };
         let chip = board.chip();
         chip.set_clocks(0.0, LSI_HZ);

@@ -22,8 +22,9 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::board::{Board, simulated};
 use crate::power_stage::{PowerStage, REFERENCE};
-use crate::{board::Board, chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
+use crate::{chip::TICKS_PER_PERIOD, image::Image, periph::Reset};
 use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;
@@ -113,7 +114,8 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
     std::thread::scope(|scope| {
-        let started: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        let workers = (0..workers).map(|_| simulated::worker().spawn_scoped(scope, work));
+        let started: Vec<_> = workers.collect::<std::io::Result<_>>()?;
         started
             .into_iter()
             .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)

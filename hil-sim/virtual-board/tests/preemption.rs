@@ -72,7 +72,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     // for in vain.
     let bound = 2.0 * LATEST_START as f64 / f64::from(CYCLES_PER_US);
     assert!(told <= bound, "{told} us by the status");
-    let floating = board.poison.map_or(0, |poison| poison.in_floating_point);
+    let floating = board.poison.as_ref().map_or(0, |poison| poison.in_floating_point);
     println!(
         "{periods} periods, {floating} interrupts in code with floating point, {lines} answers"
     );

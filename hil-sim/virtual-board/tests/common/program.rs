@@ -3,9 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use virtual_board::board::simulated;
+
 /// A session that writes to a folder.
 pub fn command(out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
+    command.env(simulated::TEST, simulated::test());
     command.arg("--out").arg(out).args(arguments);
     command
 }
