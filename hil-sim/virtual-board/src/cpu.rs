@@ -72,6 +72,8 @@ pub struct CoreState {
 const PIECE: usize = 256;
 /// After an operation of the flash the next may come within this time, ticks: 100 ms.
 const WRITES: u64 = 100 * 170_000;
+/// End of the code in CCM.
+const CCM_END: u32 = memory::CCM + memory::CCM_SIZE;
 /// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
 const EXCEPTION_EXIT: [u32; 2] = [8, 3];
 
@@ -116,55 +118,57 @@ impl Cpu {
             }),
         )?;
 
-        // Main loop and slow interrupts run from the flash: a cycle per instruction.
-        let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
-        if counting.every_instruction {
+        let end = u64::from(memory::RAM + memory::RAM_SIZE - 1);
+        // One hook for all code: the emulator asks each hook at every block whether the block is in its range.
+        let from = if counting.every_instruction {
+            let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
             uc.add_code_hook(flash.0, flash.1, |uc, address, size| {
-                if !fetched(uc, address, size) {
+                if !fetched(uc, address as u32, size) {
                     uc.get_data_mut().instructions(1);
                 }
             })?;
+            memory::CCM
         } else {
-            let mut lengths = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |_| 1);
-            let mut costs = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |i| i.cycles);
-            let mut last = 0;
-            uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
-                if fetched(uc, address, size) {
-                    return;
+            memory::FLASH
+        };
+        let flash_size = memory::STORED - memory::FLASH;
+        let mut lengths = Costs::new(memory::FLASH, flash_size, |_| 1);
+        let mut costs = Costs::new(memory::FLASH, flash_size, |instruction| instruction.cycles);
+        let mut fast = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
+        let mut last = 0;
+        uc.add_block_hook(from.into(), end, move |uc, address, size| {
+            let address = address as u32;
+            match address {
+                memory::FLASH..memory::STORED => {
+                    if fetched(uc, address, size) {
+                        return;
+                    }
+                    if uc.get_data().in_control {
+                        let cycles = cost_of(&mut costs, uc, address, size);
+                        let cycles = cycles + cost::waits(address, size);
+                        uc.get_data_mut().block(address, size, cycles);
+                        return;
+                    }
+                    // Main loop and slow interrupts: a cycle per instruction.
+                    let instructions = cost_of(&mut lengths, uc, address, size);
+                    uc.get_data_mut().instructions(u64::from(instructions));
+                    if uc.get_data().watched.is_some() {
+                        let cycles = cost_of(&mut costs, uc, address, size);
+                        uc.get_data_mut().watch(address, size, cycles);
+                    } else if size == 4 && last == address {
+                        skip_delay(uc, address);
+                    }
+                    last = address;
                 }
-                if uc.get_data().in_control {
-                    let cycles = cost_of(&mut costs, uc, address as u32, size);
-                    let cycles = cycles + cost::waits(address as u32, size);
-                    uc.get_data_mut().block(address as u32, size, cycles);
-                    return;
+                memory::CCM..CCM_END if counting.cycles && !stopped(uc, address) => {
+                    let cycles = cost_of(&mut fast, uc, address, size);
+                    uc.get_data_mut().block(address, size, cycles);
                 }
-                let instructions = cost_of(&mut lengths, uc, address as u32, size);
-                uc.get_data_mut().instructions(u64::from(instructions));
-                if uc.get_data().watched.is_some() {
-                    let cycles = cost_of(&mut costs, uc, address as u32, size);
-                    uc.get_data_mut().watch(address as u32, size, cycles);
-                } else if size == 4 && last == address {
-                    skip_delay(uc, address);
+                // No code of the firmware is in RAM: who executes there is lost, but time goes on.
+                memory::RAM.. if !stopped(uc, address) => {
+                    uc.get_data_mut().instructions(u64::from(size / 2).max(1));
                 }
-                last = address;
-            })?;
-        }
-        if counting.cycles {
-            let mut costs =
-                Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
-            let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
-            uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
-                if !stopped(uc, address) {
-                    let cycles = cost_of(&mut costs, uc, address as u32, size);
-                    uc.get_data_mut().block(address as u32, size, cycles);
-                }
-            })?;
-        }
-        // No code of the firmware is in RAM: who executes there is lost, but time goes on.
-        let ram = (u64::from(memory::RAM), u64::from(memory::RAM + memory::RAM_SIZE - 1));
-        uc.add_block_hook(ram.0, ram.1, |uc, address, size| {
-            if !stopped(uc, address) {
-                uc.get_data_mut().instructions(u64::from(size / 2).max(1));
+                _ => {}
             }
         })?;
         let trapped = Rc::new(Cell::new(false));
@@ -177,7 +181,7 @@ impl Cpu {
         let faulted = Rc::new(Cell::new(None));
         // The emulator writes slowly to a page with a hook, even one of this kind, and to a page that it takes for executable. So this
         // hook leaves RAM out, and a page becomes executable with its first fetch.
-        for (from, to) in [(0, ram.0 - 1), (ram.1 + 1, u64::MAX)] {
+        for (from, to) in [(0, u64::from(memory::RAM - 1)), (end + 1, u64::MAX)] {
             let note = Rc::clone(&faulted);
             uc.add_mem_hook(HookType::MEM_INVALID, from, to, move |_, _, address, _, _| {
                 note.set(Some(address as u32));
@@ -340,10 +344,10 @@ impl Cpu {
 
 /// Stops the core where the chip wants attention: before the block that begins here, which is met again, and
 /// then counted, when the core goes on.
-#[inline]
-fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
+#[inline(always)]
+fn stopped(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     let chip = uc.get_data_mut();
-    chip.at = address as u32;
+    chip.at = address;
     let stops = chip.stops_here();
     if stops {
         uc.emu_stop().ok();
@@ -352,9 +356,9 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
 }
 
 /// The same of code in the flash, which may have to wait for the flash.
-#[inline]
-fn fetched(uc: &mut Unicorn<Chip>, address: u64, size: u32) -> bool {
-    if uc.get_data_mut().fetch(address as u32, size) {
+#[inline(always)]
+fn fetched(uc: &mut Unicorn<Chip>, address: u32, size: u32) -> bool {
+    if uc.get_data_mut().fetch(address, size) {
         uc.emu_stop().ok();
         return true;
     }
@@ -362,8 +366,8 @@ fn fetched(uc: &mut Unicorn<Chip>, address: u64, size: u32) -> bool {
 }
 
 /// Executes at once the rounds of a delay loop, `subs rN, #1` and `bne` to it, that begin before the next event; all but the last.
-fn skip_delay(uc: &mut Unicorn<Chip>, address: u64) {
-    let code = uc.mem_read_as_vec(address, 4);
+fn skip_delay(uc: &mut Unicorn<Chip>, address: u32) {
+    let code = uc.mem_read_as_vec(address.into(), 4);
     if let Ok([1, subtract @ 0x38..=0x3f, 0xfd, 0xd1]) = code.as_deref() {
         let register = Register::R0 as i32 + i32::from(subtract & 7);
         let left = uc.reg_read(register).unwrap_or(0);
@@ -374,7 +378,7 @@ fn skip_delay(uc: &mut Unicorn<Chip>, address: u64) {
 }
 
 /// Cycles of a block.
-#[inline]
+#[inline(always)]
 fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
     match costs.known(address, size) {
         Some(cost) => cost,

@@ -1,5 +1,7 @@
 //! The pins against their use (datasheet, tables of pins and alternate functions).
 
+use std::sync::LazyLock;
+
 use super::Chip;
 use crate::{periph::gpio::Pad, rules::Rule};
 
@@ -56,9 +58,13 @@ pub fn pins_of(signal: Signal) -> impl Iterator<Item = (Pin, u32)> {
     })
 }
 
+/// [`ANALOG`], looked up at every conversion.
+static ANALOG_PINS: LazyLock<[Vec<Option<Pin>>; 4]> =
+    LazyLock::new(|| ANALOG.map(|names| names.split(' ').map(pin).collect()));
+
 /// The pin of a channel of ADC1 to ADC4, counted from 0; `None` is inside the chip.
 pub fn analog(converter: usize, channel: u32) -> Option<Pin> {
-    ANALOG[converter].split(' ').nth(channel.checked_sub(1)? as usize).and_then(pin)
+    *ANALOG_PINS[converter].get(channel.checked_sub(1)? as usize)?
 }
 
 impl Chip {
@@ -88,11 +94,14 @@ impl Chip {
 
     /// Duty at the pin of the brake chopper. Released, the pin is pulled down.
     pub fn chopper_duty(&self) -> f64 {
-        let (port, pin) = CHOPPER_PIN;
+        let (duty, (port, pin)) = (self.tim8.duty(), CHOPPER_PIN);
+        if duty == 0.0 {
+            return 0.0;
+        }
         let connected = pins_of(CHOPPER).any(|(place, function)| {
             place == CHOPPER_PIN && self.gpio[port].pad(pin) == Pad::Alternate(function)
         });
-        if connected && !self.stops_chopper() { self.tim8.duty() } else { 0.0 }
+        if connected && !self.stops_chopper() { duty } else { 0.0 }
     }
 
     /// Whether the pin of the precharge relay is high. Released, it is pulled down.
