@@ -62,16 +62,19 @@ pub struct Selection {
     pub set: Vec<String>,
     /// The power stage that the image was built for.
     pub stage: &'static PowerStage,
-    /// Takes a protection out, to see that a class fails.
-    pub without: Without,
+    /// All faults are injected once with each of these changes, which take protections out to see that their classes fail.
+    pub without: Vec<Without>,
 }
 
-/// A campaign of faults; `open` opens the image. Gives the table.
+/// A campaign of faults; `open` opens the image. Gives for each change the table, or an error with the table and its failures.
 ///
 /// # Errors
-/// The table with the failures; no class has that name.
-pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
-    let Selection { count, seed, ref class, rpm, ref set, stage, without } = *selection;
+/// A board does not start; no class has that name.
+pub fn run(
+    open: impl Fn() -> Result<Image> + Sync,
+    selection: &Selection,
+) -> Result<Vec<Result<String>>> {
+    let Selection { count, seed, ref class, rpm, ref set, stage, ref without } = *selection;
     let all = Class::all(rpm.is_some());
     let classes = all.len() as u64;
     let chosen = |one: &Class| class.split('|').any(|part| one.name.contains(part));
@@ -88,17 +91,18 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
         SPEEDS_RPM.start(),
         SPEEDS_RPM.end()
     );
-    let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
-    let runs: Mutex<Runs> = Mutex::default();
+    let chosen = |change| (seed..).filter(is_chosen).take(count as usize).map(move |s| (change, s));
+    let seeds = Mutex::new((0..without.len()).flat_map(chosen));
+    let runs: Mutex<Vec<Runs>> = Mutex::new(without.iter().map(|_| Runs::default()).collect());
     let work = || -> Result<()> {
         let mut scene = Scene::new(open()?, stage, set, rpm)?;
         scene.board.forgive();
         loop {
             // A seed says all: a campaign of one with the seed of a failure repeats it.
             let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
-            let Some(seed) = taken else { return Ok(()) };
+            let Some((change, seed)) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
-            let outcome = one(&mut scene, &all[which], seed / classes, seed, without);
+            let outcome = one(&mut scene, &all[which], seed / classes, seed, without[change]);
             let outcome = outcome.and_then(|outcome| {
                 // A damaged program may break the chip's rules; one that is whole may not.
                 let whole = !matches!(all[which].run, Run::Regulating);
@@ -109,10 +113,12 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
                 eprintln!("{}, seed {}: {why:#}", all[which].name, seed);
             }
             let mut runs = runs.lock().map_err(|_| anyhow!("another worker has failed"))?;
-            runs.entry(which).or_default().push((seed, outcome));
+            runs[change].entry(which).or_default().push((seed, outcome));
         }
     };
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
+    // Each worker starts a board of its own, which takes as long as 25 faults.
+    let most = (count as usize * without.len() / 100).max(1);
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(most);
     std::thread::scope(|scope| {
         let workers = (0..workers).map(|_| simulated::worker().spawn_scoped(scope, work));
         let started: Vec<_> = workers.collect::<std::io::Result<_>>()?;
@@ -121,9 +127,12 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
     })?;
     let runs = runs.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
-    let (table, failed) = table(&all, &runs);
-    ensure!(failed == 0, "{failed} of {count} failed\n{table}");
-    Ok(table)
+    let judged = runs.iter().map(|runs| {
+        let (table, failed) = table(&all, runs);
+        ensure!(failed == 0, "{failed} of {count} failed\n{table}");
+        Ok(table)
+    });
+    Ok(judged.collect())
 }
 
 /// Why a run has failed, if it has.

@@ -70,10 +70,12 @@ fn run(task: Task) -> Result<()> {
     match task {
         Task::Campaign { elf, count, seed, class, rpm, set, board } => {
             let stage = PowerStage::named(&board)?;
-            let without = |_: &mut _, _: &_, _: &_| ();
+            let without: Vec<campaign::Without> = vec![|_, _, _| ()];
             let selection = campaign::Selection { count, seed, class, rpm, set, stage, without };
             println!("{}", campaign::bounds(rpm.is_some()));
-            println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
+            for table in campaign::run(|| Image::open(&elf), &selection)? {
+                println!("{}", table?);
+            }
         }
         Task::Dump { elf, board } => {
             let lines = dump::lines(Image::open(&elf)?, PowerStage::named(&board)?)?;

@@ -75,10 +75,10 @@ fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
     let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
     for i_q in [1.5, -1.0] {
         pair.order(&format!("torque {i_q}"))?;
-        pair.run(6000, |_, _| {})?;
+        pair.run(3000, |_, _| {})?;
         let (mut sum, mut before) = (0.0, None);
-        pair.run(6000, |pair, control| {
-            sum += pair.board.plant.torque() / 6000.0;
+        pair.run(3000, |pair, control| {
+            sum += pair.board.plant.torque() / 3000.0;
             let since = control.began - before.replace(control.began).unwrap_or(control.began);
             assert!(since == 0 || since.abs_diff(period) < 200, "{since} ticks");
         })?;

@@ -3,10 +3,11 @@
 use anyhow::{Context as _, Result, bail};
 use hil_sim::Config;
 use hil_sim::experiments::drawn_machine::{Circuit, drawn};
+use virtual_board::board::simulated;
 use virtual_board::{Board, Image, Options};
 
 /// Machines, unless the environment gives another `MACHINES`.
-const MACHINES: u64 = 6;
+const MACHINES: u64 = 2;
 /// Longest that a commissioning or a learning takes, control periods: 100 s.
 const LONGEST: u64 = 600_000;
 
@@ -97,8 +98,9 @@ fn random_machines_are_commissioned_by_the_image() {
     let machines = std::env::var("MACHINES").map_or(MACHINES, |number| number.parse().unwrap());
     let share = |n| (1 + n..=machines).step_by(threads as usize).map(commissioned);
     let results: Vec<_> = std::thread::scope(|scope| {
-        let workers: Vec<_> =
-            (0..threads).map(|n| scope.spawn(move || share(n).collect::<Vec<_>>())).collect();
+        let work = |n| move || share(n).collect::<Vec<_>>();
+        let workers = (0..threads).map(|n| simulated::worker().spawn_scoped(scope, work(n)));
+        let workers: Vec<_> = workers.map(|worker| worker.expect("a thread")).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
     });
     let mut worst = Vec::new();
