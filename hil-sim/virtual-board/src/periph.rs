@@ -90,14 +90,19 @@ impl Store {
         Self(registers)
     }
 
+    fn place(&self, offset: u32) -> Option<usize> {
+        self.0.binary_search_by_key(&offset, |register| register.0).ok()
+    }
+
     /// Reads one.
     pub fn read(&self, offset: u32) -> Option<u32> {
-        self.0.iter().find(|register| register.0 == offset).map(|register| register.1)
+        self.place(offset).map(|place| self.0[place].1)
     }
 
     /// Writes one.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        let (_, kept, mask) = self.0.iter_mut().find(|register| register.0 == offset)?;
+        let place = self.place(offset)?;
+        let (_, kept, mask) = &mut self.0[place];
         *kept = *kept & !*mask | value & *mask;
         Some(Effect::None)
     }

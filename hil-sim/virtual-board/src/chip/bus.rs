@@ -11,8 +11,14 @@ use crate::periph::{Effect, Reset, gpio::IDR, uart};
 macro_rules! clocked {
     ($($name:ident = $first:literal, $register:ident, $bit:literal;)*) => {
         $(const $name: u32 = $first;)*
-        const CLOCKED: &[(u32, (&str, u32, u32))] =
-            &[$(($name, (stringify!($name), $register, $bit))),*];
+
+        /// Name, enable register and bit of the clock behind an address; `None` has none of its own.
+        pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
+            match address & !0x3ff {
+                $($name => Some((stringify!($name), $register, $bit)),)*
+                _ => None,
+            }
+        }
     };
 }
 
@@ -50,11 +56,6 @@ const BDTR: u32 = TIM1 + 0x44;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
 const TIM1_SR: u32 = 0x10;
-
-/// Name, enable register and bit of the clock behind an address; `None` has none of its own.
-pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
-    CLOCKED.iter().find(|(first, _)| *first == address & !0x3ff).map(|(_, clock)| *clock)
-}
 
 /// An access that the model does not know.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]

@@ -53,6 +53,11 @@ impl TimeBase {
 
     /// Reads a register at the time `now`, ticks.
     pub fn read(&mut self, offset: u32, now: u64, oscillates: bool) -> Option<u32> {
+        // Read in loops.
+        if offset == CNT {
+            let counts = self.store.get(CR1) & 1 != 0;
+            return Some(if counts { (now - self.from) as u32 } else { 0 });
+        }
         // Input 1 on channel 1, every eighth edge; the input is the oscillator.
         let (mode, input) = (self.store.get(CCMR1) & 0xff, self.store.get(TISEL) & 15);
         let on = oscillates && self.store.get(CCER) & 1 != 0 && (mode, input) == (0xd, 1);
@@ -70,8 +75,6 @@ impl TimeBase {
                 let ticks = (count as f64 - before) * captures.ticks;
                 Some((at as f64 + ticks - self.from as f64) as i64 as u32)
             }
-            CNT if self.store.get(CR1) & 1 == 0 => Some(0),
-            CNT => Some((now - self.from) as u32),
             _ => self.store.read(offset),
         }
     }
