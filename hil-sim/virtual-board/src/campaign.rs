@@ -268,10 +268,15 @@ fn one_set_counts(scene: &mut Scene) -> Result<()> {
 fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     let board = &mut scene.board;
     let reset = board.resets.last().map(|reset| reset.1).context("no reset")?;
+    let (mut log, cause) = (Vec::new(), reset.to_string());
     // The check sum of the image takes 39 ms.
-    board.run_periods(400)?;
-    let log = board.take_log()?;
-    let cause = reset.to_string();
+    for _ in 0..40 {
+        board.run_periods(10)?;
+        log.extend(board.take_log()?);
+        if log.iter().any(|line| line.contains(&cause)) {
+            break;
+        }
+    }
     ensure!(log.iter().any(|line| line.contains(&cause)), "no {cause:?} in the log {log:?}");
     if whole_start {
         let greeting = judge::greeting(board)?;

@@ -15,20 +15,10 @@ const START: u64 = 15_000;
 /// Periods between two reports of the control to the console.
 const REPORT: u64 = 601;
 
-fn started(seed: u64) -> Result<Board> {
-    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), seed))?;
-    board.run_periods(START)?;
-    Ok(board)
-}
-
 #[test]
 fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
-    let mut board = started(1)?;
-    assert!(
-        board.take_console().contains("last run: reset by power-on"),
-        "{}",
-        board.take_console()
-    );
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 1))?;
+    common::until_said(&mut board, "last run: reset by power-on")?;
     let log = board.take_log()?;
     assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
     assert!(log.iter().any(|line| line.contains("state: off")), "{log:#?}");
@@ -57,10 +47,7 @@ fn a_hanging_core_is_off_within_three_periods() -> Result<()> {
     }
     println!("off after {:.2} ms, peak current {peak:.2} A", (pair.board.time() - began) * 1e3);
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Window));
-    pair.board.take_console();
-    pair.board.run_periods(START)?;
-    assert!(pair.board.take_console().contains("last run: reset by window watchdog"));
-    Ok(())
+    common::until_said(&mut pair.board, "last run: reset by window watchdog").map(drop)
 }
 
 /// A main loop that hangs while the control interrupt goes on: the independent watchdog is not fed.
@@ -125,9 +112,7 @@ fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     pair.board.set_crystal(false);
     pair.board.run_ticks(2000)?;
     assert!(!pair.board.chip().tim1.outputs_on());
-    pair.board.run_periods(2 * START)?;
-    let heard = pair.board.take_console();
-    assert!(heard.contains("clock or flash failure"), "{heard}");
+    common::until_said(&mut pair.board, "clock or flash failure")?;
     let log = pair.board.take_log()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
     Ok(())
@@ -159,10 +144,12 @@ fn without_the_control_interrupt_it_stays_off() -> Result<()> {
 /// 20 ms, and the next run knows why.
 #[test]
 fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
+    let mut pair = common::regulating(6)?;
+    let running = pair.board.keep()?;
     for (code, reason) in
         [(true, "74 code of the control"), (false, "75 coefficients of the control")]
     {
-        let mut pair = common::regulating(6)?;
+        pair.board.go_back(&running)?;
         // The last word of the code, which is padding or never executed here; the direct current, by its value.
         let address = if code {
             pair.board.image.symbol("__eccm")?.address - 4
@@ -180,10 +167,8 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
             assert!(pair.board.time() - began < 20e-3, "still on");
         }
         println!("{reason}: off after {:.1} ms", (pair.board.time() - began) * 1e3);
-        pair.board.take_console();
-        pair.board.run_periods(START)?;
-        let heard = pair.board.take_console();
-        assert!(heard.contains("reset by software") && heard.contains(reason), "{heard}");
+        let heard = common::until_said(&mut pair.board, reason)?;
+        assert!(heard.contains("reset by software"), "{heard}");
     }
     Ok(())
 }

@@ -22,9 +22,9 @@ const START: u64 = 30_000;
 const REPORT: u64 = 601;
 
 /// A board set up for the motor that suits it, with the encoder.
-fn pair(stage: &'static PowerStage, load: LoadMode) -> Result<Pair> {
+fn pair(stage: &'static PowerStage) -> Result<Pair> {
     let mut config = stage.config()?;
-    config.load.mode = load;
+    config.load.mode = LoadMode::Locked;
     let options = Options::on(stage, &config, 1).set_up(&config)?;
     let mut pair = Pair::new(Image::built_for(stage.name)?, options)?;
     pair.order("angle encoder")?;
@@ -146,73 +146,6 @@ fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
     Ok(())
 }
 
-/// Off by an order, by the fault input, by a probe that halts and lets go, by the watchdog, by a supply that fails, by the
-/// reset pin and while another image is written: every gate is off then, and stays off.
-#[test]
-fn every_end_leaves_every_gate_off() -> Result<()> {
-    for stage in ALL {
-        let mut pair = pair(stage, LoadMode::Locked)?;
-        start(&mut pair)?;
-        pair.order("stop")?;
-        pair.until_state(State::Off)?;
-        off_for(&mut pair.board, 0)?;
-        let running = {
-            pair.order("start torque")?;
-            pair.until_state(State::Torque)?;
-            pair.run(600, |_, _| {})?;
-            pair.board.run_ticks(7000)?;
-            pair.board.keep()?
-        };
-        let image = Image::built_for(stage.name)?;
-        let ends: [(&str, End); 6] = [
-            ("fault input", &|board| {
-                board.set_fault_pin(false);
-                board.run_ticks(100)
-            }),
-            ("halt", &|board| {
-                board.attach(Debugger::ProbeRs);
-                board.halt(1.0)?;
-                assert!(!board.gates().any_on());
-                board.halt(20.0)?;
-                board.resume();
-                // The watchdog goes on while the core is halted, or the first interrupt notices.
-                board.run_periods(3)
-            }),
-            ("watchdog", &|board| {
-                board.hang();
-                while board.resets.is_empty() {
-                    board.run_ticks(2000)?;
-                }
-                assert_eq!(board.resets[0].1, Reset::Window);
-                Ok(())
-            }),
-            ("supply", &|board| {
-                board.chip().set_supply(2.5);
-                board.run_ticks(200)?;
-                assert!(!board.gates().any_on());
-                board.chip().set_supply(1.0);
-                off_for(board, 60)?;
-                board.chip().set_supply(3.3);
-                Ok(())
-            }),
-            ("reset pin", &|board| {
-                board.reset(Reset::Pin);
-                Ok(())
-            }),
-            ("flashing", &|board| board.flash(&image, 50.0)),
-        ];
-        for (what, end) in ends {
-            pair.board.go_back(&running)?;
-            assert!(pair.board.gates().any_on(), "{what}");
-            let ended = end(&mut pair.board).and_then(|()| off_for(&mut pair.board, 1200));
-            ended.with_context(|| format!("{}: {what}", stage.name))?;
-            assert!(pair.board.violations().is_empty(), "{what}: {:?}", pair.board.violations());
-            pair.board.set_fault_pin(true);
-        }
-    }
-    Ok(())
-}
-
 /// The image of the reference board, whose outputs are all active high, on boards whose low sides go on at a low level:
 /// caught as soon as its pins are the timer's.
 #[test]
@@ -233,54 +166,134 @@ fn the_image_of_another_board_is_caught() -> Result<()> {
 
 /// The check of the wiring, and steps of the torque with the encoder at 300 rpm: the motor's true torque is what the drive
 /// was asked for.
-#[test]
-fn torque_steps_with_the_encoder() -> Result<()> {
-    for stage in ALL {
-        let config = stage.config()?;
-        let mut pair = pair(stage, LoadMode::Locked)?;
-        pair.board.take_log()?;
-        start(&mut pair)?;
-        let log = pair.board.take_log()?;
-        assert!(log.iter().any(|line| line.contains("checking the wiring")), "{log:#?}");
-        pair.board.plant.set_load(Load::Speed { speed: config.rpm(300.0) * TAU / 60.0 })?;
-        let settings = pair.shadow.settings();
-        let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
-        for share in [1.0, 2.0, -1.5] {
-            let i_q = config.amperes(share);
-            pair.order(&format!("torque {i_q}"))?;
-            pair.run(1800, |_, _| {})?;
-            let (mut sum, mut count) = (0.0, 0.0);
-            pair.run(1800, |pair, _| {
-                sum += pair.board.plant.torque();
-                count += 1.0;
-            })?;
-            let (torque, wanted) = (sum / count, per_ampere * i_q);
-            println!("{}: {i_q:.2} A: {torque:.4} Nm of {wanted:.4} Nm", stage.name);
-            assert!((torque / wanted - 1.0).abs() < 0.05, "{}", stage.name);
-        }
-        pair.order("stop")?;
-        pair.until_state(State::Off)?;
-        off_for(&mut pair.board, REPORT)?;
+fn torque_steps(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
+    let config = stage.config()?;
+    pair.board.take_log()?;
+    start(pair)?;
+    let log = pair.board.take_log()?;
+    assert!(log.iter().any(|line| line.contains("checking the wiring")), "{log:#?}");
+    pair.board.plant.set_load(Load::Speed { speed: config.rpm(300.0) * TAU / 60.0 })?;
+    let settings = pair.shadow.settings();
+    let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
+    for share in [1.0, 2.0, -1.5] {
+        let i_q = config.amperes(share);
+        pair.order(&format!("torque {i_q}"))?;
+        pair.run(1800, |_, _| {})?;
+        let (mut sum, mut count) = (0.0, 0.0);
+        pair.run(1800, |pair, _| {
+            sum += pair.board.plant.torque();
+            count += 1.0;
+        })?;
+        let (torque, wanted) = (sum / count, per_ampere * i_q);
+        println!("{}: {i_q:.2} A: {torque:.4} Nm of {wanted:.4} Nm", stage.name);
+        assert!((torque / wanted - 1.0).abs() < 0.05, "{}", stage.name);
+    }
+    pair.order("stop")?;
+    pair.until_state(State::Off)?;
+    off_for(&mut pair.board, REPORT)
+}
+
+/// A turn with the encoder and a free shaft.
+fn position_step(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
+    pair.board.plant.set_load(Load::Locked)?;
+    pair.run(1, |_, _| {})?;
+    pair.board.plant.set_load(Load::Free { torque: 0.0 })?;
+    // Magnetising turns a free shaft a little; the position counts from where it was.
+    let from = pair.board.plant.mechanical_angle();
+    pair.order("start position")?;
+    pair.until_state(State::Position)?;
+    pair.order("position 1")?;
+    let mut largest: f64 = 0.0;
+    let turns = |pair: &Pair| (pair.board.plant.mechanical_angle() - from) / TAU;
+    pair.run(18_000, |pair, _| largest = largest.max(turns(pair)))?;
+    let end = turns(pair);
+    println!("{}: {end:.5} turns, overshoot {:.5}", stage.name, largest - 1.0);
+    assert!((end - 1.0).abs() < 0.003 && largest < 1.01, "{}: {end}, {largest}", stage.name);
+    pair.order("stop")?;
+    pair.until_state(State::Off)?;
+    off_for(&mut pair.board, REPORT)
+}
+
+/// Off by the fault input, by a probe that halts and lets go, by the watchdog, by a supply that fails, by the
+/// reset pin and while another image is written: every gate is off then, and stays off.
+fn every_end_leaves_every_gate_off(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
+    pair.board.plant.set_load(Load::Locked)?;
+    start(pair)?;
+    pair.run(600, |_, _| {})?;
+    pair.board.run_ticks(7000)?;
+    let running = pair.board.keep()?;
+    let image = Image::built_for(stage.name)?;
+    let ends: [(&str, End); 6] = [
+        ("fault input", &|board| {
+            board.set_fault_pin(false);
+            board.run_ticks(100)
+        }),
+        ("halt", &|board| {
+            board.attach(Debugger::ProbeRs);
+            board.halt(1.0)?;
+            assert!(!board.gates().any_on());
+            board.halt(20.0)?;
+            board.resume();
+            // The watchdog goes on while the core is halted, or the first interrupt notices.
+            board.run_periods(3)
+        }),
+        ("watchdog", &|board| {
+            board.hang();
+            while board.resets.is_empty() {
+                board.run_ticks(2000)?;
+            }
+            assert_eq!(board.resets[0].1, Reset::Window);
+            Ok(())
+        }),
+        ("supply", &|board| {
+            board.chip().set_supply(2.5);
+            board.run_ticks(200)?;
+            assert!(!board.gates().any_on());
+            board.chip().set_supply(1.0);
+            off_for(board, 60)?;
+            board.chip().set_supply(3.3);
+            Ok(())
+        }),
+        ("reset pin", &|board| {
+            board.reset(Reset::Pin);
+            Ok(())
+        }),
+        ("flashing", &|board| board.flash(&image, 50.0)),
+    ];
+    for (what, end) in ends {
+        pair.board.go_back(&running)?;
+        assert!(pair.board.gates().any_on(), "{what}");
+        let ended = end(&mut pair.board).and_then(|()| off_for(&mut pair.board, 1200));
+        ended.with_context(|| format!("{}: {what}", stage.name))?;
+        assert!(pair.board.violations().is_empty(), "{what}: {:?}", pair.board.violations());
+        pair.board.set_fault_pin(true);
     }
     Ok(())
 }
 
-/// A turn with the encoder and a free shaft.
+fn works(stage: &'static PowerStage) -> Result<()> {
+    let mut pair = pair(stage)?;
+    torque_steps(&mut pair, stage)?;
+    position_step(&mut pair, stage)?;
+    every_end_leaves_every_gate_off(&mut pair, stage)
+}
+
 #[test]
-fn position_step() -> Result<()> {
-    for stage in ALL {
-        let mut pair = pair(stage, LoadMode::Free)?;
-        // Magnetising turns a free shaft a little; the position counts from where it was.
-        let from = pair.board.plant.mechanical_angle();
-        pair.order("start position")?;
-        pair.until_state(State::Position)?;
-        pair.order("position 1")?;
-        let mut largest: f64 = 0.0;
-        let turns = |pair: &Pair| (pair.board.plant.mechanical_angle() - from) / TAU;
-        pair.run(18_000, |pair, _| largest = largest.max(turns(pair)))?;
-        let end = turns(&pair);
-        println!("{}: {end:.5} turns, overshoot {:.5}", stage.name, largest - 1.0);
-        assert!((end - 1.0).abs() < 0.003 && largest < 1.01, "{}: {end}, {largest}", stage.name);
-    }
-    Ok(())
+fn the_reference_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[0])
+}
+
+#[test]
+fn an_ihm08m1_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[1])
+}
+
+#[test]
+fn an_ihm023v3_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[2])
+}
+
+#[test]
+fn an_ipmm10b_works_and_every_end_leaves_its_gates_off() -> Result<()> {
+    works(ALL[3])
 }

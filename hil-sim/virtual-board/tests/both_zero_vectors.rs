@@ -4,14 +4,12 @@ use crate::common;
 use std::cell::Cell;
 use std::rc::Rc;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use drive_core::{Fault, State};
 use hil_sim::Config;
 use virtual_board::power_stage::{ALL, REFERENCE};
 use virtual_board::{Board, Image, Options, Pair};
 
-/// Longest from a reset to the greeting, periods.
-const START: u64 = 30_000;
 const YES: &str = "set scales.both_zero_vectors yes";
 
 /// Cycles of a control interrupt.
@@ -155,26 +153,13 @@ fn a_conversion_that_is_missing_in_the_upper_zero_vector_is_noticed() -> Result<
     Ok(())
 }
 
-/// Goes on until the console says this.
-fn hear(board: &mut Board, text: &str) -> Result<()> {
-    let mut heard = String::new();
-    for _ in 0..START / 100 {
-        board.run_periods(100)?;
-        heard += &board.take_console();
-        if heard.contains(text) {
-            return Ok(());
-        }
-    }
-    bail!("no {text:?} in {heard:?}")
-}
-
 /// Shunts below the low sides see nothing there: their boards refuse the setting by name, and go on as before.
 #[test]
 fn a_board_with_shunts_refuses_it() -> Result<()> {
     for stage in ALL.into_iter().filter(|stage| **stage != REFERENCE) {
         let options = Options::on(stage, &stage.config()?, 44);
         let mut board = Board::new(Image::built_for(stage.name)?, options)?;
-        hear(&mut board, "last run: ")?;
+        common::until_said(&mut board, "last run: ")?;
         for (line, answer) in [
             (YES, "ok: staged"),
             (
@@ -187,7 +172,7 @@ fn a_board_with_shunts_refuses_it() -> Result<()> {
             board.run_periods(600)?;
             board.take_console();
             board.type_line(line);
-            hear(&mut board, answer)?;
+            common::until_said(&mut board, answer)?;
         }
         assert!(!board.chip().adc.samples_twice() && board.violations().is_empty());
     }

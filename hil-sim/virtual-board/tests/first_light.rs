@@ -25,7 +25,7 @@ use hil_sim::first_light::wire::{Port, Wire};
 use hil_sim::plant::Load;
 use induction_drive::board::{ADC_FULL_SCALE, protection};
 use induction_drive::boards::Level;
-use virtual_board::board::Debugger;
+use virtual_board::board::{Debugger, snapshot::Snapshot};
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Counting, Image, Options, dump};
@@ -129,6 +129,19 @@ impl Lab {
 
     fn bench(&self) -> RefMut<'_, Bench> {
         self.0.borrow_mut()
+    }
+
+    /// The board as it was when it had started, with this defect.
+    fn again(&self, started: &Snapshot, defect: Defect) -> Result<()> {
+        let mut bench = self.bench();
+        bench.board.go_back(started)?;
+        (bench.defect, bench.gone) = (defect, false);
+        bench.sent.clear();
+        bench.unasked.clear();
+        let connected = bench.connected;
+        bench.set_fault_pin(connected);
+        bench.sensors(None);
+        Ok(())
     }
 }
 
@@ -509,7 +522,7 @@ fn every_step_on_the_reference_board() -> Result<()> {
 
 /// From the step that connects the power stage: those before it are of the controller, which is that of the reference board.
 fn every_step_of_the_power_stage(stage: &'static PowerStage) -> Result<()> {
-    let begun = Begun::at(stage, "noise", D::None)?;
+    let begun = Begun::at(stage, "noise")?;
     walk(&begun.table, &begun.lab, options(&begun.file))?.run()?;
     let evidence = Evidence::open(&begun.file)?.context("a file")?;
     ensure!(begun.table.next(&evidence)?.is_none());
@@ -524,6 +537,7 @@ fn every_step_with_shunts_at_low_voltage() -> Result<()> {
 }
 
 #[test]
+#[ignore = "long; cargo xtask prove image"]
 fn every_step_with_shunts_at_high_voltage() -> Result<()> {
     every_step_of_the_power_stage(ALL[2])
 }
@@ -556,15 +570,24 @@ struct Begun {
 }
 
 impl Begun {
-    fn at(stage: &'static PowerStage, step: &str, defect: Defect) -> Result<Self> {
+    fn at(stage: &'static PowerStage, step: &str) -> Result<Self> {
         let table = Table::read()?;
         let place = |name: &str| table.steps().position(|(_, step)| step.name == name);
         let [first, connected, confirmed] = [step, "noise", "low-voltage"].map(place);
         let (connected, confirmed) = (first >= connected, first >= confirmed);
-        let lab = Lab::new(stage, defect, connected, confirmed, Counting::default())?;
-        let file = folder(&format!("first-light-{}-{defect:?}", stage.name)).join("evidence.toml");
+        let lab = Lab::new(stage, D::None, connected, confirmed, Counting::default())?;
+        Self::with(lab, step)
+    }
+
+    /// The same with a board that has started.
+    fn with(lab: Lab, step: &str) -> Result<Self> {
+        let table = Table::read()?;
+        let bench = lab.bench();
+        let name = format!("first-light-{}-{:?}-{step}", bench.stage.name, bench.defect);
+        drop(bench);
+        let file = folder(&name).join("evidence.toml");
         let mut evidence = walk(&table, &lab, options(&file))?.evidence().clone();
-        let before = table.steps().take(first.context("a step")?);
+        let before = table.steps().take_while(|(_, other)| other.name != step);
         evidence.steps.extend(before.map(|(_, step)| Record::new(&step.name, Verdict::Passed)));
         evidence.write(&file)?;
         Ok(Self { table, lab, file })
@@ -581,49 +604,67 @@ impl Begun {
     }
 }
 
-/// A defect that is there from a step on stops the walk at the step that is for it: the drive is off then, and before the
-/// steps that judge gates and fault input were passed no line was sent that switches it on.
-#[test]
-fn every_defect_is_stopped_at_its_step() -> Result<()> {
-    let table = [
-        (D::RegisterChanged, "registers", "registers"),
-        (D::WatchdogResets, "power", "power"),
-        (D::BootPinFloats, "cycles", "boot-pin"),
-        (D::DriverPolarity, "gates-in-reset", "gate-levels"),
-        (D::CurrentGain, "noise", "sensors"),
-        (D::CurrentSign, "noise", "sensors"),
-        (D::SensorsExchanged, "noise", "sensors"),
-        (D::Divider, "noise", "dc-link"),
-        (D::NtcOpen, "noise", "heat-sink"),
-        (D::NtcShorted, "noise", "heat-sink"),
-        (D::BreakNeverTrips, "noise", "break-pin"),
-        (D::BreakAlwaysTrips, "noise", "break-pin"),
-        (D::DeadTime, "low-voltage", "dead-time"),
-        (D::PhasesExchanged, "low-voltage", "forwards"),
-    ];
-    let one = |(defect, first, expected): (Defect, &str, &str)| -> Result<()> {
-        let begun = Begun::at(&REFERENCE, first, defect).with_context(|| format!("{defect:?}"))?;
+/// A defect that is there from a step on stops the walk at the step that is for it, which is `expected`: the drive is off then,
+/// and only behind the steps that judge gates and fault input a line was sent that switches it on.
+fn are_stopped(defects: &[(Defect, &str, &str)], switched_on: bool) -> Result<()> {
+    let lab = Begun::at(&REFERENCE, defects[0].1)?.lab;
+    let started = lab.bench().board.keep()?;
+    for &(defect, first, expected) in defects {
+        lab.again(&started, defect)?;
+        let begun = Begun::with(lab.clone(), first).with_context(|| format!("{defect:?}"))?;
         let last = begun.stops().with_context(|| format!("{defect:?}"))?;
         println!("STOPPED {defect:?} at {}: {}", last.name, last.why);
         ensure!(last.name == expected && last.verdict == Verdict::Stopped, "{defect:?}: {last:?}");
-        let mut bench = begun.lab.bench();
+        let mut bench = lab.bench();
         bench.run(0.5)?;
         ensure!(!bench.board.gates().any_on(), "{defect:?}: a gate is on");
-        let switched_on = bench.sent.iter().any(|line| line.starts_with("start"));
-        let late = matches!(defect, D::DeadTime | D::PhasesExchanged);
-        ensure!(switched_on == late, "{defect:?}: {:?}", bench.sent);
-        Ok(())
-    };
-    // Two at a time: each has a board of its own.
-    std::thread::scope(|scope| {
-        let halves = [0, 1].map(|half| table.into_iter().skip(half).step_by(2));
-        let workers = halves.map(|mut half| scope.spawn(move || half.try_for_each(one)));
-        workers.into_iter().try_for_each(|worker| worker.join().unwrap())
-    })
+        let was_on = bench.sent.iter().any(|line| line.starts_with("start"));
+        ensure!(was_on == switched_on, "{defect:?}: {:?}", bench.sent);
+    }
+    Ok(())
 }
 
-/// A person who pulls the plug when asked to do something.
+#[test]
+fn every_defect_of_controller_and_drivers_is_stopped_at_its_step() -> Result<()> {
+    let defects = [
+        (D::RegisterChanged, "registers", "registers"),
+        (D::WatchdogResets, "power", "power"),
+        (D::BootPinFloats, "boot-pin", "boot-pin"),
+        (D::DriverPolarity, "gate-levels", "gate-levels"),
+    ];
+    are_stopped(&defects, false)
+}
+
+#[test]
+fn every_defect_of_the_measurements_is_stopped_at_its_step() -> Result<()> {
+    let defects = [
+        (D::CurrentGain, "noise", "sensors"),
+        (D::CurrentSign, "sensors", "sensors"),
+        (D::SensorsExchanged, "sensors", "sensors"),
+        (D::Divider, "dc-link", "dc-link"),
+        (D::NtcOpen, "heat-sink", "heat-sink"),
+        (D::NtcShorted, "heat-sink", "heat-sink"),
+        (D::BreakNeverTrips, "break-pin", "break-pin"),
+        (D::BreakAlwaysTrips, "break-pin", "break-pin"),
+    ];
+    are_stopped(&defects, false)
+}
+
+#[test]
+fn every_defect_of_the_first_turn_is_stopped_at_its_step() -> Result<()> {
+    let defects =
+        [(D::DeadTime, "low-voltage", "dead-time"), (D::PhasesExchanged, "current", "forwards")];
+    are_stopped(&defects, true)
+}
+
+/// A person who pulls the plug when asked to do something, or when the test has failed.
 struct Puller(Child);
+
+impl Drop for Puller {
+    fn drop(&mut self) {
+        let _ = self.0.kill().and_then(|()| self.0.wait());
+    }
+}
 
 impl Person for Puller {
     fn tell(&mut self, text: &str) {
@@ -648,10 +689,10 @@ impl Person for Puller {
 fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let folder = folder("first-light-port");
     let (table, file) = (Table::read()?, folder.join("evidence.toml"));
-    let mut board =
-        command(&folder, &["--fast"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+    let mut board = command(&folder, &["--fast"]);
+    let mut board = Puller(board.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?);
     let mut first = String::new();
-    BufReader::new(board.stdout.take().context("its output")?).read_line(&mut first)?;
+    BufReader::new(board.0.stdout.take().context("its output")?).read_line(&mut first)?;
     let path = first.trim().strip_prefix("console: ").context("a port")?;
     let mut port = Port::new(path, 115_200, Arc::default())?;
     let version = port.ask("version")?.lines.join(" ");
@@ -662,7 +703,7 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
     let evidence =
         Evidence { schema: SCHEMA, bench, board: REFERENCE.name.to_owned(), build, steps };
     evidence.write(&file)?;
-    let bench = (port, Puller(board));
+    let bench = (port, board);
     let why = Walk::new(&table, bench, options(&file), Arc::default())?.run().err();
     let why = why.context("it has ended")?.to_string();
     let evidence = Evidence::open(&file)?.context("a file")?;
@@ -676,7 +717,7 @@ fn a_serial_port_that_goes_is_noted() -> Result<()> {
 /// Ctrl-C while a line is being answered: `stop` is sent, and the step counts as interrupted.
 #[test]
 fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
-    let begun = Begun::at(&REFERENCE, "noise", D::None)?;
+    let begun = Begun::at(&REFERENCE, "noise")?;
     let interrupted = Arc::new(AtomicBool::new(true));
     let bench = (begun.lab.clone(), begun.lab.clone());
     ensure!(Walk::new(&begun.table, bench, options(&begun.file), interrupted)?.run().is_err());
@@ -689,7 +730,7 @@ fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
 /// The image of another board, and another build than that of the evidence, are refused before anything is done.
 #[test]
 fn another_image_is_refused() -> Result<()> {
-    let begun = Begun::at(&REFERENCE, "noise", D::None)?;
+    let begun = Begun::at(&REFERENCE, "noise")?;
     let refused = |options: Light, text: &str| {
         let why = walk(&begun.table, &begun.lab, options).err().context("refused")?.to_string();
         ensure!(why.contains(text), "{why}");
@@ -707,10 +748,13 @@ fn another_image_is_refused() -> Result<()> {
 /// `stop`. Noted; a later run repeats the step and goes on.
 #[test]
 fn a_lost_port_and_a_lost_person_stop_the_drive_and_the_walk_goes_on() -> Result<()> {
+    let lab = Begun::at(&REFERENCE, "turn-at-nominal")?.lab;
+    let started = lab.bench().board.keep()?;
     for (defect, verdict) in
         [(D::PortLost, Verdict::Stopped), (D::PersonGone, Verdict::Interrupted)]
     {
-        let begun = Begun::at(&REFERENCE, "turn-at-nominal", defect)?;
+        lab.again(&started, defect)?;
+        let begun = Begun::with(lab.clone(), "turn-at-nominal")?;
         let last = begun.stops()?;
         ensure!(last.name == "turn-at-nominal" && last.verdict == verdict, "{last:?}");
         let stopped = begun.lab.bench().sent.iter().any(|line| line == "stop");

@@ -11,28 +11,13 @@ use virtual_board::power_stage::driver::Request;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Image, Options, Pair};
 
-/// Periods from a reset to the greeting, at most.
-const START: u64 = 30_000;
+use crate::common::until_said as said;
 
 fn board(stage: &'static PowerStage) -> Result<Board> {
     let mut board =
         Board::new(Image::built_for(stage.name)?, Options::on(stage, &stage.config()?, 5))?;
     said(&mut board, "last run: ")?;
     Ok(board)
-}
-
-/// Waits for a text from the console.
-fn said(board: &mut Board, text: &str) -> Result<String> {
-    let mut heard = String::new();
-    for _ in 0..START / 100 {
-        board.run_periods(100)?;
-        while board.next_period().is_some() {}
-        heard += &board.take_console();
-        if heard.contains(text) && heard.ends_with('\n') {
-            return Ok(heard);
-        }
-    }
-    anyhow::bail!("no {text:?} in {heard:?}")
 }
 
 /// Types a line; its answer begins so.
@@ -121,6 +106,7 @@ fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result
     ];
     for (stage, expected) in ALL.into_iter().zip(expected) {
         let mut board = board(stage)?;
+        let started = board.keep()?;
         assert_eq!(gates_on(&mut board), [""; 0], "{}", stage.name);
         assert!(!board.reset_with_boot_pin(false), "a low pin");
         assert!(board.reset_with_boot_pin(true));
@@ -128,16 +114,16 @@ fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result
         let why = board.run_periods(1).expect_err("nothing was noticed").to_string();
         assert!(why.contains("bad gate signals"), "{why}");
         // Never the image.
-        let mut off = self::board(stage)?;
-        off.chip().flash.options &= !(N_SWBOOT0 | N_BOOT0);
-        assert!(off.reset_with_boot_pin(false));
-        let mut safe = self::board(stage)?;
-        safe.chip().flash.options &= !N_SWBOOT0;
-        safe.chip().flash.options |= N_BOOT0;
+        board.go_back(&started)?;
+        board.chip().flash.options &= !(N_SWBOOT0 | N_BOOT0);
+        assert!(board.reset_with_boot_pin(false));
+        board.go_back(&started)?;
+        board.chip().flash.options &= !N_SWBOOT0;
+        board.chip().flash.options |= N_BOOT0;
         for high in [true, false] {
-            assert!(!safe.reset_with_boot_pin(high));
-            said(&mut safe, "last run: ")?;
-            assert_eq!(gates_on(&mut safe), [""; 0], "{}", stage.name);
+            assert!(!board.reset_with_boot_pin(high));
+            said(&mut board, "last run: ")?;
+            assert_eq!(gates_on(&mut board), [""; 0], "{}", stage.name);
         }
     }
     Ok(())

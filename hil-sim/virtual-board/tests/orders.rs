@@ -66,26 +66,28 @@ fn an_order_leaves_most_of_the_period() -> Result<()> {
 fn with_voltage_and_frequency_an_angle_is_not_found_again_and_a_stop_brakes() -> Result<()> {
     let mut config = Config::default();
     config.load.mode = LoadMode::Free;
+    let rpm = |board: &Board| board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+    let run = |board: &mut Board, periods: u64| -> Result<String> {
+        board.run_periods(periods)?;
+        while board.next_period().is_some() {}
+        Ok(board.take_console())
+    };
+    let mut board = Board::new(Image::built()?, Options::new(&config, 6))?;
+    common::until_said(&mut board, "last run: ")?;
+    for (line, periods) in [("start vf", 6000), ("speed 300", 12_000)] {
+        board.type_line(line);
+        let said = run(&mut board, periods)?;
+        assert!(said.starts_with("ok"), "{line}: {said}");
+    }
+    let before = rpm(&board);
+    assert!((270.0..330.0).contains(&before), "{before} rpm");
+    board.type_line("relock");
+    let said = run(&mut board, 600)?;
+    assert!(said.starts_with("error: ") && (rpm(&board) - before).abs() < 5.0, "{said}");
+    let turning = board.keep()?;
     let mut seconds = [0.0; 2];
     for (stop, seconds) in ["stop ramp", "stop quick"].into_iter().zip(&mut seconds) {
-        let mut board = Board::new(Image::built()?, Options::new(&config, 6))?;
-        let rpm = |board: &Board| board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
-        let run = |board: &mut Board, periods: u64| -> Result<String> {
-            board.run_periods(periods)?;
-            while board.next_period().is_some() {}
-            Ok(board.take_console())
-        };
-        run(&mut board, 12_000)?;
-        for (line, periods) in [("start vf", 6000), ("speed 300", 12_000)] {
-            board.type_line(line);
-            let said = run(&mut board, periods)?;
-            assert!(said.starts_with("ok"), "{line}: {said}");
-        }
-        let before = rpm(&board);
-        assert!((270.0..330.0).contains(&before), "{before} rpm");
-        board.type_line("relock");
-        let said = run(&mut board, 600)?;
-        assert!(said.starts_with("error: ") && (rpm(&board) - before).abs() < 5.0, "{said}");
+        board.go_back(&turning)?;
         board.type_line(stop);
         let mut periods = 0;
         while board.chip().tim1.outputs_on() {

@@ -27,7 +27,9 @@ fn the_history_survives_power_off() -> Result<()> {
     assert_eq!(totals.lines().next(), Some("powered 0.0 h, with current 0.0 h, starts 1"));
     pair.board.set_fault_pin(true);
     let list = |board: &mut virtual_board::Board| -> Result<Vec<String>> {
-        board.run_periods(30_000)?;
+        common::until_said(board, "last run: ")?;
+        // A second, in which nothing is written.
+        board.run_periods(6000)?;
         board.take_console();
         board.type_line("history");
         board.run_periods(3000)?;

@@ -47,7 +47,7 @@ fn started(board: &mut Board) -> Result<()> {
 #[test]
 fn our_image_breaks_no_rule() -> Result<()> {
     let mut board = exact(Image::built()?)?;
-    board.run_periods(START)?;
+    common::until_said(&mut board, "last run: ")?;
     board.type_line("confirm board");
     // Changed and changed back, without a design: there is something to save.
     for line in ["set command.timeout_s 3", "save", "set command.timeout_s 0", "save"] {
@@ -100,9 +100,9 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
 fn a_detached_probe_changes_nothing() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 12))?;
     board.attach(Debugger::ProbeRs);
-    board.run_periods(START)?;
+    common::until_said(&mut board, "last run: ")?;
     board.detach();
-    board.run_periods(START)?;
+    board.run_periods(6000)?;
     assert!(board.resets.is_empty(), "{:?}", board.resets);
     Ok(())
 }
@@ -114,12 +114,7 @@ fn it_starts_with_slow_flash() -> Result<()> {
     for cycles in [1, 3] {
         let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 13))?;
         board.chip().flash_cycles = cycles;
-        let mut heard = String::new();
-        while !heard.contains("last run") {
-            board.run_periods(100)?;
-            heard += &board.take_console();
-            assert!(board.time() < 12.0 && board.resets.is_empty(), "{:?}", board.resets);
-        }
+        common::until_said(&mut board, "last run: ")?;
         println!("{cycles} cycles an instruction: greeting after {:.2} s", board.time());
         board.run_periods(6000)?;
         assert!(board.resets.is_empty(), "{:?}", board.resets);
@@ -140,25 +135,19 @@ fn a_sagging_supply_switches_off() -> Result<()> {
     board.run_periods(60)?;
     assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Power));
     board.chip().set_supply(3.3);
-    board.run_periods(START)?;
-    assert!(board.take_console().contains("last run: reset by power-on"));
-    Ok(())
+    common::until_said(&mut board, "last run: reset by power-on").map(drop)
 }
 
 /// A stack that has grown into the guard below it is a fault, and the next run knows it.
 #[test]
 fn a_stack_in_the_guard_faults() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 15))?;
-    board.run_periods(START)?;
-    board.take_console();
+    common::until_said(&mut board, "last run: ")?;
     let guard = board.chip().scs.mpu.guard().context("no guard")?;
     board.cpu.set(Register::SP, guard.end() + 16);
     board.run_periods(60)?;
     assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Software));
-    board.run_periods(START)?;
-    let heard = board.take_console();
-    assert!(heard.contains("reset by software"), "{heard}");
-    Ok(())
+    common::until_said(&mut board, "reset by software").map(drop)
 }
 
 /// A PLL that does not lock: the chip stays on its internal oscillator, and says why it does not start. (At the console only a
