@@ -1,6 +1,7 @@
 //! The virtual board: tests with the finished image on an emulated controller, faults, and the time that
 //! its control interrupt takes.
 
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
@@ -15,6 +16,9 @@ pub const ELF: &str = "INDUCTION_DRIVE_ELF";
 /// Environment variable by which they find the images of the other boards: a folder with one folder a board.
 const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 
+/// Environment variable with the file to which each board appends the seconds that it simulated.
+const SIMULATED: &str = "INDUCTION_DRIVE_SIMULATED";
+
 /// Faults of a whole campaign; `cargo xtask test` injects a twentieth.
 pub const CAMPAIGN: u32 = 2000;
 
@@ -22,8 +26,10 @@ pub const CAMPAIGN: u32 = 2000;
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let mut command = cargo("test --release --tests --no-fail-fast")?;
-    command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
-    times::test("the images on the virtual board", command)
+    let simulated = run::target_dir()?.join("simulated.txt");
+    fs::write(&simulated, "")?;
+    command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?).env(SIMULATED, &simulated);
+    times::beside_simulated("the images on the virtual board", command, &simulated)
 }
 
 /// Format, lints and documentation of the virtual board, in the profile of its tests, so that the emulator is built once.

@@ -1,7 +1,9 @@
 //! Tests with the time that each of their modules takes.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::io::{BufRead as _, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -13,7 +15,12 @@ use crate::{budget, run};
 const LISTED: f64 = 3.0;
 
 /// Runs a command `cargo test` that has no options for the tests themselves; lists the slow modules.
-pub fn test(name: &str, mut command: Command) -> Result<()> {
+pub fn test(name: &str, command: Command) -> Result<()> {
+    beside_simulated(name, command, Path::new(""))
+}
+
+/// As [`test`], and shows beside the seconds of each test those that it simulated, which the tests append to a file.
+pub fn beside_simulated(name: &str, mut command: Command, simulated: &Path) -> Result<()> {
     // A stable harness shows times only with this variable. As a runner's it does not reach the compiler.
     let host = run::output("rustc", &["--print", "host-tuple"])?.to_uppercase().replace('-', "_");
     command.env(format!("CARGO_TARGET_{host}_RUNNER"), "env RUSTC_BOOTSTRAP=1");
@@ -24,9 +31,15 @@ pub fn test(name: &str, mut command: Command) -> Result<()> {
     let mut modules: BTreeMap<String, f64> = BTreeMap::new();
     for line in BufReader::new(child.stdout.take().context("no output")?).lines() {
         let line = line?;
-        println!("{line}");
-        if let Some((module, seconds)) = time_of(&line) {
-            *modules.entry(module.to_owned()).or_default() += seconds;
+        let Some((test, seconds)) = time_of(&line) else {
+            println!("{line}");
+            continue;
+        };
+        let module = test.split_once("::").map_or(test, |(module, _)| module);
+        *modules.entry(module.to_owned()).or_default() += seconds;
+        match simulated_s(simulated, Some(test)) {
+            0.0 => println!("{line}"),
+            simulated => println!("{line}  {simulated:.1} s simulated"),
         }
     }
     let status = child.wait()?;
@@ -37,16 +50,28 @@ pub fn test(name: &str, mut command: Command) -> Result<()> {
     for (module, seconds) in &modules {
         println!("{module:<30}{seconds:>8.1}{}", if *seconds > budget { "  above" } else { "" });
     }
+    let all = simulated_s(simulated, None);
+    if all > 0.0 {
+        println!("{name}: {all:.0} s simulated in all");
+    }
     println!("    {name}: done in {:.0} s", began.elapsed().as_secs_f64());
     ensure!(status.success(), "{name}, {status}\n    {command:?}");
     Ok(())
 }
 
-/// Module of the first level and seconds, from a line such as `test drive::tests::a_start ... ok <1.200s>`.
+/// Test and seconds, from a line such as `test drive::tests::a_start ... ok <1.200s>`.
 fn time_of(line: &str) -> Option<(&str, f64)> {
     let (test, result) = line.strip_prefix("test ")?.split_once(" ... ")?;
     let seconds = result.rsplit_once('<')?.1.strip_suffix("s>")?;
-    Some((test.split_once("::").map_or(test, |(module, _)| module), seconds.parse().ok()?))
+    Some((test, seconds.parse().ok()?))
+}
+
+/// The sum of the lines `TEST SECONDS` of a file, of one test or of all; none if there is no such file.
+fn simulated_s(file: &Path, test: Option<&str>) -> f64 {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let lines = text.lines().filter_map(|line| line.rsplit_once(' '));
+    let of_it = lines.filter(|(name, _)| test.is_none_or(|test| *name == test));
+    of_it.filter_map(|(_, seconds)| seconds.parse::<f64>().ok()).sum()
 }
 
 #[cfg(test)]
@@ -55,11 +80,20 @@ mod tests {
 
     #[test]
     fn lines_of_the_harness_are_read() {
-        assert_eq!(time_of("test a::b::c ... ok <1.200s>"), Some(("a", 1.2)));
+        assert_eq!(time_of("test a::b::c ... ok <1.200s>"), Some(("a::b::c", 1.2)));
         assert_eq!(
             time_of("test a - should panic ... ok <0.100s>"),
             Some(("a - should panic", 0.1))
         );
         assert_eq!(time_of("test a::b ... ignored, why"), None);
+    }
+
+    #[test]
+    fn the_boards_of_a_test_add_up() {
+        let file = std::env::temp_dir().join(format!("simulated-{}", std::process::id()));
+        fs::write(&file, "a::b 1.5\nc 4\na::b 2\n").unwrap();
+        assert_eq!((simulated_s(&file, Some("a::b")), simulated_s(&file, None)), (3.5, 7.5));
+        fs::remove_file(&file).unwrap();
+        assert_eq!(simulated_s(&file, None), 0.0);
     }
 }
