@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(ours.difference(&found).next(), None);
         // That command joins the features of all targets and tests: rand_core's random numbers of the system are those of the host, and
         // the settings are tested with serde.
-        let hosts = ["getrandom@", "serde@", "serde_core@"];
+        let hosts = ["getrandom@", "cfg-if@", "serde@", "serde_core@"];
         let more = found.difference(&ours);
         let more: Vec<_> = more.filter(|one| !hosts.iter().any(|of| one.starts_with(of))).collect();
         assert_eq!(more, Vec::<&String>::new());
