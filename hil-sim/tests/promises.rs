@@ -83,6 +83,7 @@ fn the_readme_states_the_torque_ripple_of_the_injection() {
 }
 
 #[test]
+#[ignore = "a table of the documents: cargo xtask test"]
 fn the_figures_are_those_of_the_runs() {
     let [left_in, torque] = numbers(
         "encoder-orientation",

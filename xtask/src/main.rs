@@ -210,9 +210,10 @@ fn test() -> Result<()> {
 
     let rest = run::cargo("test --package drive-live --package xtask --no-fail-fast");
     steps.run("tests of page and tasks", || times::test("tests of page and tasks", rest));
-    let commands = "commands_of_the_documents -- --ignored --nocapture";
-    let commands = run::cargo(&format!("test --test simulator {commands}"));
-    steps.command("commands of the documents", commands);
+    let tables = ["commands_of", "the_page_prints", "every_printed", "the_errata", "the_figures"];
+    let mut documents = run::cargo("test --test simulator --");
+    documents.args(["--ignored", "--nocapture"]).args(tables);
+    steps.command("commands and tables of the documents", documents);
 
     let check = "format, lints, documentation of the virtual board";
     steps.with(compiler, check, |()| board::check());

@@ -1,5 +1,7 @@
 //! The history against a flash that loses power.
 
+use std::ops::Range;
+
 use super::fake::Fake;
 use crate::store::history::{FAULTS, History, LONG_S, ON_S, SAME_FAULT_S};
 
@@ -88,9 +90,8 @@ fn what_was_counted_is_there_after_a_reset() {
 
 /// The power fails in every operation of several pages, with whatever that leaves: what was written before is there, and
 /// the log goes on.
-#[test]
-fn whenever_the_power_fails_what_was_written_is_there() {
-    for seed in 0..8 {
+fn whenever_the_power_fails(seeds: Range<u64>) {
+    for seed in seeds {
         for operation in (0..700).step_by(1 + seed as usize % 3) {
             let mut fake = Fake::new();
             fake.random = seed * 1000 + operation as u64;
@@ -120,6 +121,17 @@ fn whenever_the_power_fails_what_was_written_is_there() {
             assert!(running - load(&mut fake).running_s <= LONG_S);
         }
     }
+}
+
+#[test]
+fn whenever_the_power_fails_what_was_written_is_there() {
+    whenever_the_power_fails(0..3);
+}
+
+#[test]
+#[ignore = "cargo xtask prove long-tests"]
+fn whenever_the_power_fails_what_was_written_is_there_with_more_seeds() {
+    whenever_the_power_fails(3..8);
 }
 
 /// Erasures that the head of the module states: a start and a stop without end.
