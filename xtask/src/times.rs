@@ -19,7 +19,7 @@ pub fn test(name: &str, command: Command) -> Result<()> {
     beside_simulated(name, command, Path::new(""))
 }
 
-/// As [`test`], and shows beside the seconds of each test those that it simulated, which the tests append to a file.
+/// As [`test()`], and shows beside the seconds of each test those that it simulated, which the tests append to a file.
 pub fn beside_simulated(name: &str, mut command: Command, simulated: &Path) -> Result<()> {
     // A stable harness shows times only with this variable. As a runner's it does not reach the compiler.
     let host = run::output("rustc", &["--print", "host-tuple"])?.to_uppercase().replace('-', "_");
