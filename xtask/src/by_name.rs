@@ -32,7 +32,7 @@ pub fn pages() -> Result<()> {
     let (elf, web) = (image::build()?, web::build()?);
     // One after the other: the virtual board keeps pace with the clock.
     let options = "--ignored --nocapture --test-threads=1";
-    let mut test = run::cargo(&format!("test --package drive-live --test page -- {options}"));
+    let mut test = run::cargo(&format!("test {} --test page -- {options}", run::TESTED));
     run::step(
         "pages in Chromium",
         test.env("PAGES", &folder).env("LIVE_ELF", elf).env("WEB", web),

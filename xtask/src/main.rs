@@ -208,7 +208,8 @@ fn test() -> Result<()> {
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);
 
-    let rest = run::cargo("test --package drive-live --package xtask --no-fail-fast");
+    let rest = "--test page --test clones --bin xtask --no-fail-fast";
+    let rest = run::cargo(&format!("test {} {rest}", run::TESTED));
     steps.run("tests of page and tasks", || times::test("tests of page and tasks", rest));
     let tables = ["commands_of", "the_page_prints", "every_printed", "the_errata", "the_figures"];
     let mut documents = run::cargo("test --test simulator --");

@@ -18,6 +18,10 @@ pub const BROWSER: &str = "wasm32-unknown-unknown";
 /// Profile of the image that is flashed.
 pub const PROFILE: &str = "firmware";
 
+/// Packages of `cargo test`, live page and tasks. A smaller selection would want other features of the crates below, and build them again.
+pub const TESTED: &str =
+    "--workspace --exclude induction-drive-benches --exclude induction-drive-python";
+
 /// Profile of the programs and the wheel of a release.
 pub const SHIPPED: &str = "shipped";
 
