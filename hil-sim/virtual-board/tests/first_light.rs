@@ -25,7 +25,7 @@ use hil_sim::first_light::wire::{Port, Wire};
 use hil_sim::plant::Load;
 use induction_drive::board::{ADC_FULL_SCALE, protection};
 use induction_drive::boards::Level;
-use virtual_board::board::{Debugger, snapshot::Snapshot};
+use virtual_board::board::{Debugger, simulated, snapshot::Snapshot};
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Counting, Image, Options, dump};
@@ -583,7 +583,9 @@ impl Begun {
     fn with(lab: Lab, step: &str) -> Result<Self> {
         let table = Table::read()?;
         let bench = lab.bench();
-        let name = format!("first-light-{}-{:?}-{step}", bench.stage.name, bench.defect);
+        // Tests of one step and defect run at once.
+        let test = simulated::test().replace("::", "-");
+        let name = format!("{test}-{}-{:?}-{step}", bench.stage.name, bench.defect);
         drop(bench);
         let file = folder(&name).join("evidence.toml");
         let mut evidence = walk(&table, &lab, options(&file))?.evidence().clone();
