@@ -44,25 +44,26 @@ fn power(hz: f32, i_q: f32, error: f32) -> f32 {
 #[test]
 fn what_is_allowed_keeps_the_limits_and_no_torque_is_reversed() {
     for hz in (-600..=600).map(|n| n as f32 * 0.25) {
-        for most in [25.0, 60.0, 300.0] {
-            for least in [0.0, 60.0, 300.0] {
-                for error in [0.0, -3.0, 20.0] {
-                    let (low, high) = limits(hz, watts(most), watts(least), error);
-                    let case = format!("{hz} Hz, {most} W, {least} W, {error}: {low} to {high}");
-                    assert!(low <= 0.0 && high >= 0.0, "{case}");
-                    let losses = power(hz, 0.0, error);
-                    let (over, under) = (f32::max(most, losses), f32::min(-least, losses));
-                    for n in 0..=20 {
-                        let p = power(hz, low + (high - low) * n as f32 / 20.0, error);
-                        assert!(p < over + 0.1 && p > under - 0.1, "{case}: {p} W");
-                    }
-                    let lowest = (-1000..1000).map(|n| power(hz, n as f32 * 0.02, error));
-                    let lowest = lowest.fold(f32::MAX, f32::min);
-                    for beyond in [low - 0.02, high + 0.02] {
-                        let p = power(hz, beyond, error);
-                        let all = lowest > -least - 0.1;
-                        assert!(p > most || p < -least || all, "{case}: {p} W at {beyond} A");
-                    }
+        for error in [0.0, -3.0, 20.0] {
+            let losses = power(hz, 0.0, error);
+            let lowest = (-1000..1000).map(|n| power(hz, n as f32 * 0.02, error));
+            let lowest = lowest.fold(f32::MAX, f32::min);
+            for (most, least) in [25.0, 60.0, 300.0]
+                .into_iter()
+                .flat_map(|most| [0.0, 60.0, 300.0].map(|least| (most, least)))
+            {
+                let (low, high) = limits(hz, watts(most), watts(least), error);
+                let case = || format!("{hz} Hz, {most} W, {least} W, {error}: {low} to {high}");
+                assert!(low <= 0.0 && high >= 0.0, "{}", case());
+                let (over, under) = (f32::max(most, losses), f32::min(-least, losses));
+                for n in 0..=20 {
+                    let p = power(hz, low + (high - low) * n as f32 / 20.0, error);
+                    assert!(p < over + 0.1 && p > under - 0.1, "{}: {p} W", case());
+                }
+                for beyond in [low - 0.02, high + 0.02] {
+                    let p = power(hz, beyond, error);
+                    let all = lowest > -least - 0.1;
+                    assert!(p > most || p < -least || all, "{}: {p} W at {beyond} A", case());
                 }
             }
         }
