@@ -167,7 +167,7 @@ fn commands_that_never_rest_are_borne() {
 #[test]
 fn drawn_disturbances_cost_accuracy() {
     let motor = ["plant=r", "flux_level=high", "sequence.flux=high"];
-    let run = |set: &str| battery(&[&motor[..], &["prepare.learn=yes", "runs=24", set]].concat()).0;
+    let run = |set: &str| battery(&[&motor[..], &["prepare.learn=yes", "runs=12", set]].concat()).0;
     let (none, drawn) = (run("disturbed.drawn=0"), run("disturbed.drawn=1"));
     let rms = |metrics: &Metrics| get(metrics, "angle_error_rms_deg");
     assert!(rms(&drawn) > 1.2 * rms(&none), "{} {}", rms(&drawn), rms(&none));

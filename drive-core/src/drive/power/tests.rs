@@ -1,6 +1,7 @@
 //! The limits against the power of the model, over speeds, limits and errors of the model.
 
 use core::f32::consts::TAU;
+use std::sync::LazyLock;
 
 use super::*;
 use crate::settings::Settings;
@@ -9,17 +10,20 @@ use crate::{Dq, Motor};
 const DC_LINK: f32 = 300.0;
 const MAGNETISING: f32 = 1.4;
 const ASKED: f32 = 50.0;
+/// Those of the default motor; to compute them takes longer than a test of the limits.
+static COEFFICIENTS: LazyLock<Coefficients> =
+    LazyLock::new(|| Settings::default().build().unwrap());
 
 /// Least and largest torque current at this speed, Hz electrical, where the model leaves `error` W.
 fn limits(hz: f32, motoring: DcLimit, generating: DcLimit, error: f32) -> (f32, f32) {
-    let (c, limit) = (Settings::default().build().unwrap(), PowerLimit { motoring, generating });
+    let (c, limit) = (&*COEFFICIENTS, PowerLimit { motoring, generating });
     let mut seen =
         Telemetry { dc_link: DC_LINK, rotor_freq: hz * PERIOD_S, ..Telemetry::default() };
     seen.current = Dq { d: MAGNETISING, q: 0.0 };
     seen.voltage.d = (c.voltage_limit.r_s * MAGNETISING * MAGNETISING + error) / MAGNETISING;
     let (mut state, mut found) =
         (error, DcLinkLimits { i_q: (-ASKED, ASKED), ..Default::default() });
-    limit.step(&c, &mut state, &mut found, &seen, (MAGNETISING, 0.0));
+    limit.step(c, &mut state, &mut found, &seen, (MAGNETISING, 0.0));
     assert!((state - error).abs() < 1e-3, "{state}");
     for (bound, why) in [(found.i_q.0, found.why.0), (found.i_q.1, found.why.1)] {
         assert_eq!(why == Limiting::Power, bound.abs() < ASKED, "{bound}");
