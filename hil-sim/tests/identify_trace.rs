@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::bridge::{TOP, duties};
 use crate::cli_common::{folder, hil_sim, object, text};
+use crate::duties::{TOP, duties};
 use hil_sim::config::{Config, plant_settings};
 use hil_sim::experiments::identify_trace::{Reading, Voltages, identify};
 use hil_sim::outcome::Outcome;

@@ -5,14 +5,14 @@ mod battery;
 mod bench_tests;
 mod board_builds;
 mod board_options;
-#[path = "../plant/tests/bridge.rs"]
-mod bridge;
 mod cli_common;
 mod cli_contract;
 mod commission;
 mod configuration;
 mod console;
 mod documents;
+#[path = "../plant/tests/duties.rs"]
+mod duties;
 mod first_light;
 mod full_range;
 #[path = "../../tests/common/generated.rs"]

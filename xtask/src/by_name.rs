@@ -20,7 +20,7 @@ pub fn pages() -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let folder = run::folder("pages")?;
     for arguments in PAGES {
-        let mut command = run::cargo("run --quiet --package hil-sim -- run");
+        let mut command = run::cargo("run --quiet --bin hil-sim -- run");
         let command = command.args(arguments.split(' ')).arg("--out").arg(&folder);
         run::step(arguments, command.stdout(std::process::Stdio::null()))?;
     }

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::bridge::{PERIOD, TOP, duties, plant, settings, voltage};
+use crate::bridge::{PERIOD, plant, settings, voltage};
+use crate::duties::{TOP, duties};
 use drive_core::Compare;
 use motor_plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
 use rand::{RngExt, SeedableRng};

@@ -3,6 +3,7 @@
 mod bridge;
 mod common;
 mod dc_link;
+mod duties;
 mod effects_board;
 mod effects_motor;
 mod energy;
