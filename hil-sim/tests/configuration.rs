@@ -167,7 +167,7 @@ fn the_scales_of_the_drive_follow_the_sensors() {
 #[test]
 fn every_file_is_a_motor_whose_numbers_all_have_one_source() {
     let all = Motor::all();
-    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/bench/motors")).unwrap();
+    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../motors")).unwrap();
     let files = folder.filter(|file| file.as_ref().unwrap().path().is_file());
     assert_eq!(all.len(), files.count());
     assert!(all.len() >= 9);
