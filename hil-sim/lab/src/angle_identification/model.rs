@@ -129,8 +129,8 @@ impl Model {
         [a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s]
     }
 
-    /// The fastest controller with its zero a factor [`LEAD`] below the crossover that is stable and
-    /// keeps the sensitivity peak below [`MS`]; and that crossover, rad/sample. (A phase margin alone
+    /// The fastest controller with its zero a factor `LEAD` below the crossover that is stable and
+    /// keeps the sensitivity peak below `MS`; and that crossover, rad/sample. (A phase margin alone
     /// would not do: an identified plant may peak above the crossover.)
     pub fn design(&self) -> Option<(Pii, f64)> {
         let sign = self.static_gain().signum();
