@@ -25,7 +25,7 @@ pub const CAMPAIGN: u32 = 2000;
 /// Runs the tests of the virtual board with this image of the reference board and the images of the other boards in `target/boards`.
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    let mut command = cargo("test --release --tests --no-fail-fast")?;
+    let mut command = cargo("test --release --tests --no-fail-fast");
     let simulated = run::target_dir()?.join("simulated.txt");
     fs::write(&simulated, "")?;
     command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?).env(SIMULATED, &simulated);
@@ -37,7 +37,7 @@ pub fn check() -> Result<()> {
     let words =
         ["fmt --check", "clippy --release --all-targets -- -D warnings", "doc --release --no-deps"];
     words.into_iter().try_for_each(|words| {
-        run::step("virtual board", cargo(words)?.env("RUSTDOCFLAGS", "-D warnings"))
+        run::step("virtual board", cargo(words).env("RUSTDOCFLAGS", "-D warnings"))
     })
 }
 
@@ -45,7 +45,7 @@ pub fn check() -> Result<()> {
 pub fn cycles(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let budget::Cycles { to_last_compare, whole } = budget::read()?.cycles;
-    let mut command = program("cycles", elf)?;
+    let mut command = program("cycles", elf);
     command.args([to_last_compare.to_string(), whole.to_string()]);
     run::step("cycles of the control interrupt", &mut command)
 }
@@ -54,7 +54,7 @@ pub fn cycles(elf: &Path) -> Result<()> {
 pub fn campaign(elf: &Path, board: &str, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let Faults { count, seed, class, rpm } = faults;
-    let mut command = program("campaign", elf)?;
+    let mut command = program("campaign", elf);
     command.args([&count.to_string(), &seed.to_string(), "--board", board]);
     command.args(rpm.map(|rpm| format!("--rpm={rpm}"))).args(["--class", class]);
     run::step("campaign of faults", &mut command)
@@ -78,21 +78,20 @@ pub struct Faults {
 }
 
 /// A task of the virtual board as a program.
-fn program(task: &str, elf: &Path) -> Result<Command> {
-    let mut command = cargo("run --release --")?;
+fn program(task: &str, elf: &Path) -> Command {
+    let mut command = cargo("run --release --");
     command.arg(task).arg(elf);
-    Ok(command)
+    command
 }
 
 /// An ignored test with images, run by its name.
-pub fn ignored_test(name: &str) -> Result<Command> {
+pub fn ignored_test(name: &str) -> Command {
     cargo(&format!("test --release --test image {name} -- --ignored --nocapture"))
 }
 
-/// A cargo command in the workspace of the virtual board. Its build results are beside those of the main one.
-pub fn cargo(arguments: &str) -> Result<Command> {
+/// A cargo command in the workspace of the virtual board.
+pub fn cargo(arguments: &str) -> Command {
     let mut command = run::cargo(arguments);
     command.current_dir(run::root().join("hil-sim/virtual-board"));
-    command.env("CARGO_TARGET_DIR", run::target_dir()?);
-    Ok(command)
+    command
 }

@@ -44,7 +44,7 @@ pub fn test() -> Result<()> {
         let name = source.file_stem().context("no name")?.to_string_lossy().into_owned();
         fs::copy(built.join(&name), programs.join(format!("embassy-{name}")))?;
     }
-    let mut test = board::ignored_test("foreign")?;
+    let mut test = board::ignored_test("foreign");
     run::step("programs of others on the virtual board", test.env(FOLDER, programs))
 }
 

@@ -34,11 +34,7 @@ pub fn image(board: &str, verbose: bool) -> Result<PathBuf, Error> {
 /// # Errors
 /// As [`image`].
 pub fn virtual_board() -> Result<PathBuf, Error> {
-    // It lies beside this program, unless one of them was built with another profile.
-    let built = std::env::current_exe().is_ok_and(|here| here.with_file_name("board").exists());
-    if !built {
-        eprintln!("emulator: built once; some 2 minutes");
-    }
+    eprintln!("emulator: built where its source has changed; some 2 minutes the first time");
     let mut command = cargo();
     command.args(["build", "--release", "--bin", "board"]);
     command.arg("--message-format=json-render-diagnostics");
