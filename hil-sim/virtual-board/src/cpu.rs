@@ -58,9 +58,14 @@ pub struct Cpu {
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
     guard: Option<guard::Guard>,
+    /// Set where a block has to begin anew, see [`is_stale`].
+    again: Rc<Cell<bool>>,
     /// The hook of reads from the flash of the code.
     flash_reads: Option<UcHookId>,
 }
+
+/// State of the IT block in XPSR.
+const IT_STATE: u32 = 0x0600_fc00;
 
 /// Registers and memories of a stopped core.
 pub struct CoreState {
@@ -136,8 +141,16 @@ impl Cpu {
         let mut costs = Costs::new(memory::FLASH, flash_size, |instruction| instruction.cycles);
         let mut fast = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
         let mut last = 0;
+        // Since the last block a page was looked up, and the block that has begun is one that must begin anew.
+        let (looked_up, again) = (Rc::new(Cell::new(false)), Rc::new(Cell::new(false)));
+        let (page, stale) = (Rc::clone(&looked_up), Rc::clone(&again));
         uc.add_block_hook(from.into(), end, move |uc, address, size| {
             let address = address as u32;
+            if page.replace(false) && is_stale(uc, address) {
+                stale.set(true);
+                uc.emu_stop().ok();
+                return;
+            }
             match address {
                 memory::FLASH..memory::STORED => {
                     if fetched(uc, address, size) {
@@ -189,12 +202,13 @@ impl Cpu {
             })?;
         }
         uc.ctl_tlb_type(TlbType::VIRTUAL)?;
-        uc.add_tlb_hook(0, u64::MAX, |_, paddr, access| {
+        uc.add_tlb_hook(0, u64::MAX, move |_, paddr, access| {
+            looked_up.set(true);
             let data = Permission::READ | Permission::WRITE;
             let perms = if access == MemType::FETCH { Permission::ALL } else { data };
             Some(TlbEntry { paddr, perms })
         })?;
-        Ok(Self { uc, faulted, trapped, guard: None, flash_reads: None })
+        Ok(Self { uc, faulted, trapped, again, guard: None, flash_reads: None })
     }
 
     /// Follows the flash: reads of data from the part of the code are looked at only while it is written or has a bad word, since
@@ -272,8 +286,14 @@ impl Cpu {
         self.trapped.set(false);
         self.chip_mut().first = true;
         self.chip_mut().core_runs = true;
-        let pc = self.get(Register::PC);
-        let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
+        let result = loop {
+            let pc = self.get(Register::PC);
+            let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
+            if !self.again.replace(false) {
+                break result;
+            }
+            self.set(Register::XPSR, self.get(Register::XPSR) & !IT_STATE);
+        };
         let pc = self.get(Register::PC);
         self.chip_mut().core_runs = false;
         if let Some(address) = self.chip_mut().guard_hit.take() {
@@ -353,6 +373,18 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u32) -> bool {
         uc.emu_stop().ok();
     }
     stops
+}
+
+/// Whether the emulator takes the first instructions of a block for those of an IT block that has ended: it does if an access in that
+/// block, the conditional one, was the first to a page since it has forgotten its pages.
+#[cold]
+fn is_stale(uc: &mut Unicorn<Chip>, address: u32) -> bool {
+    if uc.reg_read(Register::XPSR).unwrap_or(0) as u32 & IT_STATE == 0 {
+        return false;
+    }
+    // An IT block has four instructions at most: one that the block lies in begins within 18 bytes before it.
+    let before = uc.mem_read_as_vec(u64::from(address) - 18, 18).unwrap_or_default();
+    !before.chunks_exact(2).any(|code| code[1] == 0xbf && code[0] & 0xf != 0)
 }
 
 /// The same of code in the flash, which may have to wait for the flash.
