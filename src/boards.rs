@@ -6,6 +6,7 @@
 
 mod confirm;
 pub mod converter;
+pub mod identity;
 mod morpho;
 pub mod pin;
 #[cfg(test)]

@@ -31,7 +31,13 @@ pub struct Session {
     next: u32,
     /// Until the console has taken it nothing goes on.
     news: Option<News>,
+    /// [`ORDERED`] from the order to the end: a second fact beside the state of the commissioning, without which a flipped bit there
+    /// energises no motor.
+    ordered: u32,
 }
+
+/// See [`Session::ordered`].
+const ORDERED: u32 = 0x695a_3cc3;
 
 impl Session {
     /// For a drive with these settings; what an earlier one has found is forgotten.
@@ -41,6 +47,7 @@ impl Session {
             sums: Collector::default(),
             next: 0,
             news: None,
+            ordered: 0,
         }
     }
 
@@ -48,6 +55,7 @@ impl Session {
     #[inline(never)]
     pub fn configured(&mut self, settings: &Settings) {
         self.commissioning = Commissioning::new(settings);
+        self.ordered = 0;
     }
 
     /// Begins the steps from `first` to `last`. The drive must be off.
@@ -55,11 +63,12 @@ impl Session {
         self.news = None;
         self.sums.begin(Record::Nothing);
         self.commissioning.start(first, last);
+        self.ordered = ORDERED;
     }
 
     /// Whether steps are being done.
     pub fn is_running(&self) -> bool {
-        self.commissioning.is_running()
+        self.ordered == ORDERED && self.commissioning.is_running()
     }
 
     /// Takes the next period of those that are [observed](Period::observed).
@@ -92,6 +101,7 @@ impl Session {
             Next::Design => design(&mut self.commissioning),
             Next::Report(report) => self.news = Some(News::Report(report)),
             Next::Done => {
+                self.ordered = 0;
                 let (sound, step) = (self.commissioning.is_sound(), self.commissioning.step());
                 self.news = Some(News::Ended { sound, step });
             }

@@ -127,8 +127,7 @@ impl Console {
             _ => {}
         }
         // One line: what it costs to compute must not hold up the main loop. Frames first: a list has time.
-        let settings = &desk.settings().in_force().drive;
-        if self.flushed(port) && self.send_frames(port, settings, drive) {
+        if self.flushed(port) && self.send_frames(port, desk, drive) {
             self.next_of_list(desk, drive);
             self.flushed(port);
         }
@@ -160,7 +159,11 @@ impl Console {
         if matches!(byte, b'\r' | b'\n') && !self.reader.begun() {
             self.note_line(desk, now_ms);
         }
-        let Some(line) = self.reader.push(byte).transpose() else { return };
+        let line = self.reader.push(byte).transpose();
+        if !self.reader.begun() {
+            self.began_ms = None;
+        }
+        let Some(line) = line else { return };
         // The next line has its own time.
         (self.list, self.began_ms) = (None, None);
         self.out.begin_answer(None);

@@ -7,6 +7,8 @@
 pub mod handle;
 pub mod news;
 pub mod order;
+pub mod shaft;
+mod stage_faults;
 #[cfg(test)]
 mod tests;
 
@@ -17,15 +19,15 @@ use drive_core::{Accepted, Command, Fault, Mode, Refused, State, Stop};
 use drive_settings::entry::Change;
 
 use crate::settings::FirmwareSettings;
-use crate::settings::bus::Commander;
-use crate::settings::staging::{Applied, Assignments, Staging};
+use crate::settings::bus::{BUS_SILENT_S, Commander};
+use crate::settings::staging::{Applied, Assignments, Staging, guarded};
 use crate::terminals::{Lost, Wires};
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
 use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
+use shaft::Shaft;
+use stage_faults::StageFaults;
 
-/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
-const BUS_SILENT_S: f32 = 1.0;
 /// From the answer to a reset, ms: the transmit queue empties in 39.
 const REBOOT_MS: u32 = 100;
 /// Time between two readings of the motor's temperature sensor, ms.
@@ -36,6 +38,17 @@ pub type Answer = Result<Reply, Refusal>;
 /// Remarks on settings that an order has put in force, beside its answer.
 type Done = (Applied, Answer);
 
+/// See [`Desk::waits`].
+const WAITS: u32 = 0xa53c_5a96;
+
+/// An order that takes long and waits until its answer is on the way.
+struct Task {
+    from: Commander,
+    order: Order,
+    /// Once its settings are in force: remarks on them.
+    applied: Option<Applied>,
+}
+
 /// See the head of the module.
 pub struct Desk {
     settings: Staging,
@@ -43,8 +56,11 @@ pub struct Desk {
     unsaved: bool,
     /// The board that lines belong to, if it is another than this one.
     foreign: Option<&'static str>,
-    /// An order that takes long and waits until its answer is on the way, and who has given it.
-    task: Option<(Commander, Order)>,
+    /// The board that the settings in the flash were saved on, if it is another.
+    saved_on: Option<&'static str>,
+    task: Option<Task>,
+    /// [`WAITS`] while a task waits: a second fact, without which a flipped bit carries out no order of the past.
+    waits: u32,
     /// Time of an order to reset the chip.
     reboot_ms: Option<u32>,
     /// How the console's last task has ended, until the console takes it.
@@ -52,6 +68,13 @@ pub struct Desk {
     /// Number of designs of the controllers, wrapping. A design takes seconds.
     designs: u32,
     announcer: Announcer,
+    /// Faults of the power stage, which are not cleared as often as one likes.
+    stage: StageFaults,
+    shaft: Shaft,
+    /// Whether the drive was told that there is a brake.
+    braked: bool,
+    /// Time of the present pass, ms, wrapping.
+    now_ms: u32,
     /// Time of the last sign of life of the one that commands; `None` to begin anew.
     heard_ms: Option<u32>,
     /// A stop after this silence, s, or why the drive did not take it, until that is announced.
@@ -68,8 +91,9 @@ pub struct Desk {
     /// The last refusal of bus or strip, and whose, if it is still to be announced.
     refusal: Option<Refusal>,
     refused: Option<Commander>,
-    /// Wires of the terminal strip that are closed.
+    /// Wires of the terminal strip that are closed, and its contacts at the last look.
     pub(crate) wires: Wires,
+    pub(crate) contacts: Wires,
     /// Why the strip's reference was lost, until that is cleared.
     pub(crate) lost: Option<Lost>,
     /// Last reading of the motor's temperature sensor, °C, and its time.
@@ -84,11 +108,17 @@ impl Desk {
             settings: Staging::new(settings),
             unsaved: false,
             foreign: None,
+            saved_on: None,
             task: None,
+            waits: 0,
             reboot_ms: None,
             done: None,
             designs: 0,
             announcer: Announcer::default(),
+            stage: StageFaults::default(),
+            shaft: Shaft::default(),
+            braked: false,
+            now_ms: 0,
             heard_ms: None,
             stopped: None,
             checking: None,
@@ -99,10 +129,17 @@ impl Desk {
             refusal: None,
             refused: None,
             wires: Wires::default(),
+            contacts: Wires::default(),
             lost: None,
             motor: None,
             motor_ms: 0,
         }
+    }
+
+    /// Notes that the settings in the flash were saved on another board. The gates stay unconnected until somebody says which of both
+    /// this is.
+    pub fn saved_on(&mut self, theirs: &'static str) {
+        self.saved_on = Some(theirs);
     }
 
     /// The settings, in force and staged.
@@ -169,8 +206,13 @@ impl Desk {
         if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
     }
 
-    /// Follows the drive. Called at the beginning of each pass of the main loop.
-    pub fn follow(&mut self, drive: &mut impl DriveHandle) {
+    /// Follows the drive. Called at the beginning of each pass of the main loop. `now_ms` wraps.
+    pub fn follow(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+        self.now_ms = now_ms;
+        if let Some(status) = drive.status() {
+            self.stage.watch(&status, now_ms);
+            self.shaft.watch(&status, self.settings.in_force(), now_ms);
+        }
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
             self.settings.learned(result);
@@ -195,6 +237,11 @@ impl Desk {
             // It is taken in every state; without an answer there is no control.
             let _ = drive.command(Command::MotorTemperature(reading));
         }
+    }
+
+    /// The speed of the shaft.
+    pub fn shaft(&self) -> &Shaft {
+        &self.shaft
     }
 
     /// The last reading of the motor's temperature sensor, °C.
@@ -298,6 +345,7 @@ impl Desk {
             | Order::Save => self.begin(from, order, drive),
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
+                self.cancel_start(from);
                 if !drive.is_off() {
                     self.announcer.stopped = Some(from);
                 }
@@ -312,12 +360,10 @@ impl Desk {
                 give(Command::Position(turns), "turns", drive)
             }
             Order::Home(plan) => self.home(plan, drive),
-            Order::Clear => {
-                self.lost = None;
-                give(Command::Clear, "", drive)
-            }
+            Order::Clear => self.clear(drive),
             Order::Defaults => {
                 may_stage(drive)?;
+                self.saved_on = None;
                 self.settings.set_defaults();
                 Ok(self.staged())
             }
@@ -350,11 +396,28 @@ impl Desk {
             Order::Confirm => {
                 must_be_off(drive)?;
                 self.nothing_staged()?;
+                self.is_own_record()?;
                 self.settings.note(FirmwareSettings::confirm_board);
                 let boot_pin = self.settings.in_force().boot_pin_counts;
-                self.save(if boot_pin { Reply::BootPin } else { Reply::Done }, drive)
+                let reply =
+                    self.save(if boot_pin { Reply::BootPin } else { Reply::Done }, drive)?;
+                drive.connect();
+                Ok(reply)
             }
         }
+    }
+
+    /// Clears the latched fault, if it has been reported: one that came since then is told first, and counted.
+    fn clear(&mut self, drive: &mut impl DriveHandle) -> Answer {
+        let Some(status) = drive.status() else { return give(Command::Clear, "", drive) };
+        let latched = self.stage.watch(&status, self.now_ms);
+        self.stage.may_clear().map_err(Refusal::TooOften)?;
+        self.lost = None;
+        if latched {
+            give(Command::Clear, "", drive)?;
+            self.stage.cleared(&status);
+        }
+        Ok(Reply::Done)
     }
 
     /// Passes if no values are staged.
@@ -374,15 +437,29 @@ impl Desk {
         self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
     }
 
+    /// Passes if the settings in the flash were not saved on another board.
+    ///
+    /// # Errors
+    /// They were.
+    fn is_own_record(&self) -> Result<(), Refusal> {
+        let own = self.settings.in_force().board.name;
+        self.saved_on.map_or(Ok(()), |theirs| Err(Refusal::SavedOn { theirs, own }))
+    }
+
     /// Stages settings.
     ///
     /// # Errors
     /// Nothing has changed: the drive is not off, or a value is out of its range.
-    pub fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) -> Answer {
+    pub fn set(
+        &mut self,
+        from: Commander,
+        values: &Assignments,
+        drive: &impl DriveHandle,
+    ) -> Answer {
         may_stage(drive)?;
         let late = values.iter().find(|(key, _)| key.change() == Change::FromReset);
         let confirmed = self.settings.latest().board_is_confirmed();
-        if self.settings.set(values)? {
+        if self.settings.set(from, values)? {
             return Ok(Reply::RestoredDropped);
         }
         Ok(match late {
@@ -415,41 +492,73 @@ impl Desk {
             _ => must_be_off(drive)?,
         }
         self.is_own_board()?;
-        if order.is_for_the_commander(Commander::Console)
-            && !self.settings.latest().board_is_confirmed()
-        {
-            return Err(Refusal::NotConfirmed);
+        if order.is_for_the_commander(Commander::Console) {
+            self.is_own_record()?;
+            if !self.settings.latest().board_is_confirmed() {
+                return Err(Refusal::NotConfirmed);
+            }
+            // A setting that was put back has made it the confirmed board again.
+            drive.connect();
         }
         let learned = self.settings.in_force().learned.is_some();
         let forgets = matches!(order, Order::Learn { again: false }) && learned;
         if self.settings.needs_design() || forgets {
             drive.status().ok_or_else(|| drive.no_control())?;
-            self.task = Some((from, order));
+            self.wait(Task { from, order, applied: None });
             return Ok(Reply::Designing);
         }
         let staged = self.settings.prepare().is_some();
         self.unsaved |= staged;
-        let applied = if staged { self.settings.adopt() } else { Applied::default() };
+        let applied = if staged { self.adopt(drive) } else { Applied::default() };
         self.finish(&order, applied, drive).1
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of the front ends
     pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        let Some((from, order)) = self.task.take() else { return };
+        let task = self.task.take();
+        let waits = core::mem::take(&mut self.waits) == WAITS;
+        let Some(Task { from, order, applied }) = task.filter(|_| waits) else { return };
         if matches!(order, Order::Reboot(_) | Order::Update) {
             let since = *self.reboot_ms.get_or_insert(now_ms);
             if now_ms.wrapping_sub(since) >= REBOOT_MS {
                 return drive.reboot(order == Order::Update);
             }
-            return self.task = Some((from, order));
+            return self.wait(Task { from, order, applied });
         }
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
-        let done = match self.apply(&order, drive) {
-            Ok(applied) => self.finish(&order, applied, drive),
-            Err(why) => (Applied::default(), Err(why)),
+        let done = match applied {
+            Some(applied) => self.finish(&order, applied, drive),
+            None => match self.apply(&order, drive) {
+                // In the next pass: a stop that has come meanwhile, and an ENABLE that was opened, are seen first.
+                Ok(applied) if order.starts() => {
+                    return self.wait(Task { from, order, applied: Some(applied) });
+                }
+                Ok(applied) => self.finish(&order, applied, drive),
+                Err(why) => (Applied::default(), Err(why)),
+            },
         };
+        self.close(from, done);
+    }
+
+    /// Lets a task wait.
+    fn wait(&mut self, task: Task) {
+        (self.task, self.waits) = (Some(task), WAITS);
+    }
+
+    /// Drops a start that waits for its controllers: a stop has come.
+    fn cancel_start(&mut self, from: Commander) {
+        if let Some(task) = self.task.take_if(|task| task.order.starts()) {
+            let applied = task.applied.unwrap_or_default();
+            if task.from != from {
+                self.close(task.from, (applied, Err(Refusal::Stopped)));
+            }
+        }
+    }
+
+    /// Tells how a task has ended.
+    fn close(&mut self, from: Commander, done: Done) {
         match (from, done) {
             (Commander::Console, done) => self.done = Some(done),
             (from, (_, Err(why))) => self.note_refusal(from, why),
@@ -492,7 +601,7 @@ impl Desk {
             && let Some(settings) = self.settings.prepare()
         {
             configure(drive, settings)?;
-            (applied, self.unsaved) = (self.settings.adopt(), true);
+            (applied, self.unsaved) = (self.adopt(drive), true);
             drive.configured(self.settings.in_force());
         }
         if matches!(order, Order::Learn { again: false }) {
@@ -501,10 +610,23 @@ impl Desk {
         Ok(applied)
     }
 
+    /// Takes the prepared settings as those in force, and notes which of those that protect have changed.
+    fn adopt(&mut self, drive: &mut impl DriveHandle) -> Applied {
+        let staging = &self.settings;
+        guarded().filter(|key| staging.differs(*key)).for_each(|key| drive.changed(key));
+        self.settings.adopt()
+    }
+
     /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
     /// boost is a check at every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
         self.not_held()?;
+        let strip = self.settings.in_force().strip;
+        if strip.brake || self.braked {
+            let brake_s = if strip.brake { strip.brake_s } else { 0.0 };
+            drive.command(Command::Brake(brake_s))?;
+            self.braked = strip.brake;
+        }
         if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
             return give(Command::Start(mode), "", drive);
         }
@@ -515,9 +637,11 @@ impl Desk {
         Ok(Reply::WiringFirst)
     }
 
-    /// Passes if the terminal strip lets the drive run.
+    /// Passes if the terminal strip lets the drive run. A contact that has just opened does not.
     fn not_held(&self) -> Result<(), Refusal> {
-        self.hold().map_or(Ok(()), |stop| Err(Refusal::Held(stop)))
+        let closed = Wires(self.wires.0 & self.contacts.0);
+        let hold = self.settings.in_force().strip.hold(closed);
+        hold.map_or(Ok(()), |stop| Err(Refusal::Held(stop)))
     }
 
     /// Lets the drive measure its motor.
@@ -560,7 +684,8 @@ impl Desk {
         if !now && (self.unsaved || self.settings.is_staged()) {
             return Err(Refusal::Unsaved);
         }
-        (self.task, self.reboot_ms) = (Some((from, order)), None);
+        self.reboot_ms = None;
+        self.wait(Task { from, order, applied: None });
         Ok(())
     }
 }

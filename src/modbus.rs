@@ -12,7 +12,8 @@ pub mod slave;
 #[cfg(test)]
 mod tests;
 
-use crate::settings::bus::{Baud, Format};
+use crate::settings::bus::Settings;
+use slave::Written;
 
 /// Bytes of the longest frame (Modbus over serial line V1.02, 2.5.1).
 pub const LONGEST: usize = 256;
@@ -22,20 +23,22 @@ pub type Frame = heapless::Vec<u8, LONGEST>;
 
 /// The bus's end of the RS-485 port.
 pub trait Port {
-    /// Sets the rate and the format of the bytes; cheap if they are so already.
-    fn set_line(&mut self, baud: Baud, format: Format);
+    /// Sets rate and format of the bytes, and the address that the port answers for; cheap if they are so already.
+    fn set_line(&mut self, settings: &Settings);
     /// The next frame: bytes with a silence before and behind.
     fn receive(&mut self) -> Option<Frame>;
     /// Sends a frame, after the one before.
     fn send(&mut self, frame: &Frame);
-    /// While a slave has this address the port itself answers its requests with [`slave::busy`], until `None`.
-    fn set_busy(&mut self, own: Option<u8>);
+    /// While the slave is busy, the port itself answers its requests with [`slave::busy`].
+    fn set_busy(&mut self, busy: bool);
+    /// A stop that came while the slave was busy, or before it had taken the frame before: acknowledged, and still to be carried out.
+    fn take_stop(&mut self) -> Option<Written>;
 }
 
 /// A board may have no bus.
 impl<P: Port> Port for Option<P> {
-    fn set_line(&mut self, baud: Baud, format: Format) {
-        self.iter_mut().for_each(|port| port.set_line(baud, format));
+    fn set_line(&mut self, settings: &Settings) {
+        self.iter_mut().for_each(|port| port.set_line(settings));
     }
     fn receive(&mut self) -> Option<Frame> {
         self.as_mut().and_then(P::receive)
@@ -43,7 +46,10 @@ impl<P: Port> Port for Option<P> {
     fn send(&mut self, frame: &Frame) {
         self.iter_mut().for_each(|port| port.send(frame));
     }
-    fn set_busy(&mut self, own: Option<u8>) {
-        self.iter_mut().for_each(|port| port.set_busy(own));
+    fn set_busy(&mut self, busy: bool) {
+        self.iter_mut().for_each(|port| port.set_busy(busy));
+    }
+    fn take_stop(&mut self) -> Option<Written> {
+        self.as_mut().and_then(P::take_stop)
     }
 }

@@ -40,16 +40,26 @@ pub struct FirmwareSettings {
 }
 
 /// Settings for the handling of commands.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandSettings {
     /// The drive is stopped when no valid line arrived for this long, s; 0 disables the time-out.
     pub timeout_s: f32,
+    /// Longest time in which the shaft coasts to rest, s.
+    pub coasts_s: f32,
     /// Whether a start has checked the wiring since the defaults were set.
     pub wiring_checked: bool,
     /// Whether the console sends typed characters back.
     pub echo: bool,
     /// The [confirmation](crate::boards::Board::confirmation) of the board whose bench steps were done; 0: none.
     pub confirmed: u32,
+}
+
+impl Default for CommandSettings {
+    fn default() -> Self {
+        // A small spindle coasts for half a minute.
+        let coasts_s = 60.0;
+        Self { timeout_s: 0.0, coasts_s, wiring_checked: false, echo: false, confirmed: 0 }
+    }
 }
 
 impl FirmwareSettings {

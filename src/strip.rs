@@ -72,7 +72,7 @@ impl Strip {
         }
         let contacts = port.look();
         let closed = self.debounce.look(contacts);
-        desk.wires = closed;
+        (desk.wires, desk.contacts) = (closed, contacts);
         desk.note_activity(Commander::Strip, now_ms);
         let settings = desk.settings().in_force();
         let (own, speed) = (settings.strip, self.speed(settings, port, closed));
@@ -86,7 +86,8 @@ impl Strip {
             give(desk, Order::Clear);
         }
         let stopping = state.is_stopping();
-        let harder = hold == Some(Stop::Coast) && state != State::Stopping;
+        let harder =
+            hold == Some(Stop::Now) || (hold == Some(Stop::Coast) && state != State::Stopping);
         if let Some(stop) = hold
             && !off
             && (harder || !stopping)

@@ -4,6 +4,7 @@ mod asymmetry_at_start;
 mod command_turns;
 mod common;
 mod demodulator_truth;
+mod edges;
 mod encoder_orientation;
 mod five_demodulators;
 mod homing;

@@ -2,6 +2,7 @@
 
 mod allowed;
 mod axes;
+mod brake;
 mod catching;
 mod coefficients;
 mod command;
@@ -65,6 +66,7 @@ use limits::Limits;
 use prepare::Prepare;
 use scalar::Scalar;
 pub use state::{Mode, Stage, State};
+pub use stopping::COAST_S;
 pub use telemetry::{Room, Telemetry};
 
 /// The drive: coefficients, the phase that it is in, and that which outlives a phase.
@@ -117,6 +119,8 @@ struct Kept {
     thermal: ThermalLoads,
     relay: RelayState,
     learned: Option<Learned>,
+    /// Periods that the motor's brake needs to close; 0: there is none.
+    brake: u32,
 }
 
 /// References that every goal has; fresh at every start.
@@ -131,21 +135,23 @@ struct References {
 }
 
 /// The phase of a drive. A phase owns the state that only it uses.
+///
+/// Its word ([`Drive::PHASES`]) differs from each other one, and from 0, in 16 bits: flipped bits make no phase of another one.
 // The large one is the one that matters; the others share its memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 #[repr(u32)] // a word of its own: a state is not copied around a byte of it
 enum Phase {
-    Off(Left),
-    Fault(Fault, Left),
+    Off(Left) = Drive::PHASES[0],
+    Fault(Fault, Left) = Drive::PHASES[1],
     /// On the way to one of the next three.
-    Prepare(Prepare),
+    Prepare(Prepare) = Drive::PHASES[2],
     /// Excitation of the motor at rest.
-    Excite(Excite),
+    Excite(Excite) = Drive::PHASES[3],
     /// Turning by voltage and frequency.
-    Scalar(Scalar),
+    Scalar(Scalar) = Drive::PHASES[4],
     /// Current in a frame of the flux.
-    Field(Field),
+    Field(Field) = Drive::PHASES[5],
 }
 
 /// The work that a drive was started for.
@@ -263,6 +269,8 @@ enum FluxPhase {
     Hold,
     /// Tracking without torque: is it the flux that is tracked?
     Verify,
+    /// Torque against the closed brake.
+    Prove,
     /// The sensors are watched while the carrier is off.
     Ready(TravelWatchState),
     /// Ready, and a learning measures.
@@ -298,6 +306,10 @@ enum Goal {
     Brake {
         quick: bool,
     },
+    /// At rest, until the brake has closed, for so many periods.
+    Hold {
+        left: u32,
+    },
     /// To no torque, and off.
     Release,
 }
@@ -307,14 +319,14 @@ impl Goal {
     pub fn regulates(&self) -> bool {
         match self {
             Self::Torque | Self::Speed { .. } | Self::Position { .. } => true,
-            Self::Learn | Self::Brake { .. } | Self::Release => false,
+            Self::Learn | Self::Brake { .. } | Self::Hold { .. } | Self::Release => false,
         }
     }
 
     /// The mode that has this goal; of a drive that stops none is asked for.
     pub fn mode(&self) -> Mode {
         match self {
-            Self::Torque | Self::Brake { .. } | Self::Release => Mode::Torque,
+            Self::Torque | Self::Brake { .. } | Self::Hold { .. } | Self::Release => Mode::Torque,
             Self::Speed { .. } => Mode::Speed,
             Self::Position { .. } => Mode::Position,
             Self::Learn => Mode::Learning,
@@ -333,7 +345,8 @@ impl Goal {
             Self::Position { turns, press } => {
                 turns.is_none_or(f32::is_finite) && press.is_none_or(|(speed, _)| speed.is_finite())
             }
-            Self::Torque | Self::Learn | Self::Brake { .. } | Self::Release => true,
+            Self::Torque | Self::Learn => true,
+            Self::Brake { .. } | Self::Hold { .. } | Self::Release => true,
         }
     }
 }
@@ -373,6 +386,17 @@ impl Drive {
         offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients>();
     /// Where in a drive that count is, a `u32`.
     pub const CHANGES: usize = offset_of!(Self, changes);
+
+    /// Where in a drive the word of its phase is, bytes, and the words that it can have: for a check from outside before each step.
+    pub const PHASE: usize = offset_of!(Self, phase);
+    /// See [`PHASE`](Self::PHASE). Rows of a Hadamard matrix that the core compares with in one instruction.
+    pub const PHASES: [u32; 6] =
+        [0x5555_5555, 0x3333_3333, 0x6666_6666, 0x0f0f_0f0f, 0x00ff_00ff, 0xff00_ff00];
+
+    /// Whether a drive whose phase has this word [is off](Self::is_off).
+    pub const fn is_off_in(phase: u32) -> bool {
+        phase == Self::PHASES[0] || phase == Self::PHASES[1]
+    }
 
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {

@@ -90,12 +90,23 @@ faults! {
     MotorSensorShorted = 55, "temperature sensor of the motor shorted";
     MotorHot = 56, "motor too hot by its temperature sensor";
     MotorSensorUnread = 57, "no reading of the motor's temperature sensor came";
+    TorqueNotProven = 58, "the torque was not proven: the current did not follow while the brake was closed";
 }
 
 impl Fault {
     /// Number of the fault.
     pub const fn code(self) -> u8 {
         self as u8
+    }
+
+    /// Whether the current or the temperature was beyond what the power stage stands, or it said so itself: a start into the same wiring
+    /// is a load for its switches.
+    pub const fn is_of_the_power_stage(self) -> bool {
+        match self {
+            Self::OverCurrentA | Self::OverCurrentB | Self::OverCurrentC => true,
+            Self::OverTemperature | Self::Break | Self::AnalogWatchdog => true,
+            _ => false,
+        }
     }
 
     /// The result of a check: this fault, unless what was seen is `sound`. A comparison with NaN is not.

@@ -67,8 +67,8 @@ pub mod table;
 
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode, Protection,
-    Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
+    Accepted, COAST_S, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode,
+    Protection, Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
 pub use drive::{DcLimit, PowerLimit};
 pub use fault::Fault;

@@ -132,8 +132,8 @@ fn what_is_wrong_is_named_with_file_and_line() {
         ("[[part]]\nspeed_rpm = 1\n".into(), "line 2: a part without `seconds`"),
         (part.into(), "no [[part]] gives a reference: torque_current_a, speed_rpm"),
         (
-            format!("{part}speed_rpm = 1\nstop = \"now\"\n"),
-            "line 4: stop = \"now\"; allowed: coast",
+            format!("{part}speed_rpm = 1\nstop = \"soon\"\n"),
+            "line 4: stop = \"soon\"; allowed: coast",
         ),
         (format!("columns = [\"speed\"]\n{part}"), "s.toml, line 1: unknown column `speed`"),
         (format!("shown = 1\n{part}"), "s.toml, line 1: unknown field `shown`, expected one of"),

@@ -26,6 +26,7 @@ const COMMANDS: &[Named] = &[
     ("stop", |_| Command::Stop(Stop::Coast)),
     ("stop ramp", |_| Command::Stop(Stop::Ramp)),
     ("stop quick", |_| Command::Stop(Stop::Quick)),
+    ("stop now", |_| Command::Stop(Stop::Now)),
     ("relock", |_| Command::Relock),
     ("clear", |_| Command::Clear),
 ];

@@ -32,10 +32,18 @@ pub struct TimerEvents {
 pub struct Pwm {
     timer: pac::TIM1,
     on: bool,
+    /// Whether a start was taken since the drive was off: a second fact beside the state of the drive, as a word that no few flipped
+    /// bits turn into the other.
+    armed: u32,
 }
 
+/// The outputs may be switched on.
+const ARMED: u32 = 0x3c96_a5c3;
+const DISARMED: u32 = !ARMED;
+
 impl Pwm {
-    /// Sets up the timer, with all six switches off and the counter at rest, and connects it with the pins of the board.
+    /// Sets up the timer, with all six switches off and the counter at rest. The pins of the gates stay as after a reset until
+    /// [`connect_gates`].
     ///
     /// # Errors
     /// It has no clock; dead time, polarity, break or lock do not read back as they were written; the address of its break
@@ -135,19 +143,11 @@ impl Pwm {
         timer.egr().write(|w| w.ug().update());
         timer.rcr().write(|w| w.rep().set(settings.updates_left_out()));
 
-        // The pins follow last: they are driven off. The resistors hold them off as well, should the timer ever release
-        // them.
-        let off = |on_at: Level| if on_at == Level::Low { Level::High } else { Level::Low };
-        let gates = SELECTED.high.pins.into_iter().zip(SELECTED.low.pins);
-        for ((high_pin, low_pin), (positive, negative)) in gates.zip(pin::TIM1_LEGS) {
-            pins::alternate(high_pin, high_pin.function(positive), Some(off(high)));
-            pins::alternate(low_pin, low_pin.function(negative), Some(off(low)));
-        }
         // Pulled to the level that trips, so that a broken wire does.
         let fault = SELECTED.fault;
         pins::alternate(fault.pin, fault.pin.function(&pin::TIM1_BKIN), Some(fault.trips_at.value));
 
-        Ok(Self { timer, on: false })
+        Ok(Self { timer, on: false, armed: DISARMED })
     }
 
     /// Whether a break was flagged since the last call; clears it. For the self-test, with the outputs off.
@@ -176,10 +176,21 @@ impl Pwm {
         Err("TIM1 does not run in step")
     }
 
-    /// Applies the output of the drive: compare values for the next period, outputs on or off now.
+    /// Lets the outputs be switched on: a start was taken.
+    pub fn arm(&mut self) {
+        self.armed = ARMED;
+    }
+
+    /// Keeps the outputs off until the next [`arm`](Self::arm): the drive is off.
+    pub fn disarm(&mut self) {
+        self.armed = DISARMED;
+    }
+
+    /// Applies the output of the drive: compare values for the next period, outputs on or off now. Returns whether it was right: a drive
+    /// that wants its outputs on although no start was taken has a flipped bit in its state, and the outputs stay off.
     ///
     /// Until the first compare values are taken over, the initial zeros hold: low sides on.
-    pub fn apply(&mut self, compare: Compare) {
+    pub fn apply(&mut self, compare: Compare) -> bool {
         if !compare.enabled {
             self.trip();
         }
@@ -188,9 +199,13 @@ impl Pwm {
         self.timer.ccr3().write(|w| w.ccr().set(u32::from(compare.c)));
         // Once, when the drive switches on: written in every period, it would undo a break since the sample.
         if compare.enabled && !self.on {
+            if self.armed != ARMED {
+                return false;
+            }
             self.timer.bdtr().modify(|_, w| w.moe().enabled());
             self.on = true;
         }
+        true
     }
 
     /// Switches all six switches off, now.
@@ -225,6 +240,19 @@ impl Pwm {
     /// Whether the timer has taken over compare values since the last call of [`take_events`](Self::take_events).
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()
+    }
+}
+
+/// Connects the pins of the gates with the timer, which drives them off. Only on the board that the image is for: on another one, the level
+/// that is off here may switch on.
+pub fn connect_gates() {
+    // The resistors hold them off as well, should the timer ever release them.
+    let off = |on_at: Level| if on_at == Level::Low { Level::High } else { Level::Low };
+    let (high, low) = (SELECTED.high.on_at.value, SELECTED.low.on_at.value);
+    let gates = SELECTED.high.pins.into_iter().zip(SELECTED.low.pins);
+    for ((high_pin, low_pin), (positive, negative)) in gates.zip(pin::TIM1_LEGS) {
+        pins::alternate(high_pin, high_pin.function(positive), Some(off(high)));
+        pins::alternate(low_pin, low_pin.function(negative), Some(off(low)));
     }
 }
 

@@ -5,7 +5,7 @@
 //! driver is on nothing is received.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use drive_settings::value::Words as _;
@@ -18,8 +18,9 @@ use crate::chip::serial::PRIORITY;
 use induction_drive::boards::pin::{Pin, USART3_RX, USART3_TX};
 use induction_drive::boards::{Level, Rs485};
 use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
-use induction_drive::modbus::{self, Frame, slave};
-use induction_drive::settings::bus::{Baud, Format};
+use induction_drive::modbus::slave::{self, Written};
+use induction_drive::modbus::{self, Frame, bus};
+use induction_drive::settings::bus::{Baud, Format, Settings};
 
 /// The main loop's end of the port.
 pub struct Port {
@@ -52,17 +53,24 @@ unsafe impl Sync for Owned {}
 
 static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 
-/// The line that is wanted: rate and format, see [`line`].
+/// The line that is wanted: address, rate and format, see [`line`].
 static LINE: AtomicU32 = AtomicU32::new(NO_LINE);
 /// The port is off.
 const NO_LINE: u32 = u32::MAX;
 
-/// Address of a slave that is busy; 0 while it is not.
-static BUSY: AtomicU8 = AtomicU8::new(0);
+/// Whether the slave is busy.
+static BUSY: AtomicBool = AtomicBool::new(false);
+/// A stop that the main loop could not take: register and word. 0: none.
+static STOP: AtomicU32 = AtomicU32::new(0);
 
-/// Rate and format as a word.
-fn line(baud: Baud, format: Format) -> u32 {
-    (baud.place() as u32) << 8 | format.place() as u32
+/// Address, rate and format as a word.
+fn line(settings: &Settings) -> u32 {
+    u32::from_be_bytes([
+        0,
+        settings.own(),
+        settings.baud.place() as u8,
+        settings.format.place() as u8,
+    ])
 }
 
 impl Port {
@@ -102,8 +110,8 @@ impl Port {
 }
 
 impl modbus::Port for Port {
-    fn set_line(&mut self, baud: Baud, format: Format) {
-        let wanted = line(baud, format);
+    fn set_line(&mut self, settings: &Settings) {
+        let wanted = line(settings);
         if LINE.swap(wanted, Ordering::Relaxed) != wanted {
             NVIC::pend(Interrupt::USART3);
         }
@@ -119,8 +127,13 @@ impl modbus::Port for Port {
         NVIC::pend(Interrupt::USART3);
     }
 
-    fn set_busy(&mut self, own: Option<u8>) {
-        BUSY.store(own.unwrap_or(0), Ordering::Relaxed);
+    fn set_busy(&mut self, busy: bool) {
+        BUSY.store(busy, Ordering::Relaxed);
+    }
+
+    fn take_stop(&mut self) -> Option<Written> {
+        let stop = STOP.swap(0, Ordering::Relaxed);
+        (stop != 0).then_some(((stop >> 16) as u16, stop as u16))
     }
 }
 
@@ -163,17 +176,23 @@ impl PortInterrupt {
         }
     }
 
-    /// A frame has come in: to the main loop, or answered here while that designs controllers for seconds.
+    /// A frame has come in: to the main loop, or answered here while that designs controllers for seconds, or has not taken the frame
+    /// before.
     fn end_frame(&mut self) {
         let whole = !self.damaged && !self.frame.is_empty();
-        let own = BUSY.load(Ordering::Relaxed);
-        if whole && own == 0 {
-            // Lost if the main loop has not taken the one before: the master asks again.
-            self.received.send_with(|place| place.clone_from(&self.frame));
-        } else if whole && let Some(answer) = slave::busy(&self.frame, own) {
-            self.frame = answer;
-            self.transmit();
-            return;
+        let busy = BUSY.load(Ordering::Relaxed);
+        if whole && (busy || !self.received.send_with(|place| place.clone_from(&self.frame))) {
+            let [_, own, ..] = self.line.to_be_bytes();
+            let (answer, stop) = slave::busy(&self.frame, own, bus::is_stop);
+            if let Some((at, word)) = stop {
+                // Of two the one that stays is a stop as well.
+                STOP.fetch_max(u32::from(at) << 16 | u32::from(word), Ordering::Relaxed);
+            }
+            if let Some(answer) = answer {
+                self.frame = answer;
+                self.transmit();
+                return;
+            }
         }
         self.frame.clear();
     }
@@ -197,7 +216,8 @@ impl PortInterrupt {
         let wanted = LINE.load(Ordering::Relaxed);
         if wanted != self.line {
             self.line = wanted;
-            self.set_line(Baud::at((wanted >> 8) as usize), Format::at((wanted & 0xff) as usize));
+            let [.., baud, format] = wanted.to_be_bytes();
+            self.set_line(Baud::at(baud.into()), Format::at(format.into()));
         }
     }
 

@@ -13,6 +13,13 @@
 use core::arch::global_asm;
 
 use induction_drive::board;
+use induction_drive::boards::SELECTED;
+use induction_drive::boards::identity::Identity;
+
+// SAFETY: in the first page of the flash, between functions; nothing but tools reads it there.
+#[used]
+#[unsafe(link_section = ".start.board")]
+static IDENTITY: Identity = Identity::of(SELECTED);
 
 unsafe extern "C" {
     /// Resets the chip into ST's loader. Only with the outputs off, and the supply of the gate drivers too.

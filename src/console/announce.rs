@@ -16,6 +16,9 @@ use crate::desk::news::News;
 /// Asymmetry that no gain mismatch explains from which on a second rotor position is advised.
 const UNEXPLAINED: f32 = 0.002;
 
+/// Told beside a fault of a drive with a brake.
+const HANGS: &str = "; the brake closes now, and alone holds the load";
+
 impl Console {
     /// Writes the next news, if there are any, on lines of their own.
     pub(super) fn announce(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
@@ -53,7 +56,10 @@ impl Console {
             News::Fault(fault) => {
                 let likely = fault.causes().first().copied().unwrap_or_default();
                 let code = fault.code();
-                out.news(format_args!("fault {code}: {fault}; likely: {likely}; type 'clear'"));
+                let brake = if desk.settings().in_force().strip.brake { HANGS } else { "" };
+                out.news(format_args!(
+                    "fault {code}: {fault}; likely: {likely}; type 'clear'{brake}"
+                ));
             }
             News::Running(State::Speed) => out.news(format_args!("running: speed")),
             News::Running(State::Position) => out.news(format_args!("running: position")),

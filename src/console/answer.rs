@@ -23,7 +23,7 @@ impl Console {
     pub(super) fn answer(&mut self, request: Request, desk: &mut Desk, drive: &mut impl Firmware) {
         match request {
             Request::Order(order) => self.reply(&desk.order(Commander::Console, order, drive)),
-            Request::Set(values) => self.reply(&desk.set(&values, drive)),
+            Request::Set(values) => self.reply(&desk.set(Commander::Console, &values, drive)),
             Request::Help => self.begin(ListKind::Help),
             Request::Status => self.status(desk, drive),
             Request::Get(key) => {

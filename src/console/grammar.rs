@@ -184,8 +184,9 @@ fn order<'a>(word: &str, words: &mut Words<'a>) -> Result<Option<Order>, ParseEr
             None => Order::Stop(Stop::Coast),
             Some("ramp") => Order::Stop(Stop::Ramp),
             Some("quick") => Order::Stop(Stop::Quick),
+            Some("now") => Order::Stop(Stop::Now),
             Some(word) => {
-                return Err(ParseError::OneOf { what: "the way to stop", word, all: "ramp quick" });
+                return Err(ParseError::OneOf { what: "the way to stop", word, all: "ramp quick now" });
             }
         },
         "relock" => Order::Relock,

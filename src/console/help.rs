@@ -8,7 +8,7 @@ pub const HELP: [&str; 41] = [
     "commission [STEP [STEP]]  measure the motor at rest, from its nameplate: all steps, one, or from one to another; plant: shaft locked; inertia: shaft free",
     "accept                    put in force what `commission` has found, and save",
     "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",
-    "stop [ramp|quick]         torque to zero, then off; ramp, quick: speed to zero first, by speed.ramp_rpm_per_s or speed.quick_rpm_per_s",
+    "stop [ramp|quick|now]     torque to zero, then off; ramp, quick: speed to zero first, by speed.ramp_rpm_per_s or speed.quick_rpm_per_s; now: off at once",
     "relock                    no torque, magnetise again, verify the lock, go on",
     "torque A                  current on the quadrature axis, A peak",
     "speed RPM                 speed, mechanical rpm",

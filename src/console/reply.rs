@@ -8,9 +8,9 @@ use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::Key;
+use crate::settings::keys::{self, Key};
 use crate::settings::staging::Staging;
-use crate::store::history::History;
+use crate::store::history::{CHANGED, History};
 
 /// A setting with its unit and the allowed values. They are computed before anything is printed, because printing
 /// needs much stack and so does the range.
@@ -167,6 +167,11 @@ pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
             );
         };
         let (code, at) = (fault.code, hours(60 * fault.powered_min));
+        if code == CHANGED {
+            let key = u16::try_from(fault.running_s).ok().and_then(keys::find_id);
+            let name = key.map_or("a setting", Key::name);
+            return write!(f, "at {at:.1} h: {name} was changed, which protects");
+        }
         write!(f, "at {at:.1} h, with current {:.1} h: fault {code}", hours(fault.running_s))?;
         let known = Fault::ALL.iter().find(|known| known.code() == code);
         known.map_or(Ok(()), |known| write!(f, ", {known}"))

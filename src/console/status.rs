@@ -6,6 +6,7 @@ use core::fmt;
 use drive_core::current::VoltageLimit;
 use drive_core::io::PERIOD_S;
 use drive_core::{Fault, Hardware, Limiting, State};
+use drive_settings::value::Value;
 use drive_settings::{CurrentSensors, Settings};
 
 use super::Console;
@@ -13,9 +14,12 @@ use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
 use crate::desk::Desk;
 use crate::desk::order::Refusal;
+use crate::desk::shaft::Shaft;
 use crate::link::Status;
 use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
+use crate::settings::keys::Key;
+use crate::settings::staging::guarded;
 use crate::terminals::Wires;
 
 impl Console {
@@ -23,9 +27,14 @@ impl Console {
     pub(super) fn status(&mut self, desk: &Desk, drive: &impl Firmware) {
         let Some(status) = drive.status() else { return self.error(&drive.no_control()) };
         let tracking = drive.tracking().filter(|_| status.state.regulates());
-        let staged = desk.settings().count();
+        let (staged, loose) = (desk.settings().count(), looser(desk.settings().in_force()));
         let line = fmt::from_fn(|f| {
-            line(f, &status, desk.settings().in_force(), drive.stack())?;
+            line(f, &status, desk.settings().in_force(), desk.shaft(), drive.stack())?;
+            let mut separator = "; looser than by default: ";
+            for (_, key) in guarded().enumerate().filter(|(n, _)| loose >> n & 1 == 1) {
+                write!(f, "{separator}{} {}", key.name(), key.get(desk.settings().in_force()))?;
+                separator = ", ";
+            }
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
@@ -52,8 +61,10 @@ fn line(
     f: &mut fmt::Formatter<'_>,
     s: &Status,
     settings: &FirmwareSettings,
+    shaft: &Shaft,
     (used, size): (usize, usize),
 ) -> fmt::Result {
+    let rpm = shaft.rpm(settings);
     let power = Power::of(Some(s.state), cia402::bus_may_start(settings)).name();
     let settings = &settings.drive;
     let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
@@ -65,7 +76,7 @@ fn line(
         write!(f, "limiting now, because: {}; ", s.limiting)?;
     }
     // While the drive is off, its signals are those of the last run.
-    if s.state != State::Off {
+    if !s.state.is_off() {
         let (i, reference) = (t.current, t.reference);
         let rpm = t.rotor_freq * (60.0 / PERIOD_S) / f32::from(motor.pole_pairs);
         let torque = motor.torque_per_ampere(i.d) * i.q;
@@ -76,6 +87,8 @@ fn line(
         write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
     }
     if s.state.is_off() {
+        let assumed = if shaft.is_assumed() { " assumed: nothing measures it" } else { "" };
+        write!(f, "speed {rpm:.1} rpm{assumed}, ")?;
         let [a, b] =
             [(scales.current_a, s.sample.current_a), (scales.current_b, s.sample.current_b)]
                 .map(|(line, code)| scales.of_code(line).at(code));
@@ -96,6 +109,15 @@ fn line(
     write!(f, "{} of {without} cycles, {with} with a command, ", s.last_cycles)?;
     write!(f, "latest start {latency_us:.1} us, ")?;
     write!(f, "stack {used} of {size}")
+}
+
+/// A bit for each of the settings that protect and are looser than by rule and default. Not in a formatter: the defaults take much stack.
+#[inline(never)]
+fn looser(settings: &FirmwareSettings) -> u64 {
+    let usual = FirmwareSettings::of(settings.board);
+    let by_rule = |key: Key| key.get(settings) == Value::Auto;
+    let is_looser = |key: Key| !by_rule(key) && key.is_looser(settings, &usual);
+    guarded().enumerate().fold(0, |bits, (n, key)| bits | u64::from(is_looser(key)) << n)
 }
 
 /// Writes the torque that the drive can give now, least and largest, with the direct current that is left there; of a shaft at

@@ -12,6 +12,7 @@ use super::grammar::Stream;
 use super::handle::{Firmware, Port};
 use crate::board;
 use crate::desk::Desk;
+use crate::desk::shaft::Shaft;
 use crate::link::ring::Record;
 use crate::link::trace::{self, SIGNALS};
 use crate::settings::bus::Commander;
@@ -48,10 +49,11 @@ impl Wire {
     }
 
     /// Makes the frame of a record, and counts those before it that were dropped.
-    fn make(&mut self, record: &Record, settings: &Settings) {
+    fn make(&mut self, record: &Record, settings: &Settings, shaft: &Shaft) {
         let Some(stream) = &self.stream else { return };
+        let all = trace::shown(&record.telemetry, &record.sampled, shaft.freq());
         let mut values = trace::Record::default();
-        stream.choice.record(&mut values, &trace::values(&record.telemetry, &record.sampled));
+        stream.choice.record(&mut values, &all);
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
         // It has waited for less than a divider.
@@ -109,15 +111,16 @@ impl Console {
     pub(super) fn send_frames(
         &mut self,
         port: &mut impl Port,
-        settings: &Settings,
+        desk: &Desk,
         drive: &mut impl Firmware,
     ) -> bool {
+        let settings = &desk.settings().in_force().drive;
         let wire = &mut self.wire;
         // As many as the ring holds at most: the main loop goes on.
         for _ in 0..=board::RECORDED_PERIODS {
             if wire.waiting == 0 {
                 let Some(record) = drive.sampled() else { return true };
-                wire.make(&record, settings);
+                wire.make(&record, settings, desk.shaft());
             }
             if !port.write(wire.frame.get(..wire.waiting).unwrap_or_default()) {
                 return false;

@@ -8,6 +8,7 @@ use thiserror::Error;
 use crate::commissioning::Session;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
+use crate::settings::keys::Key;
 use crate::store::FlashError;
 
 /// Reason why a command was not carried out.
@@ -44,6 +45,10 @@ pub trait DriveHandle {
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
+    /// Connects the pins of the gates: the board is the one that the image is for.
+    fn connect(&mut self);
+    /// Notes that this setting, which protects, has another value now. Only while the outputs are off.
+    fn changed(&mut self, key: Key);
     /// The commissioning.
     fn session(&mut self) -> &mut Session;
     /// Saves the settings. Takes up to two erasures: only while the outputs are off.

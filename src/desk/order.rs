@@ -65,6 +65,11 @@ pub enum Order {
 }
 
 impl Order {
+    /// Whether it ends with the motor energised.
+    pub fn starts(&self) -> bool {
+        matches!(self, Self::Start(_) | Self::Learn { .. } | Self::Commission(..))
+    }
+
     /// Whether only the one that commands may give it. Anybody may stop the drive; the console may also clear a fault, and do all that needs
     /// the drive off.
     pub fn is_for_the_commander(&self, from: Commander) -> bool {
@@ -152,6 +157,16 @@ pub enum Refusal {
         /// This board.
         own: &'static str,
     },
+    /// The settings in the flash are of another board.
+    #[error(
+        "this image is for the board {own}, and the settings in the flash are of the board {theirs}: flash the image of {theirs}; only if this is a {own}: `defaults`, then its bench steps and `confirm board`"
+    )]
+    SavedOn {
+        /// The board of the settings.
+        theirs: &'static str,
+        /// The board of the image.
+        own: &'static str,
+    },
     /// The board is not confirmed.
     #[error(
         "the board's polarities, dead time and scales are assumed, or were changed: do the bench steps that `board` lists, then `confirm board`"
@@ -184,8 +199,16 @@ pub enum Refusal {
     #[error("the drive has stopped for another reason: write a stop first")]
     Ended,
     /// The terminal strip does not let the drive run.
-    #[error("the terminal strip holds the drive: {} is open", HOLDS[usize::from(*.0 != Stop::Coast)])]
+    #[error("the terminal strip holds the drive: {} is open", HOLDS[usize::from(*.0 == Stop::Ramp)])]
     Held(Stop),
+    /// A stop came before the controllers for a start were designed.
+    #[error("a stop came before the start")]
+    Stopped,
+    /// Seconds for which a fault of the power stage is not cleared.
+    #[error(
+        "three faults of the power stage within 10 s: find the short circuit, the earth fault or the wrong wire first; `clear` works in {0} s"
+    )]
+    TooOften(u32),
     /// The reference of the terminal strip was lost.
     #[error("the reference is lost, {0}; close RESET or `clear`, then start anew")]
     Reference(Lost),
@@ -210,9 +233,10 @@ impl Refusal {
         match self {
             Self::Authority(_) => 1,
             Self::MustBeOff => 2,
-            Self::NotConfirmed => 3,
+            Self::NotConfirmed | Self::SavedOn { .. } => 3,
             Self::NothingLearned | Self::Command(CommandError::Refused(Refused::NotLearned)) => 4,
             Self::Command(CommandError::Refused(Refused::Fault(_))) => 5,
+            Self::Set(SetError::Loosens(..)) => 17,
             Self::Set(_) | Self::Design(_) => 6,
             Self::Hardware(_) => 7,
             Self::Flash(_) => 8,
@@ -221,6 +245,9 @@ impl Refusal {
             Self::Command(CommandError::Refused(_)) => 11,
             Self::Held(_) => 13,
             Self::Reference(_) => 14,
+            Self::Stopped => 15,
+            Self::TooOften(_) => 16,
+
             _ => 12,
         }
     }

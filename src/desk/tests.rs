@@ -53,7 +53,7 @@ fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
         Situation::NoControl => drive.running = false,
         Situation::Staged => {
             let values = [(keys::find("bus.address").unwrap(), Value::Whole(7))];
-            desk.set(&values.into_iter().collect(), &drive).unwrap();
+            desk.set(Commander::Console, &values.into_iter().collect(), &drive).unwrap();
         }
     }
     drive.commands.clear();

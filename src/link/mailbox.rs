@@ -4,14 +4,18 @@
 //! 0.9.3) takes items by value, one copy more in every report, and so does `heapless::mpmc`.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
+
+/// Whether there is a message, as words of 16 different bits: a flipped one neither sends a message again nor blocks the sender.
+const FULL: u32 = 0x96c3_5a3c;
+const EMPTY: u32 = 0;
 
 /// Holds at most one message; the sender and the receiver never wait for each other.
 ///
 /// Shared by one [`Sender`] and one [`Receiver`].
 pub struct Mailbox<T> {
-    /// Owner of the message: the receiver if set, else the sender.
-    full: AtomicBool,
+    /// Owner of the message: the receiver if [`FULL`], else the sender.
+    full: AtomicU32,
     message: UnsafeCell<T>,
 }
 
@@ -26,12 +30,12 @@ pub struct Sender<'a, T>(&'a Mailbox<T>);
 pub struct Receiver<'a, T>(&'a Mailbox<T>);
 
 impl<T> Mailbox<T> {
-    /// Offset in a mailbox, bytes, of a byte that is 1 while there is a message.
+    /// Offset in a mailbox, bytes, of a byte that is not 0 while there is a message.
     pub const FULL: usize = core::mem::offset_of!(Self, full);
 
     /// An empty mailbox. `unread` only initialises the storage; it is never received.
     pub const fn new(unread: T) -> Self {
-        Self { full: AtomicBool::new(false), message: UnsafeCell::new(unread) }
+        Self { full: AtomicU32::new(EMPTY), message: UnsafeCell::new(unread) }
     }
 
     /// Its two ends.
@@ -48,13 +52,13 @@ impl<T> Sender<'_, T> {
 
     /// The same with a message that `write` writes in place, over an earlier one.
     pub fn send_with(&mut self, write: impl FnOnce(&mut T)) -> bool {
-        if self.0.full.load(Ordering::Acquire) {
+        if self.0.full.load(Ordering::Acquire) == FULL {
             return false;
         }
         // SAFETY: the receiver leaves the message alone while the mailbox is not full, and `&mut
         // self` keeps out other senders.
         write(unsafe { &mut *self.0.message.get() });
-        self.0.full.store(true, Ordering::Release);
+        self.0.full.store(FULL, Ordering::Release);
         true
     }
 }
@@ -62,13 +66,26 @@ impl<T> Sender<'_, T> {
 impl<T> Receiver<'_, T> {
     /// Passes the message to `with`, if there is one, then empties the mailbox.
     pub fn take_with<R>(&mut self, with: impl FnOnce(&T) -> R) -> Option<R> {
-        if !self.0.full.load(Ordering::Acquire) {
+        self.take_if(|_| true, |message| with(message))
+    }
+
+    /// Passes the message to `with`, which may overwrite it, if there is one that is `wanted`; then empties the mailbox.
+    pub fn take_if<R>(
+        &mut self,
+        wanted: impl FnOnce(&T) -> bool,
+        with: impl FnOnce(&mut T) -> R,
+    ) -> Option<R> {
+        if self.0.full.load(Ordering::Acquire) != FULL {
             return None;
         }
         // SAFETY: the sender leaves the message alone while the mailbox is full, and `&mut self`
         // keeps out other receivers.
-        let result = with(unsafe { &*self.0.message.get() });
-        self.0.full.store(false, Ordering::Release);
+        let message = unsafe { &mut *self.0.message.get() };
+        if !wanted(message) {
+            return None;
+        }
+        let result = with(message);
+        self.0.full.store(EMPTY, Ordering::Release);
         Some(result)
     }
 

@@ -11,21 +11,33 @@ use super::cia402;
 use super::faults::FaultLog;
 use super::float::from_float;
 use super::registers::{COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, STAGED, View};
-use super::slave::{self, Registers, Words};
+use super::slave::{self, Registers, Words, Written};
 use crate::desk::Desk;
 use crate::desk::handle::DriveHandle;
 use crate::desk::order::{Order, Refusal};
-use crate::settings::bus::Commander;
+use crate::settings::bus::{Alive, Commander};
 use crate::settings::keys;
-use crate::settings::staging::{Assignments, MOST};
+use crate::settings::staging::{Assignments, MOST, SetError};
 
 /// Fields of the command word: what to do, and the direction. Other bits are refused.
 const ACTION: u16 = 0b11;
 const STOP: u16 = 1;
 const FORWARD: u16 = 1 << 4;
 const REVERSE: u16 = 1 << 5;
-/// Bit of the reset register.
+/// Bits of the reset register: clear the latched fault; base block, which switches the outputs off at once.
 const CLEAR: u16 = 1 << 1;
+const BASE_BLOCK: u16 = 1 << 2;
+
+/// Whether a write is a stop, which acts also while the drive is busy.
+pub fn is_stop((at, word): Written) -> bool {
+    match at {
+        // A release is one where the bus commands.
+        COMMAND => word & ACTION == STOP || word == 0,
+        RESET => word & BASE_BLOCK != 0,
+        CONTROL => cia402::stop(word).is_some(),
+        _ => false,
+    }
+}
 
 /// The run command of the master.
 #[derive(Clone, Copy, Default, PartialEq)]
@@ -52,6 +64,8 @@ pub struct Bus {
     given: Option<f32>,
     /// Number of the desk's last design that was noticed.
     designs: u32,
+    /// Whether the control word of CiA 402 that was written last asks for the reset of a fault: the change to it does.
+    resets: bool,
     faults: FaultLog,
     seconds: u32,
     second_ms: u32,
@@ -68,7 +82,7 @@ impl Bus {
         now_ms: u32,
     ) {
         let settings = desk.settings().in_force().bus;
-        port.set_line(settings.baud, settings.format);
+        port.set_line(&settings);
         while now_ms.wrapping_sub(self.second_ms) >= 1000 {
             self.second_ms = self.second_ms.wrapping_add(1000);
             self.seconds += 1;
@@ -82,11 +96,27 @@ impl Bus {
         let frame = port.receive();
         // An answer to a request from before a design, which the master has given up, would be taken for that to another.
         let late = desk.has_designed(&mut self.designs);
-        let Some(frame) = frame.filter(|_| !late) else { return };
-        let mut access = Access { bus: self, desk, drive };
-        // A master counts as alive by its writes: a panel that only reads does not stand in for it.
-        if slave::answer(&frame, settings.own(), &mut access, |answer| port.send(answer)) {
-            desk.note_activity(Commander::Bus, now_ms);
+        let mut access = Access { bus: self, desk, drive, commanded: false };
+        match frame {
+            // A stop acts all the same.
+            Some(frame) if late => {
+                let (_, stop) = slave::busy(&frame, settings.own(), is_stop);
+                stop.iter().for_each(|stop| access.carry_out(*stop));
+            }
+            Some(frame) => {
+                let own = settings.own();
+                let valid = slave::answer(&frame, own, &mut access, |answer| port.send(answer));
+                // By default a master counts as alive by what it commands: neither a panel that only reads nor a gateway that writes to
+                // all stands in for it.
+                if valid && (access.commanded || settings.alive == Alive::Any) {
+                    access.desk.note_activity(Commander::Bus, now_ms);
+                }
+            }
+            None => {}
+        }
+        // Behind the frame, which came before it.
+        if let Some(stop) = port.take_stop() {
+            access.carry_out(stop);
         }
     }
 
@@ -130,6 +160,7 @@ impl Bus {
 impl From<Refusal> for Exception {
     fn from(why: Refusal) -> Self {
         match why {
+            Refusal::Set(SetError::Loosens(..)) => Self::ServerDeviceFailure,
             Refusal::Set(_) => Self::IllegalDataValue,
             _ => Self::ServerDeviceFailure,
         }
@@ -141,6 +172,8 @@ struct Access<'a, D> {
     bus: &'a mut Bus,
     desk: &'a mut Desk,
     drive: &'a mut D,
+    /// Whether command, frequency or control word were written, and taken.
+    commanded: bool,
 }
 
 impl<D: DriveHandle> Access<'_, D> {
@@ -148,9 +181,39 @@ impl<D: DriveHandle> Access<'_, D> {
         Ok(self.desk.order(Commander::Bus, order, self.drive).map(drop)?)
     }
 
+    /// Carries out a stop that has been acknowledged already, or whose master waits no more.
+    fn carry_out(&mut self, (at, word): Written) {
+        // What is refused is announced.
+        let _ = self.write_word(at, word);
+    }
+
     fn refuse(&mut self, why: Refusal) -> Result<(), Exception> {
         self.desk.note_refusal(Commander::Bus, why.clone());
         Err(why.into())
+    }
+
+    /// Writes a register that is no setting.
+    fn write_word(&mut self, at: u16, word: u16) -> Result<(), Exception> {
+        match at {
+            COMMAND => self.command(word),
+            FREQUENCY => self.frequency(word),
+            RESET => self.reset(word),
+            CONTROL => self.control(word),
+            STAGED => self.staged(word),
+            _ => Err(Exception::IllegalDataAddress),
+        }?;
+        self.commanded |= matches!(at, COMMAND | FREQUENCY | CONTROL);
+        Ok(())
+    }
+
+    fn reset(&mut self, word: u16) -> Result<(), Exception> {
+        if word & !(CLEAR | BASE_BLOCK) != 0 {
+            return Err(Exception::IllegalDataValue);
+        }
+        if word & BASE_BLOCK != 0 {
+            return self.stop(Stop::Now);
+        }
+        if word == CLEAR { self.order(Order::Clear) } else { Ok(()) }
     }
 
     fn command(&mut self, word: u16) -> Result<(), Exception> {
@@ -196,9 +259,11 @@ impl<D: DriveHandle> Access<'_, D> {
 
     /// A control word of CiA 402. A run keeps the direction.
     fn control(&mut self, word: u16) -> Result<(), Exception> {
-        if word & cia402::FAULT_RESET != 0 {
+        let resets = word & cia402::FAULT_RESET != 0;
+        if resets && !core::mem::replace(&mut self.bus.resets, resets) {
             self.order(Order::Clear)?;
         }
+        self.bus.resets = resets;
         match cia402::stop(word) {
             Some(stop) => self.stop(stop),
             None => self.command(RUN),
@@ -246,7 +311,7 @@ impl<D: DriveHandle> Access<'_, D> {
             // There is room.
             let _ = values.push((key, from_float(key, self.desk.settings().latest(), float)?));
         }
-        self.desk.set(&values, self.drive).map(drop).or_else(|why| self.refuse(why))
+        self.desk.set(Commander::Bus, &values, self.drive).map(drop).or_else(|why| self.refuse(why))
     }
 
     fn staged(&mut self, word: u16) -> Result<(), Exception> {
@@ -291,17 +356,9 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
                 if word & ACTION == RUN {
                     self.frequency(frequency)?;
                 }
-                self.command(word)
+                self.write_word(at, word)
             }
-            (COMMAND, None) => self.command(word),
-            (FREQUENCY, None) => self.frequency(word),
-            (RESET, None) => match word {
-                0 => Ok(()),
-                CLEAR => self.order(Order::Clear),
-                _ => Err(Exception::IllegalDataValue),
-            },
-            (CONTROL, None) => self.control(word),
-            (STAGED, None) => self.staged(word),
+            (_, None) => self.write_word(at, word),
             _ => Err(Exception::IllegalDataAddress),
         }
     }

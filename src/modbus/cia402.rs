@@ -80,11 +80,11 @@ pub const RUN: u16 = SWITCH_ON | ENABLE_VOLTAGE | QUICK_STOP | ENABLE_OPERATION;
 /// The control word of a drive that is stopped: shutdown.
 pub const SHUTDOWN: u16 = ENABLE_VOLTAGE | QUICK_STOP;
 
-/// The stop that a control word orders; `None` for a run. Disable voltage coasts, a quick stop brakes by its own ramp, and
-/// shutdown, switch on and disable operation brake by the ramp of the speed.
+/// The stop that a control word orders; `None` for a run. Disable voltage switches off at once, a quick stop brakes by its own ramp,
+/// and shutdown, switch on and disable operation brake by the ramp of the speed.
 pub const fn stop(control_word: u16) -> Option<Stop> {
     if control_word & ENABLE_VOLTAGE == 0 {
-        Some(Stop::Coast)
+        Some(Stop::Now)
     } else if control_word & QUICK_STOP == 0 {
         Some(Stop::Quick)
     } else if control_word & RUN == RUN {
@@ -96,6 +96,8 @@ pub const fn stop(control_word: u16) -> Option<Stop> {
 
 /// Bit of the status word: the dc link is above its lower limit.
 pub const VOLTAGE_ENABLED: u16 = 1 << 4;
+/// Bit of the status word, the manufacturer's: the drive is off, and the speed is the last measured one.
+pub const SPEED_ASSUMED: u16 = 1 << 14;
 /// Bit of the status word: the bus commands.
 pub const REMOTE: u16 = 1 << 9;
 /// Bit of the status word: the speed is within 1 % of `speed.limit_rpm` of its reference.

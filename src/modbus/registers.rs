@@ -13,7 +13,7 @@ use super::float::to_float;
 use crate::desk::Desk;
 use crate::desk::order::Refusal;
 use crate::link::Status;
-use crate::link::trace::{SIGNALS as ALL_SIGNALS, Sampled, values};
+use crate::link::trace::{SIGNALS as ALL_SIGNALS, Sampled, shown};
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
 use crate::settings::keys;
@@ -57,6 +57,7 @@ const STATE_STARTS: u16 = 0b10;
 const STATE_STOPS: u16 = 0b01;
 const TURNS_REVERSE: u16 = 0b11 << 3;
 const BY_BUS: u16 = 1 << 8 | 1 << 10;
+const SPEED_ASSUMED: u16 = 1 << 15;
 
 /// Speed counts as reached within this share of the largest.
 const REACHED: f32 = 0.01;
@@ -174,14 +175,15 @@ impl View<'_> {
     /// The latest value of the signal with this number; 0 for none, and before the control runs.
     fn signal(&self, id: u16) -> f32 {
         let Some(s) = &self.status else { return 0.0 };
-        let values = values(&s.telemetry, &Sampled::new(&s.sample, s.state, s.limiting));
+        let sampled = Sampled::new(&s.sample, s.state, s.limiting);
+        let values = shown(&s.telemetry, &sampled, self.desk.shaft().freq());
         let found = ALL_SIGNALS.iter().zip(values).find(|(signal, _)| signal.id == id);
         found.map_or(0.0, |(signal, value)| signal.shown(value, &self.settings.drive))
     }
 
-    /// The state, if the motor has current or had it at the moment of a fault.
+    /// The report of a drive that is not off.
     fn active(&self) -> Option<&Status> {
-        self.status.as_ref().filter(|status| status.state != State::Off)
+        self.status.as_ref().filter(|status| !status.state.is_off())
     }
 
     fn largest_hz(&self) -> f32 {
@@ -206,13 +208,27 @@ impl View<'_> {
         }
     }
 
+    /// Of a drive that is off that of the shaft: masters take it for the speed, and wait for rest by it.
     fn output_hz(&self) -> f32 {
-        self.active().map_or(0.0, |status| (status.telemetry.flux_freq / PERIOD_S).abs())
+        let freq = match self.active() {
+            Some(status) => status.telemetry.flux_freq,
+            None => self.desk.shaft().freq(),
+        };
+        (freq / PERIOD_S).abs()
     }
 
-    /// Of the shaft, signed.
+    /// Of the shaft, signed; the last measured one while nobody measures it.
     fn rpm(&self) -> f32 {
-        self.active().map_or(0.0, |s| s.telemetry.rotor_freq / PERIOD_S / self.hz_per_rpm())
+        let freq = match self.active() {
+            Some(status) => status.telemetry.rotor_freq,
+            None => self.desk.shaft().freq(),
+        };
+        freq / PERIOD_S / self.hz_per_rpm()
+    }
+
+    /// Whether the drive is off and does not know whether the shaft turns.
+    fn speed_is_assumed(&self) -> bool {
+        self.active().is_none() && self.desk.shaft().is_assumed()
     }
 
     fn current(&self) -> f32 {
@@ -262,7 +278,8 @@ impl View<'_> {
         };
         let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
         let by_bus = if self.settings.bus.commander == Commander::Bus { BY_BUS } else { 0 };
-        state | reverse | by_bus
+        let assumed = if self.speed_is_assumed() { SPEED_ASSUMED } else { 0 };
+        state | reverse | by_bus | assumed
     }
 
     fn control_word(&self) -> u16 {
@@ -276,6 +293,9 @@ impl View<'_> {
         }
         if self.settings.bus.commander == Commander::Bus {
             word |= cia402::REMOTE;
+        }
+        if self.speed_is_assumed() {
+            word |= cia402::SPEED_ASSUMED;
         }
         let wanted = f32::from(self.frequency) * 0.01 / self.hz_per_rpm();
         let error = self.rpm().abs() - wanted.min(self.settings.drive.speed_limit_rpm());

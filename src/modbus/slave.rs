@@ -40,6 +40,9 @@ impl Words<'_> {
     }
 }
 
+/// A register and the word that is written to it.
+pub type Written = (u16, u16);
+
 /// The registers of a slave.
 pub trait Registers {
     /// Whether every request is to be answered with [`Exception::ServerDeviceBusy`].
@@ -68,7 +71,7 @@ enum Asked<'a> {
 }
 
 /// Carries out a frame that came in, if it is whole and for the address `own` or for all, and sends the answer, if there is
-/// one; whether it was a write.
+/// one. Returns whether it was a request to this address alone, and was carried out.
 pub fn answer(
     frame: &[u8],
     own: u8,
@@ -77,9 +80,8 @@ pub fn answer(
 ) -> bool {
     let Some((slave, pdu)) = whole(frame) else { return false };
     let function = pdu[0];
-    let writes = matches!(function, 6 | 16);
     // A read of all has no answer.
-    let for_us = slave == own || (slave == BROADCAST && writes);
+    let for_us = slave == own || (slave == BROADCAST && matches!(function, 6 | 16));
     if !for_us || function > LAST_FUNCTION {
         return false;
     }
@@ -91,22 +93,45 @@ pub fn answer(
         asked => asked,
     };
     if slave != BROADCAST {
-        reply(slave, function, asked, registers, send);
+        return reply(slave, function, asked, registers, send);
     }
-    writes
+    false
 }
 
-/// The answer of a slave with this address that is busy, exception 6, if the frame is whole and for it alone. Without a panic, for an
-/// interrupt.
-pub fn busy(frame: &[u8], own: u8) -> Option<Frame> {
-    let (body, sum) = frame.split_last_chunk::<2>()?;
-    let [slave, function, ..] = *body else { return None };
-    if slave != own || function > LAST_FUNCTION || *sum != rtu::crc16(body).to_be_bytes() {
-        return None;
+/// What a slave that is busy makes of a frame: its answer, and a stop that is to be carried out.
+pub type Busy = (Option<Frame>, Option<Written>);
+
+/// The same for the address `own`, if the frame is whole: a write that is a stop, to this slave or to all, is acknowledged; other requests
+/// to this slave alone are answered with exception 6. Without a panic, for an interrupt.
+pub fn busy(frame: &[u8], own: u8, is_stop: impl FnOnce(Written) -> bool) -> Busy {
+    let Some((body, sum)) = frame.split_last_chunk::<2>() else { return (None, None) };
+    if *sum != rtu::crc16(body).to_be_bytes() {
+        return (None, None);
     }
-    let [a, b, c] = [own, function | 0x80, Exception::ServerDeviceBusy as u8];
-    let [d, e] = rtu::crc16(&[a, b, c]).to_be_bytes();
-    Frame::from_slice(&[a, b, c, d, e]).ok()
+    let word = |high, low| u16::from_be_bytes([high, low]);
+    let written = match *body {
+        [_, 6, a, b, c, d] | [_, 16, a, b, _, _, _, c, d, ..] => Some((word(a, b), word(c, d))),
+        _ => None,
+    };
+    let for_us = body.first().is_some_and(|slave| *slave == own || *slave == BROADCAST);
+    let stop = written.filter(|written| for_us && is_stop(*written));
+    let answer = match *body {
+        [slave, ..] if slave != own => None,
+        // Address, function, register, word or number of words.
+        [_, function, a, b, c, d, ..] if stop.is_some() => with_sum(&[own, function, a, b, c, d]),
+        [_, function, ..] if function <= LAST_FUNCTION => {
+            with_sum(&[own, function | 0x80, Exception::ServerDeviceBusy as u8])
+        }
+        _ => None,
+    };
+    (answer, stop)
+}
+
+/// A frame of these bytes and their checksum.
+fn with_sum(body: &[u8]) -> Option<Frame> {
+    let mut frame = Frame::from_slice(body).ok()?;
+    frame.extend_from_slice(&rtu::crc16(body).to_be_bytes()).ok()?;
+    Some(frame)
 }
 
 /// Address and request of a frame; `None` if it is damaged.
@@ -153,7 +178,7 @@ fn asked(pdu: &[u8]) -> Result<Asked<'_>, Exception> {
     }
 }
 
-/// Sends the answer. Not inlined: its buffers must not lie below what a write calls.
+/// Sends the answer; whether it is no exception. Not inlined: its buffers must not lie below what a write calls.
 #[inline(never)]
 fn reply(
     slave: u8,
@@ -161,7 +186,7 @@ fn reply(
     asked: Result<Asked<'_>, Exception>,
     registers: &mut impl Registers,
     send: impl FnOnce(&Frame),
-) {
+) -> bool {
     let mut bytes = [0; 2 * MOST_READ as usize];
     let response = asked.and_then(|asked| match asked {
         Asked::Read(at, last) => {
@@ -181,6 +206,7 @@ fn reply(
         }
         Asked::Echo(function, data) => Ok(Response::Custom(function, data)),
     });
+    let carried_out = response.is_ok();
     let pdu = ResponsePdu(response.map_err(|exception| ExceptionResponse {
         function: FunctionCode::new(function),
         exception,
@@ -193,4 +219,5 @@ fn reply(
     if !out.is_empty() {
         send(&out);
     }
+    carried_out
 }

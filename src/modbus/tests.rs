@@ -9,6 +9,7 @@ use drive_core::{Fault, Refused};
 use drive_settings::SettingsError;
 
 use super::Frame;
+use super::bus::is_stop;
 use super::cia402::Power;
 use super::registers::{FAULTS, ROWS, Shown};
 use super::slave::{self, Registers, Words};
@@ -18,6 +19,7 @@ use crate::desk::order::Refusal;
 use crate::generated;
 use crate::settings::bus::{Baud, Commander, Format};
 use crate::settings::keys;
+use crate::settings::staging::SetError;
 use crate::store::FlashError;
 
 /// Registers 0x2000 to 0x20ff, of which the last cannot be written.
@@ -76,21 +78,49 @@ fn ask(frame: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
     Some(bytes.to_vec())
 }
 
-/// Exception 6 to a whole request for this slave alone; nothing to a damaged one, to others, to all, and to an exception.
+/// Exception 6 to a whole request for this slave alone; nothing to a damaged one, to others, to all, and to an exception. A stop is
+/// acknowledged, and told.
 #[test]
 fn a_busy_slave_answers_whole_requests_for_it_alone() {
-    let busy = |frame: &[u8]| slave::busy(frame, 17).map(|answer| answer.to_vec());
+    let busy = |frame: &[u8]| {
+        let (answer, stop) = slave::busy(frame, 17, is_stop);
+        (answer.map(|answer| answer.to_vec()), stop)
+    };
+    let answer = |bytes: &[u8]| (Some(framed(bytes)), None);
     let read = framed(&[17, 3, 0x20, 0x01, 0, 2]);
-    assert_eq!(busy(&read), Some(framed(&[17, 0x83, 6])));
-    assert_eq!(busy(&framed(&[17, 16, 0x20, 1, 0, 1, 2, 0, 9])), Some(framed(&[17, 0x90, 6])));
+    assert_eq!(busy(&read), answer(&[17, 0x83, 6]));
+    assert_eq!(busy(&framed(&[17, 16, 0x20, 1, 0, 1, 2, 0, 9])), answer(&[17, 0x90, 6]));
     for at in 0..read.len() {
         let mut damaged = read.clone();
         damaged[at] ^= 1;
-        assert_eq!(busy(&damaged), None, "byte {at}");
-        assert_eq!(busy(&read[..at]), None, "{at} bytes");
+        assert_eq!(busy(&damaged), (None, None), "byte {at}");
+        assert_eq!(busy(&read[..at]), (None, None), "{at} bytes");
     }
     for other in [&[18, 3, 0, 0, 0, 1][..], &[0, 6, 0x20, 1, 0, 1], &[17, 0x83, 2], &[17]] {
-        assert_eq!(busy(&framed(other)), None, "{other:?}");
+        assert_eq!(busy(&framed(other)), (None, None), "{other:?}");
+    }
+    for (at, word, stops) in [
+        (0x2000, 1, true),
+        (0x2000, 0, true),
+        (0x2000, 18, false),
+        (0x2002, 4, true),
+        (0x2002, 2, false),
+        (0x6040, 0, true),
+        (0x6040, 6, true),
+        (0x6040, 15, false),
+        (0x2001, 1, false),
+    ] {
+        let ([a, b], [c, d]) = ((at as u16).to_be_bytes(), (word as u16).to_be_bytes());
+        let stop = stops.then_some((at, word));
+        let exception =
+            |function: u8| if stops { None } else { Some(framed(&[17, function | 0x80, 6])) };
+        let one = [17, 6, a, b, c, d];
+        assert_eq!(busy(&framed(&one)), (exception(6).or(Some(framed(&one))), stop), "{at:#x}");
+        let several = [17, 16, a, b, 0, 1, 2, c, d];
+        let acknowledged = Some(framed(&several[..6]));
+        assert_eq!(busy(&framed(&several)), (exception(16).or(acknowledged), stop), "{at:#x}");
+        assert_eq!(busy(&framed(&[0, 6, a, b, c, d])), (None, stop), "{at:#x}");
+        assert_eq!(busy(&framed(&[18, 6, a, b, c, d])), (None, None), "{at:#x}");
     }
 }
 
@@ -331,6 +361,17 @@ fn the_manual_lists_the_refusals() {
             Refusal::Reference(crate::terminals::Lost::Low),
             "the strip's reference was lost",
             "RESET or `clear`, then a new start",
+        ),
+        (Refusal::Stopped, "a stop came before the start", "start again"),
+        (
+            Refusal::TooOften(7),
+            "three faults of the power stage within 10 s",
+            "find the short circuit, then clear after 10 s",
+        ),
+        (
+            Refusal::Set(SetError::Loosens(key, key)),
+            "a setting that protects would become looser",
+            "set it at the console",
         ),
     ];
     let mut table = "| value | reason | cure |\n|---|---|---|\n".to_owned();

@@ -27,11 +27,14 @@ pub enum Reason {
     Coefficients = 75,
     /// A configuration register has changed; details: address, its checked bits, those after the start.
     Register = 77,
+    /// A bit of the drive's state has flipped: its phase is none, or it wants its outputs on although no start was taken; details: the
+    /// word of the phase.
+    State = 78,
 }
 
 impl Reason {
     /// All reasons, each with a short text.
-    pub const ALL: [(Self, &str); 9] = [
+    pub const ALL: [(Self, &str); 10] = [
         (Self::Panic, "panic"),
         (Self::HardFault, "processor fault"),
         (Self::NonMaskable, "clock or flash failure"),
@@ -41,6 +44,7 @@ impl Reason {
         (Self::Code, "code of the control changed"),
         (Self::Coefficients, "coefficients of the control changed"),
         (Self::Register, "register of the chip changed"),
+        (Self::State, "state of the control changed"),
     ];
 }
 
@@ -102,7 +106,7 @@ mod tests {
     #[test]
     fn numbers_follow_those_of_the_drive_and_never_change() {
         let codes: Vec<u8> = Reason::ALL.iter().map(|reason| reason.0 as u8).collect();
-        assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75, 77]);
+        assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75, 77, 78]);
         assert!(drive_core::Fault::ALL.iter().all(|fault| fault.code() < 64));
     }
 

@@ -125,10 +125,16 @@ pub struct RegisterCheck {
 impl RegisterCheck {
     /// A check of these registers with their contents now; `read` reads the word at an address.
     pub fn new(expected: &'static mut [u32; COUNT], read: impl Fn(u32) -> u32) -> Self {
-        for (Register { address, mask }, expected) in control().zip(expected.iter_mut()) {
+        let mut new = Self { expected, next: 0 };
+        new.renew(read);
+        new
+    }
+
+    /// Takes the contents now.
+    pub fn renew(&mut self, read: impl Fn(u32) -> u32) {
+        for (Register { address, mask }, expected) in control().zip(self.expected.iter_mut()) {
             *expected = read(address) & mask;
         }
-        Self { expected, next: 0 }
     }
 
     /// Checks the next slice.

@@ -30,6 +30,9 @@ words! {
     }
 }
 
+/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
+pub const BUS_SILENT_S: f32 = 1.0;
+
 /// Silence that ends a frame above 19 200 bit/s, us (Modbus over serial line V1.02, 2.5.1.1). Below, 3.5 characters.
 const SILENCE_US: u32 = 1750;
 
@@ -77,6 +80,18 @@ words! {
     }
 }
 
+words! {
+    /// The requests by which the master that commands counts as alive: valid ones to the address of the drive alone.
+    #[derive(Default)]
+    pub enum Alive {
+        /// Those that write command, frequency or control word.
+        #[default]
+        Writes = "writes",
+        /// All, for masters that write once and then only read.
+        Any = "any",
+    }
+}
+
 /// Settings of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -88,6 +103,8 @@ pub struct Settings {
     pub format: Format,
     /// Who commands.
     pub commander: Commander,
+    /// Signs of life of the master.
+    pub alive: Alive,
 }
 
 impl Settings {
@@ -102,6 +119,6 @@ impl Default for Settings {
     fn default() -> Self {
         // Rate and parity that the specification recommends (Modbus over serial line V1.02, 2.4.2).
         let (baud, format) = (Baud::B19200, Format::Even);
-        Self { address: 1, baud, format, commander: Commander::Console }
+        Self { address: 1, baud, format, commander: Commander::Console, alive: Alive::Writes }
     }
 }

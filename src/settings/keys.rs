@@ -2,13 +2,14 @@
 
 use core::fmt;
 
-use drive_settings::entry::{Change, Entry};
+use drive_settings::entry::{Change, Entry, Guard};
 use drive_settings::value::{Value, ValueError};
 use drive_settings::{SETTINGS, Settings, SettingsError};
 
 use super::FirmwareSettings;
+use super::bus::BUS_SILENT_S;
 pub use super::own::BOARD;
-use super::own::OWN;
+use super::own::{OWN, TIMEOUT};
 use crate::boards::Board;
 use crate::hash;
 
@@ -104,6 +105,29 @@ impl Key {
     /// Whether the power stage is at stake: only at the console, and to be confirmed.
     pub fn hardware(self) -> bool {
         with!(self, |entry| entry.hardware)
+    }
+
+    /// Whether it protects: from elsewhere than the console it can only be tightened.
+    pub fn guards(self) -> bool {
+        with!(self, |entry| entry.guard != Guard::None)
+    }
+
+    /// The number in effect; of a word its place. A time-out of 0 is that of the bus.
+    pub fn level(self, settings: &FirmwareSettings) -> f32 {
+        let level = with!(self, settings, |entry, s| entry.level(s));
+        if self.name() == TIMEOUT && level == 0.0 { BUS_SILENT_S } else { level }
+    }
+
+    /// Whether these settings protect as well as those in which it has this level.
+    pub fn holds(self, settings: &FirmwareSettings, bound: f32) -> bool {
+        let level = self.level(settings);
+        with!(self, |entry| entry.guard.holds(level, bound))
+    }
+
+    /// Whether it protects less with these settings than with others.
+    pub fn is_looser(self, settings: &FirmwareSettings, than: &FirmwareSettings) -> bool {
+        let says_what_is_there = with!(self, |entry| entry.guard == Guard::Keep);
+        !says_what_is_there && !self.holds(settings, self.level(than))
     }
 
     /// The words that may be set; none for a number.

@@ -1,28 +1,33 @@
 //! The table of the firmware's own settings, beside those of the drive.
 
 use drive_settings::entry;
-use drive_settings::entry::{Access, Change, Entry};
+use drive_settings::entry::{Access, Change, Entry, Guard};
 use drive_settings::value::Words;
 
 use super::FirmwareSettings as Settings;
-use super::bus::{Baud, Commander, Format};
-use super::strip::{Reference, Start};
+use super::bus::{Alive, Baud, Commander, Format};
+use super::strip::{Enable, Reference, Start};
 use crate::boards;
+
+/// The setting of the silence that stops the drive.
+pub const TIMEOUT: &str = "command.timeout_s";
 
 /// The setting that names the board.
 pub const BOARD: &str = "board";
 
 /// In the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
-pub static OWN: [Entry<Settings>; 21] = [
-    entry!(101: number("s"), "command.timeout_s", [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
-    entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
+pub static OWN: [Entry<Settings>; 24] = [
+    entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
+    entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest: for so long after the outputs went off it is assumed to turn").from_to(0.0, 3600.0).guarded(Guard::Raise),
+    entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set").guarded(Guard::Keep),
     entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
     entry!(104: word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
     entry!(105: whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
     entry!(106: word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
     entry!(107: word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
-    entry!(110: word(), "strip.enable", [strip] enable: bool, "whether ENABLE must be closed; open it stops the drive at once, whoever commands"),
+    entry!(131: word(), "bus.alive", [bus] alive: Alive, "requests by which the master counts as alive: writes of command, frequency or control word, or any valid one").guarded(Guard::Lower),
+    entry!(110: word(), "strip.enable", [strip] enable: Enable, "whether ENABLE must be closed, whoever commands; opening it takes the torque to zero and switches off, `now` switches off at once").guarded(Guard::Raise),
     entry!(111: word(), "strip.start", [strip] start: Start, "a switch at START starts and stops, or a button at START starts and one at STOP stops"),
     entry!(112: word(), "strip.reverse", [strip] reverse: bool, "whether REVERSE, closed at a start, turns the other way"),
     entry!(113: word(), "strip.reset", [strip] reset: bool, "whether closing RESET clears a latched fault"),
@@ -33,7 +38,8 @@ pub static OWN: [Entry<Settings>; 21] = [
     entry!(118: word(), "strip.reference", [strip] reference: Reference, "signal that gives the speed while no preset speed is selected"),
     entry!(119: whole(), "strip.reference_rpm", [strip] reference_rpm: u16, "speed at 20 mA or 10 V").from_to(0.0, 24_000.0),
     entry!(120: word(), "strip.outputs", [strip] outputs: bool, "whether the outputs RUN and FAULT are used"),
-    entry!(121: word(), "strip.brake", [strip] brake: bool, "whether the output BRAKE releases a brake while the drive has torque"),
+    entry!(121: word(), "strip.brake", [strip] brake: bool, "whether the output BRAKE opens a brake while the drive has torque, which each start proves first").guarded(Guard::Keep),
+    entry!(133: number("s"), "strip.brake_s", [strip] brake_s: f32, "time that the brake needs to close; for so long the torque is kept at a stop").from_to(0.01, 5.0).guarded(Guard::Keep),
     Entry::new(108, BOARD, "", Access::Word(
         |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
         |s, place| s.board = boards::ALL[place % boards::ALL.len()],

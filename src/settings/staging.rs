@@ -10,11 +10,15 @@ use heapless::Vec;
 use thiserror::Error;
 
 use super::FirmwareSettings;
+use super::bus::Commander;
 use super::keys::{self, Key};
 use crate::board;
 
 /// Most settings that are set at once.
 pub const MOST: usize = 8;
+
+/// Room for the settings that protect.
+const GUARDED: usize = 48;
 
 /// Settings with their new values.
 pub type Assignments = Vec<(Key, Value), MOST>;
@@ -27,6 +31,8 @@ pub struct Staging {
     again: bool,
     /// Whether the drive learned since it was given the settings in force, so that it may have other learned values.
     outdated: bool,
+    /// Levels of the settings that protect, as the console staged them last: nobody else loosens them beyond.
+    bounds: Vec<f32, GUARDED>,
 }
 
 struct Staged {
@@ -45,6 +51,9 @@ pub enum SetError {
     /// A value out of range.
     #[error("{0}")]
     Range(SettingsError),
+    /// The first setting would loosen the second one, which protects.
+    #[error("{} would loosen {}, which protects: set it at the console", .0.name(), .1.name())]
+    Loosens(Key, Key),
 }
 
 /// A hardware setting has changed.
@@ -85,10 +94,24 @@ impl fmt::Display for Applied {
     }
 }
 
+/// The settings that protect.
+pub fn guarded() -> impl Iterator<Item = Key> {
+    keys::all().filter(|key| key.guards())
+}
+
 impl Staging {
     /// These settings in force, none staged.
-    pub const fn new(in_force: FirmwareSettings) -> Self {
-        Self { in_force, staged: None, again: false, outdated: false }
+    pub fn new(in_force: FirmwareSettings) -> Self {
+        let mut new =
+            Self { in_force, staged: None, again: false, outdated: false, bounds: Vec::new() };
+        new.bound();
+        new
+    }
+
+    /// Takes the protection of the latest settings as the loosest that others than the console may set.
+    fn bound(&mut self) {
+        let latest = self.staged.as_ref().map_or(&self.in_force, |staged| &staged.settings);
+        self.bounds = guarded().map(|key| key.level(latest)).collect();
     }
 
     /// The settings in force.
@@ -117,12 +140,12 @@ impl Staging {
     }
 
     /// Stages values: all of them or none. Each must be in its range beside the other staged values; the settings as a
-    /// whole are checked when they are put in force. Returns whether restored learned values are dropped, which hold for
-    /// the settings that they were restored with.
+    /// whole are checked when they are put in force. From elsewhere than the console they must not loosen a setting that protects, not
+    /// even by its rule. Returns whether restored learned values are dropped, which hold for the settings that they were restored with.
     ///
     /// # Errors
     /// The first value that is refused.
-    pub fn set(&mut self, values: &Assignments) -> Result<bool, SetError> {
+    pub fn set(&mut self, from: Commander, values: &Assignments) -> Result<bool, SetError> {
         if let Some((key, _)) = values.iter().find(|(key, _)| key.change() == Change::Board) {
             return Err(SetError::Board(*key));
         }
@@ -133,7 +156,18 @@ impl Staging {
             let _ = before.push((*key, key.get(&staged.settings)));
             key.set(&mut staged.settings, *value);
         }
-        let checked = values.iter().try_for_each(|(key, _)| key.check(&staged.settings));
+        let ranges = values.iter().try_for_each(|(key, _)| key.check(&staged.settings));
+        let checked = ranges.map_err(SetError::Range).and_then(|()| {
+            let mut guards = guarded().zip(&self.bounds);
+            let loose = guards.find(|(key, bound)| !key.holds(&staged.settings, **bound));
+            match (loose, values.first()) {
+                (Some((guard, _)), Some((key, _))) if from != Commander::Console => {
+                    let itself = values.iter().find(|(key, _)| *key == guard);
+                    Err(SetError::Loosens(itself.map_or(*key, |(key, _)| *key), guard))
+                }
+                _ => Ok(()),
+            }
+        });
         let mut dropped = false;
         if checked.is_err() {
             // Backwards: a setting may be named twice.
@@ -144,7 +178,10 @@ impl Staging {
             dropped = staged.settings.learned.take().is_some();
         }
         self.drop_if_same();
-        checked.map(|()| dropped).map_err(SetError::Range)
+        if from == Commander::Console {
+            self.bound();
+        }
+        checked.map(|()| dropped)
     }
 
     /// Stages the settings of the image, with nothing learned.
@@ -156,6 +193,7 @@ impl Staging {
         settings.boot_pin_counts = self.in_force.boot_pin_counts;
         *staged = Staged { settings, learned: true };
         self.drop_if_same();
+        self.bound();
     }
 
     /// Stages settings of the drive that the commissioning has found. They are checked when they are put in force.
@@ -169,6 +207,7 @@ impl Staging {
         }
         staged.settings.command.wiring_checked = true;
         self.drop_if_same();
+        self.bound();
     }
 
     /// Stages the result of a learning with the staged settings.
@@ -181,6 +220,7 @@ impl Staging {
     /// Drops the staged settings.
     pub fn revert(&mut self) {
         self.staged = None;
+        self.bound();
     }
 
     /// Whether the controllers have to be designed anew, for the staged settings or since the drive has learned.

@@ -8,6 +8,20 @@ use crate::boards::{Board, EXTRA_LOW_V};
 use crate::terminals::{TERMINALS, Wires};
 
 words! {
+    /// Whether ENABLE must be closed, and how opening it stops the drive, whoever commands.
+    #[derive(Default)]
+    pub enum Enable {
+        /// It need not be.
+        #[default]
+        No = "no",
+        /// Opening it takes the torque to zero, then switches off.
+        Yes = "yes",
+        /// Opening it switches off at once.
+        Now = "now",
+    }
+}
+
+words! {
     /// How START starts.
     #[derive(Default)]
     pub enum Start {
@@ -36,10 +50,10 @@ words! {
 }
 
 /// Settings of the terminal strip.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Whether ENABLE must be closed, whoever commands.
-    pub enable: bool,
+    pub enable: Enable,
     /// How START and STOP work.
     pub start: Start,
     /// Whether REVERSE counts.
@@ -54,6 +68,8 @@ pub struct Settings {
     pub outputs: bool,
     /// Whether the output for the brake is used.
     pub brake: bool,
+    /// Time that the brake needs to close, s.
+    pub brake_s: f32,
     /// Preset speeds, rpm.
     pub preset_1_rpm: u16,
     /// The second.
@@ -62,6 +78,27 @@ pub struct Settings {
     pub preset_3_rpm: u16,
     /// Speed at the full reference, rpm.
     pub reference_rpm: u16,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            enable: Enable::No,
+            start: Start::Off,
+            reverse: false,
+            reset: false,
+            presets: false,
+            reference: Reference::Off,
+            outputs: false,
+            brake: false,
+            // Most spring-applied brakes close within it.
+            brake_s: 0.2,
+            preset_1_rpm: 0,
+            preset_2_rpm: 0,
+            preset_3_rpm: 0,
+            reference_rpm: 0,
+        }
+    }
 }
 
 /// A switch that is closed when the power comes is told from one that is being closed only by an ENABLE that comes with it.
@@ -73,8 +110,10 @@ const NO_LIVE_ZERO: &str =
 impl Settings {
     /// The stop that keeps the drive from running with these wires closed; `None` lets it run.
     pub fn hold(&self, closed: Wires) -> Option<Stop> {
-        if self.enable && !closed.has(Wires::ENABLE) {
-            return Some(Stop::Coast);
+        match self.enable {
+            Enable::Yes if !closed.has(Wires::ENABLE) => return Some(Stop::Coast),
+            Enable::Now if !closed.has(Wires::ENABLE) => return Some(Stop::Now),
+            _ => {}
         }
         (self.start == Start::Buttons && !closed.has(Wires::STOP)).then_some(Stop::Ramp)
     }
@@ -92,7 +131,8 @@ impl Settings {
         let buttons = start == Start::Buttons;
         needs("strip.enable", self.enable, has("ENABLE"), NO_PIN)?;
         needs("strip.start", start, has("START") && (!buttons || has("STOP")), NO_PIN)?;
-        needs("strip.start", start, buttons || self.enable, NEEDS_ENABLE)?;
+        let enable = self.enable != Enable::No;
+        needs("strip.start", start, buttons || enable, NEEDS_ENABLE)?;
         needs("strip.reverse", self.reverse, has("REVERSE"), NO_PIN)?;
         needs("strip.reset", self.reset, has("RESET"), NO_PIN)?;
         needs("strip.presets", self.presets, has("PRESET1") && has("PRESET2"), NO_PIN)?;

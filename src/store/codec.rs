@@ -73,7 +73,9 @@ impl fmt::Display for Rejected {
             Self::Newer(version) => write!(f, "version {version}, known is {VERSION}"),
             Self::Value(key) => write!(f, "unknown value of {key}"),
             Self::Refused => f.write_str("out of range"),
-            Self::Board(name) => write!(f, "saved on the board {name}"),
+            Self::Board(name) => {
+                write!(f, "saved on the board {name}; the gates are not connected")
+            }
         }
     }
 }

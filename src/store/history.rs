@@ -5,7 +5,8 @@
 //! | 0, header, written last | magic, 32 bits | | sequence number |
 //! | time | 0x80 | time powered, minutes | time with current, s |
 //! | starts | 0x81 | 0 | starts |
-//! | fault | its number, 1 to 127 | time powered, minutes | time with current, s |
+//! | fault | its number, 1 to 125 | time powered, minutes | time with current, s |
+//! | change of a setting that protects | 126 | time powered, minutes | its number for life |
 //!
 //! A page is filled from its beginning. When it is full, the other is erased, gets a time, the starts and the last faults,
 //! and its header, by which it counts. A power failure tears the double word that is being written, which is passed over,
@@ -39,15 +40,17 @@ const MAGIC: u32 = 0x6c68_6469;
 const TIME: u8 = 0x80;
 const STARTS: u8 = 0x81;
 const LAST_FAULT: u8 = 0x7f;
+/// In place of the number of a fault: a setting that protects was changed.
+pub const CHANGED: u8 = 0x7e;
 
-/// A fault of the past.
+/// A fault of the past, or a change of a setting that protects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PastFault {
-    /// Its number.
+    /// Its number, or [`CHANGED`].
     pub code: u8,
     /// Time powered until then, minutes.
     pub powered_min: u32,
-    /// Time with current until then, s.
+    /// Time with current until then, s; the number of the setting that was changed.
     pub running_s: u32,
 }
 
@@ -113,7 +116,9 @@ impl History {
                 }
                 // Faults that a page begins with are older than its time.
                 self.powered_s = self.powered_s.max(60 * middle);
-                self.running_s = self.running_s.max(high);
+                if kind != CHANGED {
+                    self.running_s = self.running_s.max(high);
+                }
             }
             _ => {}
         }
@@ -154,9 +159,23 @@ impl History {
     /// # Errors
     /// The flash failed. The fault is remembered until the next reset.
     pub fn fault(&mut self, flash: &mut impl Flash, code: u8) -> Result<(), FlashError> {
-        let fault = PastFault { code, powered_min: self.powered_s / 60, running_s: self.running_s };
-        let same = self.faults.back().is_some_and(|last| {
-            last.code == code && self.powered_s - 60 * last.powered_min < SAME_FAULT_S
+        self.note(flash, code, self.running_s)
+    }
+
+    /// Notes that the setting with this number, which protects, was changed, and writes it.
+    ///
+    /// # Errors
+    /// As [`fault`](Self::fault).
+    pub fn changed(&mut self, flash: &mut impl Flash, setting: u16) -> Result<(), FlashError> {
+        self.note(flash, CHANGED, setting.into())
+    }
+
+    fn note(&mut self, flash: &mut impl Flash, code: u8, last: u32) -> Result<(), FlashError> {
+        let fault = PastFault { code, powered_min: self.powered_s / 60, running_s: last };
+        let same = self.faults.back().is_some_and(|before| {
+            before.code == code
+                && (code != CHANGED || before.running_s == last)
+                && self.powered_s - 60 * before.powered_min < SAME_FAULT_S
         });
         if same {
             return Ok(());

@@ -11,7 +11,7 @@ use super::sequence::ARMED;
 use super::*;
 use crate::boards::{ALL, Board};
 use crate::generated;
-use crate::settings::strip::{Settings, Start};
+use crate::settings::strip::{Enable, Settings, Start};
 use crate::terminals::{CONTACTS, TERMINALS};
 
 fn code(full_v: f32, volts_of_ten: f32) -> u16 {
@@ -111,14 +111,14 @@ fn the_table_of_what_holds_the_drive() {
     for bits in 0..=u8::MAX >> 1 {
         let closed = Wires(bits);
         for (enable, start) in
-            [false, true].into_iter().flat_map(|e| Start::VALUES.iter().map(move |s| (e, *s)))
+            Enable::VALUES.iter().flat_map(|e| Start::VALUES.iter().map(move |s| (*e, *s)))
         {
             let own = Settings { enable, start, ..Settings::default() };
-            let expected = match (enable && bits & 1 == 0, start == Start::Buttons && bits & 4 == 0)
-            {
-                (true, _) => Some(Stop::Coast),
-                (false, true) => Some(Stop::Ramp),
-                _ => None,
+            let buttons = start == Start::Buttons && bits & 4 == 0;
+            let expected = match (enable, bits & 1 == 0) {
+                (Enable::Yes, true) => Some(Stop::Coast),
+                (Enable::Now, true) => Some(Stop::Now),
+                _ => buttons.then_some(Stop::Ramp),
             };
             assert_eq!(own.hold(closed), expected, "{closed} {own:?}");
         }
@@ -206,7 +206,7 @@ fn references_in_and_out_of_range() {
 #[test]
 fn what_a_board_cannot_do_is_refused_by_name() {
     let all = Settings {
-        enable: true,
+        enable: Enable::Yes,
         start: Start::Buttons,
         reverse: true,
         reset: true,
@@ -226,7 +226,7 @@ fn what_a_board_cannot_do_is_refused_by_name() {
     assert!(refused(all, ihm023v3).starts_with("strip.enable = yes: this board has no pin"));
     let switch = Settings { start: Start::Switch, ..Settings::default() };
     assert!(refused(switch, reference).starts_with("strip.start = switch: needs strip.enable"));
-    assert_eq!(refused(Settings { enable: true, ..switch }, reference), "");
+    assert_eq!(refused(Settings { enable: Enable::Yes, ..switch }, reference), "");
     // 48 V, one input; more volts, one input.
     let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
     assert_eq!(refused(voltage, ihm08m1), "");

@@ -88,14 +88,19 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     core.DWT.enable_cycle_counter();
 
     let mut start = load(Pages::new(chip.FLASH));
+    start.settings.boot_pin_counts = board::boot_pin_counts(options);
     let timer = board::Timer::of(&start.settings.drive.inverter);
 
     // The clocks of the ports; `pins` does the rest.
     chip.GPIOA.split(&mut rcc);
     chip.GPIOB.split(&mut rcc);
     chip.GPIOC.split(&mut rcc);
-    // First, because the drivers are switched off from here on.
+    // First, because the drivers are switched off from here on: on the board that the image is for, as somebody has confirmed.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, &timer);
+    let connected = pwm.is_ok() && start.settings.board_is_confirmed();
+    if connected {
+        pwm::connect_gates();
+    }
     let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
     let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
     let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
@@ -135,12 +140,15 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     }
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
-    start.settings.boot_pin_counts = board::boot_pin_counts(options);
     let front = make(front, || Front::new(start.settings));
     let Start { saved, history, ref settings, rejected } = start;
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
-    let chip = Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started };
+    if let Some(Rejected::Board(theirs)) = rejected {
+        front.desk.saved_on(theirs);
+    }
+    let chip =
+        Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started, connected };
     let link = link.ok();
     let drive = &settings.drive;
     let supervisor =

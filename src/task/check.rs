@@ -1,11 +1,13 @@
 //! The check of the control's memory and registers, by the main loop.
 
+use core::sync::atomic::Ordering;
+
 use cortex_m::singleton;
 
 use crate::chip::{memory, stop};
 use crate::task::control;
 use induction_drive::monitor::memory_check::{CheckedMemory, MemoryCheck};
-use induction_drive::monitor::record::Record;
+use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::register_check::{COUNT, RegisterCheck};
 
 /// The check and its progress.
@@ -27,9 +29,18 @@ impl Check {
         })
     }
 
+    /// Takes the registers as they are now: pins have been connected.
+    pub fn renew(&mut self) {
+        self.registers.renew(memory::word);
+    }
+
     /// Checks a slice. A flipped bit ends the run: start-up copies the code, computes the coefficients and sets the
     /// registers up afresh.
     pub fn slice(&mut self) {
+        let broken = control::BROKEN.load(Ordering::Relaxed);
+        if broken != 0 {
+            stop::end(Reason::State, [broken, 0, 0, 0]);
+        }
         let registers = self.registers.slice(memory::word);
         let checked = registers.and_then(|()| self.memory.slice(memory::word));
         if let Err(Record { reason, details }) = checked {

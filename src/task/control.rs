@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::learned::Learned;
-use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State};
+use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State, Stop};
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
@@ -74,6 +74,8 @@ pub static TOLD: AtomicU8 = AtomicU8::new(0);
 /// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
 pub const WATCHED: u8 = 1 << 7;
 const _: () = assert!(Hardware::all().bits() & WATCHED == 0);
+/// Word of the phase of a drive whose state has a flipped bit; 0: none. The outputs are off, and the main loop ends the run.
+pub static BROKEN: AtomicU32 = AtomicU32::new(0);
 /// Whether a deadline was ever missed.
 pub static MISSED: AtomicBool = AtomicBool::new(false);
 
@@ -93,6 +95,7 @@ impl Control {
             late: Hardware::empty(),
             over_current: Hardware::empty(),
             unreported: Hardware::empty(),
+            phase: Drive::PHASES[0],
             began: 0,
             reported: None,
             report_left: 0,
@@ -124,6 +127,14 @@ pub fn constants() -> ([MemoryRange; 2], u32) {
     (constants, (control + drive + Drive::CHANGES) as u32)
 }
 
+/// The word of the drive's phase as it lies in memory: one of [`Drive::PHASES`], unless a bit has flipped.
+#[inline(always)]
+fn phase(drive: &Drive) -> u32 {
+    let drive = &raw const *drive;
+    // SAFETY: a word within the drive. It is read as what it is, a number, and not as the tag of an enum.
+    unsafe { drive.cast::<u32>().byte_add(Drive::PHASE).read_volatile() }
+}
+
 /// The interrupt's own memory.
 struct Owned(UnsafeCell<MaybeUninit<Running>>);
 
@@ -149,6 +160,8 @@ struct Running {
     over_current: Hardware,
     /// Events since the last report.
     unreported: Hardware,
+    /// Word of the drive's phase at the end of the last period.
+    phase: u32,
     /// Time of the start of the last period.
     began: u32,
     /// State in the last report.
@@ -226,7 +239,13 @@ impl Running {
         if !converters.complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
-        let was_off = drive.is_off();
+        // Before anything is decided by it: of a drive whose phase has a flipped bit nothing can be told.
+        let phase = phase(drive);
+        if phase != self.phase {
+            pwm.trip();
+            return BROKEN.store(phase | 1, Ordering::Relaxed);
+        }
+        let was_off = Drive::is_off_in(phase);
         if dc_link.is_off() {
             if was_off {
                 dc_link.restore();
@@ -237,7 +256,11 @@ impl Running {
         let read = adc.read();
         let sample = Sample { encoder: encoder.count(), hardware, ..read };
 
-        let put_out = &mut |compare| pwm.apply(compare);
+        let put_out = &mut |compare| {
+            if !pwm.apply(compare) {
+                BROKEN.store(phase, Ordering::Relaxed);
+            }
+        };
         let (_, output) = drive.period(&mut self.front_end, &sample, put_out);
 
         // The timer was at its top again before all compare values were written.
@@ -260,14 +283,30 @@ impl Running {
 
         // Between two steps: a command acts from the next step on.
         // There is room for the answer: the main loop takes the last one before it sends a command.
-        let commanded = drive.has_time()
-            && commands
-                .take_with(|command| {
+        let has_time = drive.has_time();
+        let commanded = commands
+            .take_if(
+                |command| has_time || matches!(command, Command::Stop(Stop::Now)),
+                |command| {
+                    // A start that is refused leaves the drive off, which disarms again.
+                    if matches!(command, Command::Start(_) | Command::Excite(_)) {
+                        pwm.arm();
+                    }
                     answers.send_with(|answer| *answer = drive.command(command));
                     adc.convert_both(drive.front_end().both_zero_vectors);
-                })
-                .is_some();
-        IS_OFF.store(drive.is_off(), Ordering::Relaxed);
+                    // What was taken is never carried out again.
+                    *command = Command::Stop(Stop::Now);
+                },
+            )
+            .is_some();
+        self.phase = self::phase(drive);
+        let is_off = Drive::is_off_in(self.phase);
+        if is_off {
+            // A stop at once does not wait for the next period.
+            pwm.trip();
+            pwm.disarm();
+        }
+        IS_OFF.store(is_off, Ordering::Relaxed);
         let state = drive.state();
         let sampled = Sampled::new(&read, state, drive.limiting());
         let traced = trace.step(&sampled, drive.telemetry());

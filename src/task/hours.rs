@@ -47,6 +47,11 @@ impl Hours {
         }
     }
 
+    /// Notes that the setting with this number, which protects, was changed.
+    pub fn changed(&mut self, setting: u16, guard: &mut Guard, pages: &mut Pages) {
+        self.write(guard, pages, |history, pages| history.changed(pages, setting));
+    }
+
     fn write(
         &mut self,
         guard: &mut Guard,

@@ -32,6 +32,7 @@ use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::keys::Key;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
 use induction_drive::store::{FlashError, Saved};
@@ -104,6 +105,8 @@ pub struct Chip {
     pub timer: board::Timer,
     /// Reason why the control was not started, if it was not.
     pub not_started: Option<&'static str>,
+    /// Whether the pins of the gates are connected.
+    pub connected: bool,
 }
 
 impl Supervisor {
@@ -321,6 +324,18 @@ impl DriveHandle for Supervisor {
         self.tracking = Tracking::new(&settings.drive);
         self.commissioning.configured(&settings.drive);
         self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
+    }
+
+    fn connect(&mut self) {
+        if self.link.is_some() && !self.chip.connected {
+            self.chip.connected = true;
+            pwm::connect_gates();
+            self.check.iter_mut().for_each(Check::renew);
+        }
+    }
+
+    fn changed(&mut self, key: Key) {
+        self.hours.changed(key.id(), &mut self.guard, self.chip.saved.flash());
     }
 
     fn session(&mut self) -> &mut Session {

@@ -10,8 +10,9 @@ use induction_drive::board;
 use induction_drive::console::handle::Port;
 use induction_drive::front::Front;
 use induction_drive::modbus;
+use induction_drive::modbus::slave::Written;
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::bus::{Baud, Format};
+use induction_drive::settings::bus;
 use induction_drive::strip;
 use induction_drive::terminals;
 use motor_plant::{
@@ -83,12 +84,15 @@ impl Port for Wires {
 enum NoBus {}
 
 impl modbus::Port for NoBus {
-    fn set_line(&mut self, _: Baud, _: Format) {}
+    fn set_line(&mut self, _: &bus::Settings) {}
     fn receive(&mut self) -> Option<modbus::Frame> {
         None
     }
     fn send(&mut self, _: &modbus::Frame) {}
-    fn set_busy(&mut self, _: Option<u8>) {}
+    fn set_busy(&mut self, _: bool) {}
+    fn take_stop(&mut self) -> Option<Written> {
+        None
+    }
 }
 
 /// The plant that `cargo sim` simulates by default, with the converters and the timer of the reference board, as the virtual board

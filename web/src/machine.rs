@@ -21,6 +21,7 @@ use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Recorder, Sampled, Trace};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::keys::Key;
 use induction_drive::store::{FlashError, history::History};
 use motor_plant::Plant;
 
@@ -183,6 +184,8 @@ impl DriveHandle for Machine {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
     }
+    fn connect(&mut self) {}
+    fn changed(&mut self, _: Key) {}
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::toolchain::{self, Target};
 use crate::{paths, run, seal, sections, sources, stack};
@@ -74,10 +74,64 @@ fn check(elf: &Path) -> Result<()> {
     sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)
 }
 
-/// Builds the image of a board, writes it there and shows its log until interrupted.
-pub fn flash(board: &str) -> Result<()> {
+/// What stands in the first page of an image before the name of its board, and the bytes of the name (`src/boards/identity.rs`).
+const MAGIC: &[u8] = b"idboard1";
+const NAME: usize = 32;
+
+/// The board to flash: `wanted`, or the one whose image is in the flash, the first page of which is given.
+///
+/// # Errors
+/// Nothing says which board it is, or another one than `wanted` is there.
+fn board_to_flash(wanted: Option<&str>, page: &[u8], other_board: bool) -> Result<String> {
+    let at = page.windows(MAGIC.len()).position(|window| window == MAGIC);
+    let name = at.and_then(|at| page.get(at + MAGIC.len()..)?.get(..NAME));
+    let there = name.map(|name| String::from_utf8_lossy(name).trim_end_matches('\0').to_owned());
+    match (wanted, there) {
+        (None, None) => bail!("the flash names no board: say which one it is with --board NAME"),
+        (None, Some(there)) => Ok(there),
+        (Some(wanted), Some(there)) if wanted != there && !other_board => bail!(
+            "the image in the flash is for the board {there}, not {wanted}: on another board an image may switch gates on; \
+             leave --board out, or add --other-board"
+        ),
+        (Some(wanted), _) => Ok(wanted.to_owned()),
+    }
+}
+
+/// Builds the image of a board, writes it there and shows its log until interrupted. The board is that of the image in the flash, unless
+/// another is named.
+pub fn flash(board: Option<&str>, other_board: bool) -> Result<()> {
     // Asked before the build, which takes minutes.
     run::probe_rs()?;
-    let elf = build_for(&toolchain::for_target()?, board)?;
+    let read = ["read", "--chip", CHIP, "b8", "0x08000000", "2048"];
+    let page = page(&run::output("probe-rs", &read)?);
+    let board = board_to_flash(board, &page, other_board)?;
+    let elf = build_for(&toolchain::for_target()?, &board)?;
     run::step("flash", run::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
+}
+
+/// The bytes that `probe-rs read b8` has printed: in hexadecimal, with spaces between.
+fn page(printed: &str) -> Vec<u8> {
+    let words = printed.split_whitespace().filter(|word| word.len() == 2);
+    words.filter_map(|word| u8::from_str_radix(word, 16).ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_flashed_with_its_own_image() {
+        let image = |name: &str| [&[7; 40][..], MAGIC, name.as_bytes(), &[0; NAME]].concat();
+        let ask = |wanted, page: &[u8], other| board_to_flash(wanted, page, other).ok();
+        let one = image("reference");
+        assert_eq!(ask(None, &one, false).as_deref(), Some("reference"));
+        assert_eq!(ask(Some("reference"), &one, false).as_deref(), Some("reference"));
+        assert_eq!(ask(Some("other"), &one, false), None);
+        assert_eq!(ask(Some("other"), &one, true).as_deref(), Some("other"));
+        assert_eq!(ask(None, &[0xff; 2048], false), None);
+        assert_eq!(ask(Some("other"), &[0xff; 2048], false).as_deref(), Some("other"));
+        let why = board_to_flash(Some("other"), &one, false).unwrap_err().to_string();
+        assert!(why.contains("reference, not other") && why.contains("--other-board"), "{why}");
+        assert_eq!(page("69 64 ff\n0a"), [0x69, 0x64, 0xff, 0x0a]);
+    }
 }

@@ -49,7 +49,14 @@ enum Task {
     /// Builds and checks the image for a board (also: cargo firmware)
     Firmware(Which),
     /// Builds the image of a board, writes it through a debug probe and shows its log
-    Flash(Which),
+    Flash {
+        /// Name of the board; without it that of the image in the flash
+        #[arg(long, value_name = "NAME")]
+        board: Option<String>,
+        /// Write the image although the flash holds that of another board
+        #[arg(long)]
+        other_board: bool,
+    },
     /// Builds the images and tests them on the virtual board
     Board,
     /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
@@ -139,7 +146,7 @@ fn run(task: Task) -> Result<()> {
         Task::Quick => quick(),
         Task::Images => images(),
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
-        Task::Flash(which) => image::flash(&which.board),
+        Task::Flash { board, other_board } => image::flash(board.as_deref(), other_board),
         Task::Board => board::test(&image::build_all(&toolchain::for_target()?)?),
         Task::BenchDump(which) => by_name::bench_dump(&which.image()?, &which.board),
         Task::Foreign => foreign::test(),

@@ -36,7 +36,7 @@ pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(),
     let taken = match command {
         // Off and stopping stay as they are.
         Command::Stop(_) | Command::Clear | Command::MotorTemperature(_) => return Ok(()),
-        Command::Start(_) | Command::CheckWiring => Taken::OFF,
+        Command::Start(_) | Command::CheckWiring | Command::Brake(_) => Taken::OFF,
         Command::Configure(_) => Taken { fault: true, ..Taken::OFF },
         Command::Excite(_) => Taken { modes: &[Mode::Commissioning], ..Taken::OFF },
         Command::Relock => Taken::running(REGULATING),

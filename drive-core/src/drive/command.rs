@@ -20,6 +20,9 @@ pub enum Command {
     Relock,
     /// From off: the next start checks the wiring first; see `crate::protect::wiring_check`.
     CheckWiring,
+    /// From off: the motor has a brake, which needs this time to close, s; 0: none, as at the beginning. A start then proves the torque,
+    /// and a stop keeps it for that time; see `drive/brake.rs`.
+    Brake(f32),
     /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
     /// offsets and charges the bootstraps first. See `crate::commission`.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -70,13 +73,16 @@ pub enum Command {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stop {
-    /// Take the torque to zero, then switch off: the shaft coasts. While the motor at rest is excited, switch off.
+    /// Take the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. Whatever is set, the outputs are off
+    /// [`COAST_S`](crate::COAST_S) after the command, with a [brake](Command::Brake) after its time as well. While the motor at rest is excited, switch off at once.
     #[default]
     Coast,
     /// Take the speed to zero by `speed.ramp_rpm_per_s`, then as [`Coast`](Self::Coast).
     Ramp,
     /// The same by `speed.quick_rpm_per_s`, also during a stop by ramp.
     Quick,
+    /// Switch off at once, whatever the drive does: the motor's current decays through the diodes of the inverter.
+    Now,
 }
 
 /// An accepted command.

@@ -1,10 +1,11 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
 use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
-use super::{allowed::allowed, prepare::Prepare, scalar::Scalar};
+use super::{allowed::allowed, brake::BRAKE_MAX_S, prepare::Prepare, scalar::Scalar};
 
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::Mode;
+use crate::io::PERIOD_S;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::{Angle, AngleSource};
@@ -28,6 +29,10 @@ impl Drive {
             Command::Start(mode) => return self.start(Job::of_mode(mode)),
             Command::Relock => self.relock()?,
             Command::CheckWiring => self.kept.wiring_unchecked = true,
+            Command::Brake(seconds) => {
+                in_range(seconds, 0.0, BRAKE_MAX_S)?;
+                self.kept.brake = (seconds / PERIOD_S) as u32;
+            }
             Command::Excite(excitation) => return self.take_excitation(excitation),
             Command::Stop(stop) => self.stop(stop),
             Command::Clear => {
@@ -207,7 +212,8 @@ impl Drive {
         match &mut field.goal {
             goal @ Goal::Speed { .. } => *goal = Goal::SPEED,
             goal @ Goal::Position { .. } => *goal = Goal::POSITION,
-            Goal::Torque | Goal::Learn | Goal::Brake { .. } | Goal::Release => {}
+            Goal::Torque | Goal::Learn => {}
+            Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release => {}
         }
         c.estimator.start(&mut field.estimator);
         field.lock = LockMonitorState::default();

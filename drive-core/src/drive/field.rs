@@ -3,6 +3,7 @@
 
 use super::catching::Residual;
 use super::in_turn::StepResults;
+use super::stopping::COAST;
 use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
 use crate::carrier::at_start::{AtStart, AtStartState};
 use crate::carrier::{CarrierPeriod, CarrierSample};
@@ -41,10 +42,10 @@ impl Field {
     pub fn state(&self) -> State {
         match (&self.flux, &self.goal) {
             (_, Goal::Brake { .. }) => State::Braking,
-            (_, Goal::Release) => State::Stopping,
+            (_, Goal::Hold { .. } | Goal::Release) => State::Stopping,
             (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::Catching,
             (FluxPhase::Asymmetry(_) | FluxPhase::Hold, _) => State::Magnetising,
-            (FluxPhase::Verify, _) => State::Verifying,
+            (FluxPhase::Verify | FluxPhase::Prove, _) => State::Verifying,
             (FluxPhase::Ready(_) | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
         }
     }
@@ -56,7 +57,7 @@ impl Field {
 
     /// Whether there is torque for a purpose: as asked for, or to come to rest.
     pub fn has_torque(&self) -> bool {
-        self.regulates() || matches!(self.goal, Goal::Brake { .. })
+        self.regulates() || matches!(self.goal, Goal::Brake { .. } | Goal::Hold { .. })
     }
 
     /// What this run leaves to the next one.
@@ -251,11 +252,12 @@ impl Field {
         }
         let i_q = match self.goal {
             Goal::Torque => k.references.current.q,
-            Goal::Speed { .. } | Goal::Position { .. } | Goal::Brake { .. } => self.follow(c, k),
+            Goal::Speed { .. } | Goal::Position { .. } => self.follow(c, k),
+            Goal::Brake { .. } | Goal::Hold { .. } => self.follow(c, k),
             Goal::Learn => self.learn(c, k)?,
             Goal::Release => {
                 let (i_q, ramp) = (&mut k.references.current.q, c.sequence.stop_ramp);
-                if i_q.abs() > ramp {
+                if i_q.abs() > ramp && k.elapsed < COAST {
                     *i_q -= limited(*i_q, ramp);
                 } else {
                     return Err(End::Stopped);
@@ -277,6 +279,7 @@ impl Field {
             FluxPhase::Build { from } => self.build(c, k, from)?,
             FluxPhase::Hold => self.magnetise(c, k)?,
             FluxPhase::Verify => self.verify(c, k)?,
+            FluxPhase::Prove => self.prove(c, k)?,
             FluxPhase::Ready(_) | FluxPhase::Learn(_) => Dq::ZERO,
         })
     }
@@ -301,12 +304,20 @@ impl Field {
             }
             Goal::Position { turns, press: None } => motion::Goal::Position(turns.unwrap_or(0.0)),
             Goal::Brake { quick } => motion::Goal::Rest { quick: *quick },
+            Goal::Hold { left } => {
+                *left = left.saturating_sub(1);
+                motion::Goal::Rest { quick: true }
+            }
             Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
         };
         let i_q = c.motion.step(&mut self.motion, goal, k.rotor_count, range);
         k.references.current.q = i_q;
-        if matches!(self.goal, Goal::Brake { .. }) && c.motion.is_at_rest(&self.motion) {
-            (self.goal, k.elapsed) = (Goal::Release, 0);
+        match self.goal {
+            Goal::Brake { .. } if c.motion.is_at_rest(&self.motion) => {
+                (self.goal, k.elapsed) = (self.at_rest(k), 0);
+            }
+            Goal::Hold { left: 0 } => (self.goal, k.elapsed) = (Goal::Release, 0),
+            _ => {}
         }
         i_q
     }
@@ -401,7 +412,7 @@ impl Field {
                 } else if c.lock_monitor.is_some() {
                     FluxPhase::Verify
                 } else {
-                    FluxPhase::ready()
+                    Self::behind_the_flux(k)
                 };
                 k.elapsed = 0;
             }
@@ -421,7 +432,8 @@ impl Field {
             if !k.stands(c) {
                 return Err(Fault::LostLock);
             }
-            self.enter(k, FluxPhase::ready());
+            let phase = Self::behind_the_flux(k);
+            self.enter(k, phase);
         }
         Ok(Dq { d: k.references.current.d, q: 0.0 })
     }

@@ -1,16 +1,24 @@
 //! The ways to stop.
 
+use crate::io::PERIOD_S;
+
 use super::{Drive, End, Field, FluxPhase, Goal, Kept, Phase};
 use crate::Coefficients;
 use crate::drive::command::Stop;
+
+/// Longest time from a stop by [`Stop::Coast`] to the outputs off, s. With the time of the contact, the main loop and the command it stays
+/// below the 200 ms that the manual promises.
+pub const COAST_S: f32 = 0.15;
+/// The same in control periods.
+pub(super) const COAST: u32 = (COAST_S / PERIOD_S + 0.5) as u32;
 
 impl Drive {
     pub(super) fn stop(&mut self, stop: Stop) {
         match (&mut self.phase, stop) {
             (Phase::Off(_) | Phase::Fault(..), _) => {}
-            (Phase::Prepare(_) | Phase::Excite(_), _) | (Phase::Scalar(_), Stop::Coast) => {
-                self.end(End::Stopped);
-            }
+            (_, Stop::Now)
+            | (Phase::Prepare(_) | Phase::Excite(_), _)
+            | (Phase::Scalar(_), Stop::Coast) => self.end(End::Stopped),
             (Phase::Scalar(scalar), Stop::Ramp | Stop::Quick) => {
                 if scalar.stop.is_none() {
                     self.kept.elapsed = 0;
@@ -24,9 +32,9 @@ impl Drive {
 
 impl Field {
     fn stop(&mut self, c: &Coefficients, k: &mut Kept, stop: Stop) {
-        let regulates = self.regulates();
+        let (regulates, turns) = (self.regulates(), self.has_torque());
         match (&mut self.goal, stop) {
-            (Goal::Release, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
+            (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
             (Goal::Brake { quick }, Stop::Quick) => {
                 *quick = true;
                 return;
@@ -37,6 +45,15 @@ impl Field {
                 let (i_q, _) = k.limits.now.hold(k.references.current.q);
                 c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
                 *goal = Goal::Brake { quick: stop == Stop::Quick };
+            }
+            // The brake closes at once, and is helped until it has.
+            (goal, _) if turns && k.brake > 0 => {
+                if regulates {
+                    let speed = k.seen.rotor_freq / c.freq_per_speed;
+                    let (i_q, _) = k.limits.now.hold(k.references.current.q);
+                    c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
+                }
+                *goal = Goal::Hold { left: k.brake };
             }
             (goal, _) => {
                 // A torque that was asked for during the start has not come yet.

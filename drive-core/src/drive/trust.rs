@@ -66,8 +66,8 @@ impl Field {
             },
             (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
             (FluxPhase::Hold, Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
-            (FluxPhase::Verify | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::LockedShaft) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
-            (FluxPhase::Verify | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
+            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::LockedShaft) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
+            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
         }
     }
 }

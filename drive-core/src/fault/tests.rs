@@ -61,6 +61,7 @@ fn codes_never_change() {
         (55, Fault::MotorSensorShorted),
         (56, Fault::MotorHot),
         (57, Fault::MotorSensorUnread),
+        (58, Fault::TorqueNotProven),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

@@ -22,14 +22,17 @@ pub struct Options {
     /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` names
     #[arg(long, value_name = "PATH")]
     pub port: String,
-    /// Board whose image is built and written
-    #[arg(long, value_name = "NAME", default_value = "reference", conflicts_with = "file")]
-    pub board: String,
+    /// Board whose image is built and written; without it that which the drive at the port names
+    #[arg(long, value_name = "NAME", conflicts_with = "file")]
+    pub board: Option<String>,
     /// The image instead: a `.bin` of `cargo firmware`, or the ELF beside it
     pub file: Option<PathBuf>,
     /// The supply of the gate drivers is off: ST's loader switches a gate on (PA9)
     #[arg(long)]
     pub gates_off: bool,
+    /// Write the image although the drive at the port names another board
+    #[arg(long)]
+    pub other_board: bool,
 }
 
 const FLASH: u32 = 0x0800_0000;
@@ -45,10 +48,16 @@ const ACK: u8 = 0x79;
 const ANSWER: Duration = Duration::from_secs(2);
 const GREETING: Duration = Duration::from_secs(30);
 
+/// What stands in the first page of an image before the name of its board, and the bytes of the name (`src/boards/identity.rs`).
+const MAGIC: &[u8] = b"idboard1";
+const NAME: usize = 32;
+
 /// An image.
 pub struct Image {
     bytes: Vec<u8>,
     check: u32,
+    /// The board that it is for; `None` for an image of an older firmware.
+    pub board: Option<String>,
 }
 
 impl Image {
@@ -76,7 +85,14 @@ impl Image {
         }
         let check = digest.finalize();
         match word(list + 32) {
-            Some(found) if found == check && bytes.len() <= STORED => Ok(Self { bytes, check }),
+            Some(found) if found == check && bytes.len() <= STORED => {
+                let page = &bytes[..PAGE];
+                let at = page.windows(MAGIC.len()).position(|window| window == MAGIC);
+                let name = at.and_then(|at| page.get(at + MAGIC.len()..)?.get(..NAME));
+                let text = |name| String::from_utf8_lossy(name).trim_end_matches('\0').to_owned();
+                let board = name.map(text);
+                Ok(Self { bytes, check, board })
+            }
             _ => Err("its check sum is wrong"),
         }
     }
@@ -99,15 +115,49 @@ pub fn run(options: &Options) -> Result<(), Error> {
         let why = "switch off the supply of the gate drivers, for ST's loader switches a gate on; then add --gates-off";
         return Err(Error::Refused(why.into()));
     }
-    let file = options.file.clone().map_or_else(|| board::image(&options.board, false), Ok)?;
+    let mut port = super::open(&options.port, 115_200)?.0;
+    let there = board_at(&mut port)?;
+    let file = match (&options.file, options.board.as_ref().or(there.as_ref())) {
+        (Some(file), _) => file.clone(),
+        (None, Some(board)) => board::image(board, false)?,
+        (None, None) => {
+            let why = "the drive at the port does not say which board it is: name it with --board";
+            return Err(Error::Refused(why.into()));
+        }
+    };
     let bin = if file.extension().is_some() { file } else { file.with_extension("bin") };
     let refused = |why: String| Error::Refused(format!("{}: {why}", bin.display()));
     let bytes = std::fs::read(&bin).map_err(|why| refused(why.to_string()))?;
     let image = Image::new(bytes).map_err(|why| refused(why.into()))?;
-    let mut port = super::open(&options.port, 115_200)?.0;
+    if let (Some(of), Some(there)) = (&image.board, &there)
+        && of != there
+        && !options.other_board
+    {
+        return Err(refused(format!(
+            "the image is for the board {of}, and the drive at the port is a {there}: on it, the image may switch gates on; \
+             take the image of {there}, or say --other-board"
+        )));
+    }
     let said = update(&mut port, &image, |line| eprintln!("{line}"))?;
     println!("{said}");
     Ok(())
+}
+
+/// The name of the board that the drive at the port tells; `None` where it does not answer, or its image is damaged.
+///
+/// # Errors
+/// The port fails.
+fn board_at(port: &mut Port) -> Result<Option<String>, Error> {
+    // Ends a line that may have begun; what is said to that goes by.
+    send(port, b"\n").map_err(Error::Internal)?;
+    line(port, Duration::from_millis(300), |_| false);
+    send(port, b"board\n").map_err(Error::Internal)?;
+    let said = line(port, ANSWER, |line| line.starts_with("board ") || line.starts_with("error: "));
+    let name = said.as_deref().and_then(|line| line.strip_prefix("board ")?.split(':').next());
+    let name = name.map(str::to_owned);
+    // The rest of the list.
+    line(port, Duration::from_millis(500), |line| line == "ok");
+    Ok(name)
 }
 
 fn lost(what: impl std::fmt::Display) -> Error {

@@ -8,7 +8,7 @@ use crate::{image::Image, memory::Region};
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";
 /// Version of its layout that this crate reads.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// The table.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,10 +21,12 @@ pub struct Addresses {
     pub state: Region,
     /// A pointer to the mailbox of orders.
     pub orders: u32,
-    /// Offset in it of a byte that is 1 while an order waits.
+    /// Offset in it of a byte that is not 0 while an order waits.
     pub order_waits: u32,
     /// The telemetry of the drive.
     pub telemetry: u32,
+    /// The word of its phase.
+    pub phase: u32,
 }
 
 impl Addresses {
@@ -39,7 +41,7 @@ impl Addresses {
         let words = image.contents(SYMBOL)?;
         let version = words.first();
         ensure!(version == Some(&VERSION), "{SYMBOL} has version {version:?}, not {VERSION}");
-        let table: [u32; 10] = words.try_into().ok().context("a table of another size")?;
+        let table: [u32; 11] = words.try_into().ok().context("a table of another size")?;
         let region = |at: usize| Region { address: table[at], size: table[at + 1] };
         Ok(Some(Self {
             control: region(1),
@@ -48,6 +50,7 @@ impl Addresses {
             orders: table[7],
             order_waits: table[8],
             telemetry: table[9],
+            phase: table[10],
         }))
     }
 }

@@ -13,7 +13,10 @@ const STARTED: u64 = 30_000;
 /// # Errors
 /// A failure of the board.
 pub fn lines(image: Image, stage: &'static PowerStage) -> Result<Vec<String>> {
-    let mut board = Board::new(image, Options::on(stage, &stage.config()?, 1))?;
+    let mut options = Options::on(stage, &stage.config()?, 1);
+    // As a board is that nobody has confirmed: its gates are not connected.
+    options.confirmed = false;
+    let mut board = Board::new(image, options)?;
     board.run_periods(STARTED)?;
     let chip = board.chip();
     let line = |(name, address, mask): (String, u32, u32)| {

@@ -14,7 +14,7 @@ use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::{
     commissioning::Session, desk::Desk, link::Status, link::ring::Record, rotor_tracking::Tracking,
-    settings::FirmwareSettings, settings::bus::Commander, store::FlashError,
+    settings::FirmwareSettings, settings::bus::Commander, settings::keys::Key, store::FlashError,
 };
 
 /// A drive with the settings of the board, and a desk of its own.
@@ -62,6 +62,8 @@ impl DriveHandle for Orders {
         settings.build_for(&self.timer)
     }
     fn configured(&mut self, _: &FirmwareSettings) {}
+    fn connect(&mut self) {}
+    fn changed(&mut self, _: Key) {}
     fn session(&mut self) -> &mut Session {
         &mut self.session
     }
@@ -118,9 +120,12 @@ impl Shadow {
         match grammar::parse(line) {
             Ok(Request::Order(order)) => {
                 let _ = self.desk.order(Commander::Console, order, &mut self.orders);
-                self.desk.go_on(&mut self.orders, 0);
+                // A start follows its design in the next pass.
+                (0..2).for_each(|_| self.desk.go_on(&mut self.orders, 0));
             }
-            Ok(Request::Set(values)) => drop(self.desk.set(&values, &self.orders)),
+            Ok(Request::Set(values)) => {
+                drop(self.desk.set(Commander::Console, &values, &self.orders))
+            }
             Ok(_) => {} // no order
             Err(why) => bail!("{line}: {why}"),
         }
@@ -166,7 +171,7 @@ impl Shadow {
         }
         self.compared += 1;
         (self.orders.state, self.orders.periods) = (self.drive.state(), self.compared as u32);
-        self.desk.follow(&mut self.orders);
+        self.desk.follow(&mut self.orders, self.compared as u32 / 6);
         if period.took_order {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);

@@ -10,8 +10,10 @@ use induction_drive::boards::{self, Currents, Level};
 use induction_drive::terminals;
 use virtual_board::board::Debugger;
 use virtual_board::periph::Reset;
-use virtual_board::power_stage::{ALL, CODES, REFERENCE, REFERENCE_V, Sensors, channel};
+use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, Sensors, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
+
+use crate::common::until_said as said;
 
 /// Something that ends a run.
 type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
@@ -146,20 +148,67 @@ fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
     Ok(())
 }
 
-/// The image of the reference board, whose outputs are all active high, on boards whose low sides go on at a low level:
-/// caught as soon as its pins are the timer's.
+/// The image of each board on each other one, with the settings of that board saved and confirmed, and on a blank one: no gate is on, for
+/// the pins stay as after a reset, and the console names both boards and the ways out.
 #[test]
-fn the_image_of_another_board_is_caught() -> Result<()> {
-    let low = |stage: &PowerStage| stage.driver.low.on_at_high;
-    // A board with the polarities of the reference is told by its name alone.
-    for stage in ALL.into_iter().filter(|stage| low(stage) != low(&REFERENCE)) {
-        let mut board = Board::new(Image::built()?, Options::on(stage, &stage.config()?, 3))?;
-        let why = board.run_periods(START).expect_err("nothing was noticed").to_string();
-        println!("{}: {}", stage.name, why.lines().next().unwrap_or_default());
-        assert!(
-            why.contains("low side") && why.contains("is on while the outputs are off"),
-            "{why}"
-        );
+fn the_image_of_another_board_drives_no_gate() -> Result<()> {
+    for (n, stage) in ALL.into_iter().enumerate() {
+        for of in ALL {
+            let mut options = Options::on(stage, &stage.config()?, 3);
+            options.confirmed = of.name != stage.name;
+            let mut board = Board::new(Image::built_for(of.name)?, options)?;
+            off_for(&mut board, 3000)?;
+            assert!(board.resets.is_empty() && board.violations().is_empty(), "{}", of.name);
+            // What it says, once for each board.
+            if of.name != ALL[(n + 1) % ALL.len()].name {
+                continue;
+            }
+            said(&mut board, "last run: ")?;
+            board.take_console();
+            for line in ["start vf", "confirm board"] {
+                board.type_line(line);
+                let answer = said(&mut board, "error: ")?;
+                let names = format!("for the board {}, ", of.name);
+                let theirs = format!("flash the image of {}", stage.name);
+                assert!(answer.contains(&names) && answer.contains(&theirs), "{answer}");
+                assert!(answer.contains("`defaults`"), "{answer}");
+            }
+            off_for(&mut board, 600)?;
+        }
+    }
+    Ok(())
+}
+
+/// The gates of a blank board are connected by `confirm board`, driven to off, and stay connected over a reset.
+#[test]
+fn a_confirmation_connects_the_gates() -> Result<()> {
+    for stage in ALL {
+        let mut options = Options::on(stage, &stage.config()?, 4);
+        options.confirmed = false;
+        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
+        said(&mut board, "last run: ")?;
+        let firmware = stage.board();
+        let connected = |board: &mut Board| {
+            let pins = firmware.high.pins.into_iter().chain(firmware.low.pins);
+            let modes: Vec<_> = pins
+                .map(|pin| {
+                    let mode = board.chip().gpio[pin.port as usize].read(0).unwrap_or(0);
+                    mode >> (2 * pin.number) & 3
+                })
+                .collect();
+            modes.iter().all(|mode| *mode == 2)
+        };
+        assert!(!connected(&mut board), "{}", stage.name);
+        board.take_console();
+        board.type_line("confirm board");
+        said(&mut board, "ok")?;
+        assert!(connected(&mut board), "{}", stage.name);
+        // The check of the registers goes round.
+        off_for(&mut board, 1200)?;
+        board.reset(Reset::Pin);
+        said(&mut board, "last run: ")?;
+        assert!(connected(&mut board) && !board.gates().any_on(), "{}", stage.name);
+        assert!(board.violations().is_empty());
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ mod cost;
 mod dc_link;
 mod drivers;
 mod first_light;
+mod flips;
 mod foreign;
 mod hardware;
 mod homing;

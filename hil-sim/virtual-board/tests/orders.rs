@@ -45,12 +45,12 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
 fn an_order_leaves_most_of_the_period() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 5)?;
     pair.say("set motor.inertia 0.013")?;
-    for line in ["clear", "apply", "start"] {
+    for line in ["apply", "start"] {
         let (taken, _) = cost(&mut pair, line)?;
         assert!(taken <= LONGEST_INTERRUPT_CYCLES, "{line}: {taken} cycles");
     }
     pair.until_state(State::Torque)?;
-    for line in ["torque 1", "torque 9", "start", "clear", "relock"] {
+    for line in ["torque 1", "torque 9", "start", "relock"] {
         let (taken, _) = cost(&mut pair, line)?;
         assert!(taken < PERIOD / 5, "{line}: {taken} cycles");
     }

@@ -84,14 +84,7 @@ fn no_interrupt_needs_the_second_bank() -> Result<()> {
 fn no_control_period_waits_for_the_flash() -> Result<()> {
     let mut board = greeted(42)?;
     let (mut in_first, mut in_second, mut last) = (0_u64, 0_u64, None);
-    let lines = [
-        "set command.timeout_s 3",
-        "save",
-        "set command.timeout_s 0",
-        "save",
-        "start torque",
-        "fault",
-    ];
+    let lines = ["set bus.address 3", "save", "set bus.address 1", "save", "start torque", "fault"];
     for line in lines {
         let operations = board.chip().flash.operations;
         match line {

@@ -18,9 +18,11 @@ use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
 use induction_drive::modbus;
+use induction_drive::modbus::slave::Written;
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::bus::{Baud, Format};
+use induction_drive::settings::bus::{self, Baud, Format};
+use induction_drive::settings::keys::Key;
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
 use induction_drive::strip;
@@ -58,6 +60,10 @@ pub struct FakeDrive {
     pub session: Session,
     /// Operating hours, starts and faults.
     pub history: History,
+    /// Whether the pins of the gates are connected.
+    pub connected: bool,
+    /// Settings that protect and were changed, in order.
+    pub changed: Vec<&'static str>,
 }
 
 impl FakeDrive {
@@ -79,6 +85,8 @@ impl FakeDrive {
             streamed: (0, VecDeque::new()),
             session: Session::new(&Settings::default()),
             history: History::default(),
+            connected: false,
+            changed: Vec::new(),
         }
     }
 }
@@ -120,6 +128,12 @@ impl DriveHandle for FakeDrive {
     fn configured(&mut self, settings: &FirmwareSettings) {
         self.tracking = Tracking::new(&settings.drive);
         self.session.configured(&settings.drive);
+    }
+    fn connect(&mut self) {
+        self.connected = true;
+    }
+    fn changed(&mut self, key: Key) {
+        self.changed.push(key.name());
     }
     fn session(&mut self) -> &mut Session {
         &mut self.session
@@ -271,11 +285,13 @@ pub struct FakeBus {
     pub answers: VecDeque<modbus::Frame>,
     /// Rate and format that were set.
     pub line: Option<(Baud, Format)>,
+    /// A stop that came while the slave was busy.
+    pub stop: Option<Written>,
 }
 
 impl modbus::Port for FakeBus {
-    fn set_line(&mut self, baud: Baud, format: Format) {
-        self.line = Some((baud, format));
+    fn set_line(&mut self, settings: &bus::Settings) {
+        self.line = Some((settings.baud, settings.format));
     }
     fn receive(&mut self) -> Option<modbus::Frame> {
         self.asked.pop_front()
@@ -283,7 +299,10 @@ impl modbus::Port for FakeBus {
     fn send(&mut self, frame: &modbus::Frame) {
         self.answers.push_back(frame.clone());
     }
-    fn set_busy(&mut self, _: Option<u8>) {}
+    fn set_busy(&mut self, _: bool) {}
+    fn take_stop(&mut self) -> Option<Written> {
+        self.stop.take()
+    }
 }
 
 /// The pins of the terminal strip.

@@ -3,7 +3,8 @@
 use super::*;
 use crate::board;
 use crate::link::ring::Record;
-use drive_core::Telemetry;
+use crate::link::trace::Sampled;
+use drive_core::{Stage, Telemetry};
 
 impl Talk {
     /// A record of this period for the stream, with this current.
@@ -11,7 +12,8 @@ impl Talk {
         let mut telemetry = Telemetry { turns: 0.5, ..Telemetry::default() };
         telemetry.current.q = i_q;
         telemetry.rotor_freq = 10.0 * PERIOD_S;
-        let record = Record { period, telemetry, ..Record::default() };
+        let sampled = Sampled { state: Stage::Running as u8, ..Sampled::default() };
+        let record = Record { period, telemetry, sampled, ..Record::default() };
         self.drive.streamed.1.push_back(record);
     }
 

@@ -15,7 +15,7 @@ impl Panel {
         let mut talk = Talk::new();
         let all = "set strip.enable yes strip.start switch strip.reset yes strip.reverse yes\n\
                    set strip.presets yes strip.preset_1_rpm 300 strip.preset_2_rpm 600 strip.preset_3_rpm 900\n\
-                   set strip.reference_rpm 1500 strip.outputs yes strip.brake yes strip.reference 4-20ma\n\
+                   set strip.reference_rpm 1500 strip.outputs yes strip.reference 4-20ma\n\
                    set bus.commands strip\n";
         talk.say(format!("{all}{lines}apply\n"));
         talk.drive.commands.clear();
@@ -233,7 +233,7 @@ fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
     assert_eq!(panel.commands(), []);
     panel.close(Wires::RESET);
     panel.wait(1000);
-    assert_eq!(panel.commands(), [Command::Clear]);
+    assert_eq!(panel.commands(), []);
     panel.open(Wires::START);
     panel.close(Wires::START);
     assert_eq!(panel.commands(), [START, Command::Speed(750.0)]);
@@ -242,4 +242,31 @@ fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
     panel.ma(0.0);
     panel.wait(1000);
     assert_eq!(panel.commands(), [Command::Speed(300.0)]);
+}
+
+/// A brake: the drive is told before each start that there is one, the output opens it while the drive regulates, and a fault says what
+/// holds the load.
+#[test]
+fn a_brake_is_told_to_the_drive_and_opens_only_while_it_regulates() {
+    let mut panel = Panel::new("set strip.brake yes strip.brake_s 0.3\n");
+    panel.close(Wires::START);
+    assert_eq!(panel.commands(), [Command::Brake(0.3), START, Command::Speed(0.0)]);
+    assert_eq!(panel.0.strip.outputs, [true, false, false], "closed until it regulates");
+    panel.0.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
+    panel.wait(2);
+    let said = panel.0.say("").concat();
+    assert!(said.contains("the brake closes now, and alone holds the load"), "{said}");
+    assert_eq!(panel.0.strip.outputs, [false, true, false]);
+    // Without it the drive is told once.
+    panel.0.say("clear\nset strip.brake no\napply\n");
+    panel.commands();
+    for told in [Some(Command::Brake(0.0)), None] {
+        panel.open(Wires::START);
+        panel.close(Wires::START);
+        let commands = panel.commands();
+        let all: Vec<_> = told.into_iter().chain([START]).collect();
+        assert_eq!(commands[..all.len()], all, "{commands:?}");
+        panel.0.say("stop now\n");
+        panel.commands();
+    }
 }

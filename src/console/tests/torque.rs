@@ -65,7 +65,9 @@ fn a_drive_that_is_off_has_the_torque_of_a_shaft_at_rest_and_a_fault_has_none() 
     let at = |line: drive_core::Line, code| format!("{:.2} A", line.at(code));
     let a = at(settings.scales.current_a, talk.drive.sample.current_a);
     let b = at(settings.scales.current_b, talk.drive.sample.current_b);
-    let begin = format!("off; switch on disabled; sensors a {a}, b {b}, torque now -");
+    let begin = format!(
+        "off; switch on disabled; speed 0.0 rpm assumed: nothing measures it, sensors a {a}, b {b}, torque now -"
+    );
     assert!(status.starts_with(&begin), "{status}");
     let (nm, a) = promised(&status);
     assert!((nm[1] - f64::from(i_q * per_a)).abs() < 0.01 && nm[0] == -nm[1], "{status}");

@@ -42,6 +42,13 @@ impl Sampled {
     }
 }
 
+impl Sampled {
+    /// Whether the drive is off, with a fault or without.
+    pub fn is_off(&self) -> bool {
+        self.state == 0 || self.state >= FAULT
+    }
+}
+
 impl Signal {
     /// The unit that the name ends with; empty if there is none.
     pub fn unit(&self) -> &'static str {
@@ -115,6 +122,20 @@ signals! { |t, s|
     17: "heat_sink_c" = s.heat_sink.into(),
     18: "state" = s.state.into(),
     19: "limit" = s.limit.into(),
+}
+
+/// Index of the speed.
+pub const SPEED: usize = 2;
+
+/// The values as they are shown: a drive that is off has no current and no torque, whatever its last step saw, and the shaft this speed,
+/// electrical turns per control period.
+pub fn shown(telemetry: &Telemetry, sampled: &Sampled, shaft: f32) -> Values {
+    if !sampled.is_off() {
+        return values(telemetry, sampled);
+    }
+    let mut values = values(&telemetry.without_current(), sampled);
+    values[SPEED] = shaft;
+    values
 }
 
 /// Index of the signal with this name.

@@ -161,6 +161,7 @@ fn signals_are_recorded_as_they_were_chosen() {
     }
     let mut full = SignalChoice::usual();
     assert!(!full.add(0) && find("speed").is_none() && find("").is_none());
+    assert_eq!(SIGNALS[SPEED].name, "speed_rpm");
 }
 
 /// The numbers of state and limit, which programs rely on.

@@ -12,7 +12,7 @@ use induction_drive::link::mailbox::Mailbox;
 use super::{Control, RUNNING, Running};
 
 /// Version of the layout of [`Table`].
-const VERSION: usize = 3;
+const VERSION: usize = 4;
 
 /// The layout of the table. Sizes and offsets are in bytes.
 #[repr(C)]
@@ -30,6 +30,8 @@ struct Table {
     command_waits: usize,
     /// The [`Telemetry`](drive_core::Telemetry) of the last step with the outputs on.
     telemetry: *const u8,
+    /// The word of the drive's phase: one of [`Drive::PHASES`].
+    phase: *const u8,
 }
 
 // SAFETY: only addresses, which the firmware itself never follows.
@@ -59,4 +61,5 @@ static INDUCTION_DRIVE_ADDRESSES: Table = Table {
     commands: in_control(offset_of!(Control, commands)),
     command_waits: Mailbox::<Command>::FULL,
     telemetry: in_drive(Drive::TELEMETRY),
+    phase: in_drive(Drive::PHASE),
 };

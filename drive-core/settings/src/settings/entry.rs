@@ -14,6 +14,31 @@ pub enum Change {
     Board,
 }
 
+/// What another than the console may do with a setting that protects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Guard {
+    /// Change it: it protects nothing.
+    None,
+    /// Make it smaller, or, of words, choose an earlier one: larger ones are looser.
+    Lower,
+    /// Make it larger, or, of words, choose a later one: smaller ones are looser.
+    Raise,
+    /// Nothing: it says what is there.
+    Keep,
+}
+
+impl Guard {
+    /// Whether a level protects as well as another one. One that is not a number never does.
+    pub fn holds(self, level: f32, bound: f32) -> bool {
+        match self {
+            Self::None => true,
+            Self::Lower => level <= bound,
+            Self::Raise => level >= bound,
+            Self::Keep => level == bound,
+        }
+    }
+}
+
 /// A setting of the settings `S`: number, name, unit, help, range, and the way to its value.
 pub struct Entry<S: 'static> {
     /// Its number for life: in the flash, and of its registers on the bus. No other setting ever gets it.
@@ -30,6 +55,8 @@ pub struct Entry<S: 'static> {
     pub learned: bool,
     /// Whether the power stage is at stake: a protection or the scale of its sensor.
     pub hardware: bool,
+    /// Whether it protects, and what may be done to it from elsewhere than the console.
+    pub guard: Guard,
     access: Access<S>,
     range: Range<S>,
 }
@@ -63,7 +90,8 @@ impl<S> Entry<S> {
     ) -> Self {
         let range = Range::Fixed(0.0, 0.0);
         let change = Change::WhileOff;
-        Self { id, name, unit, help, change, learned: false, hardware: false, access, range }
+        let (learned, hardware, guard) = (false, false, Guard::None);
+        Self { id, name, unit, help, change, learned, hardware, guard, access, range }
     }
 
     /// Accepted from `min` to `max`, both included.
@@ -87,6 +115,12 @@ impl<S> Entry<S> {
     /// A wrong value may damage the power stage.
     pub const fn hardware(mut self) -> Self {
         self.hardware = true;
+        self
+    }
+
+    /// It protects: from elsewhere than the console it can only be tightened.
+    pub const fn guarded(mut self, guard: Guard) -> Self {
+        self.guard = guard;
         self
     }
 
@@ -115,6 +149,14 @@ impl<S> Entry<S> {
             Access::Auto(.., effective) => Some(effective(settings)),
             Access::Whole(get, _) => Some(get(settings) as f32),
             Access::Word(..) => None,
+        }
+    }
+
+    /// The number in effect; of a word its place.
+    pub fn level(&self, settings: &S) -> f32 {
+        match self.access {
+            Access::Word(get, ..) => get(settings) as f32,
+            _ => self.number(settings).unwrap_or(f32::NAN),
         }
     }
 

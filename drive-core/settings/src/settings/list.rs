@@ -10,7 +10,7 @@
 use core::f32::consts::SQRT_2;
 
 use super::declare::{rule, settings};
-use super::entry::{Access, Change, Entry, entry};
+use super::entry::{Access, Change, Entry, Guard, entry};
 use super::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN, TRIP_OF_RANGE, TRIP_OF_RATED, WITHIN};
 use super::numbers::{either_sign, or_rule};
 use super::value::Words;
@@ -42,13 +42,13 @@ settings! {
     /// The temperature sensor of the motor, from ground to an input of the board, fed from the reference of the converter.
     MotorSensor "motor." [motor_sensor] {
         /// temperature sensor of the motor
-        sensor: SensorKind = SensorKind::None, 122: word();
+        sensor: SensorKind = SensorKind::None, 122: word().guarded(Guard::Keep);
         /// resistor between that sensor and the reference of the converter
         sensor_ohm: f32 = 4700.0, 123: number("ohm").from_to(100.0, 1e6).hardware();
         /// band below `motor.sensor_trip_c`, K, in which the torque falls to nothing
         sensor_band_k: u8 = 20, 124: whole().from_to(1.0, 100.0);
         /// temperature of the motor, degC, that trips
-        sensor_trip_c: u8 = 140, 125: whole().from_to(2.0, 199.0);
+        sensor_trip_c: u8 = 140, 125: whole().from_to(2.0, 199.0).guarded(Guard::Lower);
     }
 
     /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
@@ -310,7 +310,7 @@ settings! {
         /// whether a drive that has not learned starts without an encoder
         ///
         /// For motors whose saliency is known from elsewhere, as that of a model.
-        allow_unlearned: bool = false, 54: word();
+        allow_unlearned: bool = false, 54: word().guarded(Guard::Lower);
         /// saliency per ampere of stator current
         ///
         /// For the observer until it is learned.
@@ -320,23 +320,23 @@ settings! {
         /// whether a start checks the saliency of the motor
         ///
         /// See `saliency_check`. Without the check a start assumes it, and a shaft at standstill.
-        check: bool = true, 56: word();
+        check: bool = true, 56: word().guarded(Guard::Raise);
         /// whether the lock is verified and watched
         ///
         /// See `lock_monitor`.
-        monitor: bool = true, 57: word();
+        monitor: bool = true, 57: word().guarded(Guard::Raise);
         /// Carrier current over the torque current, learned with the shaft locked, for the monitor; unset: guessed.
         carrier: Option<CarrierTable> = None;
         /// share of the flux-fixed saliency that may be missing
         ///
         /// 1 is zero flux.
-        allowed_loss: f32 = 0.55, 58: number().from_to(0.3, 0.9);
+        allowed_loss: f32 = 0.55, 58: number().from_to(0.3, 0.9).guarded(Guard::Lower);
         /// time constant of the mean of that share
-        loss_s: f32 = 0.12, 59: number("s").from_to(0.01, 1.0);
+        loss_s: f32 = 0.12, 59: number("s").from_to(0.01, 1.0).guarded(Guard::Lower);
         /// speed that trips without an encoder
         ///
         /// Mechanical: the end of the range in which the angle is tracked.
-        tracked_rpm: Option<f32> = None, 60: auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0) => [
+        tracked_rpm: Option<f32> = None, 60: auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0).guarded(Guard::Lower) => [
             /// whether the carrier is injected beside an encoder
             "injection.beside_encoder" [injection] beside_encoder: bool, 61: word();
         ];
@@ -366,51 +366,51 @@ settings! {
         /// The length of the current vector. With high flux that of 155 % of the rated torque, 1 to 1.6 times the rated current. The
         /// carrier and the noise stay clear of the trip.
         current_a: Option<f32> = None, 66: auto("A", current_limit_a: |s| s.wanted_limit_a().min(s.limit_of_trip() * s.trip_a()))
-            .beside(|s| (0.01, s.trip_a()));
+            .beside(|s| (0.01, s.trip_a())).guarded(Guard::Lower);
         /// dc link above which the drive trips
         dc_over_v: Option<f32> = None, 67: auto("V", dc_over_v: |s| s.share_of_dc_link(400.0).min(WITHIN * s.dc_over_max_v()).min(0.95 * s.dc_link_range_v()))
             .beside(Settings::dc_over_range).hardware();
         /// dc link below which it trips while the outputs are on
-        dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
+        dc_under_v: Option<f32> = None, 68: auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range).guarded(Guard::Raise);
         /// speed of the shaft that trips
         ///
         /// At most 500 Hz electrical: without an encoder the rotor is counted 1200 times a second, and half a turn is the most it may
         /// move in between.
         speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
-            .beside(|s| (1.0, 500.0 / s.nameplate.frequency_hz * s.nameplate.speed_rpm));
+            .beside(|s| (1.0, 500.0 / s.nameplate.frequency_hz * s.nameplate.speed_rpm)).guarded(Guard::Lower);
         /// largest voltage that the motor model does not explain at standstill
         ///
         /// By rule an error of 26 % of the stator resistance at the current limit, and 2.3 % of the dc link for dead time and drop
         /// of the inverter; the dc link at most.
         unexplained_v: Option<f32> = None,
-            70: auto("V", unexplained_v: |s| (0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).min(s.inverter.dc_link_v)).from_to(0.01, 1000.0);
+            70: auto("V", unexplained_v: |s| (0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).min(s.inverter.dc_link_v)).from_to(0.01, 1000.0).guarded(Guard::Lower);
         /// current that the motor carries for any time at standstill, peak
-        motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a()));
+        motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a())).guarded(Guard::Lower);
         /// thermal time constant of its windings
         ///
         /// By default between those of the trip classes 10 and 20 (IEC 60947-4-1: 7.2 times the rated current for 10 and 20 s mean 518 and
         /// 1037 s): a warm motor bears 150 % of its torque for 60 s.
-        motor_s: f32 = 600.0, 72: number("s").from_to(1.0, 10_000.0);
+        motor_s: f32 = 600.0, 72: number("s").from_to(1.0, 10_000.0).guarded(Guard::Lower);
         /// current that the inverter carries for any time, peak
-        inverter_a: Option<f32> = None, 73: auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a()));
+        inverter_a: Option<f32> = None, 73: auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a())).guarded(Guard::Lower);
         /// thermal time constant of its switches to the heat sink
-        inverter_s: f32 = 5.0, 74: number("s").from_to(0.1, 1000.0);
+        inverter_s: f32 = 5.0, 74: number("s").from_to(0.1, 1000.0).guarded(Guard::Lower);
         /// temperature of the heat sink that trips
         ///
         /// The default suits most power modules.
         heat_sink_c: f32 = 85.0, 75: number("degC").from_to(0.0, 150.0).hardware();
         /// temperature of the heat sink from which on the current limit falls, to nothing where it trips
-        derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c));
+        derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c)).guarded(Guard::Lower);
         /// largest current from the dc link, motoring; 1000 for none
         ///
         /// A limit lies above the copper losses of the direct current.
-        dc_motoring_a: f32 = DcLimit::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, DcLimit::NONE.current_a));
+        dc_motoring_a: f32 = DcLimit::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, DcLimit::NONE.current_a)).guarded(Guard::Lower);
         /// largest current into the dc link, generating; 1000 for none
-        dc_generating_a: f32 = DcLimit::NONE.current_a, 127: number("A").from_to(0.0, DcLimit::NONE.current_a);
+        dc_generating_a: f32 = DcLimit::NONE.current_a, 127: number("A").from_to(0.0, DcLimit::NONE.current_a).guarded(Guard::Lower);
         /// largest power from the dc link, motoring; 1e6 for none
-        motoring_w: f32 = DcLimit::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), DcLimit::NONE.power_w));
+        motoring_w: f32 = DcLimit::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), DcLimit::NONE.power_w)).guarded(Guard::Lower);
         /// largest power into the dc link, generating; 1e6 for none
-        generating_w: f32 = DcLimit::NONE.power_w, 129: number("W").from_to(0.0, DcLimit::NONE.power_w);
+        generating_w: f32 = DcLimit::NONE.power_w, 129: number("W").from_to(0.0, DcLimit::NONE.power_w).guarded(Guard::Lower);
     }
 
     /// The sequence between `start` and regulation, and at `stop`. Unset values follow [`rules`](super::rules).
@@ -433,7 +433,7 @@ settings! {
         /// rated current and of the current limit: 0.707 times these.
         i_d: Option<f32> = None, 81: auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
         /// slope of the torque current at a stop
-        stop_a_per_s: Option<f32> = None, 82: auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5);
+        stop_a_per_s: Option<f32> = None, 82: auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5).guarded(Guard::Raise);
         /// whether a start with the observer looks for a turning shaft first
         ///
         /// For 0.25 s, without an encoder.
@@ -458,13 +458,13 @@ settings! {
         /// In either mode. By rule the rated speed with the observer. The injection alone is good to 300 rpm on four poles; with an
         /// encoder it may be larger.
         limit_rpm: Option<f32> = None, 86: auto("rpm", speed_limit_rpm: |s| (if s.uses_observer() { s.nameplate.speed_rpm } else { s.share_of_poles(300.0) }).min(WITHIN * s.speed_trip_rpm()))
-            .beside(|s| (1.0, s.speed_trip_rpm()));
+            .beside(|s| (1.0, s.speed_trip_rpm())).guarded(Guard::Lower);
         /// largest acceleration that is asked for
-        ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5);
+        ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5).guarded(Guard::Raise);
         /// deceleration of a quick stop
-        quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5));
+        quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5)).guarded(Guard::Raise);
         /// time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once
-        s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0);
+        s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0).guarded(Guard::Lower);
         /// phase margin of the speed loop: more is calmer and slower
         ///
         /// Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
@@ -484,11 +484,11 @@ settings! {
         flux_a: Option<f32> = None, 93: auto("A", braking_flux_a: |s| f32::min(s.share_of_rated(1.0), WITHIN * s.current_limit_a()))
             .beside(|s| (0.0, s.current_limit_a()));
         /// brake resistor behind the chopper; 0 for none
-        ohm: f32 = 0.0, 94: number("ohm").from_to(0.0, 1e5);
+        ohm: f32 = 0.0, 94: number("ohm").from_to(0.0, 1e5).guarded(Guard::Keep);
         /// energy that the brake resistor takes from cold
-        energy_j: f32 = 1000.0, 95: number("J").from_to(1.0, 1e7);
+        energy_j: f32 = 1000.0, 95: number("J").from_to(1.0, 1e7).guarded(Guard::Lower);
         /// power that it takes for ever
-        power_w: f32 = 50.0, 96: number("W").from_to(0.1, 1e5);
+        power_w: f32 = 50.0, 96: number("W").from_to(0.1, 1e5).guarded(Guard::Lower);
     }
 
     /// The supply of the dc link.
@@ -496,7 +496,7 @@ settings! {
         /// time that the dc link must be steady before the precharge relay closes; 0 without one
         ///
         /// See `drive_core::supply`.
-        relay_s: f32 = 0.0, 97: number("s").from_to(0.0, 60.0);
+        relay_s: f32 = 0.0, 97: number("s").from_to(0.0, 60.0).guarded(Guard::Raise);
     }
 
     /// The mode for a motor that nobody has identified; see `drive_core::flux::volts_per_hertz`. Unset values follow

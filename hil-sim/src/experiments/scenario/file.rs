@@ -302,7 +302,8 @@ impl Scenario {
             ("stop", Some("coast")) => part.stop = Some(Stop::Coast),
             ("stop", Some("ramp")) => part.stop = Some(Stop::Ramp),
             ("stop", Some("quick")) => part.stop = Some(Stop::Quick),
-            ("stop", _) => return Err(wrong("coast, ramp, quick")),
+            ("stop", Some("now")) => part.stop = Some(Stop::Now),
+            ("stop", _) => return Err(wrong("coast, ramp, quick, now")),
             _ => {
                 let known = COLUMNS.iter().map(|column| column.0);
                 if !known.clone().any(|known| known == name) {

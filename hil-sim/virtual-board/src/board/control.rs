@@ -49,7 +49,9 @@ impl Board {
     fn has_order(&self) -> bool {
         let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
         let mailbox = self.cpu.word(orders);
-        mailbox.and_then(|mailbox| self.cpu.byte(mailbox.wrapping_add(order_waits))) == Some(1)
+        mailbox
+            .and_then(|mailbox| self.cpu.byte(mailbox.wrapping_add(order_waits)))
+            .is_some_and(|byte| byte != 0)
     }
 
     pub(super) fn begin_control(&mut self) {

@@ -1,0 +1,43 @@
+//! A motor with a mechanical brake, as of a hoist: the brake opens only after the torque was proven, and the torque ends only after the
+//! brake has closed.
+//!
+//! Whoever drives the brake opens it while the drive regulates, and closes it when the drive stops; see `src/strip.rs` of the firmware.
+
+use super::{Field, FluxPhase, Goal, Kept};
+use crate::{Coefficients, Dq, Fault};
+
+/// Longest time that a brake may need to close, s.
+pub const BRAKE_MAX_S: f32 = 5.0;
+/// Torque current of the proof, as a share of the largest one.
+const PROOF_SHARE: f32 = 0.25;
+/// Periods of the proof: 0.1 s, in which the current settles several times.
+const PROOF: u32 = 600;
+/// Share of that current by which the measured one may be off.
+const PROOF_ERROR: f32 = 0.3;
+
+impl Field {
+    /// The phase behind a flux that was built up and verified.
+    pub(super) fn behind_the_flux(k: &Kept) -> FluxPhase {
+        if k.brake > 0 { FluxPhase::Prove } else { FluxPhase::ready() }
+    }
+
+    /// The goal of a shaft that has come to rest.
+    pub(super) fn at_rest(&self, k: &Kept) -> Goal {
+        if k.brake > 0 { Goal::Hold { left: k.brake } } else { Goal::Release }
+    }
+
+    /// The current while the torque is proven, A: the brake is closed, and the torque current must follow.
+    ///
+    /// # Errors
+    /// [`Fault::TorqueNotProven`].
+    #[cold]
+    pub(super) fn prove(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+        let wanted = PROOF_SHARE * c.protection.i_q;
+        if k.elapsed >= PROOF {
+            let missing = (wanted - k.seen.current.q).abs();
+            Fault::TorqueNotProven.unless(missing <= PROOF_ERROR * wanted)?;
+            self.enter(k, FluxPhase::ready());
+        }
+        Ok(Dq { d: k.references.current.d, q: wanted })
+    }
+}

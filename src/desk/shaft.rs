@@ -1,0 +1,98 @@
+//! The speed of the shaft as the desk knows it. While the drive is off nobody measures it without an encoder: the last measured speed stays,
+//! marked as assumed, until the shaft must have come to rest.
+
+use drive_core::{AngleSource, State};
+
+use crate::link::Status;
+use crate::settings::FirmwareSettings;
+
+/// Speed at and below which a shaft that was braked counts as at rest, mechanical rpm.
+const REST_RPM: f32 = 30.0;
+
+/// See the head of the module.
+pub struct Shaft {
+    /// Electrical speed, turns per control period.
+    freq: f32,
+    /// Whether it is not measured: the last one, or, after a reset, none.
+    assumed: bool,
+    /// Whether the drive brakes, or stops after it has braked.
+    braked: bool,
+    measured_ms: u32,
+    /// Periods and count of the encoder of the last report.
+    counted: (u32, u32),
+}
+
+impl Default for Shaft {
+    fn default() -> Self {
+        // After a reset the shaft may turn.
+        Self { freq: 0.0, assumed: true, braked: false, measured_ms: 0, counted: (0, 0) }
+    }
+}
+
+impl Shaft {
+    /// Follows the reports of the drive. Called in each pass of the main loop; `now_ms` wraps.
+    pub fn watch(&mut self, status: &Status, settings: &FirmwareSettings, now_ms: u32) {
+        let rpm = self.rpm(settings).abs();
+        let encoder = settings.drive.angle_source == AngleSource::Encoder;
+        match status.state {
+            State::Magnetising | State::Verifying | State::Torque | State::Speed => {
+                self.braked = false
+            }
+            State::Position | State::VoltsPerHertz => self.braked = false,
+            State::Braking | State::BrakingByFrequency => self.braked = true,
+            State::Stopping => {}
+            State::Off | State::Fault(_) if encoder => {
+                if let Some(freq) = self.counted(status, settings) {
+                    (self.freq, self.measured_ms) = (freq, now_ms);
+                }
+                return self.assumed = false;
+            }
+            State::Off if self.braked && rpm <= REST_RPM => {
+                return (self.freq, self.assumed) = (0.0, false);
+            }
+            State::Off | State::Fault(_) => {
+                let passed = now_ms.wrapping_sub(self.measured_ms) as f32 * 1e-3;
+                // It is asked in each pass: what is known once is not assumed again.
+                self.assumed &= passed < settings.command.coasts_s;
+                if !self.assumed {
+                    self.freq = 0.0;
+                }
+                return;
+            }
+            // The shaft is looked for, or nothing measures it.
+            State::Calibrating | State::Precharge | State::CheckingWiring => return,
+            State::Catching | State::Exciting | State::Learning => return,
+        }
+        (self.freq, self.measured_ms) = (status.telemetry.rotor_freq, now_ms);
+        // Should the drive go off now.
+        self.assumed = true;
+        self.counted = (status.periods, status.sample.encoder);
+    }
+
+    /// The speed by the encoder since the report before, if there is a new one.
+    fn counted(&mut self, status: &Status, settings: &FirmwareSettings) -> Option<f32> {
+        let (periods, count) =
+            core::mem::replace(&mut self.counted, (status.periods, status.sample.encoder));
+        let passed = status.periods.wrapping_sub(periods);
+        let turns = status.sample.encoder.wrapping_sub(count) as i32 as f32
+            / settings.drive.scales.encoder_counts as f32;
+        let pole_pairs = f32::from(settings.drive.motor.pole_pairs);
+        (passed > 0).then(|| turns * pole_pairs / passed as f32)
+    }
+
+    /// Speed, mechanical rpm, signed.
+    pub fn rpm(&self, settings: &FirmwareSettings) -> f32 {
+        let pole_pairs = f32::from(settings.drive.motor.pole_pairs);
+        self.freq * (60.0 / drive_core::io::PERIOD_S) / pole_pairs
+    }
+
+    /// Electrical speed, turns per control period.
+    pub fn freq(&self) -> f32 {
+        self.freq
+    }
+
+    /// Whether a drive that is off does not know whether the shaft turns.
+    pub fn is_assumed(&self) -> bool {
+        self.assumed
+    }
+}

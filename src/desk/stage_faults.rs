@@ -1,0 +1,56 @@
+//! Faults of the power stage, which a master must not clear as often as it likes: each start into a short circuit is a load for the
+//! switches.
+
+use crate::link::Status;
+
+/// Three faults within this time block the next clear, for this time from the last one, ms.
+const WINDOW_MS: u32 = 10_000;
+
+/// The times of the last faults of the power stage.
+#[derive(Default)]
+pub struct StageFaults {
+    /// Whether the fault that is latched has been counted.
+    counted: bool,
+    /// Periods of the report that was the last one when the fault was cleared: it shows that fault still.
+    stale: Option<u32>,
+    /// Ages of the last three, ms, the newest first; those that are older than the window are forgotten.
+    ages: [Option<u32>; 3],
+    seen_ms: u32,
+}
+
+impl StageFaults {
+    /// Counts the fault that is latched, once; whether any is. Called in each pass of the main loop; `now_ms` wraps.
+    pub fn watch(&mut self, status: &Status, now_ms: u32) -> bool {
+        let passed = now_ms.wrapping_sub(core::mem::replace(&mut self.seen_ms, now_ms));
+        for age in &mut self.ages {
+            *age = age.map(|age| age.saturating_add(passed)).filter(|age| *age < WINDOW_MS);
+        }
+        if self.stale == Some(status.periods) {
+            return false;
+        }
+        let fault = status.state.fault();
+        let counts = fault.is_some_and(|fault| fault.is_of_the_power_stage());
+        if counts && !self.counted {
+            self.ages.rotate_right(1);
+            self.ages[0] = Some(0);
+        }
+        (self.counted, self.stale) = (counts, None);
+        fault.is_some()
+    }
+
+    /// Passes if the fault may be cleared now, behind [`watch`](Self::watch).
+    ///
+    /// # Errors
+    /// The seconds until then.
+    pub fn may_clear(&self) -> Result<(), u32> {
+        match self.ages {
+            [Some(newest), _, Some(_)] => Err((WINDOW_MS - newest).div_ceil(1000)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The fault was cleared; this is the last report, from before.
+    pub fn cleared(&mut self, status: &Status) {
+        (self.counted, self.stale) = (false, Some(status.periods));
+    }
+}
