@@ -15,6 +15,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
 use crate::console;
+use crate::error::{message, parser_text, printable};
 use crate::experiments;
 use crate::first_light;
 use crate::input::{Input, OUT};
@@ -140,7 +141,14 @@ enum Command {
 /// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
 /// has to be changed.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let cli = Cli::try_parse().unwrap_or_else(|error| {
+        if !error.use_stderr() {
+            error.exit()
+        }
+        eprintln!("{}", message(parser_text(&error)));
+        std::process::exit(error.exit_code())
+    });
+    let result = match cli.command {
         None => {
             let input = Input { seed: 1, ..Input::default() };
             run::run(&Request { name: experiments::DEFAULT.into(), input, ..Request::default() })
@@ -170,16 +178,16 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", message(&error));
             ExitCode::from(error.exit_code())
         }
     }
 }
 
-/// Prints on standard output. A closed pipe, as behind `head`, is no error.
+/// Prints on standard output, without the control characters that a text of the user may have. A closed pipe, as behind `head`, is no error.
 fn say(text: impl AsRef<str>) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_ref().as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(printable(text.as_ref()).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Error::write(Path::new("standard output"))(e))
         }

@@ -27,6 +27,7 @@ pub use sim_bench::{learning, statistics};
 pub use sim_lab::*;
 use statistics::Statistical;
 
+use crate::error::cut;
 use crate::prelude::*;
 
 /// All experiments, in the order of the report.
@@ -119,7 +120,8 @@ pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     found.ok_or_else(|| {
         let known: Vec<_> = STATISTICAL.iter().map(|known| known.experiment.name).collect();
         Error::Refused(format!(
-            "{name} does not consist of independent runs; those that do: {}",
+            "{} does not consist of independent runs; those that do: {}",
+            cut(name),
             known.join(", ")
         ))
     })

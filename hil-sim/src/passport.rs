@@ -10,6 +10,7 @@ use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
 use crate::console::answer::split_tag;
+use crate::error::parser_text;
 use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
 use crate::prelude::*;
@@ -148,7 +149,7 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
             settings.insert(setting["name"].as_str().unwrap_or_default().to_owned(), setting);
         }
     }
-    refused.map_or(Ok(()), Err)?;
+    refused.map_or(Ok(()), |line| Err(parser_text(line)))?;
     measured.append(&mut learned);
     let found = |name: &str| {
         let found = measured.iter().rfind(|found: &&Measured| found.name == name);

@@ -127,3 +127,54 @@ fn each_message_names_the_thing_the_value_and_what_is_allowed() {
         assert_eq!(files(&folder).len(), FILES.len(), "{line} leaves files: {:?}", files(&folder));
     }
 }
+
+/// A file that somebody sends can bring control characters, which a terminal obeys, and lines without end.
+#[test]
+fn quoted_input_is_escaped_and_cut() {
+    let folder = folder("quoted-input");
+    let long = "[31m ".repeat(40_000);
+    let (raw, escaped) =
+        (format!("\u{1b}]0;x\u{7}\u{9b}{long}"), format!("\\u001b]0;x\\u0007\\u009b{long}"));
+    for (name, contents) in [
+        ("syntax.toml", format!("{raw} = 1\n")),
+        ("key.toml", format!("\"{escaped}\" = 1\n")),
+        ("value.toml", format!("[motor]\nr_s = \"{escaped}\"\n")),
+        ("motor.toml", format!("[[source]]\n\"{escaped}\" = 1\n")),
+        ("part.toml", format!("[[part]]\nseconds = \"{escaped}\"\n")),
+        ("column.toml", format!("[[part]]\n\"{escaped}\" = 1\n")),
+        ("header.csv", format!("time_s,{raw}\n0,1\n")),
+        ("cell.csv", format!("time_s,speed_rpm\n0,1\n1,{raw}\n")),
+        ("schema.json", format!("{{\"schema\": \"{escaped}\"}}\n")),
+        ("syntax.json", format!("{{\"schema\": 1, {raw}\n")),
+    ] {
+        std::fs::write(folder.join(name), contents).unwrap();
+    }
+    let argument: String = raw.chars().take(50_000).collect();
+    let set = format!("motor.r_s={argument}");
+    let cases: [&[&str]; 15] = [
+        &["run", "torque-steps", "--config", "syntax.toml"],
+        &["run", "torque-steps", "--config", "key.toml"],
+        &["run", "torque-steps", "--config", "value.toml"],
+        &["run", "torque-steps", "--motor", "syntax.toml"],
+        &["run", "torque-steps", "--motor", "motor.toml"],
+        &["run", "syntax.toml"],
+        &["run", "part.toml"],
+        &["run", "column.toml"],
+        &["run", "profile", "--input", "header.csv"],
+        &["run", "profile", "--input", "cell.csv"],
+        &["run", "torque-steps", "--motor", "schema.json"],
+        &["run", "torque-steps", "--motor", "syntax.json"],
+        &["run", "torque-steps", "--set", &set],
+        &["run", "torque-steps", "--seed", &argument],
+        &["run", &argument],
+    ];
+    for arguments in cases {
+        let (output, case) =
+            (hil_sim(&folder, arguments), arguments[..arguments.len() - 1].join(" "));
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{case}: {message}");
+        assert!(!message.contains(|c: char| c.is_control() && c != '\n'), "{case}: {message:?}");
+        let quoted = |line: &str| 5 * line.matches("[31m ").count();
+        assert!(message.lines().all(|l| quoted(l) <= 120 && l.len() < 500), "{case}: {message}");
+    }
+}

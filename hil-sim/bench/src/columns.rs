@@ -1,8 +1,9 @@
 //! CSV files that a user brings: a header with the names of the columns, then numbers.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, unknown};
+use crate::error::{Error, cut, unknown};
 
 /// Named columns of equal length.
 #[derive(Debug)]
@@ -11,12 +12,6 @@ pub struct Columns {
     names: Vec<String>,
     /// Row by row, with the line of each.
     rows: Vec<(u64, Vec<f64>)>,
-}
-
-/// The beginning of a text of a file, for a message.
-fn cut(text: &str) -> String {
-    let short: String = text.chars().take(60).collect();
-    if short.len() < text.len() { short + "..." } else { short }
 }
 
 impl Columns {
@@ -48,10 +43,9 @@ impl Columns {
         } else if names.iter().all(|name| name.parse::<f64>().is_ok()) {
             return Err(failed(Some(1), format!("`{line}`: the first line must name the columns")));
         }
-        for (n, name) in names.iter().enumerate() {
-            if names[..n].contains(name) {
-                return Err(failed(Some(1), format!("two columns are called `{name}`")));
-            }
+        let mut before = BTreeSet::new();
+        if let Some(name) = names.iter().find(|name| !before.insert(*name)) {
+            return Err(failed(Some(1), format!("two columns are called `{}`", cut(name))));
         }
         let mut rows = Vec::new();
         for record in reader.records() {
@@ -91,8 +85,8 @@ impl Columns {
     /// [`Error::Data`] with the columns there are.
     pub fn need(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.get(name).ok_or_else(|| {
-            let names = self.names.join(", ");
-            self.error(format!("there is no column `{name}`; the file has: {}", cut(&names)))
+            let (name, names) = (cut(name), cut(&self.names.join(", ")));
+            self.error(format!("there is no column `{name}`; the file has: {names}"))
         })
     }
 

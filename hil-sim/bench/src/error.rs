@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Nothing has this name.
-    #[error("there is no {what} `{name}`{}; {list}", did_you_mean(.nearest))]
+    #[error("there is no {what} `{}`{}; {list}", cut(.name), did_you_mean(.nearest))]
     Unknown {
         /// The kind of thing that it should name.
         what: &'static str,
@@ -19,7 +19,7 @@ pub enum Error {
         list: &'static str,
     },
     /// A key cannot have this value.
-    #[error("{key} = {value}: {problem}; allowed: {allowed}")]
+    #[error("{} = {}: {problem}; allowed: {allowed}", cut(.key), cut(.value))]
     Value {
         /// The key.
         key: String,
@@ -31,10 +31,10 @@ pub enum Error {
         allowed: String,
     },
     /// `--set` without an equals sign.
-    #[error("`{0}`: write KEY=VALUE, for example --set motor.r_s=5.4")]
+    #[error("`{}`: write KEY=VALUE, for example --set motor.r_s=5.4", cut(.0))]
     Assignment(String),
     /// The experiment does not use a key that was set for it.
-    #[error("{name} does not use `{key}`; it uses: {uses}")]
+    #[error("{} does not use `{}`; it uses: {uses}", cut(.name), cut(.key))]
     UnusedKey {
         /// The experiment, or the group.
         name: String,
@@ -126,6 +126,43 @@ impl Error {
     }
 }
 
+/// Most characters of an input that a message quotes, and most of a message.
+const QUOTED: usize = 120;
+const MESSAGE: usize = 4000;
+
+/// The beginning of an input, for a message that quotes it.
+pub fn cut(text: &str) -> String {
+    cut_at(text, QUOTED)
+}
+
+fn cut_at(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// A parser's words about an input. They quote it somewhere: a line that is longer than the words of any parser is cut.
+pub fn parser_text(error: impl std::fmt::Display) -> String {
+    let line = |line: &str| if line.len() > 3 * QUOTED { cut(line) } else { line.to_owned() };
+    error.to_string().trim_end().lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// A text as a terminal may get it: control characters, which an input can bring, are escaped.
+pub fn printable(text: &str) -> String {
+    let shown = |c: char| !c.is_control() || matches!(c, '\n' | '\t');
+    let mut printable = String::with_capacity(text.len());
+    for c in text.chars() {
+        if shown(c) { printable.push(c) } else { printable.extend(c.escape_debug()) }
+    }
+    printable
+}
+
+/// A message for a terminal: [`printable`], and not longer than a page.
+pub fn message(error: impl std::fmt::Display) -> String {
+    printable(&cut_at(&error.to_string(), MESSAGE))
+}
+
 fn line_text(line: &Option<u64>) -> String {
     line.map(|line| format!(", line {line}")).unwrap_or_default()
 }
@@ -137,12 +174,15 @@ fn did_you_mean(nearest: &Option<String>) -> String {
 /// The message about a name that is none of those which are allowed.
 pub fn unknown(what: &str, name: &str, allowed: &[&str]) -> String {
     let guess = nearest(name, allowed.iter().copied()).map(str::to_owned);
-    format!("unknown {what} `{name}`{}; allowed: {}", did_you_mean(&guess), allowed.join(", "))
+    let (name, allowed) = (cut(name), allowed.join(", "));
+    format!("unknown {what} `{name}`{}; allowed: {allowed}", did_you_mean(&guess))
 }
 
 /// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.
 pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    // A longer one is no misspelling, and would take its time.
     known
+        .filter(|_| name.len() <= QUOTED)
         .map(|candidate| (strsim::levenshtein(&name.to_lowercase(), candidate), candidate))
         .filter(|&(distance, candidate)| distance <= 2 + candidate.len() / 4)
         .min()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use drive_settings::words;
 use sim_bench::columns::Columns;
-use sim_bench::error::unknown;
+use sim_bench::error::{cut, unknown};
 use sim_bench::plant::clarke;
 
 use crate::identification::output_error::{OutputErrorFit, Record};
@@ -78,13 +78,14 @@ impl Names {
         let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
         let pair = |given: &String| {
             let Some((ours, theirs)) = given.split_once('=') else {
+                let given = cut(given);
                 return Err(Error::Refused(format!(
                     "--column {given}: write OURS=THEIRS, for example --column speed_rpm=n"
                 )));
             };
             if !known.contains(&ours) {
                 let problem = unknown("column", ours, &known);
-                return Err(Error::Refused(format!("--column {given}: {problem}")));
+                return Err(Error::Refused(format!("--column {}: {problem}", cut(given))));
             }
             Ok((ours.to_owned(), theirs.to_owned()))
         };

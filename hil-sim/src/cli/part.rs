@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::say;
+use crate::error::message;
 use crate::experiments;
 use crate::prelude::*;
 use crate::report;
@@ -68,7 +69,7 @@ impl Part {
 
 /// What was found in a journal, on standard error. A torn line is named even if little is to be said.
 fn note(journal: &Journal, header: &Header, quiet: bool) {
-    let path = journal.path.display();
+    let path = message(journal.path.display());
     if let Some(line) = journal.torn {
         eprintln!("note: {path}, line {line}, was torn; its run is done again");
     }

@@ -1,6 +1,7 @@
 //! Refusal of keys that an experiment does not use.
 
 use crate::config::{assigned, file, keys_of};
+use crate::error::message;
 use crate::input::Input;
 use crate::prelude::*;
 
@@ -41,7 +42,8 @@ pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(
         }
     }
     if !unused.is_empty() && !input.quiet {
-        eprintln!("note: {name} does not use {} of {}", unused.join(", "), path.display());
+        let (unused, path) = (unused.join(", "), path.display());
+        eprintln!("{}", message(format_args!("note: {name} does not use {unused} of {path}")));
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use super::link::{Link, LinkError};
 use super::own::{HELP, Own};
 use super::transfer;
+use crate::error::cut;
 use crate::prelude::*;
 use crate::report;
 
@@ -50,7 +51,7 @@ impl Session {
                 Flow::Refused(why) => {
                     return Err(Error::Internal(format!(
                         "the drive refuses `{}`: {why}",
-                        line.trim()
+                        cut(line.trim())
                     )));
                 }
                 Flow::Quit => break,

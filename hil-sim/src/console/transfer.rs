@@ -1,6 +1,7 @@
 //! Settings to and from a file: lines that are sent one by one.
 
 use super::link::{Link, LinkError};
+use crate::error::cut;
 
 /// The lines that restore the present settings: those of the drive's `backup`.
 ///
@@ -32,7 +33,8 @@ pub fn restore(
         let answer = link.ask(line, |_| ()).map_err(|why| format!("line {number}: {why}"))?;
         if let Some(error) = answer.error() {
             return Err(format!(
-                "line {number}: `{line}`: {error}; {done} lines before it are set"
+                "line {number}: `{}`: {error}; {done} lines before it are set",
+                cut(line)
             ));
         }
     }

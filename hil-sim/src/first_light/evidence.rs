@@ -1,5 +1,6 @@
 //! The evidence: a TOML file that says which board did what, step by step. It is written whole before and after every step.
 
+use crate::error::{cut, parser_text};
 use crate::prelude::*;
 use crate::report;
 
@@ -79,8 +80,10 @@ impl Evidence {
     /// The text for the person.
     pub fn is_of(&self, found: &str) -> Result<(), String> {
         let own = format!("board {}, build {}", self.board, self.build);
-        let other =
-            format!("{found}: allowed is {own}; another image begins with a new evidence file");
+        let other = format!(
+            "{found}: allowed is {}; another image begins with a new evidence file",
+            cut(&own)
+        );
         if found == own { Ok(()) } else { Err(other) }
     }
 
@@ -103,7 +106,7 @@ impl Evidence {
         }
         let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|why| refused(why.to_string()))?;
-        let evidence: Self = toml::from_str(&text).map_err(|why| refused(why.to_string()))?;
+        let evidence: Self = toml::from_str(&text).map_err(|why| refused(parser_text(why)))?;
         match evidence.schema {
             SCHEMA => Ok(Some(evidence)),
             other => Err(refused(format!("schema = {other}; allowed: {SCHEMA}"))),

@@ -6,6 +6,7 @@ use serde_json::Value as Json;
 
 use super::Shard;
 use crate::config::{Key, Value};
+use crate::error::cut;
 use crate::outcome::{Origin, SCHEMA_VERSION};
 use crate::prelude::*;
 
@@ -102,7 +103,8 @@ impl Header {
         ];
         let mut all = fields.into_iter().chain(settings).chain(rest);
         all.find(|(_, here, there)| here != there)
-            .map(|(name, here, there)| format!("{name} is {here}, there {there}"))
+            .map(|(name, here, there)| [name, &here, &there].map(cut))
+            .map(|[name, here, there]| format!("{name} is {here}, there {there}"))
     }
 }
 

@@ -1,11 +1,12 @@
 //! Configuration files: TOML with the names of the keys, in tables or dotted.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
 use super::{Allowed, Config, Key, Value, flattened};
-use crate::error::Error;
+use crate::error::{Error, parser_text};
 
 /// An assignment of a file.
 pub struct FileAssignment {
@@ -24,14 +25,15 @@ pub struct FileAssignment {
 pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
     let failed = |problem: String| Error::data(path, None, problem);
     let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
-    let table: toml::Table =
-        text.parse().map_err(|e: toml::de::Error| failed(e.to_string().trim_end().to_owned()))?;
-    let places = DeTable::parse(&text).map_err(|e| failed(e.to_string()))?;
-    let mut offsets = Vec::new();
+    let no_toml = |e: toml::de::Error| failed(parser_text(e));
+    let table: toml::Table = text.parse().map_err(no_toml)?;
+    let places = DeTable::parse(&text).map_err(no_toml)?;
+    let mut offsets = BTreeMap::new();
     find("", places.get_ref(), &mut offsets);
+    let ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
     let line_of = |name: &str| {
-        let offset = offsets.iter().find(|(known, _)| known == name).map_or(0, |found| found.1);
-        1 + text[..offset].matches('\n').count() as u64
+        let offset = offsets.get(name).copied().unwrap_or(0);
+        1 + ends.partition_point(|end| *end < offset) as u64
     };
     let assignments = flattened(&table).into_iter();
     Ok(assignments
@@ -40,12 +42,12 @@ pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
 }
 
 /// Names of the values in a table, and where their keys stand in the text.
-fn find(prefix: &str, table: &DeTable<'_>, into: &mut Vec<(String, usize)>) {
+fn find(prefix: &str, table: &DeTable<'_>, into: &mut BTreeMap<String, usize>) {
     for (key, value) in table {
         let name = format!("{prefix}{}", key.get_ref());
         match value.get_ref() {
             DeValue::Table(inner) => find(&format!("{name}."), inner, into),
-            _ => into.push((name, key.span().start)),
+            _ => drop(into.insert(name, key.span().start)),
         }
     }
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
-use crate::error::Error;
+use crate::error::{Error, cut, parser_text};
 
 /// The folder `motors`, which `build.rs` finds.
 static FILES: Dir<'static> = include_dir!("$MOTORS");
@@ -81,7 +81,7 @@ impl Motor {
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
             return match name.ends_with(".json") {
                 true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),
-                false => parse(name, &text).map_err(|e| failed(e.to_string())),
+                false => parse(name, &text).map_err(|e| failed(parser_text(e))),
             };
         }
         let all = Self::all();
@@ -95,7 +95,7 @@ impl Motor {
     /// # Errors
     /// [`Error::Refused`] when it is not of that form.
     pub fn from_text(name: &str, text: &str) -> Result<Self, Error> {
-        parse(name, text).map_err(Error::refused)
+        parse(name, text).map_err(|e| Error::Refused(parser_text(e)))
     }
 
     /// The keys that the file sets, with their values.
@@ -131,7 +131,8 @@ impl Motor {
             let count = sources.filter(|known| **known == key).count();
             if count > 1 || count == 0 && !self.is_own() {
                 return Err(Error::Refused(format!(
-                    "motor {name}: {key} has {count} sources; one [[source]] must name it"
+                    "motor {name}: {} has {count} sources; one [[source]] must name it",
+                    cut(&key)
                 )));
             }
             config.set(&key, &value)?;

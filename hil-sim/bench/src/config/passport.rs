@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::{cut, parser_text};
+
 /// Version of the file.
 pub const SCHEMA: u32 = 1;
 /// Keys that the twin of a learned motor needs beside those of a motor file.
@@ -48,11 +50,12 @@ impl Passport {
     pub fn parse(text: &str) -> Result<Self, String> {
         let named = |why: serde_json::Error| {
             let line = text.lines().nth(why.line().saturating_sub(1)).unwrap_or_default().trim();
-            format!("{why}: `{line}`")
+            format!("{}: `{}`", parser_text(why), cut(line))
         };
         let schema =
             serde_json::from_str::<serde_json::Value>(text).map_err(named)?["schema"].take();
         if schema != SCHEMA {
+            let schema = cut(&schema.to_string());
             return Err(format!("schema = {schema}; allowed: {SCHEMA}"));
         }
         let passport: Self = serde_json::from_str(text).map_err(named)?;

@@ -8,7 +8,7 @@ use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
 use crate::columns::Columns;
 use crate::config::{Value, flattened};
-use crate::error::unknown;
+use crate::error::{cut, parser_text, unknown};
 use crate::prelude::*;
 
 /// A value from the beginning to the end of a part, straight between them.
@@ -195,7 +195,7 @@ impl Scenario {
             Error::data(path, Some(1 + text[..offset].matches('\n').count() as u64), problem)
         };
         let mut text: Text = toml::from_str(text)
-            .map_err(|e| at(e.span().unwrap_or_default().start, e.message().to_owned()))?;
+            .map_err(|e| at(e.span().unwrap_or_default().start, parser_text(e.message())))?;
         let (parts, settings) =
             (std::mem::take(&mut text.part), std::mem::take(&mut text.settings));
         let mut scenario = Self { text, ..Self::default() };
@@ -292,7 +292,8 @@ impl Scenario {
         value: &toml::Value,
     ) -> Result<(), String> {
         let (text, ramp) = (value.as_str(), Ramp::of(value));
-        let wrong = |allowed: &str| format!("{name} = {value}; allowed: {allowed}");
+        let wrong =
+            |allowed: &str| format!("{name} = {}; allowed: {allowed}", cut(&value.to_string()));
         match (name, text) {
             ("seconds", _) => {
                 let seconds = ramp.filter(|ramp| ramp.0 > 0.0 && ramp.1 == ramp.0);
