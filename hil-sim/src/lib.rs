@@ -15,6 +15,6 @@ pub mod report;
 pub mod shards;
 
 pub use sim_bench::{
-    Config, Error, Outcome, columns, config, error, outcome, plant, progress, rig, stats,
+    Config, Error, Outcome, bounded, columns, config, error, outcome, plant, progress, rig, stats,
 };
 pub use sim_lab::identification;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use clap::Args;
 use serde_json::Value;
 
+use crate::bounded;
 use crate::config::Key;
 use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
@@ -60,7 +61,7 @@ pub fn run(options: &Options) -> Result<String, Error> {
         (None, from) => {
             let path = from.clone().unwrap_or_default();
             let failed = |why| Error::Refused(format!("--from {}: {why}", path.display()));
-            std::fs::read_to_string(&path).map_err(|why: std::io::Error| failed(why.to_string()))?
+            bounded::text(&path).map_err(|why: std::io::Error| failed(why.to_string()))?
         }
     };
     report::write_whole(&options.out.with_extension("log"), &text)?;

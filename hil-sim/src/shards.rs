@@ -41,8 +41,12 @@ impl Shard {
 
     /// A shard, if there is one with these numbers.
     pub fn new(index: u32, count: u32) -> Option<Self> {
-        let exists = (1..=Self::MOST).contains(&count) && (1..=count).contains(&index);
-        exists.then_some(Self { index, count })
+        Some(Self { index, count }).filter(Self::exists)
+    }
+
+    /// Whether its numbers are possible; those of a file need not be.
+    pub fn exists(&self) -> bool {
+        (1..=Self::MOST).contains(&self.count) && (1..=self.count).contains(&self.index)
     }
 
     /// The shard of this process in an array of jobs, by the variables of the scheduler.

@@ -149,9 +149,10 @@ fn shards_that_do_not_belong_together_are_refused_by_name() {
         text.lines().filter(|line| !line.contains("\"run\":1,")).map(|l| format!("{l}\n")).collect()
     });
     write("more.json", &|text| text.replace("\"run\":4", "\"run\":5"));
+    write("many.json", &|text| text.replacen("\"runs\":6}\n", "\"runs\":1000000000000000}\n", 1));
     let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat());
     std::fs::write(folder.join("whole.json"), whole.stdout).unwrap();
-    let cases: [(&[&str], &[&str]); 14] = [
+    let cases: [(&[&str], &[&str]); 15] = [
         (&["1.json", "3.json"], &["1 of 3 shards are missing: 2/3"]),
         (&["1.json"], &["2 of 3 shards are missing: 2/3, 3/3"]),
         (&["1.json", "2.json", "1.json"], &["1.json", "shard 1/3 is in 1.json already"]),
@@ -164,6 +165,7 @@ fn shards_that_do_not_belong_together_are_refused_by_name() {
         (&["1.json", "sources.json"], &["sources.json", "sources is 0"]),
         (&["1.json", "torn.json"], &["torn.json", "line 3 is torn"]),
         (&["1.json", "less.json"], &["less.json", "shard 2/3 has not its runs 1"]),
+        (&["many.json"], &["many.json", "shard 2/3 has not its runs 7, 10, 13,"]),
         (&["1.json", "more.json"], &["more.json, line 3", "no record of a run of this shard"]),
         (&["whole.json"], &["whole.json, line 1", "not the head of a shard"]),
     ];

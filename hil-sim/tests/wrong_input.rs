@@ -178,3 +178,36 @@ fn quoted_input_is_escaped_and_cut() {
         assert!(message.lines().all(|l| quoted(l) <= 120 && l.len() < 500), "{case}: {message}");
     }
 }
+
+/// The likely mistake is a table in milliseconds; a device has no end.
+#[test]
+fn endless_times_and_files_are_refused_by_name() {
+    let folder = folder("endless");
+    for (name, last) in [("ms.csv", "10000"), ("huge.csv", "1e300")] {
+        let rows = format!("time_s,speed_rpm\n0,1\n{last},1\n");
+        std::fs::write(folder.join(name), rows).unwrap();
+    }
+    let part = "[[part]]\nseconds = 2000\nspeed_rpm = 1\n";
+    std::fs::write(folder.join("long.toml"), part.repeat(2)).unwrap();
+    for name in ["zero.toml", "zero.json"] {
+        std::os::unix::fs::symlink("/dev/zero", folder.join(name)).unwrap();
+    }
+    for (line, parts) in [
+        ("run profile --input ms.csv", ["ms.csv, line 3: ", "10000 s", "0.001 to 3600 s"]),
+        ("run profile --input huge.csv", ["huge.csv, line 3: ", "milliseconds", "3600 s"]),
+        ("run long.toml", ["long.toml: ", "4000 s", "0.001 to 3600 s"]),
+        ("run profile --input /dev/zero", ["/dev/zero", "longer than 64 MiB", "right file"]),
+        ("identify-trace --input /dev/zero", ["/dev/zero", "longer than 64 MiB", "right file"]),
+        ("run torque-steps --config /dev/zero", ["/dev/zero", "longer than 16 MiB", "right file"]),
+        ("run torque-steps --motor zero.toml", ["zero.toml", "longer than 16 MiB", "right file"]),
+        ("run torque-steps --motor zero.json", ["zero.json", "longer than 16 MiB", "right file"]),
+        ("run zero.toml", ["zero.toml", "longer than 16 MiB", "right file"]),
+        ("passport --from /dev/zero", ["/dev/zero", "longer than 16 MiB", "right file"]),
+        ("merge /dev/zero", ["/dev/zero", "longer than 256 MiB", "right file"]),
+    ] {
+        let output = hil_sim(&folder, &line.split(' ').collect::<Vec<_>>());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{line}: {message}");
+    }
+}

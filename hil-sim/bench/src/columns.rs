@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::bounded;
 use crate::error::{Error, cut, unknown};
 
 /// Named columns of equal length.
@@ -27,14 +28,15 @@ impl Columns {
                 csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
                     format!("{len} cells; the header has {expected_len}")
                 }
-                csv::ErrorKind::Io(error) => error.to_string(),
                 _ => "no UTF-8 text".to_owned(),
             };
             failed(line, problem)
         };
         let mut builder = csv::ReaderBuilder::new();
         let builder = builder.trim(csv::Trim::All).comment(Some(b'#'));
-        let mut reader = builder.from_path(path).map_err(of_csv)?;
+        let bytes = bounded::bytes(path, bounded::TABLE_MIB);
+        let bytes = bytes.map_err(|why| failed(None, why.to_string()))?;
+        let mut reader = builder.from_reader(&bytes[..]);
         let names: Vec<String> =
             reader.headers().map_err(of_csv)?.iter().map(str::to_owned).collect();
         let line = cut(&names.join(", "));

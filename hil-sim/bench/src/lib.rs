@@ -3,6 +3,7 @@
 #![deny(clippy::use_debug)]
 
 pub mod bode;
+pub mod bounded;
 pub mod columns;
 pub mod config;
 pub mod error;

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use super::link::{Link, LinkError};
 use super::own::{HELP, Own};
 use super::transfer;
+use crate::bounded;
 use crate::error::cut;
 use crate::prelude::*;
 use crate::report;
@@ -100,8 +101,8 @@ impl Session {
 
     fn restore(&mut self, file: &Path, mut say: impl FnMut(&str)) -> Result<(), Error> {
         let name = file.display();
-        let text = std::fs::read_to_string(file)
-            .map_err(|why| Error::Refused(format!("!restore {name}: {why}")))?;
+        let text =
+            bounded::text(file).map_err(|why| Error::Refused(format!("!restore {name}: {why}")))?;
         let mut said = Instant::now();
         let done = transfer::restore(&mut self.link, &text, |done, all| {
             if said.elapsed() > PROGRESS {

@@ -14,6 +14,7 @@ use serialport::Parity;
 
 use super::Port;
 use crate::board;
+use crate::bounded;
 use crate::prelude::*;
 
 /// Options of an update.
@@ -127,7 +128,7 @@ pub fn run(options: &Options) -> Result<(), Error> {
     };
     let bin = if file.extension().is_some() { file } else { file.with_extension("bin") };
     let refused = |why: String| Error::Refused(format!("{}: {why}", bin.display()));
-    let bytes = std::fs::read(&bin).map_err(|why| refused(why.to_string()))?;
+    let bytes = bounded::bytes(&bin, bounded::TEXT_MIB).map_err(|why| refused(why.to_string()))?;
     let image = Image::new(bytes).map_err(|why| refused(why.into()))?;
     if let (Some(of), Some(there)) = (&image.board, &there)
         && of != there

@@ -1,5 +1,6 @@
 //! The evidence: a TOML file that says which board did what, step by step. It is written whole before and after every step.
 
+use crate::bounded;
 use crate::error::{cut, parser_text};
 use crate::prelude::*;
 use crate::report;
@@ -105,7 +106,7 @@ impl Evidence {
             return Ok(None);
         }
         let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|why| refused(why.to_string()))?;
+        let text = bounded::text(path).map_err(|why| refused(why.to_string()))?;
         let evidence: Self = toml::from_str(&text).map_err(|why| refused(parser_text(why)))?;
         match evidence.schema {
             SCHEMA => Ok(Some(evidence)),

@@ -2,11 +2,11 @@
 //! that is killed while it writes leaves a torn last line.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::io::{Seek as _, SeekFrom, Write as _};
 use std::sync::{Mutex, PoisonError};
 
 use super::{Header, Run};
-
+use crate::bounded;
 use crate::prelude::*;
 
 /// A file that is read.
@@ -30,7 +30,8 @@ impl Lines {
         let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
         let whole = |line: &&[u8]| line.ends_with(b"\n");
         let first = lines.next().filter(whole);
-        let header = first.and_then(|line| serde_json::from_slice(line).ok()).ok_or_else(|| {
+        let header = first.and_then(|line| serde_json::from_slice(line).ok());
+        let header = header.filter(|header: &Header| header.shard.exists()).ok_or_else(|| {
             let problem = "not the head of a shard or of a file for --resume, or torn";
             Error::data(path, Some(1), problem)
         })?;
@@ -97,8 +98,7 @@ impl Journal {
             let path = path.display();
             return Err(Error::Refused(format!("{path}: another process writes it")));
         }
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(Error::write(path))?;
+        let bytes = bounded::read(&file, bounded::RUNS_MIB).map_err(Error::write(path))?;
         let first = line(header)?;
         let mut read = if first.len() > bytes.len() && first.starts_with(&bytes) {
             let torn = (!bytes.is_empty()).then_some(1);
@@ -202,7 +202,9 @@ mod tests {
         let damaged = format!("{of_seed_2}{{\"run\":1,\"rec\n{{\"run\":3,\"record\":1}}\n");
         let not_of_shard =
             format!("{of_seed_2}{{\"run\":2,\"record\":1}}\n{{\"run\":3,\"record\":1}}\n");
+        let impossible = of_seed_2.replace("\"count\":2", "\"count\":0");
         let cases = [
+            (impossible.as_str(), 1, "line 1: not the head"),
             (of_seed_2.as_str(), 1, "line 1: of another run: here seed is 1, there 2"),
             ("a list of things to do", 1, "line 1: not the head"),
             (damaged.as_str(), 2, "line 2: no record of a run of this shard"),

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::Header;
 use super::journal::Lines;
+use crate::bounded;
 use crate::experiments::statistical;
 use crate::prelude::*;
 
@@ -29,7 +30,8 @@ pub struct Merged {
 pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
     let mut files: Vec<(&Path, Lines)> = Vec::new();
     for path in paths {
-        let bytes = std::fs::read(path).map_err(|e| data(path, e.to_string()))?;
+        let bytes =
+            bounded::bytes(path, bounded::RUNS_MIB).map_err(|e| data(path, e.to_string()))?;
         files.push((path, Lines::of(path, &bytes)?));
     }
     let Some((first_path, first)) = files.first() else {
@@ -56,7 +58,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         }
         records.extend(file.runs.into_iter().map(|run| (run.run, run.record)));
         let missing = shard.numbers(header.runs).filter(|run| !records.contains_key(run));
-        let missing = missing.map(|run| run.to_string()).collect::<Vec<_>>();
+        // As many as are listed: the number of runs is that of the file.
+        let missing = missing.map(|run| run.to_string()).take(LISTED + 1).collect::<Vec<_>>();
         if !missing.is_empty() {
             return Err(data(path, format!("shard {shard} has not its runs {}", listed(&missing))));
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
 use super::{Allowed, Config, Key, Value, flattened};
+use crate::bounded;
 use crate::error::{Error, parser_text};
 
 /// An assignment of a file.
@@ -24,7 +25,7 @@ pub struct FileAssignment {
 /// [`Error::Data`] when the file cannot be read or is not TOML.
 pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
     let failed = |problem: String| Error::data(path, None, problem);
-    let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+    let text = bounded::text(path).map_err(|e| failed(e.to_string()))?;
     let no_toml = |e: toml::de::Error| failed(parser_text(e));
     let table: toml::Table = text.parse().map_err(no_toml)?;
     let places = DeTable::parse(&text).map_err(no_toml)?;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::passport::Passport;
 use super::{Config, Key, Value, alias, flattened};
+use crate::bounded;
 use crate::error::{Error, cut, parser_text};
 
 /// The folder `motors`, which `build.rs` finds.
@@ -78,7 +79,7 @@ impl Motor {
         if is_file(name) {
             let path = Path::new(name);
             let failed = |problem: String| Error::data(path, None, problem);
-            let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+            let text = bounded::text(path).map_err(|e| failed(e.to_string()))?;
             return match name.ends_with(".json") {
                 true => Passport::parse(&text).map(|it| of_passport(name, it)).map_err(failed),
                 false => parse(name, &text).map_err(|e| failed(parser_text(e))),

@@ -6,6 +6,7 @@ use toml::Spanned;
 
 use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
+use crate::bounded;
 use crate::columns::Columns;
 use crate::config::{Value, flattened};
 use crate::error::{cut, parser_text, unknown};
@@ -183,7 +184,7 @@ impl Scenario {
     /// [`Error::Data`] with the line.
     pub fn read(path: &Path, config: &Config) -> Result<Self, Error> {
         let failed = |e: std::io::Error| Error::data(path, None, e.to_string());
-        Self::of_toml(path, &std::fs::read_to_string(path).map_err(failed)?, config)
+        Self::of_toml(path, &bounded::text(path).map_err(failed)?, config)
     }
 
     /// The same from the text of the file.
@@ -227,6 +228,8 @@ impl Scenario {
         let reference = scenario.reference.ok_or_else(|| {
             Error::data(path, None, format!("no [[part]] gives a reference: {}", references()))
         })?;
+        let last = scenario.next().begin;
+        check_time(last).map_err(|problem| Error::data(path, None, problem))?;
         Ok(Self { text: scenario.text.completed(reference.column)?, ..scenario })
     }
 
@@ -257,6 +260,8 @@ impl Scenario {
         if time[time.len() - 1] == 0.0 {
             return Err(columns.error("all rows are at the time 0".into()));
         }
+        check_time(time[time.len() - 1])
+            .map_err(|problem| columns.at(time.len(), format!("column time_s: {problem}")))?;
         let mut scenario = Self { from_rows: true, ..Self::default() };
         for row in 1..time.len() {
             let (this, before) = (time[row], time[row - 1]);
@@ -350,4 +355,14 @@ impl Scenario {
 /// The names of the references.
 fn references() -> String {
     REFERENCES.each_ref().map(|reference| reference.column).join(", ")
+}
+
+/// Checks the time of a whole run, of which every sample is kept, against the range of the key `seconds`.
+fn check_time(seconds: f64) -> Result<(), String> {
+    match Config::default().set("seconds", &Value::Number(seconds)) {
+        Err(Error::Value { value, problem, allowed, .. }) => Err(format!(
+            "the whole time = {value} s: {problem}; allowed: {allowed}. Are the times in milliseconds?"
+        )),
+        _ => Ok(()),
+    }
 }
