@@ -2,7 +2,6 @@
 //! life as long as the page is there.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use drive_web::{loops, talk};
@@ -59,11 +58,7 @@ pub fn watch(shared: &Shared) {
 }
 
 /// Connects again and again, and answers the questions meanwhile. Never returns.
-pub fn run(
-    shared: &Arc<Shared>,
-    asks: &Receiver<Ask>,
-    mut connect: impl FnMut(&Arc<Shared>) -> Result<Link, String>,
-) {
+pub fn run(shared: &Arc<Shared>, mut connect: impl FnMut(&Arc<Shared>) -> Result<Link, String>) {
     loop {
         match connect(shared) {
             Ok(mut link) => {
@@ -71,29 +66,24 @@ pub fn run(
                 shared.connect(Some(link.urgent()));
                 shared.heard();
                 hello(shared, &mut link);
-                converse(shared, asks, &mut link);
+                converse(shared, &mut link);
                 shared.connect(None);
                 shared.tell(json!({ "gone": "the connection to the drive is lost" }));
             }
             Err(why) => shared.tell(json!({ "gone": why })),
         }
         std::thread::sleep(RETRY);
-        // Nobody answers these any more.
-        for ask in asks.try_iter() {
-            if let Ask::Line(id, _) = ask {
-                shared.tell(json!({ "id": id, "error": "the drive is not connected" }));
-            }
-        }
+        shared.drop_asks("the drive is not connected");
     }
 }
 
 /// Answers questions until the port is closed.
-fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
+fn converse(shared: &Shared, link: &mut Link) {
     let mut asked = Instant::now();
     while !link.is_closed() {
-        match asks.recv_timeout(STATUS.saturating_sub(asked.elapsed())) {
-            Ok(Ask::Hello) => hello(shared, link),
-            Ok(Ask::Line(id, line)) => {
+        match shared.next_ask(STATUS.saturating_sub(asked.elapsed())) {
+            Some(Ask::Hello) => hello(shared, link),
+            Some(Ask::Line(id, line)) => {
                 let answer = match link.ask(&line, |_| ()) {
                     Ok(Answer { lines }) => {
                         let loops = (line == "describe").then(|| loops::of(&lines));
@@ -108,8 +98,7 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
                 shared.heard();
                 shared.tell(answer);
             }
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return,
+            None => {}
         }
         if asked.elapsed() >= STATUS {
             asked = Instant::now();

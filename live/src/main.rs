@@ -56,7 +56,7 @@ async fn main() -> ExitCode {
     match run(Arguments::parse()).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("{}", hil_sim::error::message(format_args!("error: {error:#}")));
             ExitCode::from(2)
         }
     }
@@ -69,7 +69,7 @@ async fn run(arguments: Arguments) -> Result<()> {
     let address = ("127.0.0.1", arguments.listen);
     let listener = TcpListener::bind(address).await;
     let listener = listener.with_context(|| format!("--listen {}: 127.0.0.1", arguments.listen))?;
-    let (shared, asks) = Shared::new();
+    let shared = Shared::new();
     let own = arguments.port.is_none();
     let simulated = own && (arguments.simulated || cfg!(not(unix)));
     let emulated = own && !simulated;
@@ -80,7 +80,7 @@ async fn run(arguments: Arguments) -> Result<()> {
     let used = port.clone();
     let worker = shared.clone();
     std::thread::spawn(move || {
-        drive::run(&worker, &asks, |shared| match simulated {
+        drive::run(&worker, |shared| match simulated {
             true => drive_live::simulated::connect(shared, seed),
             false => connect(shared, &used, baud, real),
         });

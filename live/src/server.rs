@@ -18,18 +18,27 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use axum::serve::Listener;
+use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use hyper_util::server::conn::auto::Builder;
+use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
 use serde_json::json;
 use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
 use tokio::time::{interval, timeout};
 
 use crate::drive;
-use crate::shared::{Ask, Shared};
+use crate::shared::Shared;
 
 /// From one message to the page to the next.
 const TICK: Duration = Duration::from_millis(40);
 /// A page that takes nothing for so long is disconnected.
 const SLOW: Duration = Duration::from_secs(2);
+/// The head of a request takes no longer; also the next one of a connection.
+pub const HEAD: Duration = Duration::from_secs(5);
+/// Most connections at a time, without those of WebSockets, of which there is one; others wait.
+const MOST_CONNECTIONS: usize = 256;
 /// Longest message of the page, bytes.
 pub const LONGEST: usize = 8192;
 
@@ -55,7 +64,7 @@ pub fn token() -> Result<String, getrandom::Error> {
 /// # Errors
 /// Those of the listener.
 pub async fn serve(
-    listener: TcpListener,
+    mut listener: TcpListener,
     token: String,
     shared: Arc<Shared>,
 ) -> std::io::Result<()> {
@@ -65,7 +74,19 @@ pub async fn serve(
         .route("/ws", get(upgrade))
         .layer(from_fn_with_state(access.clone(), guard))
         .with_state(access);
-    axum::serve(listener, router).await
+    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    loop {
+        let permit = connections.clone().acquire_owned().await.map_err(std::io::Error::other)?;
+        let (stream, _) = Listener::accept(&mut listener).await;
+        let service = TowerToHyperService::new(router.clone());
+        tokio::spawn(async move {
+            let mut http = Builder::new(TokioExecutor::new()).http1_only();
+            http.http1().timer(TokioTimer::new()).header_read_timeout(HEAD);
+            // A client that goes away, or is too slow, is no error of this program.
+            let _ = http.serve_connection_with_upgrades(TokioIo::new(stream), service).await;
+            drop(permit);
+        });
+    }
 }
 
 /// Lets requests pass that come from this page.
@@ -188,7 +209,7 @@ fn take(shared: &Shared, number: u64, text: &str) {
         Ok(Said::Ack) => shared.page_answers(number),
         Ok(Said::Stop) => shared.stop("by the page"),
         Ok(Said::Ask(id, line)) => match drive::checked(&line) {
-            Ok(line) => shared.ask(Ask::Line(id, line)),
+            Ok(line) => shared.ask(id, line),
             Err(why) => shared.tell(json!({ "id": id, "error": why })),
         },
         Err(why) => shared.tell(json!({ "refused": format!("not understood: {why}") })),

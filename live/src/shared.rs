@@ -3,8 +3,7 @@
 
 use std::collections::VecDeque;
 use std::io::Write as _;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use drive_stream::Frame;
@@ -18,6 +17,8 @@ pub const PAGE_LOST: Duration = Duration::from_millis(350);
 const BUSY: Duration = Duration::from_secs(1);
 /// Most texts that wait for a slow page; the oldest go first.
 const MOST_TEXTS: usize = 2000;
+/// Most questions that wait for the drive: a page has one or two.
+pub const MOST_ASKS: usize = 64;
 
 /// A question of the page.
 #[derive(Debug)]
@@ -31,12 +32,13 @@ pub enum Ask {
 /// See the head of the module.
 pub struct Shared {
     inner: Mutex<Inner>,
-    asks: Sender<Ask>,
+    asked: Condvar,
 }
 
 #[derive(Default)]
 struct Inner {
     texts: VecDeque<Value>,
+    asks: VecDeque<Ask>,
     frames: Frames,
     flux: Option<[f64; 3]>,
     /// Number of the page that is connected, and when it has answered last.
@@ -50,10 +52,9 @@ struct Inner {
 }
 
 impl Shared {
-    /// Nothing yet, and the end that takes the questions.
-    pub fn new() -> (Arc<Self>, Receiver<Ask>) {
-        let (asks, receive) = channel();
-        (Arc::new(Self { inner: Mutex::default(), asks }), receive)
+    /// Nothing yet.
+    pub fn new() -> Arc<Self> {
+        Arc::new(Self { inner: Mutex::default(), asked: Condvar::new() })
     }
 
     /// A thread that panicked leaves whole texts and frames.
@@ -116,10 +117,10 @@ impl Shared {
         (inner.answered, inner.watched) = (Some(Instant::now()), true);
         inner.texts.clear();
         inner.frames.take();
-        let page = inner.page;
-        drop(inner);
-        self.ask(Ask::Hello);
-        page
+        // Those of the page before are nobody's.
+        inner.asks = VecDeque::from([Ask::Hello]);
+        self.asked.notify_one();
+        inner.page
     }
 
     /// Whether this page is still the one.
@@ -160,10 +161,35 @@ impl Shared {
         inner.page > 0 && !inner.watched
     }
 
-    /// Puts a question to the drive.
-    pub fn ask(&self, ask: Ask) {
-        // Without a drive, the page knows that from another message.
-        let _ = self.asks.send(ask);
+    /// Puts a line of the page to the drive, with a number for the answer, unless too many wait.
+    pub fn ask(&self, id: u64, line: String) {
+        let mut inner = self.inner();
+        if inner.asks.len() < MOST_ASKS {
+            inner.asks.push_back(Ask::Line(id, line));
+            self.asked.notify_one();
+        } else {
+            drop(inner);
+            let why = format!("not sent: {MOST_ASKS} lines wait for the drive already");
+            self.tell(json!({ "id": id, "error": why }));
+        }
+    }
+
+    /// The next question, if one comes within this time.
+    pub fn next_ask(&self, patience: Duration) -> Option<Ask> {
+        let none = |inner: &mut Inner| inner.asks.is_empty();
+        let waited = self.asked.wait_timeout_while(self.inner(), patience, none);
+        waited.unwrap_or_else(PoisonError::into_inner).0.asks.pop_front()
+    }
+
+    /// Answers all lines that wait with an error.
+    pub fn drop_asks(&self, why: &str) {
+        let waiting = std::mem::take(&mut self.inner().asks);
+        for ask in waiting {
+            match ask {
+                Ask::Hello => self.inner().asks.push_back(ask),
+                Ask::Line(id, _) => self.tell(json!({ "id": id, "error": why })),
+            }
+        }
     }
 
     /// The way to the drive for what cannot wait; `None` while it is not connected.
@@ -171,8 +197,9 @@ impl Shared {
         self.inner().urgent = urgent;
     }
 
-    /// Stops the drive at once, for a reason that the page shows.
+    /// Stops the drive at once, for a reason that the page shows. A start that still waits is not sent.
     pub fn stop(&self, why: &str) {
+        self.drop_asks("not sent: the drive was stopped");
         self.tell(json!({ "stopped": why }));
         // Whoever reads it may have gone.
         let _ = writeln!(std::io::stdout(), "drive stopped: {why}");

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use drive_live::shared::Shared;
-use drive_live::{drive, server};
+use drive_live::{drive, server, shared};
 use drive_stream::{Frame, LONGEST};
 use drive_web::loops;
 use hil_sim::console::link::Link;
@@ -63,11 +63,11 @@ fn served_with(answer: fn(&str) -> &'static str) -> Served {
             heard.lock().unwrap().push((Instant::now(), line));
         }
     });
-    let (shared, asks) = Shared::new();
+    let shared = Shared::new();
     let worker = shared.clone();
     let mut link = Some(ours);
     std::thread::spawn(move || {
-        drive::run(&worker, &asks, |shared| {
+        drive::run(&worker, |shared| {
             let ours = link.take().ok_or("once")?;
             let (writer, frames) = (ours.try_clone().unwrap(), shared.clone());
             Ok(Link::with_frames(ours, writer, |_| (), move |frame| frames.frame(frame)))
@@ -300,6 +300,49 @@ fn clients_that_send_slowly_or_too_much_hold_up_nobody() {
     assert!(sent.is_err() || read.is_err() || told.starts_with("HTTP/1.1 4"), "{told}");
     assert_eq!(ask(&mut page, 1, "torque 1")["lines"], json!(["ok"]));
     assert!(served.got("stop").is_none(), "the drive was stopped");
+}
+
+/// Also one that has been answered before.
+#[test]
+fn half_a_request_is_disconnected() {
+    let served = served();
+    let mut halves = [0, 1].map(|_| TcpStream::connect(served.address).unwrap());
+    let whole = format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", served.address);
+    write!(halves[1], "{whole}{whole}").unwrap();
+    for half in &mut halves {
+        half.set_read_timeout(Some(2 * server::HEAD)).unwrap();
+        write!(half, "GET /?token=").unwrap();
+    }
+    for mut half in halves {
+        let mut told = String::new();
+        half.read_to_string(&mut told).expect("it is still connected");
+    }
+}
+
+/// A page that asks faster than the drive answers is refused what is beyond the limit. A start that waits is not sent behind a stop.
+#[test]
+fn a_flood_of_questions_is_refused_and_a_stop_empties_the_queue() {
+    let slow = |line: &str| {
+        if line.starts_with("torque") {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        answer(line)
+    };
+    let served = served_with(slow);
+    let mut page = served.own();
+    until(&mut page, "hello");
+    let asked = |id: u64, line: &str| Message::text(json!({ "ask": [id, line] }).to_string());
+    (1..=5000).for_each(|id| page.send(asked(id, "torque 1")).unwrap());
+    let refused = until(&mut page, "error")["error"].to_string();
+    assert!(refused.contains(&format!("{} lines wait", shared::MOST_ASKS)), "{refused}");
+    page.send(Message::text("\"stop\"")).unwrap();
+    while until(&mut page, "stopped")["stopped"] != "by the page" {}
+    for (id, line) in [(5001, "torque 2"), (5002, "start torque")] {
+        page.send(asked(id, line)).unwrap();
+    }
+    page.send(Message::text("\"stop\"")).unwrap();
+    assert_eq!(ask(&mut page, 5003, "torque 3")["lines"], json!(["ok"]));
+    assert!(served.got("start torque").is_none(), "it was sent behind the stop");
 }
 
 #[test]

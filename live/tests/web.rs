@@ -163,7 +163,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
 /// The same board behind `cargo live --simulated`, in real time.
 #[test]
 fn the_simulated_board_starts_holds_torque_and_reports_an_open_wire() {
-    let (shared, _asks) = Shared::new();
+    let shared = Shared::new();
     let mut link = drive_live::simulated::connect(&shared, 1).unwrap();
     link.begin();
     let mut ask = |line: &str| link.ask(line, |_| ()).unwrap().lines.pop().unwrap();
