@@ -39,5 +39,6 @@ mod starts_after_a_run;
 mod torque_limit;
 mod torque_rise;
 mod user_files;
+mod workflows;
 mod wrong_input;
 mod yardstick;
