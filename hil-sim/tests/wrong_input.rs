@@ -4,7 +4,7 @@
 use crate::cli_common::{files, folder, hil_sim, text};
 
 /// Files of the tests: name and text.
-const FILES: [(&str, &str); 16] = [
+const FILES: [(&str, &str); 17] = [
     ("type.toml", "[motor]\nr_s = \"five\"\n"),
     ("range.toml", "[inverter]\n\ndc_link_v = 5000\n"),
     ("key.toml", "[motor]\nr_s = 5\nrs_ = 5\n"),
@@ -13,6 +13,7 @@ const FILES: [(&str, &str); 16] = [
     ("twice.toml", "seconds = 1\nseconds = 2\n"),
     ("array.toml", "[motor]\nr_s = [1, 2]\n"),
     ("motor.toml", "title = \"x\"\n"),
+    ("number.json", "7\n"),
     ("unit.csv", "time_s,torque\n0,1\n1,1\n"),
     ("both.csv", "time_s,torque_current_a,speed_rpm\n0,1,1\n1,1,1\n"),
     ("back.csv", "time_s,speed_rpm\n0,1\n2,1\n1,1\n"),
@@ -25,7 +26,7 @@ const FILES: [(&str, &str); 16] = [
 
 /// Arguments, separated by spaces, and parts of the message.
 #[rustfmt::skip] // a case a line
-const CASES: [(&str, &[&str]); 57] = [
+const CASES: [(&str, &[&str]); 58] = [
     // Commands and names.
     ("rum torque-steps", &["rum", "run"]),
     ("run", &["<NAME>", "cargo sim run"]),
@@ -77,6 +78,7 @@ const CASES: [(&str, &[&str]); 57] = [
     ("run torque-steps --config word.toml", &["word.toml, line 2: load.mode = free-wheeling", "locked, free, speed"]),
     ("run torque-steps --config array.toml", &["array.toml, line 2: motor.r_s = [1, 2]", "not a number"]),
     ("run torque-steps --motor motor.toml", &["motor.toml", "nameplate.power_w", "motor.l_m", "inverter.dc_link_v"]),
+    ("run torque-steps --motor number.json", &["number.json: schema = null; allowed: 1"]),
     // Profiles and traces.
     ("run profile", &["profile needs --input FILE"]),
     ("run torque-steps --input unit.csv", &["--input unit.csv", "allowed with: profile"]),

@@ -52,10 +52,10 @@ impl Passport {
             let line = text.lines().nth(why.line().saturating_sub(1)).unwrap_or_default().trim();
             format!("{}: `{}`", parser_text(why), cut(line))
         };
-        let schema =
-            serde_json::from_str::<serde_json::Value>(text).map_err(named)?["schema"].take();
-        if schema != SCHEMA {
-            let schema = cut(&schema.to_string());
+        let any: serde_json::Value = serde_json::from_str(text).map_err(named)?;
+        // Null, if it is no object.
+        if any["schema"] != SCHEMA {
+            let schema = cut(&any["schema"].to_string());
             return Err(format!("schema = {schema}; allowed: {SCHEMA}"));
         }
         let passport: Self = serde_json::from_str(text).map_err(named)?;
