@@ -196,7 +196,7 @@ impl Learned {
             && (least_limit_a..=POINTS as f32 * step).contains(&self.limit_a)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)
             && within(&self.current_saliency, CURRENT_SALIENCY.0 / step)
-            && self.flux_saliency.is_finite()
+            && self.flux_saliency.abs() < 1.0
     }
 
     /// This result, found at another rotor position with the coefficients of `before`, on top of it: gain mismatch and

@@ -23,9 +23,9 @@ use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;
-/// For the tests of the desk.
-pub(crate) use doubles::FakeDrive;
-use doubles::{FakeBus, FakePort, FakeStrip, found};
+use doubles::{FakeBus, FakePort, FakeStrip};
+/// For the tests of desk and store.
+pub(crate) use doubles::{FakeDrive, found};
 use drive_core::io::PERIOD_S;
 use drive_core::learned::{Learned, Verdict};
 use drive_core::{

@@ -28,9 +28,10 @@ fn row(key: Key) -> String {
     };
     let learned = if key.learned() { "; **L**" } else { "" };
     let hardware = if key.hardware() { "; **H**" } else { "" };
+    let guards = if key.guards() { "; **P**" } else { "" };
     let (name, unit, help) = (key.name(), key.unit(), key.help());
     format!(
-        "| `{name}` | {register:04X} | {unit} | {default} | {range} | {help}{change}{learned}{hardware} |"
+        "| `{name}` | {register:04X} | {unit} | {default} | {range} | {help}{change}{learned}{hardware}{guards} |"
     )
 }
 

@@ -351,3 +351,32 @@ proptest! {
         prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
     }
 }
+
+/// Each word of a stored result replaced by values that no learning gives: what is taken all the same is bounded, the injection current
+/// above all, and no number in it is infinite.
+#[test]
+fn a_restored_result_is_bounded_whatever_a_word_says() {
+    let whole = learned_words::to_words(&crate::console::tests::found(), false);
+    let mut taken = 0;
+    for word in 0..learned_words::WORDS {
+        for value in
+            [f32::NAN, f32::INFINITY, 1e30, -1e30, 100.0, -100.0, 1.0, -1.0, 1e-30, 0.0, -0.0]
+        {
+            let mut words = whole;
+            words[word] = value.to_bits();
+            let Some(result) = learned_words::from_words(&words) else { continue };
+            taken += 1;
+            let what = format!("word {word} = {value}");
+            let carrier = result.carrier.expect("the flags are as they were");
+            assert!(carrier.points().iter().all(|share| (0.5..=2.0).contains(share)), "{what}");
+            assert!(result.reference.points().iter().all(|q| q.abs() <= 0.3), "{what}");
+            let slope = result.slope.expect("the flags are as they were");
+            assert!(slope.points().iter().all(|k| (0.001..=0.6).contains(&k.abs())), "{what}");
+            assert!(result.flux_saliency.abs() < 1.0 && result.limit_a < 10.0, "{what}");
+            let numbers =
+                [result.spread, result.gain_mismatch.misfit, result.current_saliency.value];
+            assert!(numbers.iter().all(|number| number.is_finite()), "{what}");
+        }
+    }
+    assert!((50..400).contains(&taken), "{taken} taken");
+}

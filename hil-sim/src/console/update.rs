@@ -98,6 +98,20 @@ impl Image {
         }
     }
 
+    /// Passes if the image is for the board that is there, as far as both are known.
+    ///
+    /// # Errors
+    /// It is for another one.
+    pub fn fits(&self, there: Option<&str>) -> Result<(), String> {
+        match (self.board.as_deref(), there) {
+            (Some(of), Some(there)) if of != there => Err(format!(
+                "the image is for the board {of}, and the drive at the port is a {there}: on it, the image may switch gates on; \
+                 take the image of {there}, or say --other-board"
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// The pages with contents, in the order in which they are written.
     fn pages(&self) -> Vec<(usize, &[u8])> {
         let used = |(_, page): &(usize, &[u8])| page.iter().any(|byte| *byte != 0xff);
@@ -130,14 +144,8 @@ pub fn run(options: &Options) -> Result<(), Error> {
     let refused = |why: String| Error::Refused(format!("{}: {why}", bin.display()));
     let bytes = bounded::bytes(&bin, bounded::TEXT_MIB).map_err(|why| refused(why.to_string()))?;
     let image = Image::new(bytes).map_err(|why| refused(why.into()))?;
-    if let (Some(of), Some(there)) = (&image.board, &there)
-        && of != there
-        && !options.other_board
-    {
-        return Err(refused(format!(
-            "the image is for the board {of}, and the drive at the port is a {there}: on it, the image may switch gates on; \
-             take the image of {there}, or say --other-board"
-        )));
+    if !options.other_board {
+        image.fits(there.as_deref()).map_err(refused)?;
     }
     let said = update(&mut port, &image, |line| eprintln!("{line}"))?;
     println!("{said}");
@@ -148,7 +156,7 @@ pub fn run(options: &Options) -> Result<(), Error> {
 ///
 /// # Errors
 /// The port fails.
-fn board_at(port: &mut Port) -> Result<Option<String>, Error> {
+pub fn board_at(port: &mut Port) -> Result<Option<String>, Error> {
     // Ends a line that may have begun; what is said to that goes by.
     send(port, b"\n").map_err(Error::Internal)?;
     line(port, Duration::from_millis(300), |_| false);

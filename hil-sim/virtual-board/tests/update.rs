@@ -271,3 +271,38 @@ fn a_loss_of_power_leaves_an_image_that_starts_or_says_why_not() -> Result<()> {
 fn fifty_losses_of_power_and_ten_in_the_first_page() -> Result<()> {
     power_losses(50, 10)
 }
+
+/// An image names its board, and so does the drive at the port: each image fits its own board alone, and one of another is refused by the
+/// names of both.
+#[test]
+fn an_image_of_another_board_is_not_written() -> Result<()> {
+    let mut board = board()?;
+    until(&mut board, "last run: ", GREETING)?;
+    let mut pty = Pty::open()?;
+    let (mut port, _) = hil_sim::console::open(&pty.path.to_string_lossy(), 115_200)?;
+    let host = std::thread::spawn(move || update::board_at(&mut port));
+    while !host.is_finished() {
+        board.send(&pty.read()?);
+        board.run_periods(6)?;
+        pty.write(board.take_console().as_bytes())?;
+    }
+    let there = host.join().expect("it ends").map_err(|why| anyhow::anyhow!("{why:?}"))?;
+    ensure!(there.as_deref() == Some("reference"), "{there:?}");
+    for stage in virtual_board::power_stage::ALL {
+        let options = Options::on(stage, &stage.config()?, 1);
+        let other = Board::new(Image::built_for(stage.name)?, options)?;
+        let image = update::Image::new(binary(&other, false)).map_err(anyhow::Error::msg)?;
+        ensure!(image.board.as_deref() == Some(stage.name), "{:?}", image.board);
+        let fits = image.fits(there.as_deref());
+        match fits {
+            Ok(()) => ensure!(stage.name == "reference", "{} fits", stage.name),
+            Err(why) => {
+                let both = [stage.name, "is a reference", "--other-board"];
+                ensure!(stage.name != "reference" && both.iter().all(|part| why.contains(part)));
+            }
+        }
+        // Of a board that does not answer nothing is known.
+        ensure!(image.fits(None).is_ok());
+    }
+    Ok(())
+}

@@ -26,9 +26,14 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
     let settings = motor_settings(AngleSource::Injection).build().unwrap();
     vec![
         ("start, learn", MODES.map(Start).into()),
-        ("check of the wiring", vec![CheckWiring]),
+        ("check of the wiring, brake", vec![CheckWiring, Brake(0.2)]),
         ("commission", vec![Excite(current), Excite(pulses())]),
-        ("stop", [super::Stop::Coast, super::Stop::Ramp, super::Stop::Quick].map(Stop).into()),
+        (
+            "stop",
+            [super::Stop::Coast, super::Stop::Ramp, super::Stop::Quick, super::Stop::Now]
+                .map(Stop)
+                .into(),
+        ),
         ("clear", vec![Clear]),
         ("settings", vec![Configure(settings)]),
         ("relock", vec![Relock]),
@@ -204,8 +209,8 @@ fn every_command_is_taken_or_refused_in_every_state() {
 /// The other table: the state behind a stop, a clear, a start and a relock, and behind a fault.
 #[test]
 fn every_event_leads_to_the_state_of_the_table() {
-    use super::Stop::{Coast, Quick, Ramp};
-    let events = [Coast, Ramp, Quick].map(Command::Stop).into_iter();
+    use super::Stop::{Coast, Now, Quick, Ramp};
+    let events = [Coast, Ramp, Quick, Now].map(Command::Stop).into_iter();
     let events: Vec<_> = events.chain([Command::Clear, Command::Relock]).collect();
     let mut table = BTreeMap::new();
     for bench in rows().into_iter().flat_map(|(_, benches)| benches) {
@@ -237,12 +242,13 @@ fn every_event_leads_to_the_state_of_the_table() {
         assert_eq!(*table.entry(name.clone()).or_insert_with(|| row.clone()), row, "{name}");
     }
     assert_eq!(table.len(), 17, "each state");
-    let head = "| state | `stop` | `stop ramp` | `stop quick` | `clear` | `relock` | fault |";
+    let head =
+        "| state | `stop` | `stop ramp` | `stop quick` | `stop now` | `clear` | `relock` | fault |";
     let rows = table.iter().map(|(name, row)| format!("| {name} | {row} |\n")).collect::<String>();
     generated::check(
         "control-law.md",
         "events",
-        &format!("{head}\n|---|---|---|---|---|---|---|\n{rows}"),
+        &format!("{head}\n|---|---|---|---|---|---|---|---|\n{rows}"),
     );
 }
 
