@@ -102,11 +102,9 @@ impl Fault {
     /// Whether the current or the temperature was beyond what the power stage stands, or it said so itself: a start into the same wiring
     /// is a load for its switches.
     pub const fn is_of_the_power_stage(self) -> bool {
-        match self {
-            Self::OverCurrentA | Self::OverCurrentB | Self::OverCurrentC => true,
-            Self::OverTemperature | Self::Break | Self::AnalogWatchdog => true,
-            _ => false,
-        }
+        let over_current =
+            matches!(self, Self::OverCurrentA | Self::OverCurrentB | Self::OverCurrentC);
+        over_current || matches!(self, Self::OverTemperature | Self::Break | Self::AnalogWatchdog)
     }
 
     /// The result of a check: this fault, unless what was seen is `sound`. A comparison with NaN is not.

@@ -15,7 +15,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use drive_core::Telemetry;
 
 pub use signals::{
-    MOST, Record, SIGNALS, SPEED, Sampled, Signal, SignalChoice, Values, find, shown, values,
+    MOST, Record, SIGNALS, Sampled, Signal, SignalChoice, Values, find, shown, values,
 };
 
 /// What starts the part of a trace that is kept.

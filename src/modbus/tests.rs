@@ -110,7 +110,7 @@ fn a_busy_slave_answers_whole_requests_for_it_alone() {
         (0x6040, 15, false),
         (0x2001, 1, false),
     ] {
-        let ([a, b], [c, d]) = ((at as u16).to_be_bytes(), (word as u16).to_be_bytes());
+        let ([a, b], [c, d]) = (u16::to_be_bytes(at), u16::to_be_bytes(word));
         let stop = stops.then_some((at, word));
         let exception =
             |function: u8| if stops { None } else { Some(framed(&[17, function | 0x80, 6])) };

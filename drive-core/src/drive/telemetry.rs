@@ -47,12 +47,6 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// That of the same shaft with the outputs off: no current, voltage and flux.
-    pub fn without_current(&self) -> Self {
-        let Self { phi, rotor_freq, dc_link, turns, .. } = *self;
-        Self { phi, rotor_freq, dc_link, turns, ..Self::still() }
-    }
-
     /// Without current, with the whole carrier.
     pub(super) fn still() -> Self {
         Self { carrier_share: 1.0, ..Self::default() }

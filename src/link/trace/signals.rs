@@ -124,17 +124,18 @@ signals! { |t, s|
     19: "limit" = s.limit.into(),
 }
 
-/// Index of the speed.
-pub const SPEED: usize = 2;
+/// Index of the speed, and of the signals of flux, current, voltage and torque.
+const SPEED: usize = 2;
+const ENERGISED: [usize; 9] = [1, 3, 4, 5, 6, 7, 8, 9, 16];
 
 /// The values as they are shown: a drive that is off has no current and no torque, whatever its last step saw, and the shaft this speed,
 /// electrical turns per control period.
 pub fn shown(telemetry: &Telemetry, sampled: &Sampled, shaft: f32) -> Values {
-    if !sampled.is_off() {
-        return values(telemetry, sampled);
+    let mut values = values(telemetry, sampled);
+    if sampled.is_off() {
+        ENERGISED.iter().for_each(|index| values[*index] = 0.0);
+        values[SPEED] = shaft;
     }
-    let mut values = values(&telemetry.without_current(), sampled);
-    values[SPEED] = shaft;
     values
 }
 

@@ -1,4 +1,4 @@
-use drive_core::{Fault, Limiting, Sample, State, Telemetry};
+use drive_core::{Dq, Fault, Limiting, Sample, State, Telemetry};
 use drive_settings::{CurrentSensors, Settings};
 
 use super::*;
@@ -161,7 +161,6 @@ fn signals_are_recorded_as_they_were_chosen() {
     }
     let mut full = SignalChoice::usual();
     assert!(!full.add(0) && find("speed").is_none() && find("").is_none());
-    assert_eq!(SIGNALS[SPEED].name, "speed_rpm");
 }
 
 /// The numbers of state and limit, which programs rely on.
@@ -265,4 +264,32 @@ fn the_manual_lists_the_signals() {
         table += &format!("| {} | `{name}` | {meaning} |\n", signal.id);
     }
     generated::check("console.md", "signals", &table);
+}
+
+/// A drive that is off shows neither current nor voltage nor torque, and the speed that it is given; one that runs shows all.
+#[test]
+fn a_drive_that_is_off_shows_no_current() {
+    let d_q = Dq::new(1.0, 1.0);
+    let running = Telemetry {
+        flux_freq: 1.0,
+        rotor_freq: 1.0,
+        reference: d_q,
+        current: d_q,
+        voltage: d_q,
+        delta_i: 1.0,
+        ..Telemetry::default()
+    };
+    for (state, off) in [(0, true), (1, false), (2, false), (3, false), (signals::FAULT + 1, true)]
+    {
+        let sampled = Sampled { state, ..Sampled::default() };
+        for (signal, value) in SIGNALS.iter().zip(shown(&running, &sampled, 7.0)) {
+            let expected = match signal.name {
+                "speed_rpm" => [1.0, 7.0],
+                "flux_hz" | "i_d_ref_a" | "i_q_ref_a" | "i_d_a" | "i_q_a" => [1.0, 0.0],
+                "v_d_v" | "v_q_v" | "delta_i_a" | "torque_nm" => [1.0, 0.0],
+                _ => continue,
+            };
+            assert_eq!(value, expected[usize::from(off)], "{} {state}", signal.name);
+        }
+    }
 }
