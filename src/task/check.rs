@@ -1,5 +1,6 @@
 //! The check of the control's memory and registers, by the main loop.
 
+use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
 use cortex_m::singleton;
@@ -19,7 +20,9 @@ pub struct Check {
 impl Check {
     /// The check of a control that runs; on the first call only.
     pub fn new() -> Option<Self> {
-        let expected = singleton!(: [u32; COUNT] = [0; COUNT])?;
+        // Filled outside of the macro, which masks the interrupts: the control runs already.
+        let expected = singleton!(: MaybeUninit<[u32; COUNT]> = MaybeUninit::uninit())?;
+        let expected = expected.write([0; COUNT]);
         let (code, source) = memory::control_code();
         let (constants, changes) = control::constants();
         let checked = CheckedMemory { code, source, constants, changes };
