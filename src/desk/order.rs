@@ -159,7 +159,7 @@ pub enum Refusal {
     },
     /// The settings in the flash are of another board.
     #[error(
-        "this image is for the board {own}, and the settings in the flash are of the board {theirs}: flash the image of {theirs}; only if this is a {own}: `defaults`, then its bench steps and `confirm board`"
+        "this image is for the board {own}, the saved settings are of {theirs}: flash the image of {theirs}; only if this is a {own}: `defaults`, bench steps, `confirm board`"
     )]
     SavedOn {
         /// The board of the settings.
@@ -206,7 +206,7 @@ pub enum Refusal {
     Stopped,
     /// Seconds for which a fault of the power stage is not cleared.
     #[error(
-        "three faults of the power stage within 10 s: find the short circuit, the earth fault or the wrong wire first; `clear` works in {0} s"
+        "three faults of the power stage within 10 s: find the short circuit or the wrong wire; `clear` works in {0} s"
     )]
     TooOften(u32),
     /// The reference of the terminal strip was lost.

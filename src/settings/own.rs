@@ -19,15 +19,15 @@ pub const BOARD: &str = "board";
 #[rustfmt::skip] // One setting, one row.
 pub static OWN: [Entry<Settings>; 24] = [
     entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
-    entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest: for so long after the outputs went off it is assumed to turn").from_to(0.0, 3600.0).guarded(Guard::Raise),
+    entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest").from_to(0.0, 3600.0).guarded(Guard::Raise),
     entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set").guarded(Guard::Keep),
     entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
     entry!(104: word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
     entry!(105: whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
     entry!(106: word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
     entry!(107: word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
-    entry!(131: word(), "bus.alive", [bus] alive: Alive, "requests by which the master counts as alive: writes of command, frequency or control word, or any valid one").guarded(Guard::Lower),
-    entry!(110: word(), "strip.enable", [strip] enable: Enable, "whether ENABLE must be closed, whoever commands; opening it takes the torque to zero and switches off, `now` switches off at once").guarded(Guard::Raise),
+    entry!(131: word(), "bus.alive", [bus] alive: Alive, "requests by which the master counts as alive: commands, or any valid one").guarded(Guard::Lower),
+    entry!(110: word(), "strip.enable", [strip] enable: Enable, "whether ENABLE must be closed; opening it takes the torque to zero, then switches off; now: off at once").guarded(Guard::Raise),
     entry!(111: word(), "strip.start", [strip] start: Start, "a switch at START starts and stops, or a button at START starts and one at STOP stops"),
     entry!(112: word(), "strip.reverse", [strip] reverse: bool, "whether REVERSE, closed at a start, turns the other way"),
     entry!(113: word(), "strip.reset", [strip] reset: bool, "whether closing RESET clears a latched fault"),

@@ -32,37 +32,33 @@ impl Drive {
 
 impl Field {
     fn stop(&mut self, c: &Coefficients, k: &mut Kept, stop: Stop) {
-        let (regulates, turns) = (self.regulates(), self.has_torque());
         match (&mut self.goal, stop) {
             (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
             (Goal::Brake { quick }, Stop::Quick) => {
                 *quick = true;
                 return;
             }
-            (goal, Stop::Ramp | Stop::Quick) if regulates => {
-                // The speed loop takes over at the present speed and torque current.
-                let speed = k.seen.rotor_freq / c.freq_per_speed;
-                let (i_q, _) = k.limits.now.hold(k.references.current.q);
-                c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
-                *goal = Goal::Brake { quick: stop == Stop::Quick };
-            }
-            // The brake closes at once, and is helped until it has.
-            (goal, _) if turns && k.brake > 0 => {
-                if regulates {
-                    let speed = k.seen.rotor_freq / c.freq_per_speed;
-                    let (i_q, _) = k.limits.now.hold(k.references.current.q);
-                    c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
-                }
-                *goal = Goal::Hold { left: k.brake };
-            }
-            (goal, _) => {
-                // A torque that was asked for during the start has not come yet.
-                if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
-                    k.references.current.q = 0.0;
-                }
-                *goal = Goal::Release;
-            }
+            _ => {}
         }
+        let regulates = self.regulates();
+        let brakes = regulates && matches!(stop, Stop::Ramp | Stop::Quick);
+        // The brake closes at once, and is helped until it has.
+        let holds = !brakes && self.has_torque() && k.brake > 0;
+        if regulates && (brakes || holds) {
+            // The speed loop takes over at the present speed and torque current.
+            let speed = k.seen.rotor_freq / c.freq_per_speed;
+            let (i_q, _) = k.limits.now.hold(k.references.current.q);
+            c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
+        }
+        // A torque that was asked for during the start has not come yet.
+        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+            k.references.current.q = 0.0;
+        }
+        self.goal = match (brakes, holds) {
+            (true, _) => Goal::Brake { quick: stop == Stop::Quick },
+            (_, true) => Goal::Hold { left: k.brake },
+            _ => Goal::Release,
+        };
         self.enter(k, FluxPhase::ready());
     }
 }
