@@ -183,7 +183,7 @@ impl<D: DriveHandle> Access<'_, D> {
 
     /// Carries out a stop that has been acknowledged already, or whose master waits no more.
     fn carry_out(&mut self, (at, word): Written) {
-        // What is refused is announced.
+        // The desk shows a refusal at the console.
         let _ = self.write_word(at, word);
     }
 
@@ -260,10 +260,10 @@ impl<D: DriveHandle> Access<'_, D> {
     /// A control word of CiA 402. A run keeps the direction.
     fn control(&mut self, word: u16) -> Result<(), Exception> {
         let resets = word & cia402::FAULT_RESET != 0;
-        if resets && !core::mem::replace(&mut self.bus.resets, resets) {
+        let before = core::mem::replace(&mut self.bus.resets, resets);
+        if resets && !before {
             self.order(Order::Clear)?;
         }
-        self.bus.resets = resets;
         match cia402::stop(word) {
             Some(stop) => self.stop(stop),
             None => self.command(RUN),

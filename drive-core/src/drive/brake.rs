@@ -8,7 +8,7 @@ use crate::{Coefficients, Dq, Fault};
 
 /// Longest time that a brake may need to close, s.
 pub const BRAKE_MAX_S: f32 = 5.0;
-/// Torque current of the proof, as a share of the largest one.
+/// Q-axis current of the proof, as a share of the largest one.
 const PROOF_SHARE: f32 = 0.25;
 /// Periods of the proof: 0.1 s, in which the current settles several times.
 const PROOF: u32 = 600;
@@ -22,11 +22,11 @@ impl Field {
     }
 
     /// The goal of a shaft that has come to rest.
-    pub(super) fn at_rest(&self, k: &Kept) -> Goal {
+    pub(super) fn at_rest(k: &Kept) -> Goal {
         if k.brake > 0 { Goal::Hold { left: k.brake } } else { Goal::Release }
     }
 
-    /// The current while the torque is proven, A: the brake is closed, and the torque current must follow.
+    /// The current while the torque is proven, A: the brake is closed, and the q-axis current must follow its reference.
     ///
     /// # Errors
     /// [`Fault::TorqueNotProven`].

@@ -252,8 +252,9 @@ impl Field {
         }
         let i_q = match self.goal {
             Goal::Torque => k.references.current.q,
-            Goal::Speed { .. } | Goal::Position { .. } => self.follow(c, k),
-            Goal::Brake { .. } | Goal::Hold { .. } => self.follow(c, k),
+            Goal::Speed { .. } | Goal::Position { .. } | Goal::Brake { .. } | Goal::Hold { .. } => {
+                self.follow(c, k)
+            }
             Goal::Learn => self.learn(c, k)?,
             Goal::Release => {
                 let (i_q, ramp) = (&mut k.references.current.q, c.sequence.stop_ramp);
@@ -314,7 +315,7 @@ impl Field {
         k.references.current.q = i_q;
         match self.goal {
             Goal::Brake { .. } if c.motion.is_at_rest(&self.motion) => {
-                (self.goal, k.elapsed) = (self.at_rest(k), 0);
+                (self.goal, k.elapsed) = (Self::at_rest(k), 0);
             }
             Goal::Hold { left: 0 } => (self.goal, k.elapsed) = (Goal::Release, 0),
             _ => {}
