@@ -611,7 +611,6 @@ impl Desk {
     }
 
     /// Takes the prepared settings as those in force, and notes which of those that protect have changed.
-    #[inline(never)] // once in the code
     fn adopt(&mut self, drive: &mut impl DriveHandle) -> Applied {
         let staging = &self.settings;
         guarded().filter(|key| staging.differs(*key)).for_each(|key| drive.changed(key));

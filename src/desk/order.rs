@@ -247,7 +247,6 @@ impl Refusal {
             Self::Reference(_) => 14,
             Self::Stopped => 15,
             Self::TooOften(_) => 16,
-
             _ => 12,
         }
     }

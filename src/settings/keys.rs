@@ -113,7 +113,6 @@ impl Key {
     }
 
     /// The number in effect; of a word its place. A time-out of 0 is that of the bus.
-    #[inline(never)] // once in the code, as the rules are
     pub fn level(self, settings: &FirmwareSettings) -> f32 {
         let level = with!(self, settings, |entry, s| entry.level(s));
         if self.name() == TIMEOUT && level == 0.0 { BUS_SILENT_S } else { level }

@@ -109,7 +109,6 @@ impl Staging {
     }
 
     /// Takes the protection of the latest settings as the loosest that others than the console may set.
-    #[inline(never)] // once in the code
     fn bound(&mut self) {
         let latest = self.staged.as_ref().map_or(&self.in_force, |staged| &staged.settings);
         self.bounds = guarded().map(|key| key.level(latest)).collect();

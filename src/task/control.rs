@@ -128,7 +128,6 @@ pub fn constants() -> ([MemoryRange; 2], u32) {
 }
 
 /// The word of the drive's phase as it lies in memory: one of [`Drive::PHASES`], unless a bit has flipped.
-#[inline(always)]
 fn phase(drive: &Drive) -> u32 {
     let drive = &raw const *drive;
     // SAFETY: a word within the drive. It is read as what it is, a number, and not as the tag of an enum.
