@@ -79,7 +79,7 @@ impl Strip {
         let state = status.map_or(State::Off, |status| status.state);
         let (off, hold) = (drive.is_off(), desk.hold());
         let commands = desk.commander() == Commander::Strip;
-        // What is refused is announced.
+        // The desk shows a refusal at the console.
         let mut give = |desk: &mut Desk, order| drop(desk.order(Commander::Strip, order, drive));
         let reset = core::mem::replace(&mut self.reset_open, !closed.has(Wires::RESET));
         if commands && own.reset && reset && closed.has(Wires::RESET) {

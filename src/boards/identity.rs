@@ -1,4 +1,5 @@
-//! What a finished image says of its board, in its first page: `cargo sim update` and `cargo xtask flash` read it before they write.
+//! The record in the first page of an image that names its board. `cargo sim update` and `cargo xtask flash` read it before they write an
+//! image.
 
 use super::pin::Pin;
 use super::{Board, Level};

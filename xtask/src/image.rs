@@ -74,7 +74,7 @@ fn check(elf: &Path) -> Result<()> {
     sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)
 }
 
-/// What stands in the first page of an image before the name of its board, and the bytes of the name (`src/boards/identity.rs`).
+/// The mark before the name of the board in the first page of an image, and the length of the name in bytes (`src/boards/identity.rs`).
 const MAGIC: &[u8] = b"idboard1";
 const NAME: usize = 32;
 

@@ -74,7 +74,8 @@ pub enum Command {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stop {
     /// Take the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. Whatever is set, the outputs are off
-    /// [`COAST_S`](crate::COAST_S) after the command, with a [brake](Command::Brake) after its time as well. While the motor at rest is excited, switch off at once.
+    /// [`COAST_S`](crate::COAST_S) after the command, and later by the time of the [brake](Command::Brake) if there is one. While the motor
+    /// at rest is excited, switch off at once.
     #[default]
     Coast,
     /// Take the speed to zero by `speed.ramp_rpm_per_s`, then as [`Coast`](Self::Coast).

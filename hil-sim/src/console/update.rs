@@ -49,7 +49,7 @@ const ACK: u8 = 0x79;
 const ANSWER: Duration = Duration::from_secs(2);
 const GREETING: Duration = Duration::from_secs(30);
 
-/// What stands in the first page of an image before the name of its board, and the bytes of the name (`src/boards/identity.rs`).
+/// The mark before the name of the board in the first page of an image, and the length of the name in bytes (`src/boards/identity.rs`).
 const MAGIC: &[u8] = b"idboard1";
 const NAME: usize = 32;
 

@@ -159,7 +159,7 @@ fn the_image_of_another_board_drives_no_gate() -> Result<()> {
             let mut board = Board::new(Image::built_for(of.name)?, options)?;
             off_for(&mut board, 3000)?;
             assert!(board.resets.is_empty() && board.violations().is_empty(), "{}", of.name);
-            // What it says, once for each board.
+            // The messages to the user, with one foreign image for each board.
             if of.name != ALL[(n + 1) % ALL.len()].name {
                 continue;
             }

@@ -43,8 +43,8 @@ fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Re
     Ok(())
 }
 
-/// Each bit of the words by which a drive is on or off: the phase and what follows it, the first words of the drive's own state, the mailbox
-/// of the commands with the command that it has kept. A second each.
+/// A flipped bit switches no gate on, whichever bit it is of the words that decide whether the drive is on: the phase of the drive with the
+/// number of its fault, and the mailbox of the commands with the last command in it. Each flip is followed for one second.
 #[test]
 fn no_bit_of_what_decides_switches_a_gate_on() -> Result<()> {
     for (name, mut pair, kept) in situations()? {

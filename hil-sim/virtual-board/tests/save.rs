@@ -10,8 +10,8 @@ use virtual_board::{Image, campaign};
 #[test]
 fn no_operation_of_a_save_loses_both_sets() -> Result<()> {
     let operations = campaign::every_operation_of_save(Image::built()?)?;
-    // An erasure, the two words of the head, and one a key: nothing was learned. The history notes the change of what protects, once in a
-    // minute.
+    // A save erases the slot, writes two double words as its head, and one for each setting; nothing was learned. The first save of a minute
+    // also writes one entry to the history, because a setting that protects was changed.
     let save = 3 + keys::COUNT as u64;
     assert_eq!(operations, [save + 1, save]);
     println!("{operations:?} operations");

@@ -245,8 +245,9 @@ fn settings_of_the_hardware_are_not_for_the_bus() {
     assert_eq!(both.read(0x4fff), 0);
 }
 
-/// What protects can be tightened over the bus, and loosened again up to what the console has set, not beyond: not by itself and not by
-/// the rule that it follows. The console is told, `status` shows what is looser than by default, and each change is noted.
+/// A bus master can tighten a setting that protects, and loosen it again up to the value that the console has set, but not beyond: neither
+/// by writing the setting nor by writing another one from which its rule takes the value. The console shows the change, `status` lists the
+/// settings that are looser than by default, and the history notes each change.
 #[test]
 fn the_bus_never_loosens_what_protects() {
     let mut both = Both::new(

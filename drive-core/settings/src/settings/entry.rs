@@ -14,7 +14,7 @@ pub enum Change {
     Board,
 }
 
-/// What another than the console may do with a setting that protects.
+/// How a bus master may change a setting that protects the drive or people. The console may set any value in its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
     /// Change it: it protects nothing.
