@@ -137,19 +137,21 @@ impl Commission {
 
     /// What was found beside what is filed.
     fn found_table(&self, record: &Record) -> Table {
-        let mut table = Table::new("The motor", &["parameter", "found", "filed", "error (%)"]);
-        let filed = Circuit::of_plant(&self.config).values();
+        let mut table = Table::new("The motor", &["parameter", "found", "true", "error (%)"]);
         let units = ["ohm", "H", "ohm", "H", "s"];
-        for (n, ((name, filed), unit)) in filed.into_iter().zip(units).enumerate() {
-            let found = record.found.get(n).filter(|_| record.refused.is_none());
+        for (n, ((name, _), unit)) in
+            Circuit::of_plant(&self.config).values().into_iter().zip(units).enumerate()
+        {
+            let pair = record.found.get(n).zip(record.errors.get(n));
+            let pair = pair.filter(|_| record.refused.is_none());
             table.row([
                 Cell::from(format!("{name} ({unit})")),
-                Cell::fixed_or_dash(found.copied(), 5),
-                Cell::fixed(filed, 5),
+                Cell::fixed_or_dash(pair.map(|(found, _)| *found), 5),
+                Cell::fixed_or_dash(pair.map(|(found, error)| found / (1.0 + 0.01 * error)), 5),
                 Cell::fixed_or_dash(record.errors.get(n).copied(), 2),
             ]);
         }
-        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux; the leakage is that of small changes at the bias.")
+        table.note("Inverse-Gamma circuit; that of iron at the magnetising current found, the leakage that of small changes at the bias.")
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
@@ -183,7 +185,7 @@ impl Study for Commission {
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-        let mut truth = Circuit::of_plant(&config);
+        let mut truth = Circuit::at(&config, commissioned.i_d().into());
         // With iron the leakage that was measured is the incremental one at the bias.
         let mut found = found;
         let measured = session.commissioning.found().leakage;

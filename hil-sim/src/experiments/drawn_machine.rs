@@ -1,5 +1,7 @@
 //! Machines to be commissioned: the truth about them, and random ones.
 
+use drive_settings::tuning::bisected;
+
 use crate::prelude::*;
 
 /// Parameters of the inverse-Gamma circuit.
@@ -28,6 +30,20 @@ impl Circuit {
         let (m, i) = (plant_settings(config).machine, &config.inverter);
         let more = i.on_resistance + (i.more_ohm_b + i.more_ohm_c) / 3.0;
         Self::of([m.rs + more, m.rr, m.lls, m.llr, m.lm])
+    }
+
+    /// The same at a magnetising current, A: with the chord of the magnetising curve there.
+    pub fn at(config: &Config, i_d: f64) -> Self {
+        let mut config = config.clone();
+        if let Some(iron) = plant_settings(&config).iron {
+            let bent = |flux: f64| {
+                (iron.saturation - 1.0) * (flux / iron.psi_n).powi(iron.exponent as i32)
+            };
+            let straight = iron.saturation * config.motor.l_m * i_d;
+            let is_below = |flux: f64| flux * (1.0 + bent(flux)) < straight;
+            config.motor.l_m = bisected((0.0, straight), 50, &is_below).0 / i_d;
+        }
+        Self::of_plant(&config)
     }
 
     /// Rotor time constant, s.

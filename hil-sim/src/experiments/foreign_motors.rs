@@ -153,16 +153,6 @@ fn drawn(seed: u64) -> Config {
     config
 }
 
-/// The circuit at a direct current, A: with the chord of the magnetising curve there.
-fn truth(config: &Config, i_d: f64) -> Circuit {
-    let (m, iron) = (&config.motor, plant_settings(config).iron.unwrap_or_default());
-    let bent = |flux: f64| (iron.saturation - 1.0) * (flux / iron.psi_n).powi(iron.exponent as i32);
-    let current = |flux: f64| flux / (iron.saturation * m.l_m) * (1.0 + bent(flux));
-    let straight = iron.saturation * m.l_m * i_d;
-    let (flux, _) = bisected((0.0, straight), 50, &|flux| current(flux) < i_d);
-    Circuit::of([m.r_s + config.inverter.on_resistance, m.r_r, m.l_ls, m.l_lr, flux / i_d])
-}
-
 fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
     from.iter().copied().filter(|record| is(record)).collect()
 }
@@ -185,7 +175,7 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
     config.drive.motor.inertia = config.motor.inertia as f32;
     let (m, i_d) = (&config.drive.motor, f64::from(config.drive.i_d()));
     let mut found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-    let (mut truth, seen) = (truth(config, i_d), session.commissioning.found().leakage);
+    let (mut truth, seen) = (Circuit::at(config, i_d), session.commissioning.found().leakage);
     if let (Some(incremental), Some(measured)) = (session.leakage, seen) {
         (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
     }
@@ -386,7 +376,7 @@ mod tests {
     fn the_truth_is_the_chord_at_the_direct_current() {
         let config = drawn(7);
         let (m, iron) = (&config.motor, plant_settings(&config).iron.unwrap());
-        let of = |i_d: f64| truth(&config, i_d).coupled;
+        let of = |i_d: f64| Circuit::at(&config, i_d).coupled;
         let coupled = |l_m: f64| l_m * l_m / (l_m + m.l_lr);
         let knee = of(iron.psi_n / m.l_m) / coupled(m.l_m);
         let straight = of(0.01 * iron.psi_n / m.l_m) / coupled(iron.saturation * m.l_m);
