@@ -18,14 +18,18 @@
 //! `c` is of sensors and resistances that differ between the phases b and c, `v'` of legs, `g` of sensors alone, and a shaft
 //! that turns with `w` brings the flux across: that changes and decays, but leaves no steady current.
 
+use super::GAIN_RAD_PER_S;
 use super::collector::{Bin, Collector};
 use super::report::Refusal;
 use drive_core::{AlphaBeta, PERIOD_S, SQRT_3};
 
-/// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
-/// inductance meanwhile: a share of the rotor time constant, from 12 ms to 60 ms.
+/// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the inductance
+/// meanwhile: a share of the rotor time constant, from a least time to 60 ms. The least time is 12 ms for levels of a linear motor, and
+/// twice the time constant of the current loop for small changes on iron, whose rotor time constant may be 10 ms.
 const FROM_OF_TAU_R: f32 = 0.08;
-const FROM_S: (f32, f32) = (0.012, 0.060);
+const LATEST_S: f32 = 0.060;
+const LINEAR_S: f32 = 0.012;
+const SMALL_S: f32 = 2.0 / GAIN_RAD_PER_S;
 /// Range of the search, s, and its points: first over the range, then around the best of the last.
 const TAU_R: (f32, f32) = (0.003, 4.0);
 const POINTS: u8 = 40;
@@ -66,16 +70,15 @@ impl Fitted {
     /// currents of phases b and c, voltage, V, electrical speed of the shaft, rad/s, and rms of the residual, V.
     pub fn across(&self, sums: &Collector) -> Option<[f32; 4]> {
         let resistances = Some([self.r_s, self.r_r]);
-        let best = fit(sums, 0.0, self.tau_r, begins(self.tau_r), resistances)?;
+        let best = fit(sums, 0.0, self.tau_r, begins(self.tau_r, LINEAR_S), resistances)?;
         let [c, volts, _, turning] = best.values.map(|value| value as f32);
         Some([SQRT_3 * c / self.r_s, volts, -turning, libm::sqrt(best.left / best.weight) as f32])
     }
 }
 
-/// Bins from here on count with this time constant, s: control periods.
-fn begins(tau_r: f32) -> f32 {
-    let (least, most) = FROM_S;
-    (FROM_OF_TAU_R * tau_r).clamp(least, most) / PERIOD_S
+/// Bins from here on count with this time constant and this least time, s: control periods.
+fn begins(tau_r: f32, least: f32) -> f32 {
+    (FROM_OF_TAU_R * tau_r).clamp(least, LATEST_S) / PERIOD_S
 }
 
 /// A fit for one time constant.
@@ -99,8 +102,9 @@ pub(super) struct Search {
     steady: f32,
     round: u8,
     point: u8,
-    /// Bins from here on count, control periods.
+    /// Bins from here on count, control periods, and the least, s.
     begins: f32,
+    least: f32,
     /// Logarithm of the first time constant of this round, and spacing.
     from: f32,
     step: f32,
@@ -112,11 +116,12 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// With the flux of the current `steady`, A, at the beginning.
-    pub fn new(steady: f32) -> Self {
+    /// With the flux of the current `steady`, A, at the beginning; of small changes on iron, or of levels of a linear motor.
+    pub fn new(steady: f32, small: bool) -> Self {
         let (from, to) = (libm::logf(TAU_R.0), libm::logf(TAU_R.1));
         let step = (to - from) / f32::from(POINTS - 1);
-        Self { steady, begins: FROM_S.0 / PERIOD_S, from, step, ..Self::default() }
+        let least = if small { SMALL_S } else { LINEAR_S };
+        Self { steady, begins: least / PERIOD_S, least, from, step, ..Self::default() }
     }
 
     /// One fit; the result in the call after the last one, which leaves time for another fit to the same bins. Refused where nothing
@@ -145,11 +150,11 @@ impl Search {
         let (x, _) = self.best.ok_or(Refusal::SamplesLost)?;
         self.round += 1;
         if self.round < ROUNDS {
-            let Self { steady, round, .. } = *self;
-            let begins = if round == 1 { begins(libm::expf(x)) } else { self.begins };
+            let Self { steady, round, least, .. } = *self;
+            let begins = if round == 1 { begins(libm::expf(x), least) } else { self.begins };
             // From one spacing below the best to one above.
             let (from, step) = (x - self.step, self.step * (2.0 / f32::from(CLOSER_POINTS - 1)));
-            *self = Self { steady, round, begins, from, step, ..Self::default() };
+            *self = Self { steady, round, begins, least, from, step, ..Self::default() };
         }
         Ok(None)
     }

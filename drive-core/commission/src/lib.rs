@@ -324,7 +324,8 @@ impl Commissioning {
             return search.step(sums);
         }
         sums.begin(Record::Nothing);
-        (self.state.search, self.state.until) = (Some(Search::new(steady)), 0);
+        (self.state.search, self.state.until) =
+            (Some(Search::new(steady, self.step == Step::Staircase)), 0);
         Ok(None)
     }
 

@@ -39,8 +39,9 @@ pub(super) struct Plate {
     /// Rated current, and limit of the torque current, A peak.
     pub rated: f32,
     pub i_q_limit: f32,
-    /// Rated flux, Wb peak.
+    /// Rated flux, Wb peak, and largest magnetising current by the rule of `sequence.i_d`, A.
     pub flux: f32,
+    pub largest_i_d: f32,
     /// Torque per torque current in force, Nm/A.
     pub torque_per_ampere: f32,
     /// Time constant of the analog filter of the currents, control periods.
@@ -89,6 +90,7 @@ impl Plate {
             rated,
             i_q_limit: settings.i_q_limit_a(),
             flux: SQRT_2 / SQRT_3 * plate.voltage_v / omega,
+            largest_i_d: settings.largest_i_d(settings.current_limit_a()),
             torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
             filter: settings.current_age_s() / PERIOD_S,
             pulse_noise: settings.share_of_range(0.05),

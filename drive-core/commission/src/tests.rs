@@ -47,7 +47,7 @@ fn levels(motor: &Motor) -> Collector {
 }
 
 fn found(sums: &Collector) -> Fitted {
-    let mut search = Search::new(0.0);
+    let mut search = Search::new(0.0, false);
     loop {
         if let Some(fit) = search.step(sums).unwrap() {
             return fit;

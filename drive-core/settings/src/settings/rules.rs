@@ -174,7 +174,12 @@ impl Settings {
     fn useful_i_d(&self, limit_a: f32) -> f32 {
         let plate = &self.nameplate;
         let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
-        f32::min(rated_flux / self.motor.l_m, FRAC_1_SQRT_2 * self.rated_a().min(limit_a))
+        f32::min(rated_flux / self.motor.l_m, self.largest_i_d(limit_a))
+    }
+
+    /// Largest magnetising current beside a current limit, A: that of the largest torque per rated current, and per limit.
+    pub fn largest_i_d(&self, limit_a: f32) -> f32 {
+        FRAC_1_SQRT_2 * self.rated_a().min(limit_a)
     }
 
     /// Current limit per trip.
