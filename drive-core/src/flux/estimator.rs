@@ -102,7 +102,7 @@ pub struct EstimatorState {
     pub rotor_freq: f32,
     /// Output of the selected demodulator as a current difference, A; 0 with the synchronous one.
     pub delta_i: f32,
-    /// Angle error by the latest saliency, flux less estimate, rad.
+    /// Angle error by the latest saliency if it lasts, flux less estimate, rad.
     pub angle_error: f32,
     /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
     /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
@@ -236,9 +236,10 @@ impl Estimator {
         let AngleLoop::Filter { schedule, filter, .. } = &self.angle_loop else { return 0.0 };
         let saliency = &state.synchronous.saliency;
         let point = schedule.at(saliency.i_q);
-        state.angle_error = point.angle_error(saliency.q);
+        let deviation = saliency.q - point.reference;
+        state.angle_error = point.lasting * deviation;
         let (correction, resistance) = if filters {
-            filter.see_carrier(&mut state.filter, state.angle_error, point.per_saliency)
+            filter.see_carrier(&mut state.filter, point.gain * deviation, point.gain)
         } else {
             (Correction::default(), 0.0)
         };

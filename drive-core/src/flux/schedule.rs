@@ -8,13 +8,17 @@
 //! ```
 //!
 //! The reference is an odd table over i_q and the slope k an even one, of either sign; both are learned with the shaft
-//! locked. The slope is the slow one: current and flux have settled. (An angle error that is faster than the current loop
-//! rotates the current with the frame and with it the current-dependent part b of the saliency, so such errors see the slope
-//! k + 2 b |i| cos 2g, with cos 2g = (i_d^2 - i_q^2)/|i|^2.)
+//! locked. The learned slope is that of an error that lasts: current and flux have settled. It tells the size of such an error. (An
+//! angle error that is faster than the current loop rotates the current with the frame and with it the current-dependent part b
+//! of the saliency, so such errors see the slope k + 2 b |i| cos 2g, with cos 2g = (i_d^2 - i_q^2)/|i|^2.)
+//!
+//! An error that is faster than the flux is seen with the slope without load, also where load has made the lasting one smaller.
+//! That slope is the most that the loop of the angle takes: with the gain of the lasting one, up to twice as large, an oscillation
+//! of 17 Hz grew near zero stator frequency.
 
 use crate::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 
-/// Largest gain relative to that without torque current.
+/// Largest angle error per deviation of the saliency, relative to that without torque current.
 const MOST_GAIN: f32 = 2.0;
 
 /// Reference of the saliency and inverse slope over i_q.
@@ -30,8 +34,9 @@ pub struct GainSchedule {
 pub struct SchedulePoint {
     /// Reference of the saliency.
     pub reference: f32,
-    /// Angle error per deviation of the saliency, rad.
-    pub per_saliency: f32,
+    /// Angle error per deviation of the saliency, rad: of an error that lasts, and for the loop, at most that without load.
+    pub lasting: f32,
+    pub gain: f32,
 }
 
 impl GainSchedule {
@@ -51,17 +56,12 @@ impl GainSchedule {
     /// The schedule at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> SchedulePoint {
         let place = self.table.grid().place(i_q);
+        let (lasting, [at_rest, ..]) = (between(&self.per_saliency, place), self.per_saliency);
         SchedulePoint {
             reference: odd(i_q, between(self.table.points(), place)),
-            per_saliency: between(&self.per_saliency, place),
+            lasting,
+            gain: if lasting.abs() > at_rest.abs() { at_rest } else { lasting },
         }
-    }
-}
-
-impl SchedulePoint {
-    /// Angle error, rad, derived from a measured saliency `q`.
-    pub fn angle_error(&self, q: f32) -> f32 {
-        self.per_saliency * (q - self.reference)
     }
 }
 
@@ -100,18 +100,24 @@ mod tests {
     fn the_saliency_tells_the_angle() {
         let table = reference(|i_q| 0.02 * i_q.min(2.0));
         for k in [-0.07_f32, 0.1] {
-            // Beyond 1 A the slope is 0.7 of that without current, beyond 2 A a fifth: the gain is held to twice.
+            // Beyond 1 A the slope is 0.7 of that without current, beyond 2 A a fifth: the angle is held to twice, the gain to once.
             let points = core::array::from_fn(|n| {
                 k * [1.0, 0.7, 0.2][n.div_ceil(4).min(3).saturating_sub(1)]
             });
             let slope = SlopeTable::from_points(Grid::REFERENCE, points).unwrap();
             let schedule = GainSchedule::new(&table, &slope);
-            for (i_q, x, seen) in
-                [(0.0, 0.1, 0.1), (2.0, -0.2, -0.2), (-1.75, 0.05, 0.05), (3.0, 0.1, 0.04)]
-            {
+            for (i_q, x, seen, by_gain) in [
+                (0.0, 0.1, 0.1, 0.1),
+                (2.0, -0.2, -0.2, -0.14),
+                (-1.75, 0.05, 0.05, 0.035),
+                (3.0, 0.1, 0.04, 0.02),
+            ] {
                 let q = table.at(i_q) + slope.points()[(4.0 * i_q.abs()) as usize] * x;
-                let error = schedule.at(i_q).angle_error(q);
-                assert!((error - seen).abs() < 1e-5, "{error} for {x} at {i_q} A");
+                let point = schedule.at(i_q);
+                let deviation = q - point.reference;
+                let close = |of: f32, seen: f32| (of * deviation - seen).abs() < 1e-5;
+                assert!(close(point.lasting, seen), "{} for {x} at {i_q} A", point.lasting);
+                assert!(close(point.gain, by_gain), "{} for {x} at {i_q} A", point.gain);
             }
         }
     }

@@ -97,7 +97,7 @@ impl LinearModel {
             current: settings.current_loops().map_err(Error::refused)?[1],
             speed: settings.motion_loops().map_err(Error::refused)?,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
-            apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference))
+            apparent_angle: f64::from(here.gain * (before.reference - after.reference))
                 / 0.25,
         })
     }
