@@ -164,7 +164,8 @@ impl Coefficients {
         let flux = RotorFlux {
             magnetising,
             rotor_freq: step.rotor_freq,
-            axis: step.flux_axis,
+            // While it learns, the flux leads the frame.
+            axis: step.flux_axis.turned_by(s.lead_axis),
             flux_freq: step.flux_freq,
         };
         self.prediction.predict(&mut s.prediction, &flux);
