@@ -78,6 +78,9 @@ fn a_relock_on_request_goes_on_without_torque() {
         }
         assert!(verified && rig.drive.state() == State::Torque, "{}", rig.drive.state());
         assert!(rig.drive.telemetry().reference.q.abs() < 1e-6);
+        // The flux that was there does not show as a resistance.
+        let deviation = rig.drive.stator_resistance().unwrap();
+        assert!(deviation.abs() < 0.05, "seed {seed}: {deviation}");
         rig.command(&Command::Torque(i_q)).unwrap();
         rig.wait(0.5);
         let worst = worst(&mut rig);

@@ -61,6 +61,8 @@ pub struct InverterDropState {
     levels: [Level; 2],
     /// The measured drop per phase, V; 0 before the measurement and when its result is implausible.
     pub volts: f32,
+    /// Whether this start has measured. A magnetisation while it runs finds a flux whose direction nobody knows.
+    done: bool,
 }
 
 /// Input of the measurement, one per control period of the magnetisation.
@@ -107,8 +109,8 @@ impl InverterDrop {
         if elapsed < self.until { self.forced } else { 1.0 }
     }
 
-    /// Processes period `elapsed` of the magnetisation. The last one computes the drop, and returns the stator
-    /// resistance relative to the settings if it is plausible.
+    /// Processes period `elapsed` of the magnetisation, of the first one since the start. The last period computes the drop, and returns
+    /// the stator resistance relative to the settings if it is plausible.
     #[cold]
     pub fn step(
         &self,
@@ -116,6 +118,9 @@ impl InverterDrop {
         elapsed: u32,
         sample: &DropSample,
     ) -> Option<f32> {
+        if state.done {
+            return None;
+        }
         let [high, low] = &mut state.levels;
         // The current settles in the first half.
         let (level, settles) = if elapsed < self.until {
@@ -132,6 +137,7 @@ impl InverterDrop {
         if elapsed.saturating_add(1) != self.end {
             return None;
         }
+        state.done = true;
         let (volts, ratio) = match self.known {
             Some(volts) => (volts, self.resistance(&state.levels, volts)),
             None => self.solve(&state.levels),

@@ -47,10 +47,9 @@ const LARGEST_ERROR: f32 = 0.6;
 const SPEED_NOISE: f32 = 4.0;
 /// Variance of the resistance that comes in a second: heating by 1 %.
 const RESISTANCE_NOISE: f32 = 0.01 * 0.01;
-/// Deviation and time constant of the slow error, rad/s and s: slip by another rotor resistance, and the voltage of the inverter, a
-/// thousandth of the dc link over the flux. Motors of one rated frequency have about the same.
+/// Deviation of the slow error, rad/s: slip by another rotor resistance, and the voltage of the inverter, a thousandth of the dc
+/// link over the flux. Motors of one rated frequency have about the same.
 const SLOW: f32 = 1.5;
-const SLOW_S: f32 = 2.0;
 /// Share of the largest change of the current that still counts after a carrier period.
 const REMEMBERED: f32 = 0.7;
 /// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
@@ -75,6 +74,8 @@ pub struct AngleFilter {
     pub speed_per_a: f32,
     /// Change of the seen speed per angle error, torque current and speed of the rotor, `k/(tau_r i_d)`, 1/(s A).
     pub flux_by_angle: f32,
+    /// Time constant of the slow error of the seen speed, s.
+    pub slow_s: f32,
 }
 
 /// State of the filter.
@@ -160,25 +161,25 @@ impl AngleFilter {
     /// Second part: the rest of `P = F P F' + Q`, for a deviation of the resistance that decays by this share in a carrier period.
     #[inline(never)]
     pub fn predict(&self, state: &mut AngleFilterState, resistance_decay: f32) {
-        const KEPT: f32 = 1.0 - T / SLOW_S;
+        let kept = 1.0 - T / self.slow_s;
         let r_kept = 1.0 - resistance_decay;
         let [ee, we, ww, ae, aw, aa, re, rw, ra, rr, be, bw, ba, br, bb] = &mut state.covariance;
         *ee += T * (2.0 * *we + T * *ww);
         *we += T * (*ww + *ae + T * *aw);
         *ae += T * *aw;
         *re = r_kept * (*re + T * *rw);
-        *be = KEPT * (*be + T * *bw);
+        *be = kept * (*be + T * *bw);
         *ww += T * (2.0 * *aw + T * *aa + SPEED_NOISE);
         *aw += T * *aa;
         *rw = r_kept * (*rw + T * *ra);
         *ra *= r_kept;
-        *bw = KEPT * (*bw + T * *ba);
+        *bw = kept * (*bw + T * *ba);
         *aa += T * self.rate;
-        *ba *= KEPT;
+        *ba *= kept;
         *rr = r_kept * r_kept * *rr + T * RESISTANCE_NOISE;
-        *br *= KEPT * r_kept;
-        *bb = KEPT * KEPT * *bb + T * (2.0 / SLOW_S * SLOW * SLOW);
-        state.slow *= KEPT;
+        *br *= kept * r_kept;
+        *bb = kept * kept * *bb + T * (2.0 / self.slow_s * SLOW * SLOW);
+        state.slow *= kept;
     }
 
     /// Third part: what the observer has `seen`, and by how much its speed is above the tracked one, electrical turns per period.
@@ -242,6 +243,7 @@ mod tests {
         speed: 4.1,
         speed_per_a: 14.4,
         flux_by_angle: 1.95,
+        slow_s: 2.0,
     };
     const PER_SALIENCY: f32 = -14.3;
     /// -300 rpm, generating.
@@ -300,13 +302,13 @@ mod tests {
     fn reference(p: Matrix, seen: Option<&SeenSpeed>, k: f64) -> (Matrix, [f64; N]) {
         let t = f64::from(T);
         let mut f = Matrix::identity();
-        (f[(0, 1)], f[(1, 2)], f[(4, 4)]) = (t, t, 1.0 - t / f64::from(SLOW_S));
+        (f[(0, 1)], f[(1, 2)], f[(4, 4)]) = (t, t, 1.0 - t / f64::from(FILTER.slow_s));
         f[(3, 3)] = 1.0 - f64::from(RESISTANCE_DECAY);
         let mut flux = Matrix::identity();
         let w = f64::from(ROTOR_FREQ * TAU / PERIOD_S);
         flux[(4, 0)] = t * f64::from(FILTER.flux_by_angle) * w * 1.5;
         let f = f * flux;
-        let slow = 2.0 / f64::from(SLOW_S) * f64::from(SLOW).powi(2);
+        let slow = 2.0 / f64::from(FILTER.slow_s) * f64::from(SLOW).powi(2);
         let noise = [0.0, f64::from(SPEED_NOISE), f64::from(FILTER.rate), 0.01 * 0.01, slow];
         let mut p = f * p * f.transpose()
             + Matrix::from_diagonal(&(t * nalgebra::SVector::<f64, N>::from(noise)));

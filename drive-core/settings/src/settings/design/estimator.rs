@@ -27,6 +27,11 @@ const LOAD_STEP: f32 = 0.16;
 const REFERENCE_LAG: f32 = 0.14;
 /// Share of the change of the flux by an angle error that the filter reckons with, see `flux_by_angle`.
 const FLUX_SHARE: f32 = 0.5;
+/// Time constant of the slow error of the seen speed, in rotor time constants, and its upper limit, s: the flux forgets within a
+/// rotor time constant what an angle error brings into that error, and an error that lasts far longer would be seen many times too
+/// large.
+const SLOW_OF_TAU_R: f32 = 10.75;
+const SLOW_S: f32 = 2.0;
 /// Error of the leakage inductance.
 const LEAKAGE_ERROR: f32 = 0.1;
 
@@ -109,6 +114,7 @@ impl Settings {
             speed: square(SEEN_NOISE * noise_a * per_a),
             speed_per_a: LEAKAGE_ERROR * per_a,
             flux_by_angle: FLUX_SHARE / (m.tau_r() * i_d),
+            slow_s: f32::min(SLOW_OF_TAU_R * m.tau_r(), SLOW_S),
         }
     }
 }
