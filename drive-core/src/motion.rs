@@ -1,5 +1,4 @@
-//! Speed and position control: the cascaded loops of section 4.1 around the torque, at 100 Hz, with or
-//! without the encoder.
+//! Speed and position control: the cascaded loops of section 4.1 around the torque, with or without the encoder.
 //!
 //! ```text
 //! position error -> braking curve -> limit -> ramp -> PI on the speed -> limit -> i_q
@@ -10,6 +9,9 @@
 //! rotor position; the current for the ramp is fed forward. (The PI on the position of Eq. 4.2 is unstable
 //! with the plant of Eq. 4.1, |z| = 1.046: its design ignores one integrator of the plant. A PI on the
 //! speed inside a P on the position has the same terms.)
+//!
+//! The loops run at 100 Hz with an encoder and with the PII tracking of the dissertation, whose speed is the difference of two
+//! counted angles. Where angle filter and observer estimate the speed, they take the estimate, once in a period of the injection.
 //!
 //! # Without the encoder
 //! The rotor angle is the flux angle minus the slip integrated since the start:
@@ -28,18 +30,17 @@ pub mod ramp;
 #[cfg(test)]
 mod tests;
 
-use crate::Angle;
 use crate::current::{Pi, PiState};
 use crate::math::{limited, within};
+use crate::{Angle, PERIOD_S};
 
 use ramp::{Ramp, RampState};
 
 /// Largest position reference, mechanical turns: f32 resolves 0.02° there.
 pub const LARGEST_POSITION: f32 = 1000.0;
-/// Speed below which the shaft counts as at rest, mechanical turns/s (12 rpm: clear of the noise without an encoder), and for
-/// how many steps of the loops: 0.1 s.
+/// Speed below which the shaft counts as at rest, mechanical turns/s (12 rpm: clear of the noise without an encoder), for
+/// 0.1 s.
 const REST: f32 = 0.2;
-const REST_STEPS: u8 = 10;
 
 /// The controllers of speed and position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,6 +99,11 @@ pub struct Motion {
     bend: f32,
     /// Largest current, A.
     i_q_limit: f32,
+    /// Control periods in a step of the loops, and whether the speed is estimated, else counted.
+    divider: u8,
+    estimates: bool,
+    /// Steps in 0.1 s.
+    rest_steps: u8,
 }
 
 /// Reference of the loops.
@@ -131,14 +137,16 @@ pub struct MotionState {
     pub(crate) origin: u32,
     last: Option<u32>,
     phase: u8,
-    /// Steps of the loops for which the rotor was at rest, up to [`REST_STEPS`].
+    /// Steps of the loops for which the rotor was at rest, up to those of 0.1 s.
     rest: u8,
     output: f32,
 }
 
 impl Motion {
-    /// Control periods per step of the loops: 100 Hz.
+    /// Control periods per step of the loops with an encoder, and with the PII tracking: 100 Hz.
     pub const DIVIDER: u8 = 60;
+    /// Control periods per step of the loops with the estimated speed: one period of the injection.
+    pub const ESTIMATED_DIVIDER: u8 = 10;
     /// Counts of a rotor position that no encoder counts, per electrical turn.
     pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
@@ -153,6 +161,7 @@ impl Motion {
         i_q_limit: f32,
     ) -> Self {
         let rate = (1.0 / design.period_s) as f32;
+        let divider = (design.period_s / f64::from(PERIOD_S) + 0.5) as u8;
         let (k_c, forward) = (design.k_c as f32, rate / design.acceleration as f32);
         Self {
             pi: Pi { k_c, z_c: design.z_c as f32 },
@@ -169,6 +178,9 @@ impl Motion {
             twice_braking: 2.0 * ramps.usual,
             bend: ramps.usual / design.k_x as f32,
             i_q_limit,
+            divider,
+            estimates: divider == Self::ESTIMATED_DIVIDER,
+            rest_steps: (0.1 * rate + 0.5) as u8,
         }
     }
 
@@ -185,7 +197,7 @@ impl Motion {
     /// Takes over from whatever gave the torque current `i_q`, A, with the rotor at `count` and `speed`, turns/s: the speed
     /// loop goes on from both, with the acceleration that it had.
     pub fn take_over(&self, state: &mut MotionState, count: u32, speed: f32, i_q: f32) {
-        let step = state.acceleration * f32::from(Self::DIVIDER);
+        let step = state.acceleration * f32::from(self.divider);
         *state = MotionState {
             pi: PiState::at_rest(i_q - self.forward * step),
             ramp: RampState { reference: speed, change: step },
@@ -209,7 +221,7 @@ impl Motion {
 
     /// Whether reference and rotor have been at rest for 0.1 s.
     pub fn is_at_rest(&self, state: &MotionState) -> bool {
-        state.rest >= REST_STEPS
+        state.rest >= self.rest_steps
     }
 
     /// Position in mechanical turns from the start.
@@ -217,18 +229,27 @@ impl Motion {
         count.wrapping_sub(state.origin) as i32 as f32 * self.turns_per_count
     }
 
-    /// Returns the quadrature current, A, for the goal at the position `count`; called in every control
-    /// period. The current changes every `DIVIDER` periods.
+    /// Returns the q-axis current, A, for the goal at the position `count`; called in every control period. The current changes
+    /// once in a step of the loops.
     ///
     /// The computation is spread over three periods: speed, speed reference, current.
     ///
-    /// `range` is the least and the largest current, A, that is possible now.
-    pub fn step(&self, state: &mut MotionState, goal: Goal, count: u32, range: (f32, f32)) -> f32 {
+    /// `estimated` is the speed that the drive estimates, turns/s, which the loops take without an encoder. `range` is the least and the
+    /// largest current, A, that is possible now.
+    pub fn step(
+        &self,
+        state: &mut MotionState,
+        goal: Goal,
+        count: u32,
+        estimated: f32,
+        range: (f32, f32),
+    ) -> f32 {
         match state.phase {
             0 => {
                 let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
                 state.last = Some(count);
-                let speed = moved * self.turns_per_count * self.rate;
+                let counted = moved * self.turns_per_count * self.rate;
+                let speed = if self.estimates { estimated } else { counted };
                 state.speed += self.smoothing * (speed - state.speed);
             }
             1 => {
@@ -262,14 +283,15 @@ impl Motion {
                         step = 0.0;
                     }
                 }
-                state.pi.back_calculate(state.output - wanted);
-                state.acceleration = step * (1.0 / Self::DIVIDER as f32);
+                self.pi.condition(&mut state.pi, state.output - wanted);
+                state.acceleration = step * (1.0 / f32::from(self.divider));
                 let moves = state.ramp.reference != 0.0 || state.speed.abs() >= REST;
-                state.rest = if moves { 0 } else { REST_STEPS.min(state.rest.saturating_add(1)) };
+                state.rest =
+                    if moves { 0 } else { self.rest_steps.min(state.rest.saturating_add(1)) };
             }
             _ => {}
         }
-        state.phase = if state.phase < Self::DIVIDER - 1 { state.phase + 1 } else { 0 };
+        state.phase = if state.phase < self.divider - 1 { state.phase + 1 } else { 0 };
         state.output
     }
 

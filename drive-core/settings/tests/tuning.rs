@@ -5,9 +5,9 @@ use core::f64::consts::{PI, TAU};
 use induction_drive_core::FirstOrder;
 use induction_drive_core::filter::{LPF, LPF_AS_PRINTED, Section, SosState};
 use induction_drive_settings::tuning::{
-    EquivalentCircuit, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, MotionDesign, TuningError,
-    current_loop_margins, design_current_loop, design_motion_loops, motor_plant, pi_response,
-    rule_3_8,
+    EquivalentCircuit, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, MotionDesign, SpeedSource,
+    TuningError, current_loop_margins, design_current_loop, design_motion_loops, motor_plant,
+    pi_response, rule_3_8,
 };
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -232,7 +232,7 @@ fn open_position_loop(design: &MotionDesign, w: f64, period: f64) -> Complex64 {
     let smoothed = slope * design.gains.smoothing
         / (1.0 - (1.0 - design.gains.smoothing) * Complex64::cis(-w));
     let rotor = design.open_loop(w) / pi / smoothed;
-    if design.tracking.is_none() {
+    if design.source == SpeedSource::Encoder {
         // A double integrator that is held over a period: T^2 a / 2 (z + 1)/(z - 1)^2
         let z = Complex64::cis(w);
         let held = 0.5 * period * period * ACCELERATION * (z + 1.0) / (z - 1.0).powi(2);
@@ -246,16 +246,25 @@ fn open_position_loop(design: &MotionDesign, w: f64, period: f64) -> Complex64 {
 /// instead of the closed form; the position loop keeps most of it.
 #[test]
 fn motion_loops_have_the_margins_asked_for() {
-    for tracking in [None, Some(3.0), Some(4.0), Some(8.0)] {
+    let tracking = [3.0, 4.0, 8.0].map(|hz| (SpeedSource::Tracking { hz }, 0.01));
+    // Without leakage, and with so much that its low-pass decides.
+    let estimated =
+        [0.0, 0.01, 0.1].map(|leakage| (SpeedSource::Estimate { slip: 0.0, leakage }, 1.0 / 600.0));
+    for (source, t) in [&[(SpeedSource::Encoder, 0.01)], &tracking[..], &estimated].concat() {
         for margin in [45.0, 60.0, 70.0] {
-            let c = design_motion_loops(ACCELERATION, tracking, margin, 0.01).expect("designed");
-            let speed = Margins::of(&|w| c.open_loop(w), 2, 0.01).expect("crosses");
-            let position = Margins::of(&|w| open_position_loop(&c, w, 0.01), 3, 0.01);
+            let c = design_motion_loops(ACCELERATION, source, margin, t).expect("designed");
+            let speed = Margins::of(&|w| c.open_loop(w), 2, t).expect("crosses");
+            let position = Margins::of(&|w| open_position_loop(&c, w, t), 3, t);
             let position = position.expect("crosses");
-            println!("{tracking:?} {margin}: {c:?}\n  {speed:?}\n  {position:?}");
+            println!("{source:?} {margin}: {c:?}\n  {speed:?}\n  {position:?}");
             assert!(speed.stable && position.stable);
             assert!((speed.phase_margin_deg - margin).abs() < 1e-3);
-            assert_close("crossover", speed.crossover_hz, 4.0 * c.gains.k_x / TAU, 1e-6);
+            assert_close(
+                "crossover",
+                speed.crossover_hz,
+                c.source.spread() * c.gains.k_x / TAU,
+                1e-6,
+            );
             // The position's share takes atan 1/4 = 14° at an unchanged crossover; the current that
             // is fed forward moves the crossover up a little.
             assert!(position.phase_margin_deg > margin - 16.0);
@@ -265,8 +274,10 @@ fn motion_loops_have_the_margins_asked_for() {
         }
     }
     // Twice the inertia needs twice the current, and nothing else changes.
-    let [one, other] = [1.0, 0.5]
-        .map(|x| design_motion_loops(x * ACCELERATION, Some(4.0), 60.0, 0.01).expect("designed"));
+    let [one, other] = [1.0, 0.5].map(|x| {
+        design_motion_loops(x * ACCELERATION, SpeedSource::Tracking { hz: 4.0 }, 60.0, 0.01)
+            .expect("designed")
+    });
     assert_close("k_c", other.gains.k_c, 2.0 * one.gains.k_c, 1e-12);
     assert_eq!((one.gains.z_c, one.gains.k_x), (other.gains.z_c, other.gains.k_x));
 }
@@ -298,7 +309,7 @@ fn errors_name_the_value_and_its_range() {
             "r_s in ohm = -1: must be above 0 and below 1000000000",
         ),
         (
-            design_motion_loops(ACCELERATION, None, 90.0, 0.01).map(drop),
+            design_motion_loops(ACCELERATION, SpeedSource::Encoder, 90.0, 0.01).map(drop),
             "phase margin of the speed loop in degrees = 90: must be above 20 and below 75",
         ),
         (

@@ -12,7 +12,7 @@
 //!
 //! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference
 //! between realised and wanted output. Without the second call (or with zero) the controller is exactly the
-//! unlimited one. The current loop takes less of it, [`DqPi::condition`]: by the whole difference the voltage leaves its limit
+//! unlimited one. The loops of current and speed take less of it, [`Pi::condition`]: by the whole difference the voltage leaves its limit
 //! before the current is there, and a step of the torque takes twice as long.
 //!
 //! The state is the output itself, in `f32`: near 180 V it does not change for errors below
@@ -74,6 +74,13 @@ impl Pi {
         output
     }
 
+    /// Conditions the controller by `correction` = realised - wanted output, where that was limited: as if the last error had been
+    /// smaller by `correction/k_c`, that of a reference that could be realised (Hanus, Kinnaert and Henrotte, Automatica 23(6), 1987).
+    /// The next step takes `z_c` of that error back, so `1 - z_c` of the correction remains.
+    pub fn condition(&self, state: &mut PiState, correction: f32) {
+        state.back_calculate((1.0 - self.z_c) * correction);
+    }
+
     /// Makes the last step one of an error that was larger by `more`; returns by how much the wanted output is larger then.
     pub fn revise(&self, state: &mut PiState, more: f32) -> f32 {
         state.error += more;
@@ -118,12 +125,10 @@ impl DqPi {
         Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
 
-    /// Conditions the controllers by `correction` = realised - wanted voltage, V peak, where that was limited: as if the last
-    /// error had been smaller by `correction/k_c`, that of a reference that could be realised (Hanus, Kinnaert and Henrotte,
-    /// Automatica 23(6), 1987). The next step takes `z_c` of that error back, so `1 - z_c` of the correction remains.
+    /// [Conditions](Pi::condition) the controllers by `correction` = realised - wanted voltage, V peak.
     pub fn condition(&self, state: &mut DqPiState, correction: Dq) {
-        state.d.back_calculate((1.0 - self.d.z_c) * correction.d);
-        state.q.back_calculate((1.0 - self.q.z_c) * correction.q);
+        self.d.condition(&mut state.d, correction.d);
+        self.q.condition(&mut state.q, correction.q);
     }
 
     /// Takes back what the last error adds by integration: before each step of proportional controllers.

@@ -124,7 +124,10 @@ impl Field {
             if self.hand_over.leads {
                 self.lock = LockMonitorState::default();
             }
+            // The loops go on from the speed that the shaft has.
+            let speed = self.estimator.rotor_freq / c.freq_per_speed;
             c.motion.start(&mut self.motion, k.rotor_count);
+            c.motion.take_over(&mut self.motion, k.rotor_count, speed, 0.0);
             self.enter(k, FluxPhase::ready());
         }
         Ok(Dq { d, q: 0.0 })

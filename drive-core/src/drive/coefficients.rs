@@ -42,6 +42,8 @@ pub struct Coefficients {
     pub indirect: Indirect,
     /// Electrical turns per period for one mechanical turn/s.
     pub freq_per_speed: f32,
+    /// Its inverse.
+    pub speed_per_freq: f32,
     /// Delay of the measured current beside the filter, samples.
     pub current_lag: f32,
     /// 1 where the delays of the current are compensated, 0 where not.

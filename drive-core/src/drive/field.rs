@@ -311,7 +311,8 @@ impl Field {
             }
             Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
         };
-        let i_q = c.motion.step(&mut self.motion, goal, k.rotor_count, range);
+        let estimated = k.seen.rotor_freq * c.speed_per_freq;
+        let i_q = c.motion.step(&mut self.motion, goal, k.rotor_count, estimated, range);
         k.references.current.q = i_q;
         match self.goal {
             Goal::Brake { .. } if c.motion.is_at_rest(&self.motion) => {

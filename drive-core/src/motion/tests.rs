@@ -2,7 +2,7 @@ use super::*;
 
 /// No limit but the own.
 const ANY: (f32, f32) = (f32::MIN, f32::MAX);
-use crate::tuning::design_motion_loops;
+use crate::tuning::{SpeedSource, design_motion_loops};
 use core::f64::consts::TAU;
 
 /// 1 A accelerates the motor of Table 5 with 0.012 kg m^2 by 26.8 rad/s^2.
@@ -10,7 +10,7 @@ const ACCELERATION: f64 = 26.8 / TAU;
 const COUNTS: u32 = 10_000;
 
 fn motion(limit: f32, ramp: f32) -> Motion {
-    let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
+    let design = design_motion_loops(ACCELERATION, SpeedSource::Encoder, 60.0, 0.01).unwrap();
     Motion::new(
         &design.gains,
         COUNTS,
@@ -41,7 +41,7 @@ fn run(motion: &Motion, goal: Goal, load: (f64, f64), heavier: f64, seconds: f64
     for k in 0..(seconds / DT) as u32 {
         let t = f64::from(k) * DT;
         let count = 77_u32.wrapping_add((x * f64::from(COUNTS)) as i64 as u32);
-        let i = f64::from(motion.step(&mut state, goal, count, ANY));
+        let i = f64::from(motion.step(&mut state, goal, count, 0.0, ANY));
         let i_load = if t >= load.0 { load.1 } else { 0.0 };
         v += (ACCELERATION * (i - i_load) - 0.08 * v) / heavier * DT;
         x += v * DT;
@@ -88,7 +88,7 @@ fn limits_do_not_wind_up() {
     for k in 0..60_000 {
         let t = f64::from(k) / 6000.0;
         let count = (x * f64::from(COUNTS)) as i64 as u32;
-        let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, ANY));
+        let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, 0.0, ANY));
         assert!(i.abs() <= 3.0);
         let i_load = if (2.0..4.0).contains(&t) { 3.4 } else { 0.0 };
         v += ACCELERATION * (i - i_load) / 6000.0;
@@ -132,7 +132,7 @@ fn the_braking_curve_ends_at_the_goal() {
         assert!(((v * v / 2.0 + v * bend) / a / f64::from(error) - 1.0).abs() < 1e-5, "{error}");
         assert_eq!(f64::from(motion.braking_curve(-error)), -v);
     }
-    let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
+    let design = design_motion_loops(ACCELERATION, SpeedSource::Encoder, 60.0, 0.01).unwrap();
     let slope = f64::from(motion.braking_curve(1e-4)) / 1e-4;
     assert!((slope / design.gains.k_x - 1.0).abs() < 1e-3, "{slope}");
 }

@@ -20,8 +20,8 @@
 use drive_core::filter::{LPF, LpfState};
 use drive_core::flux::GainSchedule;
 use drive_core::io::PERIOD_S;
-use drive_core::{AlphaBeta, FirstOrder, Motion};
-use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign};
+use drive_core::{AlphaBeta, FirstOrder};
+use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource};
 use sim_bench::plant::{MachineSettings, MechanicsSettings};
 
 use crate::prelude::*;
@@ -97,8 +97,7 @@ impl LinearModel {
             current: settings.current_loops().map_err(Error::refused)?[1],
             speed: settings.motion_loops().map_err(Error::refused)?,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
-            apparent_angle: f64::from(here.gain * (before.reference - after.reference))
-                / 0.25,
+            apparent_angle: f64::from(here.gain * (before.reference - after.reference)) / 0.25,
         })
     }
 
@@ -116,13 +115,17 @@ impl LinearModel {
         let (mut voltage, mut acting) = (0.0, 0.0);
         let (mut e, mut m, mut w) = (0.0, 0.0, 0.0);
         let (mut w_i, mut acceleration) = (0.0, 0.0);
-        let (mut moved, mut speed, mut speed_error) = (0.0, 0.0, 0.0);
+        let (mut rotor, mut moved, mut speed, mut speed_error) = (0.0, 0.0, 0.0, 0.0);
+        let divider = (self.speed.gains.period_s / t).round() as usize;
         for k in 0..(seconds / t).round() as usize {
             response.angle_deg.push(e * 360.0 / TAU);
             response.speed_rpm.push(w * 60.0 / TAU / self.pole_pairs);
-            if free && k % usize::from(Motion::DIVIDER) == 0 {
+            if free && k % divider == 0 {
                 // turns/s, like the controller
-                let now = moved / (TAU * self.pole_pairs * self.speed.gains.period_s);
+                let now = match self.speed.source {
+                    SpeedSource::Estimate { .. } => rotor,
+                    _ => moved / self.speed.gains.period_s,
+                } / (TAU * self.pole_pairs);
                 speed += self.speed.gains.smoothing * (now - speed);
                 reference -= self.speed.gains.k_c * (speed - self.speed.gains.z_c * speed_error);
                 (speed_error, moved) = (speed, 0.0);
@@ -142,7 +145,7 @@ impl LinearModel {
             let w_n = self.w_n;
             acceleration += t * w_n.powi(3) * x;
             w_i += t * (acceleration + 2.0 * w_n * w_n * x);
-            let rotor = w_i + 2.0 * w_n * x;
+            rotor = w_i + 2.0 * w_n * x;
             moved += t * rotor;
             let fed_forward = r / (believed_t_r * i_d);
 

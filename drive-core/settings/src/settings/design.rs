@@ -7,7 +7,7 @@ mod scalar;
 use core::f32::consts::TAU;
 
 use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
-use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
+use crate::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource, TuningError};
 use drive_core::carrier::{AtStart, DemodulatorKind, Injection};
 use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLimit};
 use drive_core::flux::{Indirect, Leakage, Observer};
@@ -159,6 +159,7 @@ impl Settings {
             power: self.power_limit(),
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),
+            speed_per_freq: 1.0 / self.freq_of_rpm(60.0),
             protection: Protection {
                 trip_a: self.trip_a(),
                 dc_over: self.dc_over_v(),
@@ -230,14 +231,29 @@ impl Settings {
     pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
         let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
-        let tracking_hz = (self.angle_source == AngleSource::Injection)
-            .then(|| f64::from(self.injection.synchronous.bandwidth_hz));
-        tuning::design_motion_loops(
-            f64::from(acceleration),
-            tracking_hz,
-            f64::from(self.speed.phase_margin_deg),
-            f64::from(PERIOD_S) * f64::from(Motion::DIVIDER),
-        )
+        let design = |source, divider| {
+            tuning::design_motion_loops(
+                f64::from(acceleration),
+                source,
+                f64::from(self.speed.phase_margin_deg),
+                f64::from(PERIOD_S) * f64::from(divider),
+            )
+        };
+        if self.angle_source == AngleSource::Encoder {
+            return design(SpeedSource::Encoder, Motion::DIVIDER);
+        }
+        let hz = f64::from(self.injection.synchronous.bandwidth_hz);
+        let counted = design(SpeedSource::Tracking { hz }, Motion::DIVIDER)?;
+        if !self.tracks_synchronously() {
+            return Ok(counted);
+        }
+        let turns = TAU * f32::from(m.pole_pairs);
+        let slip = f64::from(1.0 / (m.tau_r() * self.i_d() * turns));
+        let leakage = f64::from(m.sigma_l_s() / (m.coupled_inductance() * self.i_d() * turns));
+        let source = SpeedSource::Estimate { slip, leakage };
+        let estimated = design(source, Motion::ESTIMATED_DIVIDER)?;
+        // With little flux and much slip the loop of the counted angle is the faster one.
+        Ok(if estimated.gains.k_c > counted.gains.k_c { estimated } else { counted })
     }
 
     fn motion(&self, design: &MotionDesign) -> Motion {

@@ -465,7 +465,7 @@ settings! {
         quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5)).guarded(Guard::Raise);
         /// time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once
         s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0).guarded(Guard::Lower);
-        /// phase margin of the speed loop: more is calmer and slower
+        /// phase margin of the speed loop: more is calmer and slower; without an encoder 45 only with a stiff shaft
         ///
         /// Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
         phase_margin_deg: f32 = 60.0, 90: number("deg").from_to(45.0, 70.0);

@@ -40,7 +40,7 @@ mod margins;
 mod motion;
 
 pub use margins::Margins;
-pub use motion::{MotionDesign, design_motion_loops};
+pub use motion::{MotionDesign, SpeedSource, design_motion_loops};
 
 use margins::gain_limit;
 
