@@ -38,7 +38,9 @@ pub enum RestoreError {
     #[error("learned: with scales.both_zero_vectors = {0}; set it so before, or learn again")]
     ZeroVectors(&'static str),
     /// Learned by a firmware with other rules.
-    #[error("learned: with the rules of an earlier firmware; learn again")]
+    #[error(
+        "learned: by an earlier firmware, which measured the motor in another way; `commission`, then `learn`"
+    )]
     Rules,
     /// No result that a learning accepts.
     #[error("learned: no result that a learning accepts")]

@@ -8,15 +8,16 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, a bit that earlier firmware set, today's rules; rotor positions in the third byte |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, two bits that earlier firmware set; rotor positions in the third byte; today's rules in the lowest bit of the fourth |
 //! | 37 | distance of the points, A |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
 //! | 55 to 57 | asymmetry: constant, sine, cosine |
 //! | 58 to 60 | the same at the start, 0 where it was not seen |
 //!
-//! All but number 36 are in single precision. Earlier firmware learned with other rules of the torque or another compensation of the
-//! dead time. Its results do not fit this drive: they are left out, and the drive has to learn again.
+//! All but number 36 are in single precision. Earlier firmware learned with other rules of the torque, with another compensation of the
+//! dead time, or in a frame turned by a rotor time constant that its commissioning had measured at another current than that of the
+//! drive. Its results do not fit this drive: they are left out, and the motor has to be commissioned and learned again.
 
 use core::mem::offset_of;
 
@@ -61,8 +62,9 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
-/// The firmware that set bit 14 compensated the dead time by the sign of the mean current of a period.
-const TODAYS_RULES: u32 = 1 << 15;
+/// The firmware that set bit 14 compensated the dead time by the sign of the mean current of a period, the one that set bit 15 as well
+/// measured the rotor time constant beside the current of the drive.
+const TODAYS_RULES: u32 = 1 << 24;
 
 /// The id of a value: the hash of the name plus its index.
 pub fn id(index: usize) -> u32 {

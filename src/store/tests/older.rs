@@ -69,7 +69,7 @@ fn a_result_of_other_rules_is_left_out() {
         fake.hold(0, record);
         assert_eq!(load(&mut fake), Loaded::Settings(new));
         // The bit that it did not write, and the last values.
-        record[flags] &= !(1 << (32 + 15));
+        record[flags] &= !(1 << (32 + 24));
         record[codec::WORDS - lacks as usize..].fill(u64::MAX);
         record[0] -= lacks << 48;
         fake.hold(0, resealed(record));
