@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::common::{config, plant_settings};
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode, State, Stop};
 use hil_sim::Config;
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
@@ -127,4 +127,68 @@ fn with_the_encoder_the_speed_is_exact() {
     assert!(dip < 30.0 && mean.abs() < 0.1 && most < 1.0 && angle < 1.0);
     let truth = rig.plant.mechanical_speed() * 60.0 / TAU;
     assert!((truth - 600.0).abs() < 1.0, "{truth}");
+}
+
+/// Half of the rated torque on the free shaft of a motor with saturation at 80 % of its rated speed, at the default and with a stiff shaft's
+/// margin: lowest speed, rpm below the reference, area of the dip, percent of the rated speed times s, and largest angle error, degrees.
+#[test]
+fn the_speed_falls_no_further_than_with_an_encoder() {
+    const RPM: f64 = 1150.0;
+    let step = |seed, source: &str, margin: f64| {
+        let settings = [
+            "plant=r".to_owned(),
+            FREE.to_owned(),
+            "prepare.learn=yes".to_owned(),
+            format!("angle_source={source}"),
+            format!("speed.phase_margin_deg={margin}"),
+            "speed.ramp_rpm_per_s=3000".to_owned(),
+            // Its rule is far lower with an encoder.
+            "speed.limit_rpm=1400".to_owned(),
+        ];
+        let config = Config::load(Some("motulator-2kw2"), None, &settings).unwrap();
+        let mut rig = regulating(&config, seed, RPM);
+        rig.set_load(Load::Free { torque: 0.5 * config.rated_nm() }).unwrap();
+        let (mut lowest, mut area, mut angle) = (RPM, 0.0, 0.0_f64);
+        rig.run(2.0, |p| {
+            lowest = lowest.min(p.speed_rpm);
+            area += (RPM - p.speed_rpm) / 6000.0;
+            angle = angle.max(p.angle_error_deg.abs());
+        });
+        assert_eq!(rig.drive.state(), State::Speed);
+        let rated = f64::from(config.drive.nameplate.speed_rpm);
+        (RPM - lowest, 100.0 * area / rated, angle)
+    };
+    for (seed, margin, most) in [(1, 60.0, 1.7), (2, 45.0, 1.0)] {
+        let [(dip, area, angle), (encoder, ..)] =
+            ["injection", "encoder"].map(|source| step(seed, source, margin));
+        println!(
+            "{margin} degrees: {dip:.0} rpm, {encoder:.0} with an encoder, {area:.2} %s, {angle:.1} degrees"
+        );
+        assert!(
+            dip < 1.3 * encoder && area < most && angle < 7.0,
+            "{dip} {encoder} {area} {angle}"
+        );
+    }
+}
+
+/// A start on a shaft that turns freely goes on from the speed that it finds: it does not brake the shaft. (Speed control began at rest, and
+/// braked a light shaft to a standstill.)
+#[test]
+fn a_start_on_a_turning_shaft_does_not_brake_it() {
+    let settings = ["plant=r", FREE, "prepare.learn=yes", "speed.ramp_rpm_per_s=3000"];
+    for (seed, rpm) in [(1, 1300.0), (2, -560.0)] {
+        let config = Config::load(Some("motulator-2kw2"), None, &settings).unwrap();
+        let mut rig = regulating(&config, seed, rpm);
+        rig.command(&Command::Stop(Stop::Coast)).unwrap();
+        while !rig.drive.is_off() {
+            rig.wait(0.01);
+        }
+        rig.start(Mode::Speed).unwrap();
+        rig.command(&Command::Speed(rpm as f32)).unwrap();
+        let mut slowest = f64::INFINITY;
+        rig.run(2.0, |p| slowest = slowest.min(p.speed_rpm / rpm));
+        println!("{rpm} rpm: slowest {slowest:.3} of it");
+        assert!(slowest > 0.85, "{rpm} rpm: {slowest}");
+        assert_eq!(rig.drive.state(), State::Speed);
+    }
 }
