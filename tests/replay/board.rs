@@ -93,16 +93,16 @@ fn torque_steps_without_a_sensor() {
         [
             0x4f46_c34d_2340_65e2,
             0x20c5_e0ff_87bf_2860,
-            0xbb06_da91_2d15_4d84,
-            0xe0e3_0e66_5617_8741,
-            0x080c_aca4_9344_33e0,
-            0x76a8_1e2b_205a_0604,
-            0xe3e6_440d_ebe1_cd4e,
-            0x61e3_96cf_9f48_aff9,
-            0x093f_8a50_18cc_94b9,
-            0x3877_976d_27dc_883f,
-            0x0c8b_d1df_8b4a_ed38,
-            0xbd40_ccd8_7be0_354f
+            0xdf92_5fe2_44d7_c960,
+            0x7275_b66f_0179_de2a,
+            0x7799_55cd_bbc2_6548,
+            0x1be9_6b0b_f82e_3705,
+            0xe251_32b4_49c5_033d,
+            0x716e_837a_b654_4ac1,
+            0xd932_6a55_9404_4911,
+            0x62c5_fd1d_db4f_b771,
+            0xdd22_4e6c_a5a9_b71e,
+            0x78c9_f22f_d839_01b3
         ],
         "{hashes:#018x?}"
     );
