@@ -16,6 +16,7 @@ mod orientation;
 mod record;
 pub mod scenario;
 mod sensorless_position;
+mod shaft;
 mod smallest_slope;
 mod torque_envelope;
 pub mod torque_limit;
@@ -67,6 +68,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     lock_monitor::EXPERIMENT,
     record::EXPERIMENT,
     torque_rise::EXPERIMENT,
+    shaft::EXPERIMENT,
     smallest_slope::EXPERIMENT,
     foreign_motors::EXPERIMENT,
     identify_discrete::EXPERIMENT,

@@ -1,0 +1,256 @@
+//! How far the speed of a free shaft falls when a load comes, beside an encoder and beside what the delay of the loop allows.
+
+use crate::prelude::*;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment::new("shaft", run)
+    .stands_for("beyond the dissertation")
+    .about("Load steps on a free shaft at four speeds, a hoist, other inertias and elastic couplings: lowest speed, area of the dip, recovery, \
+            torque noise, angle error, beside an encoder.")
+    .uses(&[BENCH, DRIVE])
+    .not(&[&["angle_source", "shaft.load_inertia", "shaft.stiffness", "shaft.damping", "motor.inertia"]]);
+
+/// Loads as shares of the rated torque, or of this share of the torque that the drive allows if that is smaller, and speeds as shares of
+/// the rated one.
+const ALLOWED: f64 = 0.9;
+const LOADS: [f64; 4] = [0.5, -0.5, 1.0, -1.0];
+const SPEEDS: [f64; 4] = [0.0, 0.05, 0.2, 0.8];
+/// Inertias relative to the one that the drive has in its settings.
+const INERTIAS: [f64; 3] = [0.5, 2.0, 10.0];
+/// Resonances of a coupling between two equal inertias, Hz, and its damping ratio.
+const COUPLINGS_HZ: [f64; 3] = [15.0, 30.0, 60.0];
+const DAMPING: f64 = 0.007;
+/// Time in which the load of a hoist comes, time before the load, and time that is looked at from its beginning on, s.
+const HOIST_S: f64 = 2.0;
+const BEFORE_S: f64 = 1.0;
+const AFTER_S: f64 = 3.0;
+/// Longest run-up, s.
+const RUN_UP_S: f64 = 60.0;
+/// Band within which the speed has recovered, as a share of the rated speed.
+const RECOVERED: f64 = 0.02;
+/// Speed and torque are looked at as means over a period of the injection, s.
+const MEAN_S: f64 = 10.0 / RATE_HZ;
+
+/// A load on a shaft.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    /// Share of the load, the time in which it comes, s, and speed, in rated speeds.
+    load: f64,
+    ramp_s: f64,
+    speed: f64,
+    /// True inertia relative to that of the settings; resonance of the coupling, Hz.
+    inertia: f64,
+    coupling_hz: Option<f64>,
+}
+
+/// What a load does to the speed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Response {
+    /// Largest deviation, rpm, and its area, percent of the rated speed times s; both positive in the direction of the load.
+    dip_rpm: f64,
+    area_pct_s: f64,
+    /// Time after which the speed stays within the band, s.
+    recovery_s: f64,
+    /// Deviation of the torque before the load and at the end, percent of the rated torque.
+    noise_pct: [f64; 2],
+    /// Largest angle error, degrees.
+    angle_deg: f64,
+    /// The load, in rated torques.
+    load: f64,
+    fault: Option<Fault>,
+}
+
+impl Case {
+    const STEP: Self = Self { load: 0.5, ramp_s: 0.0, speed: 0.8, inertia: 1.0, coupling_hz: None };
+
+    /// All cases.
+    fn all() -> Vec<Self> {
+        let speeds = |case: Self| SPEEDS.map(|speed| Self { speed, ..case });
+        let steps = LOADS.iter().flat_map(|&load| speeds(Self { load, ..Self::STEP }));
+        let hoist = Self { ramp_s: HOIST_S, speed: 0.0, ..Self::STEP };
+        let inertias = INERTIAS.iter().flat_map(|&inertia| speeds(Self { inertia, ..Self::STEP }));
+        let couplings = COUPLINGS_HZ
+            .iter()
+            .flat_map(|&hz| speeds(Self { coupling_hz: Some(hz), ..Self::STEP }));
+        steps.chain([hoist]).chain(inertias).chain(couplings).collect()
+    }
+
+    fn name(&self) -> String {
+        match self.coupling_hz {
+            Some(hz) => format!("coupling {hz:.0} Hz"),
+            None if self.inertia != 1.0 => format!("inertia x {}", self.inertia),
+            None if self.ramp_s > 0.0 => "hoist".to_owned(),
+            None => "step".to_owned(),
+        }
+    }
+
+    /// The bench: its load acts behind the coupling.
+    fn bench(&self, config: &Config, source: AngleSource) -> Config {
+        let mut config = config.clone();
+        config.drive.angle_source = source;
+        // Its rule is far lower with an encoder.
+        config.drive.speed.limit_rpm.get_or_insert(config.drive.nameplate.speed_rpm);
+        config.prepare.learn = true;
+        config.load.mode = LoadMode::Free;
+        config.load.torque_nm = Some(0.0);
+        config.motor.inertia *= self.inertia;
+        if let Some(hz) = self.coupling_hz {
+            let (half, omega) = (0.5 * config.motor.inertia, TAU * hz);
+            (config.motor.inertia, config.shaft.load_inertia) = (half, half);
+            // Of two halves against each other.
+            config.shaft.stiffness = 0.5 * half * omega * omega;
+            config.shaft.damping = DAMPING * half * omega;
+        }
+        config
+    }
+
+    /// The response of a drive with this source of the angle.
+    fn response(&self, config: &Config, source: AngleSource, seed: u64) -> Result<Response, Error> {
+        let (rated_nm, rated_rpm) = (config.rated_nm(), rated_rpm(config));
+        let mut rig = Rig::from_config(&self.bench(config, source), seed)?;
+        rig.start(Mode::Speed)?;
+        let (wanted, band) = (self.speed * rated_rpm, RECOVERED * rated_rpm);
+        rig.command(&Command::Speed(wanted as f32))?;
+        let runs_up = |rig: &Rig| (turning_rpm(rig) - wanted).abs() > band && rig.fault().is_none();
+        while runs_up(&rig) && rig.time() < RUN_UP_S {
+            rig.wait(0.1);
+        }
+        rig.wait(BEFORE_S);
+        let mut seen = Response::default();
+        let (mut torque, mut speed) = (Stats::default(), Stats::default());
+        let mut last = Mean::default();
+        for _ in 0..steps(BEFORE_S) {
+            last = Mean::of(&mut rig, &mut torque, &mut speed);
+        }
+        let before = speed;
+        seen.noise_pct[0] = 100.0 * torque.deviation() / rated_nm;
+        let room = rig.drive.room().i_q;
+        let allowed = f64::from((-room.0).min(room.1)) * last.torque_per_ampere;
+        seen.load = self.load * (ALLOWED * allowed / rated_nm).min(1.0);
+        let direction = self.load.signum();
+        let start = rig.time();
+        for step in 0..steps(AFTER_S + self.ramp_s) {
+            let t = rig.time() - start;
+            let share = if self.ramp_s > 0.0 { (t / self.ramp_s).min(1.0) } else { 1.0 };
+            rig.set_load(Load::Free { torque: share * seen.load * rated_nm })?;
+            if step == steps(AFTER_S + self.ramp_s - BEFORE_S) {
+                torque = Stats::default();
+            }
+            let mean = Mean::of(&mut rig, &mut torque, &mut speed);
+            seen.angle_deg = seen.angle_deg.max(mean.angle_deg);
+            let dip_rpm = direction * (before.mean() - mean.rpm);
+            seen.dip_rpm = seen.dip_rpm.max(dip_rpm);
+            seen.area_pct_s += 100.0 * dip_rpm / rated_rpm * MEAN_S;
+            if dip_rpm.abs() > band {
+                seen.recovery_s = t + MEAN_S;
+            }
+        }
+        seen.noise_pct[1] = 100.0 * torque.deviation() / rated_nm;
+        seen.fault = rig.drive.state().fault();
+        Ok(seen)
+    }
+}
+
+/// Means over a period of the injection, and the largest angle error, degrees.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mean {
+    rpm: f64,
+    torque_per_ampere: f64,
+    angle_deg: f64,
+}
+
+impl Mean {
+    fn of(rig: &mut Rig, torques: &mut Stats, speeds: &mut Stats) -> Self {
+        let (mut mean, mut torque) = (Self::default(), Stats::default());
+        rig.run(MEAN_S, |p| {
+            torque.push(p.torque);
+            mean.rpm += p.speed_rpm * MEAN_S.recip() / RATE_HZ;
+            mean.torque_per_ampere = p.torque_per_flux_ampere * p.flux;
+            mean.angle_deg = mean.angle_deg.max(p.angle_error_deg.abs());
+        });
+        torques.push(torque.mean());
+        speeds.push(mean.rpm);
+        mean
+    }
+}
+
+fn rated_rpm(config: &Config) -> f64 {
+    f64::from(config.drive.nameplate.speed_rpm)
+}
+
+fn turning_rpm(rig: &Rig) -> f64 {
+    rig.plant.mechanical_speed() * 60.0 / TAU
+}
+
+fn steps(seconds: f64) -> usize {
+    (seconds / MEAN_S).round() as usize
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let (config, seed) = (context.config, context.seed);
+    let cases = Case::all();
+    let seen = context.in_parallel("shaft", &cases, |_, case| {
+        let of = |source| case.response(config, source, seed);
+        Ok([of(AngleSource::Injection)?, of(AngleSource::Encoder)?])
+    })?;
+    let loops = config.drive.motion_loops().map_err(Error::refused)?;
+    let rated_rpm = rated_rpm(config);
+    // Torque and inertia of the settings: s from rest to the rated speed.
+    let mechanical_s =
+        f64::from(config.drive.motor.inertia) * rated_rpm * TAU / 60.0 / config.rated_nm();
+    let bound_rpm = |(case, [seen, _]): &(&Case, &[Response; 2])| {
+        seen.load.abs() * loops.delay_s() / (mechanical_s * case.inertia) * rated_rpm
+    };
+    let mut outcome = Outcome { remarks: assumptions(config), ..Outcome::default() };
+    let pairs: Vec<(&Case, &[Response; 2])> = cases.iter().zip(&seen).collect();
+    let columns = columns![|_, pair: &(&Case, &[Response; 2])|
+        "shaft" => Cell::from(pair.0.name());
+        "speed (rpm)" => Cell::fixed(pair.0.speed * rated_rpm, 0);
+        "load (%)" => Cell::fixed(100.0 * pair.1[0].load, 0);
+        "speed falls by (rpm)" => Cell::fixed(pair.1[0].dip_rpm, 1);
+        "with an encoder (rpm)" => Cell::fixed(pair.1[1].dip_rpm, 1);
+        "bound (rpm)" => Cell::fixed(bound_rpm(pair), 1);
+        "area (%s)" => Cell::fixed(pair.1[0].area_pct_s, 2);
+        "with an encoder (%s)" => Cell::fixed(pair.1[1].area_pct_s, 2);
+        "back within 2 % (s)" => Cell::fixed(pair.1[0].recovery_s, 2);
+        "torque noise before (%)" => Cell::fixed(pair.1[0].noise_pct[0], 2);
+        "after (%)" => Cell::fixed(pair.1[0].noise_pct[1], 2);
+        "largest angle error (°)" => Cell::fixed(pair.1[0].angle_deg, 1);
+        "ends" => Cell::from(pair.1[0].fault.map_or("runs".to_owned(), |fault| format!("fault {}", fault.code())));
+    ];
+    let table = Table::of("Load on a free shaft", &columns, pairs.iter().enumerate()).note(
+        "Bound: load times delay of the speed loop over the time in which the rated torque brings the inertia to the rated speed.          Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
+    );
+    outcome.tables.push(table);
+    outcome.faults.extend(pairs.iter().filter_map(|(case, [seen, _])| {
+        let fault = seen.fault?;
+        Some(format!(
+            "{}, {:.0} % at {:.0} %: {}",
+            case.name(),
+            100.0 * case.load,
+            100.0 * case.speed,
+            fault_text(fault)
+        ))
+    }));
+    let of = |is: &dyn Fn(&Case) -> bool| -> Vec<[Response; 2]> {
+        pairs.iter().filter(|(case, _)| is(case)).map(|(_, seen)| **seen).collect()
+    };
+    let is_plain = |case: &Case| case.inertia == 1.0 && case.coupling_hz.is_none();
+    let half = of(&|case| is_plain(case) && case.load == 0.5 && case.speed == 0.8);
+    let plain = of(&is_plain);
+    let largest = |of: &[[Response; 2]], value: &dyn Fn(&[Response; 2]) -> f64| {
+        of.iter().map(value).fold(0.0, f64::max)
+    };
+    let m = &mut outcome.metrics;
+    m.set("area_half_load_pct_s", largest(&half, &|r| r[0].area_pct_s));
+    m.set("dip_half_load_rpm", largest(&half, &|r| r[0].dip_rpm));
+    m.set("dip_half_load_to_encoder", largest(&half, &|r| r[0].dip_rpm / r[1].dip_rpm));
+    m.set("hoist_dip_rpm", largest(&of(&|case| case.ramp_s > 0.0), &|r| r[0].dip_rpm));
+    let rest = of(&|case| is_plain(case) && case.speed == 0.0);
+    m.set("torque_noise_at_rest_pct", largest(&rest, &|r| r[0].noise_pct[0]));
+    m.set("angle_error_max_deg", largest(&plain, &|r| r[0].angle_deg));
+    let coupled = of(&|case| case.coupling_hz.is_some());
+    m.set("torque_noise_coupled_pct", largest(&coupled, &|r| r[0].noise_pct[1]));
+    m.set("stopped_runs", outcome.faults.len() as f64);
+    Ok(outcome)
+}
