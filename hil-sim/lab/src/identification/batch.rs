@@ -70,7 +70,7 @@ pub fn least_squares<T: ComplexField<RealField = f64>>(
         return Err(NotIdentifiable::PoorExcitation);
     };
     for (k, length) in lengths.iter().enumerate() {
-        theta[k].unscale_mut(*length);
+        theta[k] = theta[k].clone().unscale(*length);
         r.column_mut(k).scale_mut(*length);
     }
     Ok(Solution { theta, r, condition, residual })
@@ -79,17 +79,6 @@ pub fn least_squares<T: ComplexField<RealField = f64>>(
 /// Real and imaginary parts behind each other.
 pub fn parts<'a>(values: impl Iterator<Item = &'a Complex>) -> DVector<f64> {
     DVector::from_vec(values.flat_map(|z| [z.re, z.im]).collect())
-}
-
-/// In-place scaling of one number.
-trait Unscale {
-    fn unscale_mut(&mut self, by: f64);
-}
-
-impl<T: ComplexField<RealField = f64>> Unscale for T {
-    fn unscale_mut(&mut self, by: f64) {
-        *self = self.clone().unscale(by);
-    }
 }
 
 /// Model A: the coefficients of the equation in differences, and how sharply the data fix them.
