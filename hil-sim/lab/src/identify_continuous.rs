@@ -17,7 +17,7 @@ pub const EXPERIMENT: Experiment = Experiment::new("identify-continuous", run)
     );
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let (all, mut outcome) = tables(context, &MODELS);
+    let (all, mut outcome) = tables(context, &MODELS)?;
     outcome.tables.push(means(&all, &mut outcome.metrics));
     let table = low_speeds(context.seed, &mut outcome);
     outcome.tables.push(table);
@@ -77,7 +77,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
 }
 
 /// Means over the twelve columns.
-fn means(all: &[Entry], metrics: &mut sim_bench::outcome::Metrics) -> Table {
+fn means(all: &[Entry], metrics: &mut Metrics) -> Table {
     let heads = ["model", "r_s (%)", "τ_r (%)", "σ l_s (%)", "l_s (%)", "ω_m (%)"];
     let mut table = Table::new("Mean of both signals, speeds and all periods", &heads);
     for model in MODELS {

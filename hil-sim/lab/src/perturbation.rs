@@ -1,7 +1,7 @@
 //! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
 //! and predicted.
 
-use crate::linear_model::{Disturbance, LinearModel};
+use crate::linear_model::{Disturbance, LinearModel, LinearResponse};
 use crate::prelude::*;
 
 /// Section 5.2 names it as work to be done.
@@ -75,14 +75,13 @@ struct StepResponse {
     /// Largest single error, noise and all.
     largest: f64,
     lost: usize,
-    predicted: Vec<f64>,
-    predicted_speed: Vec<f64>,
+    predicted: LinearResponse,
 }
 
 impl StepResponse {
     /// Measured minus predicted, rms, degrees.
     fn fit(&self) -> f64 {
-        Stats::of(self.angle.iter().zip(&self.predicted).map(|(m, p)| m - p)).rms()
+        Stats::of(self.angle.iter().zip(&self.predicted.angle_deg).map(|(m, p)| m - p)).rms()
     }
 }
 
@@ -134,40 +133,28 @@ fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, E
     let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
     let predicted = linear.response(case.disturbance, AFTER_S);
 
-    let mut sum = vec![[0.0; 2]; predicted.angle_deg.len()];
-    let (mut largest, mut lost) = (0.0_f64, 0);
     let runs: Vec<_> = (0..SEEDS)
         .into_par_iter()
         .map(|n| one(&config, &case, seed.wrapping_add(n)))
         .collect::<Result<_, _>>()?;
-    for (points, most, is_lost) in runs {
-        for (sum, point) in sum.iter_mut().zip(points) {
-            for (sum, value) in sum.iter_mut().zip(point) {
-                *sum += value / SEEDS as f64;
-            }
-        }
-        largest = largest.max(most);
-        lost += usize::from(is_lost);
-    }
+    let mean = |of: usize| -> Vec<f64> {
+        let at = |k: usize| runs.iter().map(|(points, ..)| points[k][of] / SEEDS as f64).sum();
+        (0..predicted.angle_deg.len()).map(at).collect()
+    };
     Ok(StepResponse {
         case,
-        angle: sum.iter().map(|p| p[0]).collect(),
-        speed: sum.iter().map(|p| p[1]).collect(),
-        largest,
-        lost,
-        predicted: predicted.angle_deg,
-        predicted_speed: predicted.speed_rpm,
+        angle: mean(0),
+        speed: mean(1),
+        largest: runs.iter().map(|(_, largest, _)| *largest).fold(0.0, f64::max),
+        lost: runs.iter().filter(|(.., lost)| *lost).count(),
+        predicted,
     })
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let bar = context.progress.bar("perturbation", CASES.len() as u64);
-    let mut results = Vec::with_capacity(CASES.len());
-    for case in CASES {
-        let case = case.scaled(context.config);
-        results.push(measure(context.config, case, context.seed)?);
-        bar.advance(1);
-    }
+    let results = context.in_parallel("perturbation", &CASES, |_, case| {
+        measure(context.config, case.scaled(context.config), context.seed)
+    })?;
 
     let mut outcome = Outcome::default();
     for m in results.iter().filter(|m| m.lost > 0) {
@@ -184,7 +171,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         table.record([
             ("step", Cell::from(m.case.name)),
             ("peak, measured (°)", Cell::fixed(peak(&m.angle), 2)),
-            ("predicted (°)", Cell::fixed(peak(&m.predicted), 2)),
+            ("predicted (°)", Cell::fixed(peak(&m.predicted.angle_deg), 2)),
             ("fit, rms of the difference (°)", Cell::fixed(m.fit(), 2)),
             ("largest single error (°)", Cell::fixed(m.largest, 2)),
         ]);
@@ -221,10 +208,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     };
     for m in &results {
         let name = m.case.name;
-        figure = figure.panel(panel(format!("{name} (°)"), &m.angle, &m.predicted));
+        figure = figure.panel(panel(format!("{name} (°)"), &m.angle, &m.predicted.angle_deg));
         if is_load(&m) {
             let y = format!("{name} (rpm)");
-            speeds = speeds.panel(panel(y, &m.speed, &m.predicted_speed));
+            speeds = speeds.panel(panel(y, &m.speed, &m.predicted.speed_rpm));
         }
     }
     outcome.figures.push(figure);

@@ -132,22 +132,21 @@ impl Errors {
 /// Measurements of a column, M.
 pub const TRIALS: u64 = 7;
 /// Seeds that give the spread.
-const SEEDS: u64 = 5;
+const SEEDS: usize = 5;
 
 /// The errors of some models in all columns with half the printed noise, beside the printed ones and with their spread over
 /// seeds; the shares within a factor of two, with that noise and with the printed one, as metrics.
-pub fn tables(context: &Context<'_>, models: &[&'static str]) -> (Vec<Entry>, Outcome) {
+pub fn tables(
+    context: &Context<'_>,
+    models: &[&'static str],
+) -> Result<(Vec<Entry>, Outcome), Error> {
     let all = |noise, seed| -> Vec<Entry> {
         let one = |case| errors(Parameters::PX, case, noise, seed, TRIALS).entries(models);
         Case::all().into_iter().flat_map(one).collect()
     };
-    let bar = context.progress.bar("identification", SEEDS);
-    let seeds: Vec<_> = (0..SEEDS)
-        .map(|n| {
-            bar.advance(1);
-            all(Noise::HALF, context.seed + n)
-        })
-        .collect();
+    let seeds = context.in_parallel("identification", &[(); SEEDS], |n, ()| {
+        Ok(all(Noise::HALF, context.seed + n))
+    })?;
     let mut outcome = Outcome::default();
     let entries = seeds[0].clone();
     for (k, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.printed_pct.is_some()) {
@@ -166,5 +165,5 @@ pub fn tables(context: &Context<'_>, models: &[&'static str]) -> (Vec<Entry>, Ou
          from the tables themselves (identify-machine). The printed ranges of the noise are read \
          as peak to peak, which comes nearer to these tables and contradicts the words of section 5.",
     );
-    (entries, outcome)
+    Ok((entries, outcome))
 }
