@@ -150,16 +150,6 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
     all
 });
 
-/// Source, place and quantity.
-type Key<'a> = (&'a str, &'a str, &'a str);
-
-/// Places in [`PRINTED`].
-static PLACES: LazyLock<HashMap<Key<'static>, usize>> = LazyLock::new(|| {
-    let key =
-        |(place, p): (usize, &'static Printed)| ((&*p.source, &*p.place, &*p.quantity), place);
-    PRINTED.iter().enumerate().map(key).collect()
-});
-
 /// The quantities of the formulas, by source.
 static NAMES: LazyLock<HashMap<String, HashMap<String, f64>>> = LazyLock::new(|| {
     let of = |File { source, names, .. }: File| {
@@ -188,7 +178,8 @@ pub fn value_of(source: &str, formula: &str) -> Option<f64> {
 
 /// Number of a value in [`PRINTED`].
 pub fn place_of(source: &str, place: &str, quantity: &str) -> Option<usize> {
-    PLACES.get(&(source, place, quantity)).copied()
+    let is_it = |p: &Printed| p.source == source && p.place == place && p.quantity == quantity;
+    PRINTED.iter().position(is_it)
 }
 
 /// A printed number, for an experiment that uses it.

@@ -3,7 +3,7 @@
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 
 use crate::identification::models::model_d;
-use crate::identification::{Complex, Delta, Estimate};
+use crate::identification::{Delta, Estimate};
 use crate::prelude::*;
 
 /// Calls of `refine` per second.
@@ -98,19 +98,15 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         if let (true, Ok(tracked)) = (case.used, &estimate) {
             rig.command(&Command::RotorTimeConstant(tracked.tau_r))?;
         }
+        let theta = online.rls().latest().map(|x| Complex64::new(x.re.into(), x.im.into()));
         moments.push(WarmingMoment {
             t: (n + 1) as f64 / REFINES_PER_S,
             tau_r: rig.plant.tau_r(),
             omega_m: rig.plant.mechanical_speed() * pole_pairs,
             estimate,
-            model_d: inverse(&online),
+            model_d: model_d(&Delta::from_array(theta), SAMPLE_S.into()),
             angle_error_deg: angle_error,
         });
     }
     Ok(moments)
-}
-
-fn inverse(online: &Online) -> Estimate {
-    let theta = online.rls().latest().map(|x| Complex::new(x.re.into(), x.im.into()));
-    model_d(&Delta::from_array(theta), SAMPLE_S.into())
 }

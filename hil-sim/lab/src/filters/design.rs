@@ -134,20 +134,16 @@ impl Prototype {
         let warped = |hz: f64| (PI * hz / RATE).tan();
         // Roots in the plane of the band, and where a zero at infinity goes.
         let moved = |root: Complex64| -> Vec<Complex64> {
-            let both = |half: Complex64, square: f64| {
-                let apart = (half * half - square).sqrt();
+            let both = |low: f64, high: f64, moved: &dyn Fn(f64) -> Complex64| {
+                let (low, high) = (warped(low), warped(high));
+                let half = moved(0.5 * (high - low));
+                let apart = (half * half - low * high).sqrt();
                 vec![half + apart, half - apart]
             };
             match band {
                 Band::Low(edge) => vec![root * warped(edge)],
-                Band::Pass(low, high) => {
-                    let (low, high) = (warped(low), warped(high));
-                    both(0.5 * (high - low) * root, low * high)
-                }
-                Band::Stop(low, high) => {
-                    let (low, high) = (warped(low), warped(high));
-                    both(0.5 * (high - low) / root, low * high)
-                }
+                Band::Pass(low, high) => both(low, high, &|half_width| half_width * root),
+                Band::Stop(low, high) => both(low, high, &|half_width| half_width / root),
             }
         };
         let plane = |roots: &[Complex64]| -> Vec<Complex64> {

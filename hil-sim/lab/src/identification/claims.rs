@@ -85,18 +85,13 @@ pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
     }
     // Eq. 42 and Model C on the exact coefficients.
     for (h, micros) in PERIODS.iter().zip([50, 100, 200]) {
-        let [px, rbv] = [Parameters::PX, Parameters::RBV].map(|machine| {
+        let low_by = |machine: Parameters, k: usize| {
             let machine = machine.at(fast);
             let found = model_c(&machine.continuous().series(*h, 5).current_voltage().delta(), *h);
-            found
-                .array()
-                .map(|value| value.unwrap_or(f64::NAN))
-                .into_iter()
-                .zip(machine.array())
-                .map(|(found, real)| 100.0 * (1.0 - found / real))
-                .collect::<Vec<_>>()
-        });
-        metrics.set(format!("eq_42_low_by_at_{micros}_us_pct"), px[4]);
-        metrics.set(format!("model_c_tau_r_bias_of_rbv_at_{micros}_us_pct"), rbv[1].abs());
+            100.0 * (1.0 - found.array()[k].unwrap_or(f64::NAN) / machine.array()[k])
+        };
+        metrics.set(format!("eq_42_low_by_at_{micros}_us_pct"), low_by(Parameters::PX, 4));
+        let bias = low_by(Parameters::RBV, 1).abs();
+        metrics.set(format!("model_c_tau_r_bias_of_rbv_at_{micros}_us_pct"), bias);
     }
 }

@@ -39,11 +39,9 @@ impl Evidence {
             self.metrics.insert(format!("{experiment}/{name}"), value);
         }
         for ours in &outcome.compared {
-            let Some(place) = place_of(ours.source, &ours.place, &ours.quantity) else {
-                self.astray.push(format!(
-                    "{experiment}: {} {}, {}",
-                    ours.source, ours.place, ours.quantity
-                ));
+            let Compared { source, place, quantity, .. } = ours;
+            let Some(place) = place_of(source, place, quantity) else {
+                self.astray.push(format!("{experiment}: {source} {place}, {quantity}"));
                 continue;
             };
             let known = self.compared.entry(place).or_insert_with(|| (Vec::new(), ours.clone()));
@@ -144,15 +142,11 @@ impl Evidence {
 
     /// Places without a verdict, values astray, and faults of the errata.
     pub fn faults(&self) -> Vec<String> {
-        let none = |(place, p): (usize, &Printed)| {
-            let ours =
-                self.value(place).map_or_else(|| "nothing".to_owned(), |ours| ours.to_string());
-            (self.verdict(place) == Verdict::None).then(|| {
-                format!(
-                    "{} {}, {}: {} printed, ours {ours}",
-                    p.source, p.place, p.quantity, p.value
-                )
-            })
+        let none = |(number, printed): (usize, &Printed)| {
+            let Printed { source, place, quantity, value, .. } = printed;
+            let ours = self.value(number).map_or("nothing".to_owned(), |ours| ours.to_string());
+            (self.verdict(number) == Verdict::None)
+                .then(|| format!("{source} {place}, {quantity}: {value} printed, ours {ours}"))
         };
         let mut faults: Vec<_> = PRINTED.iter().enumerate().filter_map(none).collect();
         faults.extend(self.astray.iter().map(|astray| format!("not in the list: {astray}")));
