@@ -51,15 +51,12 @@ impl DemodulationResults {
         let (seen, isotropic) = self.at_one_ampere();
         (isotropic.signal / seen.signal).abs()
     }
-
-    fn delay_text(&self) -> Cell {
-        Cell::fixed_or_dash(self.delay, 1)
-    }
 }
 
 struct ClosedLoop {
     steps: StepsRun,
-    turning: Vec<Option<SteadyRun>>,
+    /// One second at constant speed and torque, by speed.
+    turning: Vec<SteadyRun>,
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -86,7 +83,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             m.set(name("steps_rms_deg"), t.steps.stats.rms());
             m.set(name("steps_max_deg"), t.steps.stats.largest());
             for (rpm, run) in SPEEDS_RPM.iter().zip(&t.turning) {
-                let rms = run.as_ref().map_or(f64::NAN, |run| run.error.rms());
+                let rms = if run.lost { f64::NAN } else { run.error.rms() };
                 m.set(name(&format!("{rpm}rpm_rms_deg")), rms);
             }
         }
@@ -121,12 +118,8 @@ fn findings(
     let learned = demodulation.learn(config, seed)?;
     let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
         let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
-        // One second at constant speed and torque; none where the angle is lost.
-        let turning = SPEEDS_RPM.par_iter().map(|&rpm| {
-            let case = OperatingPoint { rpm, iq: RUN_IQ_A, seed };
-            let run = steady_run(&config, case, 1.0)?;
-            Ok::<_, Error>((!run.lost).then_some(run))
-        });
+        let case = |&rpm: &f64| OperatingPoint { rpm, iq: RUN_IQ_A, seed };
+        let turning = SPEEDS_RPM.par_iter().map(|rpm| steady_run(&config, case(rpm), 1.0));
         let turning = turning.collect::<Result<_, _>>()?;
         Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
     };
@@ -190,13 +183,14 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
             let (Some(t), kind) = (tracked, kind.word()) else { continue };
-            let mut row = vec![Cell::from(demodulation.name()), Cell::from(kind), f.delay_text()];
-            let mut add = |values: Option<[f64; 2]>| {
-                row.extend([0, 1].map(|k| values.map_or("lost".into(), |v| Cell::fixed(v[k], 2))));
+            let delay = Cell::fixed_or_dash(f.delay, 1);
+            let mut row = vec![Cell::from(demodulation.name()), Cell::from(kind), delay];
+            let mut add = |lost: bool, values: [f64; 2]| {
+                row.extend(values.map(|x| if lost { "lost".into() } else { Cell::fixed(x, 2) }));
             };
-            add((!t.steps.lost).then(|| [t.steps.stats.rms(), t.steps.stats.largest()]));
+            add(t.steps.lost, [t.steps.stats.rms(), t.steps.stats.largest()]);
             for run in &t.turning {
-                add(run.as_ref().map(|run| [run.error.mean(), run.error.rms()]));
+                add(run.lost, [run.error.mean(), run.error.rms()]);
             }
             table.row(row);
         }

@@ -70,32 +70,23 @@ pub struct Reading {
     pub times: [Option<f64>; 2],
 }
 
-/// Names of the columns in the file, by ours.
-struct Names(Vec<(String, String)>);
-
-impl Names {
-    fn new(mapping: &[String]) -> Result<Self, Error> {
-        let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
-        let pair = |given: &String| {
-            let Some((ours, theirs)) = given.split_once('=') else {
-                let given = cut(given);
-                return Err(Error::Refused(format!(
-                    "--column {given}: write OURS=THEIRS, for example --column speed_rpm=n"
-                )));
-            };
-            if !known.contains(&ours) {
-                let problem = unknown("column", ours, &known);
-                return Err(Error::Refused(format!("--column {}: {problem}", cut(given))));
-            }
-            Ok((ours.to_owned(), theirs.to_owned()))
+/// Our names of columns, each with the one in the file.
+fn renamed(mapping: &[String]) -> Result<Vec<(String, String)>, Error> {
+    let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
+    let pair = |given: &String| {
+        let Some((ours, theirs)) = given.split_once('=') else {
+            let given = cut(given);
+            return Err(Error::Refused(format!(
+                "--column {given}: write OURS=THEIRS, for example --column speed_rpm=n"
+            )));
         };
-        Ok(Self(mapping.iter().map(pair).collect::<Result<_, _>>()?))
-    }
-
-    fn of<'a>(&'a self, ours: &'a str) -> &'a str {
-        let mapped = self.0.iter().find(|(known, _)| known == ours);
-        mapped.map_or(ours, |(_, theirs)| theirs)
-    }
+        if !known.contains(&ours) {
+            let problem = unknown("column", ours, &known);
+            return Err(Error::Refused(format!("--column {}: {problem}", cut(given))));
+        }
+        Ok((ours.to_owned(), theirs.to_owned()))
+    };
+    mapping.iter().map(pair).collect()
 }
 
 /// A record, and what is to be said of its file.
@@ -104,11 +95,14 @@ pub(crate) fn read(
     reading: &Reading,
     config: &Config,
 ) -> Result<(Record, Vec<String>), Error> {
-    let (names, columns) = (Names::new(&reading.columns)?, Columns::read(path)?);
-    let (all, [from, to]) = (columns.need(names.of(TIME))?, reading.times);
+    let (renamed, columns) = (renamed(&reading.columns)?, Columns::read(path)?);
+    let name = |ours: &'static str| {
+        renamed.iter().find(|(known, _)| known == ours).map_or(ours, |(_, theirs)| theirs)
+    };
+    let (all, [from, to]) = (columns.need(name(TIME))?, reading.times);
     let first = from.map_or(0, |from| all.partition_point(|time| *time < from));
     let end = to.map_or(all.len(), |to| all.partition_point(|time| *time <= to)).max(first);
-    let column = |ours: &str| columns.need(names.of(ours)).map(|all| all[first..end].to_vec());
+    let column = |ours| columns.need(name(ours)).map(|all| all[first..end].to_vec());
     if end - first < 100 {
         return Err(columns.error(format!("{} rows; at least 100 are needed", end - first)));
     }
@@ -122,8 +116,8 @@ pub(crate) fn read(
         );
         return Err(columns.at(first + row + 1, problem));
     }
-    let are_phases = columns.get(names.of(VECTORS[0][0])).is_none()
-        && columns.get(names.of(PHASES[0][0])).is_some();
+    let has = |ours| columns.get(name(ours)).is_some();
+    let are_phases = !has(VECTORS[0][0]) && has(PHASES[0][0]);
     let (mut remarks, measured) = (Vec::new(), reading.voltages != Voltages::Commanded);
     let mut vectors = |given: usize| -> Result<Vec<Complex>, Error> {
         if !are_phases {
@@ -323,21 +317,15 @@ fn outcome(
     let line = |of: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
         (0..record.i.len()).map(|k| (k as f64 * record.h, of(k))).collect()
     };
-    let x = "time (s)";
     let difference = |k: usize| record.i[k] - fit.current[k];
-    outcome.figures.push(
-        Figure::new("trace", "Recorded current, and that of the identified motor", "")
-            .panel(
-                Panel::new(x, "current α (A)")
-                    .with(Series::line("recorded", line(&|k| record.i[k].re)))
-                    .with(Series::reference("identified motor", line(&|k| fit.current[k].re))),
-            )
-            .panel(
-                Panel::new(x, "difference (A)")
-                    .with(Series::line("α", line(&|k| difference(k).re)))
-                    .with(Series::line("β", line(&|k| difference(k).im))),
-            ),
-    );
+    let current = Panel::new("time (s)", "current α (A)")
+        .with(Series::line("recorded", line(&|k| record.i[k].re)))
+        .with(Series::reference("identified motor", line(&|k| fit.current[k].re)));
+    let apart = Panel::new("time (s)", "difference (A)")
+        .with(Series::line("α", line(&|k| difference(k).re)))
+        .with(Series::line("β", line(&|k| difference(k).im)));
+    let title = "Recorded current, and that of the identified motor";
+    outcome.figures.push(Figure::new("trace", title, "").panel(current).panel(apart));
     if share > REMARKED {
         outcome.remark(
             "The residual is large: harmonics, a leakage that saturates, or a false scale.",

@@ -82,17 +82,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let at_90 =
         |degrees: f64| Stats::of(isotropic[1..].iter().map(|curve| at(curve, degrees).abs()));
     let meet = [-90.0, 90.0].map(|degrees| at_90(degrees).mean());
-    let off = IQ_A
-        .iter()
-        .zip(isotropic)
-        .map(|(iq, curve)| (zero(curve).abs() - (iq / id).atan().to_degrees()).abs());
-    let largest_off = off.fold(0.0, f64::max);
+    let off = |(iq, curve): (&f64, _)| zero(curve).abs() - (iq / id).atan().to_degrees();
+    let largest_off = Stats::of(IQ_A.iter().zip(isotropic).map(off)).largest();
     outcome.metrics.set("zero_off_the_arc_tangent_deg", largest_off);
     let spread = |degrees| {
-        isotropic[1..]
-            .iter()
-            .map(|curve| (at(curve, degrees).abs() / meet[0] - 1.0).abs())
-            .fold(0.0, f64::max)
+        let off = |curve| at(curve, degrees).abs() / meet[0] - 1.0;
+        Stats::of(isotropic[1..].iter().map(off)).largest()
     };
     let meets = |degrees: f64| if spread(degrees) < 0.05 { degrees } else { f64::NAN };
     // LPF as printed makes the currents larger than their references by as much as PP takes away.
@@ -105,9 +100,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         named("zero_at_arc_tangent").simulated(largest_off < 2.0),
     ]);
     let rectified = &curves[3 * IQ_A.len()..4 * IQ_A.len()];
-    let errors =
-        rectified[2..].iter().map(|curve| (at(curve, 90.0) / at(&rectified[2], 90.0) - 1.0).abs());
-    let constant = errors.fold(0.0, f64::max);
+    let error = |curve| at(curve, 90.0) / at(&rectified[2], 90.0) - 1.0;
+    let constant = Stats::of(rectified[2..].iter().map(error)).largest();
     outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
     outcome.compared.push(named("iq_does_not_affect").simulated(constant < 0.2));
     outcome.remarks.extend([
