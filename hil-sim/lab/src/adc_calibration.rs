@@ -3,7 +3,6 @@
 use sim_bench::stats::StraightLine as Line;
 
 use crate::prelude::*;
-use crate::source;
 
 /// Table 4, Figure 17, Eq. 3.5.
 pub const EXPERIMENT: Experiment = Experiment::new("adc-calibration", run)
@@ -26,30 +25,26 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         for (part, value) in [("slope", fitted.slope), ("offset", fitted.intercept)] {
             outcome.compared.push(Compared::with("S1", "Eq. 3.5", of(part)).recomputed(value));
         }
-        let left = |line: Line| {
-            let one = move |&(code, current): &(f64, f64)| (code, 1e3 * (line.at(code) - current));
-            points.iter().map(one).collect::<Vec<_>>()
-        };
-        let largest = |line: Line| left(line).iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+        let residual = |&(code, current): &(f64, f64)| (code, 1e3 * (fitted.at(code) - current));
+        let left: Vec<_> = points.iter().map(residual).collect();
+        let largest = Stats::of(left.iter().map(|point| point.1)).largest();
         let ends = [0.0, LAST_CODE].map(|code| (code, fitted.at(code)));
         readings = readings
             .with(Series::line(format!("line {name}"), ends.to_vec()))
             .with(Series::points(format!("readings {name}"), points.clone()).like_previous());
-        residuals = residuals.with(Series::points(format!("channel {name}"), left(fitted)));
+        residuals = residuals.with(Series::points(format!("channel {name}"), left));
         let key = name.to_lowercase();
         outcome.metrics.set(format!("slope_{key}_a"), fitted.slope);
         outcome.metrics.set(format!("intercept_{key}_a"), fitted.intercept);
-        outcome.metrics.set(format!("largest_residual_{key}_a"), 1e-3 * largest(fitted));
+        outcome.metrics.set(format!("largest_residual_{key}_a"), 1e-3 * largest);
         outcome.metrics.set(format!("full_scale_{key}_a"), fitted.at(LAST_CODE));
     }
     let mismatch = outcome.metrics.get("slope_b_a").zip(outcome.metrics.get("slope_a_a"));
     let mismatch = mismatch.map_or(f64::NAN, |(b, a)| b / a - 1.0);
     outcome.metrics.set("gain_mismatch", mismatch);
-    outcome.figures.push(
-        Figure::new("calibration", "Readings, calibration lines and what is left", "Figure 17")
-            .panel(readings)
-            .panel(residuals),
-    );
+    let title = "Readings, calibration lines and what is left";
+    let figure = Figure::new("calibration", title, "Figure 17");
+    outcome.figures.push(figure.panel(readings).panel(residuals));
     outcome.remarks.push(format!(
         "The two channels differ by {:.2} % in gain before calibration. A mismatch of 1 % costs a \
          sensorless drive several degrees, so it has to be calibrated.",

@@ -6,13 +6,11 @@ pub mod model;
 
 use std::f64::consts::FRAC_2_PI;
 
-use sim_bench::bode::{Bode, frequencies};
 use sim_bench::steady::{OperatingPoint, steady_run};
 
 use crate::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
 use crate::demodulators::tracked;
 use crate::injection_map::PP;
-use crate::poles::largest_pole;
 use crate::prelude::*;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};
@@ -86,19 +84,16 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[IdentifiedPoint]) {
-    let m = &mut outcome.metrics;
+    let (m, demodulation) = (&mut outcome.metrics, demodulation.name());
     for (iq, p) in TABLE_6_A.iter().zip(points) {
-        let name = |what: &str| format!("{}_{what}_iq_{iq}a", demodulation.name());
+        let name = |what: &str| format!("{demodulation}_{what}_iq_{iq}a");
         m.set(name("fit_pct"), p.models[1].fit(&p.record).1);
         m.set(name("static_gain_milli"), p.models[1].static_gain() * 1e3);
         m.set(name("held_gain_milli"), p.held_gain() * 1e3);
         m.set(name("slow_gain_milli"), p.slow_gain() * 1e3);
     }
     let design = &points[DESIGN_ROW];
-    m.set(
-        format!("{}_held_over_slow", demodulation.name()),
-        design.held_gain() / design.slow_gain(),
-    );
+    m.set(format!("{demodulation}_held_over_slow"), design.held_gain() / design.slow_gain());
 }
 
 /// The gains of the axis alone and of axis and current together, measured and predicted.
@@ -160,10 +155,10 @@ fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
         y.iter().take(shown).enumerate().map(|(k, y)| (k as f64 / RATE_HZ, y * 1e3)).collect()
     };
     let (model, fit) = p.models[1].fit(&p.record);
-    let title =
-        format!("{}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %", demodulation.name());
+    let name = demodulation.name();
+    let title = format!("{name}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %");
     let turn = p.record.u.iter().map(|u| u.to_degrees() / 1e3).collect::<Vec<_>>();
-    Figure::new(format!("fit_{}", demodulation.name()), title, "Figure 34")
+    Figure::new(format!("fit_{name}"), title, "Figure 34")
         .panel(
             Panel::new("time (s)", format!("signal ({})", demodulation.unit()))
                 .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
@@ -175,24 +170,15 @@ fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
 fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
     let hz = frequencies(1.0, 600.0, 120);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
+    let identified = TABLE_6_A.iter().zip(points).map(|(iq, p)| (format!("{iq} A"), p.models[1]));
+    let printed = |(row, iq): (usize, &f64)| (format!("Table 6, {iq} A"), Model::printed(row));
+    let models = identified.chain(TABLE_6_A.iter().enumerate().map(printed));
     // In thousandths, as the signals are printed.
-    let scaled = |m: Model| Model { k: m.k * 1e3, ..m };
-    let models: Vec<(String, Model)> = TABLE_6_A
-        .iter()
-        .zip(points)
-        .map(|(iq, p)| (format!("{iq} A"), scaled(p.models[1])))
-        .chain(
-            (0..TABLE_6_A.len())
-                .map(|row| (format!("Table 6, {} A", TABLE_6_A[row]), scaled(Model::printed(row)))),
-        )
-        .collect();
-    let (gain, phase) =
-        bode.panels(models.iter().map(|(name, model)| (name, |w: f64| model.response(w))));
-    let title =
-        format!("{}: identified, gain in {} per rad", demodulation.name(), demodulation.unit());
-    Figure::new(format!("bode_{}", demodulation.name()), title, "Figure 35")
-        .panel(gain)
-        .panel(phase)
+    let scaled = |m: Model| move |w: f64| Model { k: m.k * 1e3, ..m }.response(w);
+    let (gain, phase) = bode.panels(models.map(|(name, model)| (name, scaled(model))));
+    let (name, unit) = (demodulation.name(), demodulation.unit());
+    let title = format!("{name}: identified, gain in {unit} per rad");
+    Figure::new(format!("bode_{name}"), title, "Figure 35").panel(gain).panel(phase)
 }
 
 fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {

@@ -21,6 +21,7 @@ const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];
 const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 
 /// Means over the second half of each level; the run ends where the drive stops itself.
+#[derive(Default)]
 struct Levels {
     error: Vec<f64>,
     torque: Vec<f64>,
@@ -48,20 +49,16 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         }
         panel = panel.with(Series::line(name, run.trace.clone()));
     }
-    let band = |degrees: f64| vec![(0.0, degrees), (LEVELS_A.len() as f64, degrees)];
-    let [low, about, high] = [
-        ("Figure 39", "angle error, least"),
-        ("Figure 38", "angle error, about"),
-        ("Figure 39", "angle error, largest"),
-    ]
-    .map(|(place, quantity)| printed(place, quantity));
+    let band = |figure: &str, which: &str| {
+        let degrees = printed(figure, &format!("angle error, {which}"));
+        vec![(0.0, degrees), (LEVELS_A.len() as f64, degrees)]
+    };
     panel = panel
-        .with(Series::limit("printed, about 50°", band(about)))
-        .with(Series::reference("40° and 60° of Figure 39", band(low)))
-        .with(Series::reference("", band(high)));
-    outcome.figures.push(
-        Figure::new("levels", "Angle error of the drive as printed", "Figures 38, 39").panel(panel),
-    );
+        .with(Series::limit("printed, about 50°", band("Figure 38", "about")))
+        .with(Series::reference("40° and 60° of Figure 39", band("Figure 39", "least")))
+        .with(Series::reference("", band("Figure 39", "largest")));
+    let figure = Figure::new("levels", "Angle error of the drive as printed", "Figures 38, 39");
+    outcome.figures.push(figure.panel(panel));
     outcome.tables.push(table);
     // The motor whose errors come nearest to what is printed: a tenth of the assumed saliency.
     let weak = &found[1];
@@ -73,8 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ("Figure 39", "angle error, largest", errors.largest()),
         ("Figure 38", "overshoot of the current in the last step", 1e3 * weak.overshoot),
     ] {
-        let ours = Compared::with("S1", place, quantity).unknown(unknown);
-        outcome.compared.push(ours.simulated(value));
+        outcome.compared.push(beside(place, quantity).unknown(unknown).simulated(value));
     }
     for (k, level) in LEVELS_A.iter().enumerate() {
         let value = weak.error.get(k).copied().unwrap_or(f64::NAN);
@@ -104,8 +100,7 @@ fn levels(context: &Context<'_>, a_psi: f64) -> Result<Levels, Error> {
     config.load.mode = LoadMode::Locked;
     let mut rig = Rig::started(&config, context.seed, Mode::Torque)?;
     let start = rig.time();
-    let mut run =
-        Levels { error: Vec::new(), torque: Vec::new(), overshoot: 0.0, trace: Vec::new() };
+    let mut run = Levels::default();
     for level in LEVELS_A {
         if rig.drive.state().fault().is_some() {
             break;

@@ -6,8 +6,6 @@ mod direct;
 mod precision;
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos};
-use sim_bench::bode::{Bode, RATE, decibels, frequencies, omega_t};
-use sim_bench::outcome::Style;
 
 use crate::prelude::*;
 use crate::recomputed::CARRIER_HZ;
@@ -34,7 +32,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(stop_band(&filters[0]));
     characteristics(&filters, &mut outcome);
     recomputed(&filters, &mut outcome);
-    let errors = precision::errors(&filters, samples, context, &mut outcome);
+    let errors = precision::errors(&filters, samples, context, &mut outcome)?;
     outcome.tables.push(errors);
     outcome.remark(
         "Tables 7 and 8 hold elliptic designs without a misprint. \"LPF\" is a band stop: it \
@@ -71,9 +69,8 @@ fn bode(filters: &[ComparedFilter]) -> Figure {
     let (printed, lag) =
         bode.panels(filters.iter().map(|f| ("", |omega_t: f64| f.direct(omega_t))));
     let dashed = |mut panel: Panel, printed: Panel| {
-        panel
-            .series
-            .extend(printed.series.into_iter().map(|s| Series { style: Style::Reference, ..s }));
+        let dashed = |series| Series { style: Style::Reference, ..series };
+        panel.series.extend(printed.series.into_iter().map(dashed));
         panel.series[3].name = "Tables 7, 8 in f64".into();
         panel
     };
@@ -95,13 +92,9 @@ fn stop_band(lpf: &ComparedFilter) -> Figure {
         .with(Series::line("sections, f32", along(&|w| lpf.sections(w))))
         .with(Series::line("direct form, f32 coefficients", along(&|w| lpf.direct_rounded(w))))
         .with(Series::reference("Table 7, f64", along(&|w| lpf.direct(w))));
-    Figure::new(
-        "stop-band",
-        "Stop band of LPF, and what is left of it when the coefficients of Table 7 are rounded to \
-         single precision",
-        "Table 7",
-    )
-    .panel(panel)
+    let title = "Stop band of LPF, and what is left of it when the coefficients of Table 7 are rounded to \
+         single precision";
+    Figure::new("stop-band", title, "Table 7").panel(panel)
 }
 
 fn characteristics(filters: &[ComparedFilter], outcome: &mut Outcome) {

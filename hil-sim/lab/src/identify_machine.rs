@@ -3,7 +3,6 @@
 use crate::identification::ratios::{self, Ratio};
 use crate::identification::{Parameters, claims};
 use crate::prelude::*;
-use crate::source;
 
 /// Numbers that do not depend on the noise.
 pub const EXPERIMENT: Experiment =

@@ -1,7 +1,6 @@
 //! The recursive form of drive-core on simulated measurements: Figures 2 to 4 of Jacobina, Lima,
 //! Ribeiro 1996.
 
-use drive_core::AlphaBeta;
 use rotor_id::rls::{Rls, RlsSettings};
 
 use crate::identification::models::{Value, model_c};
@@ -43,7 +42,6 @@ struct Run {
 }
 
 fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run, Error> {
-    use rand::SeedableRng;
     let corner = 5.0 * std::f64::consts::TAU * trial.hz;
     let settings = RlsSettings {
         corner: (corner * H) as f32,
@@ -55,7 +53,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
     let filter = Filter::new(corner, H);
     let (mut on_v, mut on_i) = (filter, filter);
     let peak = peaks(trial.raw().skip(RATE).take(RATE / 5));
-    let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (mut estimates, mut square, mut count) = (Vec::new(), 0.0, 0u32);
     let samples = (seconds * RATE as f64) as usize;
     for (n, (v, i)) in trial.raw().skip(RATE).take(samples).enumerate() {

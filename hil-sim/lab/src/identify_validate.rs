@@ -5,9 +5,8 @@ use crate::identification::models::model_c;
 use crate::identification::printed::Case;
 use crate::identification::study::errors;
 use crate::identification::trial::Noise;
-use crate::identification::{Complex, Parameters, Signal, Trial};
+use crate::identification::{Parameters, Signal, Trial};
 use crate::prelude::*;
-use crate::source;
 
 /// Figure 5, Tables 6 and 7.
 pub const EXPERIMENT: Experiment = Experiment::new("identify-validate", run)
@@ -93,7 +92,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Current of the d axis: the machine, and simulated with the same voltage and speed.
 fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome) {
-    let current = |p: &Parameters| -> Vec<Complex> {
+    let current = |p: &Parameters| -> Vec<Complex64> {
         let trial = Trial::printed(*p, Signal::SixStep, H, Noise::NONE);
         trial.raw().skip(20_000).take(1000).map(|sample| sample.1).collect()
     };

@@ -5,7 +5,6 @@ use sim_bench::plant::{
     MotorModel,
 };
 
-use crate::identification::Complex;
 use crate::identify_trace::{Reading, Voltages, read, rms};
 use crate::prelude::*;
 
@@ -56,11 +55,11 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             continue;
         }
         let (recorded, simulated) = (&record.i[part.clone()], &current[part.clone()]);
-        let apart: Vec<Complex> = recorded.iter().zip(simulated).map(|(a, b)| a - b).collect();
+        let apart: Vec<Complex64> = recorded.iter().zip(simulated).map(|(a, b)| a - b).collect();
         let to_rpm = 60.0 / TAU / machine.pole_pairs();
         let rpm =
             part.clone().map(|k| (record.omega_m[k] * to_rpm - speed[k]).powi(2)).sum::<f64>();
-        let peak = |i: &[Complex]| Cell::fixed(i.iter().map(|i| i.norm()).fold(0.0, f64::max), 1);
+        let peak = |i: &[Complex64]| Cell::fixed(i.iter().map(|i| i.norm()).fold(0.0, f64::max), 1);
         let share = 100.0 * rms(&apart) / rms(recorded);
         outcome.metrics.set(format!("{name}_current_percent"), share);
         table.record([

@@ -2,9 +2,9 @@
 
 mod carrier;
 
+use drive_core::Abc;
 use drive_core::current::Modulator;
 use drive_core::io::PERIOD_S;
-use drive_core::{Abc, AlphaBeta};
 
 use crate::dead_time::steps;
 use crate::prelude::*;
@@ -82,12 +82,8 @@ fn vectors(inverter: &Inverter) -> Figure {
         .with(Series::limit("largest circle", around(360, &on(inner))))
         .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
         .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));
-    Figure::new(
-        "vectors",
-        "Voltage vectors of the inverter, and what the modulator makes of two circles",
-        "Figure 4",
-    )
-    .panel(panel)
+    let title = "Voltage vectors of the inverter, and what the modulator makes of two circles";
+    Figure::new("vectors", title, "Figure 4").panel(panel)
 }
 
 /// Figure 5 at 20° and half of the largest circle.
@@ -103,13 +99,9 @@ fn sequence(inverter: &Inverter) -> Figure {
         let corners = steps(false, &[on, off], period_us, low);
         panel = panel.with(Series::line(format!("leg {name}"), corners));
     }
-    Figure::new(
-        "sequence",
-        "One period at 20° and half of the largest circle: O_000, U_0, U_60, O_111 and back; each leg \
-         switches twice",
-        "Figure 5",
-    )
-    .panel(panel.y_range(-0.2, 4.2))
+    let title = "One period at 20° and half of the largest circle: O_000, U_0, U_60, O_111 and back; each leg \
+         switches twice";
+    Figure::new("sequence", title, "Figure 5").panel(panel.y_range(-0.2, 4.2))
 }
 
 /// On-times of the two vectors beside a voltage in the first sector to Table 2, over the period.

@@ -45,7 +45,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ("section 3.6.3", "|z_ev|", readings.no_load_impedance()),
         ("section 3.6.3", "L_m", 1e3 * l_m),
     ] {
-        outcome.compared.push(Compared::with("S1", place, quantity).simulated(value));
+        outcome.compared.push(beside(place, quantity).simulated(value));
     }
     let bias = readings.as_printed().rr / plant.machine.rr;
     outcome.remarks.extend([

@@ -1,13 +1,10 @@
 //! The design of the current controllers in the w plane, and its margins with everything that is
 //! really in the loop.
 
-use drive_core::FirstOrder;
 use drive_core::filter::{BPF, LPF};
 use drive_settings::tuning::{
     CurrentLoopDesign, DELAY, RuleDesign, design_current_loop, motor_plant, pi_response, rule_3_8,
 };
-use sim_bench::bode::{Bode, RATE, fictitious, frequencies, omega_t};
-use sim_bench::outcome::Style;
 
 use crate::prelude::*;
 use crate::recomputed::{PERIOD_S, plant};
@@ -33,8 +30,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let motor = context.config.drive.motor.into();
     let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
-    let mut rules = Vec::new();
-    let mut designs = Vec::new();
+    let mut loops = Vec::new();
     for (place, name, key) in PLANTS {
         let identified = plant(place);
         let rule = rule_3_8(identified, PERIOD_S).map_err(Error::refused)?;
@@ -51,17 +47,16 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ] {
             outcome.metrics.set(format!("{key}_{metric}"), value);
         }
-        rules.push((name, identified, rule));
-        designs.push((name, design));
+        loops.push((name, identified, rule, design));
     }
-    outcome.figures.push(w_plane(rules[0].1, rules[0].2));
-    outcome.tables.push(margin_table(&designs));
-    outcome.figures.push(real_loop(&designs[1].1, physical));
+    let (_, identified, rule, _) = loops[0];
+    outcome.figures.push(w_plane(identified, rule));
+    outcome.tables.push(margin_table(&loops));
+    outcome.figures.push(real_loop(&loops[1].3, physical));
     // Section 2.5: the crossover of the rule beside the lower edge of BPF.
     let edges = crate::filters::edges_hz(&BPF, -0.6);
     outcome.metrics.set("bpf_lower_edge_hz", edges[0]);
     outcome.metrics.set("bpf_upper_edge_hz", edges[1]);
-    let rule = rules[0].2;
     let gain = -20.0 * rule.k_c.log10();
     let at = "gain with the zero at the crossover";
     outcome.compared.push(beside("Figure 24", "crossover, fictitious").recomputed(hz(rule.v)));
@@ -115,8 +110,8 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
         .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)).with(phases))
 }
 
-fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
-    let rows = designs.iter().flat_map(|(name, design)| {
+fn margin_table(loops: &[(&str, FirstOrder, RuleDesign, CurrentLoopDesign)]) -> Table {
+    let rows = loops.iter().flat_map(|(name, .., design)| {
         [
             ("by the rule", design.rule_k_c, design.rule_margins),
             ("used", design.k_c, design.margins),
@@ -171,12 +166,9 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         .with(Series::reference(&*names[0], sensitivity(&rule)))
         .with(Series::line(&*names[1], sensitivity(&used)))
         .with(Series::limit("largest allowed, 2.2", ends(2.2)));
-    Figure::new(
-        "real-loop",
-        "Open loop L of the d axis (Eq. 3.41) with filter, delay and motor",
-        "",
-    )
-    .panel(gain.y_range(-60.0, 30.0).with(Series::limit("", ends(0.0))))
-    .panel(phase.with(Series::limit("", ends(-180.0))))
-    .panel(sensitivity)
+    let title = "Open loop L of the d axis (Eq. 3.41) with filter, delay and motor";
+    Figure::new("real-loop", title, "")
+        .panel(gain.y_range(-60.0, 30.0).with(Series::limit("", ends(0.0))))
+        .panel(phase.with(Series::limit("", ends(-180.0))))
+        .panel(sensitivity)
 }

@@ -1,8 +1,8 @@
 //! The plants of the current loop, identified through the drive's own loop, and the controllers that
 //! follow from them.
 
+use drive_core::Dq;
 use drive_core::filter::{LPF, LpfState};
-use drive_core::{AlphaBeta, Dq, FirstOrder};
 use drive_settings::tuning::{design_current_loop, motor_plant, rule_3_8};
 
 use crate::identification::arx::{Arx, Orders, fit};
@@ -159,12 +159,9 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
     Rig::started(&config, context.seed, Mode::Torque)
 }
 
-fn physical(config: &Config) -> Result<FirstOrder, Error> {
-    motor_plant(&config.drive.motor.into(), 1.0 / RATE_HZ).map_err(Error::refused)
-}
-
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let motor = physical(context.config)?;
+    let motor = context.config.drive.motor.into();
+    let motor = motor_plant(&motor, 1.0 / RATE_HZ).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
     let mut plants = Table::new(
         "Plants (b₁ + b₂ z⁻¹) z⁻ᵈ / (z − p), k = b₁ + b₂, by least squares (appendix A)",
@@ -195,7 +192,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
         let unknown = "the motor on the day of the test, and the amplitude of the sequence";
         for (quantity, value) in [("gain", best.plant.k), ("pole", best.plant.p)] {
-            let ours = Compared::with("S1", trial.printed, quantity).unknown(unknown);
+            let ours = beside(trial.printed, quantity).unknown(unknown);
             outcome.compared.push(ours.simulated(value));
         }
         let design =
@@ -245,20 +242,14 @@ fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) ->
         x.iter().take(count).enumerate().map(at).collect()
     };
     let [u_mean, y_mean] = record.mean;
-    Figure::new(
-        format!("identification-{}", trial.key),
-        format!("Identification of the plant: {}", trial.name),
-        trial.figure,
-    )
-    .panel(
-        Panel::new("time (ms)", format!("v_{axis} (V)"))
-            .with(Series::line("voltage of the loop", over_time(&record.u, u_mean))),
-    )
-    .panel(
-        Panel::new("time (ms)", format!("i_{axis} (A)"))
-            .with(Series::line("measured", over_time(&record.y, y_mean)))
-            .with(Series::reference("identified", over_time(&modelled, y_mean))),
-    )
+    let voltage = Panel::new("time (ms)", format!("v_{axis} (V)"))
+        .with(Series::line("voltage of the loop", over_time(&record.u, u_mean)));
+    let current = Panel::new("time (ms)", format!("i_{axis} (A)"))
+        .with(Series::line("measured", over_time(&record.y, y_mean)))
+        .with(Series::reference("identified", over_time(&modelled, y_mean)));
+    let name = format!("identification-{}", trial.key);
+    let title = format!("Identification of the plant: {}", trial.name);
+    Figure::new(name, title, trial.figure).panel(voltage).panel(current)
 }
 
 fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {

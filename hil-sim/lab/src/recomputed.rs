@@ -1,15 +1,11 @@
 //! The constants of this project that are said to be those of Barroso 2017, and what follows from his numbers by no formula.
 
-use drive_core::FirstOrder;
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_settings::tuning::rule_3_8;
-use sim_bench::bode::{RATE, fictitious};
 use sim_bench::plant::{InverterSettings, MachineSettings};
 
 use crate::identification::bench_tests::Readings;
-use crate::poles::largest_pole;
 use crate::prelude::*;
-use crate::source;
 
 /// Chapters 2 to 4.
 pub const EXPERIMENT: Experiment = Experiment::new("printed-numbers", run)
@@ -33,7 +29,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let within = |hz: &f64| 100.0 * (fictitious(*hz) / hz - 1.0) <= bound;
     let limit = (1..30_000).map(|n| 0.1 * f64::from(n)).take_while(within).last();
     let limit = limit.unwrap_or(f64::NAN);
-    outcome.compared.push(source::named("difference_small_up_to").recomputed(limit));
+    outcome.compared.push(named("difference_small_up_to").recomputed(limit));
     outcome.figures.push(figure_13());
     position_loop(&mut outcome);
     Ok(outcome)
@@ -85,9 +81,8 @@ fn constants(outcome: &mut Outcome) {
         ("Eq. 3.44", "k_s", pii.k_s.into()),
         ("Eq. 3.44", "z_s", pii.z_s.into()),
     ];
-    outcome
-        .compared
-        .extend(constants.map(|(place, quantity, used)| beside(place, quantity).used(used)));
+    let ours = |(place, quantity, used)| beside(place, quantity).used(used);
+    outcome.compared.extend(constants.map(ours));
 }
 
 /// Eq. 4.1 under Eq. 4.2: (z - 1)² (z - p) + k_c k (z - z_c).

@@ -2,9 +2,8 @@
 
 use super::measure::Record;
 use crate::identification::arx::{Orders, fit};
-use crate::poles::{largest_pole, roots};
+use crate::poles::roots;
 use crate::prelude::*;
-use crate::source;
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,8 @@
 //! Section 3.4: LPF before and after the rotation into the frame of the flux.
 
-use drive_core::AlphaBeta;
 use drive_core::filter::{LPF, LpfState};
 use drive_settings::tuning::motor_plant;
 
-use crate::identification::Complex;
 use crate::prelude::*;
 use crate::recomputed::PERIOD_S;
 
@@ -18,8 +16,7 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
         Table::new("LPF before and after the rotation (section 3.4): steps of i_d and i_q", &[]);
     let [mut settles, mut all] = [true, true];
     for hz in FRAME_HZ {
-        let [before, after] = [false, true].map(|after| swing(hz, after));
-        let (before, after) = (before?, after?);
+        let (before, after) = (swing(hz, false)?, swing(hz, true)?);
         settles &= after < 0.01;
         all &= before < 0.01;
         let milli = |x: f64| Cell::fixed(1e3 * x, 2);
@@ -48,28 +45,28 @@ fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
         .map_err(Error::refused)?;
     let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
     let turn = std::f64::consts::TAU * frame_hz * PERIOD_S;
-    let reference = Complex::new(0.7, 1.0);
+    let reference = Complex64::new(0.7, 1.0);
     let (mut i, mut u, mut delayed, mut before) =
-        (Complex::ZERO, Complex::ZERO, Complex::ZERO, Complex::ZERO);
+        (Complex64::ZERO, Complex64::ZERO, Complex64::ZERO, Complex64::ZERO);
     let mut filter = LpfState::default();
     let mut late = Vec::new();
     for n in 0..SAMPLES {
-        let angle = Complex::cis(turn * n as f64);
+        let angle = Complex64::cis(turn * n as f64);
         // The current of the stator; the filter is linear and the same for both axes.
         let input = if rotated_first { i } else { i * angle };
         let out = LPF.step(&mut filter, AlphaBeta::new(input.re as f32, input.im as f32));
-        let out = Complex::new(out.alpha.into(), out.beta.into());
+        let out = Complex64::new(out.alpha.into(), out.beta.into());
         let seen = if rotated_first { out } else { out * angle.conj() };
         let error = reference - seen;
         u += (error - before * z_c) * k_c;
         before = error;
         // In the frame, which turns on by a period until the voltage acts.
-        i = (i * motor.p + delayed * motor.k) * Complex::cis(-turn);
+        i = (i * motor.p + delayed * motor.k) * Complex64::cis(-turn);
         delayed = u;
         if n >= SAMPLES / 2 {
             late.push(i);
         }
     }
-    let mean = late.iter().sum::<Complex>() / late.len() as f64;
+    let mean = late.iter().sum::<Complex64>() / late.len() as f64;
     Ok(late.iter().map(|i| (i - mean).norm()).fold(0.0, f64::max))
 }

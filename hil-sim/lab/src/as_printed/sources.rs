@@ -1,6 +1,6 @@
 //! Table 1 as runs: encoder, fundamental model and injection at rest, near it and far from it.
 
-use sim_bench::steady::{OperatingPoint, bring_up, prepared};
+use sim_bench::steady::{bring_up, prepared};
 
 use crate::prelude::*;
 
@@ -21,7 +21,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     for column in COLUMNS {
         // By construction.
         let without = f64::from(column != COLUMNS[0]);
-        let place = Compared::with("S1", "Table 1, works without encoder", column);
+        let place = beside("Table 1, works without encoder", column);
         outcome.compared.push(place.simulated(without));
         for (row, rpm) in SPEEDS {
             let found = tracked(context, column, rpm)?;
@@ -41,7 +41,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
             ]);
             let unknown =
                 (column == COLUMNS[1]).then_some("how near to zero it means, and the load");
-            let place = Compared::with("S1", format!("Table 1, {row}"), column);
+            let place = beside(&format!("Table 1, {row}"), column);
             outcome.compared.push(Compared { unknown, ..place }.simulated(works));
         }
     }
@@ -62,12 +62,11 @@ fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64,
         config.drive.injection.amplitude_v = Some(0.0);
         config.drive.injection.synchronous.check = false;
     }
-    let case = OperatingPoint { rpm, iq: IQ_A, seed: context.seed };
-    let Ok(mut rig) = prepared(&config, case.seed) else { return Ok(None) };
+    let Ok(mut rig) = prepared(&config, context.seed) else { return Ok(None) };
     if bring_up(&mut rig, rpm).is_err() || rig.drive.state().fault().is_some() {
         return Ok(None);
     }
-    rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
+    rig.settle(&Command::Torque(IQ_A as f32), 1.0)?;
     let [error, carrier] = rig.stats(1.0, |p| [p.angle_error_deg, 1e3 * p.carrier]);
     Ok(rig.drive.state().fault().is_none().then_some((error.largest(), carrier.mean())))
 }

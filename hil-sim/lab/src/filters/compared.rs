@@ -1,11 +1,9 @@
 //! The filters, each in the forms that are compared.
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
-use num_complex::Complex64;
-use sim_bench::stats::Stats;
 
 use super::direct::{self, Form};
-use crate::poles::largest_pole;
+use crate::prelude::*;
 
 /// A filter whose forms are compared: responses, and the error of each form.
 pub struct ComparedFilter {
@@ -46,13 +44,10 @@ impl ComparedFilter {
         -(self.sections(omega_t + h) / self.sections(omega_t - h)).arg() / (2.0 * h)
     }
 
-    /// Errors against `f64`, A: for each form its name and statistics.
-    pub fn errors(
-        &self,
-        input: &mut dyn FnMut() -> f64,
-        samples: u64,
-    ) -> Vec<(&'static str, Stats)> {
-        let mut forms: Vec<Form> = vec![(SECTIONS_F32, (self.at_rest)())];
+    /// Errors against `f64`, A: for each form its name, its name in the metrics and statistics.
+    pub fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<FormErrors> {
+        let mut forms: Vec<Form> =
+            vec![("sections, f32 (the drive)", "sections", (self.at_rest)())];
         forms.extend(direct::f32_forms(&self.printed));
         let mut reference = direct::reference(&self.printed);
         let mut errors = vec![Stats::default(); forms.len()];
@@ -60,16 +55,16 @@ impl ComparedFilter {
             // All forms get the same f32 input.
             let x = input() as f32;
             let exact = reference(f64::from(x));
-            for ((_, form), error) in forms.iter_mut().zip(&mut errors) {
+            for ((.., form), error) in forms.iter_mut().zip(&mut errors) {
                 error.push(f64::from(form(x)) - exact);
             }
         }
-        forms.iter().map(|(name, _)| *name).zip(errors).collect()
+        forms.iter().zip(errors).map(|((name, key, _), error)| (*name, *key, error)).collect()
     }
 }
 
-/// The form the drive runs.
-pub const SECTIONS_F32: &str = "sections, f32 (the drive)";
+/// A form, its name in the metrics, and its errors.
+pub type FormErrors = (&'static str, &'static str, Stats);
 
 fn running<const SECTIONS: usize>(sections: Sos<SECTIONS>) -> Box<dyn FnMut(f32) -> f32> {
     let mut state = SosState::default();

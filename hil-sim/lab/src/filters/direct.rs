@@ -1,8 +1,6 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 
-use num_complex::Complex64;
-
-use crate::source;
+use crate::prelude::*;
 
 /// A filter of Table 7 or 8: numerator, denominator.
 pub fn printed(table: &str, filter: &str) -> [Vec<f64>; 2] {
@@ -40,16 +38,16 @@ pub fn reference([b, a]: &[Vec<f64>; 2]) -> impl FnMut(f64) -> f64 {
     }
 }
 
-/// A way to compute a filter in `f32`: its name, and its output for an input.
-pub type Form = (&'static str, Box<dyn FnMut(f32) -> f32>);
+/// A way to compute a filter in `f32`: its name, that in the metrics, and its output for an input.
+pub type Form = (&'static str, &'static str, Box<dyn FnMut(f32) -> f32>);
 
 /// The three direct forms in `f32`.
 pub fn f32_forms(filter: &[Vec<f64>; 2]) -> [Form; 3] {
     let [b, a] = filter.each_ref().map(|part| part.iter().map(|&c| c as f32).collect::<Vec<_>>());
     [
-        ("direct form I, f32", Box::new(form_1(b.clone(), a.clone()))),
-        ("direct form II, f32", Box::new(form_2(b.clone(), a.clone()))),
-        ("transposed form II, f32", Box::new(form_2_transposed(b, a))),
+        ("direct form I, f32", "direct_1", Box::new(form_1(b.clone(), a.clone()))),
+        ("direct form II, f32", "direct_2", Box::new(form_2(b.clone(), a.clone()))),
+        ("transposed form II, f32", "transposed_2", Box::new(form_2_transposed(b, a))),
     ]
 }
 

@@ -1,12 +1,8 @@
 //! The error that single precision causes.
 
 use rand_distr::{Distribution, Uniform};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
-use sim_bench::bode::omega_t;
 
-use super::compared::{ComparedFilter, SECTIONS_F32};
-
+use super::compared::ComparedFilter;
 use crate::prelude::*;
 
 /// The inputs of the error measurement, A.
@@ -31,38 +27,26 @@ pub fn errors(
     samples: u64,
     context: &Context<'_>,
     outcome: &mut Outcome,
-) -> Table {
-    let bar = context.progress.bar("filters", 9);
+) -> Result<Table, Error> {
     let cases: Vec<(usize, usize)> = (0..3).flat_map(|s| (0..3).map(move |i| (s, i))).collect();
-    let measured: Vec<_> = cases
-        .par_iter()
-        .map(|&(filter, number)| {
-            let errors = filters[filter].errors(&mut *input(number, context.seed), samples);
-            bar.advance(1);
-            errors
-        })
-        .collect();
+    let measured = context.in_parallel("filters", &cases, |_, &(filter, number)| {
+        Ok(filters[filter].errors(&mut *input(number, context.seed), samples))
+    })?;
     let heads = ["filter", "form", INPUTS[0], INPUTS[1], INPUTS[2], "largest of all"];
     let mut table =
         Table::new("Error against double precision, mA rms, and the largest error, mA", &heads);
     for (filter, inputs) in filters.iter().zip(measured.chunks(3)) {
-        for form in 0..inputs[0].len() {
-            let name = inputs[0][form].0;
-            let rms = inputs.iter().map(|input| input[form].1.rms());
-            let largest = inputs.iter().map(|input| input[form].1.largest()).fold(0.0, f64::max);
+        for (form, (name, key, _)) in inputs[0].iter().enumerate() {
+            let rms = inputs.iter().map(|input| input[form].2.rms());
+            let largest = inputs.iter().map(|input| input[form].2.largest()).fold(0.0, f64::max);
             let worst = rms.clone().fold(0.0, f64::max);
-            let key = filter.name.to_lowercase();
-            let suffix = if name == SECTIONS_F32 {
-                "sections"
-            } else {
-                ["direct_1", "direct_2", "transposed_2"][form - 1]
-            };
-            outcome.metrics.set(format!("{key}_{suffix}_error_rms_a"), worst);
-            outcome.metrics.set(format!("{key}_{suffix}_error_max_a"), largest);
+            let key = format!("{}_{key}", filter.name.to_lowercase());
+            outcome.metrics.set(format!("{key}_error_rms_a"), worst);
+            outcome.metrics.set(format!("{key}_error_max_a"), largest);
             let rms = rms.map(|rms| Cell::significant(1e3 * rms, 2));
-            let cells = [Cell::from(filter.name), Cell::from(name)].into_iter().chain(rms);
+            let cells = [Cell::from(filter.name), Cell::from(*name)].into_iter().chain(rms);
             table.row(cells.chain([Cell::significant(1e3 * largest, 2)]));
         }
     }
-    table.note(format!("{samples} samples at 6 kHz. One step of the converter is 2.2 mA."))
+    Ok(table.note(format!("{samples} samples at 6 kHz. One step of the converter is 2.2 mA.")))
 }

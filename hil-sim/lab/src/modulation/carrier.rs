@@ -2,9 +2,6 @@
 
 use drive_core::filter::{BPF, SosState};
 use rand_distr::{Distribution, Uniform};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
-use sim_bench::bode::{RATE, omega_t};
 
 use crate::prelude::*;
 
@@ -28,21 +25,18 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
 
     let carrier: Vec<f64> = (0..SAMPLES).map(carrier).collect();
     let [a, c, p, f] = [&signal, &carrier, &product, &filtered].map(|x| spectrum(x));
-    let middle = (BAND.start() + BAND.end()) / 2;
     let at = |spectrum: &[(f64, f64)], hz: f64| spectrum[hz as usize].1;
-    let middle = f64::from(middle);
+    let middle = f64::from((BAND.start() + BAND.end()) / 2);
     let sideband = at(&p, CARRIER_HZ + middle) / at(&a, middle);
     outcome.metrics.set("sideband_over_signal", sideband);
     let lower = at(&p, CARRIER_HZ - middle) / at(&a, middle);
     let holds = (sideband - 0.5).abs() < 0.01 && (lower - 0.5).abs() < 0.01;
     outcome.compared.push(named("side_bands").recomputed(holds));
     for (key, offset) in [("inner", *BAND.start()), ("outer", *BAND.end())] {
-        for (side, hz) in
-            [("lower", CARRIER_HZ - f64::from(offset)), ("upper", CARRIER_HZ + f64::from(offset))]
-        {
-            outcome
-                .metrics
-                .set(format!("bpf_{side}_{key}_edge_db"), 20.0 * (at(&f, hz) / at(&p, hz)).log10());
+        let offset = f64::from(offset);
+        for (side, hz) in [("lower", CARRIER_HZ - offset), ("upper", CARRIER_HZ + offset)] {
+            let gain = 20.0 * (at(&f, hz) / at(&p, hz)).log10();
+            outcome.metrics.set(format!("bpf_{side}_{key}_edge_db"), gain);
         }
     }
     let metric = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
@@ -61,21 +55,14 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
 
     let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
     let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);
-    outcome.figures.push(
-        Figure::new(
-            "spectrum",
-            "Eq. 2.15: a band-limited signal A and the carrier, their product, and the product \
-             behind BPF",
-            "Figure 11",
-        )
+    let title = "Eq. 2.15: a band-limited signal A and the carrier, their product, and the product \
+             behind BPF";
+    let (behind, gain) = (Series::line("behind BPF", f), Series::reference("gain of BPF", gain));
+    let figure = Figure::new("spectrum", title, "Figure 11")
         .panel(panel().with(Series::line("A", a)).with(Series::line("carrier", c)))
         .panel(panel().with(Series::line("A times carrier", p)))
-        .panel(
-            panel()
-                .with(Series::line("behind BPF", f))
-                .with(Series::reference("gain of BPF", gain)),
-        ),
-    );
+        .panel(panel().with(behind).with(gain));
+    outcome.figures.push(figure);
 }
 
 /// Lines of 1 Hz spacing over the band, highest at its low end, with arbitrary phases.
