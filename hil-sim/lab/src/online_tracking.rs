@@ -1,5 +1,7 @@
 //! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
+use std::ops::Range;
+
 use rotor_id::online::RotorEstimate;
 
 use crate::prelude::*;
@@ -56,14 +58,13 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 fn ending(moments: &[WarmingMoment]) -> FinalMeans {
     let last: Vec<&WarmingMoment> = moments.iter().filter(|m| m.t > SETTLED).collect();
     let estimates: Vec<_> = last.iter().filter_map(|m| m.estimate.ok().map(|e| (m, e))).collect();
+    let inverse = last.iter().filter_map(|m| m.model_d.omega_m.ok().map(|w| w - m.omega_m));
     FinalMeans {
         tau_r: mean(estimates.iter().map(|(m, e)| 100.0 * (f64::from(e.tau_r) / m.tau_r - 1.0))),
         speed: mean(estimates.iter().map(|(m, e)| f64::from(e.omega_m) - m.omega_m)),
         valid: 100.0 * estimates.len() as f64 / last.len().max(1) as f64,
         angle: mean(last.iter().map(|m| m.angle_error_deg)).unwrap_or(0.0),
-        inverse_speed: mean(
-            last.iter().filter_map(|m| m.model_d.omega_m.ok().map(|w| w - m.omega_m)),
-        ),
+        inverse_speed: mean(inverse),
     }
 }
 
@@ -117,15 +118,14 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or_else(|| Cell::from("too poor"), |value| Cell::fixed(value, decimals))
 }
 
+/// Largest magnitude of a quantity in some of the four runs of each point.
+fn most(endings: &[FinalMeans], runs: Range<usize>, of: fn(&FinalMeans) -> f64) -> f64 {
+    Stats::of(endings.chunks_exact(4).flat_map(|rows| &rows[runs.clone()]).map(of)).largest()
+}
+
 fn with_encoder(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     let mut table = Table::new("With the encoder: τ_r of the warm rotor, used by the drive", &[]);
-    let (mut worst, mut angle, mut untracked) = ([0.0f64; 3], 0.0f64, 0.0f64);
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
-        for (worst, ending) in worst.iter_mut().zip(row) {
-            *worst = worst.max(ending.tau_r.unwrap_or(100.0).abs());
-        }
-        angle = angle.max(row[2].angle.abs());
-        untracked = untracked.max(row[3].angle.abs());
         table.record([
             ("speed (rpm)", Cell::fixed(point.0, 0)),
             ("i_q (A)", Cell::fixed(point.1, 1)),
@@ -136,29 +136,22 @@ fn with_encoder(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
             ("without tracking (°)", Cell::fixed(row[3].angle, 2)),
         ]);
     }
-    for (share, worst) in RESIDUALS.iter().zip(worst) {
-        metrics.set(format!("tau_r_error_max_residual_{:.0}_pct", 100.0 * share), worst);
+    for (run, share) in RESIDUALS.iter().enumerate() {
+        let name = format!("tau_r_error_max_residual_{:.0}_pct", 100.0 * share);
+        metrics.set(name, most(endings, run..run + 1, |e| e.tau_r.unwrap_or(100.0)));
     }
-    metrics.set("angle_error_max_deg", angle);
-    metrics.set("angle_error_untracked_max_deg", untracked);
+    metrics.set("angle_error_max_deg", most(endings, 2..3, |e| e.angle));
+    metrics.set("angle_error_untracked_max_deg", most(endings, 3..4, |e| e.angle));
     table.note("Means of the last three of 18 s; r_r grows by 30 % between 4 and 10 s.")
 }
 
 fn without(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     let mut table =
         Table::new("Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz", &[]);
-    let (mut tau, mut speed, mut still) = (0.0f64, 0.0f64, 0.0f64);
     for (point, rows) in SENSORLESS.iter().zip(endings.chunks_exact(4)) {
         for (n, ending) in rows.iter().enumerate() {
-            let left = RESIDUALS
-                .get(n)
-                .map_or_else(|| Cell::from("20, not moved"), |share| Cell::fixed(100.0 * share, 0));
-            if n < RESIDUALS.len() {
-                tau = tau.max(ending.tau_r.unwrap_or(100.0).abs());
-                speed = speed.max(ending.speed.unwrap_or(100.0).abs());
-            } else {
-                still = still.max(ending.valid);
-            }
+            let left = RESIDUALS.get(n).map(|share| Cell::fixed(100.0 * share, 0));
+            let left = left.unwrap_or_else(|| "20, not moved".into());
             table.record([
                 ("speed (rpm)", Cell::fixed(point.0, 0)),
                 ("i_q (A)", Cell::fixed(point.1, 1)),
@@ -170,9 +163,12 @@ fn without(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
             ]);
         }
     }
-    metrics.set("sensorless_tau_r_error_max_pct", tau);
+    let tau_r = most(endings, 0..3, |e| e.tau_r.unwrap_or(100.0));
+    let speed = most(endings, 0..3, |e| e.speed.unwrap_or(100.0));
+    metrics.set("sensorless_tau_r_error_max_pct", tau_r);
     metrics.set("sensorless_speed_error_max_rad_s", speed);
-    metrics.set("sensorless_not_moved_valid_max_pct", still);
+    // The last of the four is the one that was not moved.
+    metrics.set("sensorless_not_moved_valid_max_pct", most(endings, 3..4, |e| e.valid));
     table
 }
 
@@ -197,13 +193,12 @@ fn time_constant(moments: &[WarmingMoment]) -> Panel {
 fn figure(used: &[WarmingMoment], unused: &[WarmingMoment]) -> Figure {
     let angle =
         |moments: &[WarmingMoment]| moments.iter().map(|m| (m.t, m.angle_error_deg)).collect();
+    let error = Panel::new("time (s)", "flux angle error (° electrical)")
+        .with(Series::line("tracked", angle(used)))
+        .with(Series::line("not tracked", angle(unused)));
     Figure::new("tracking", "The rotor warms up: 150 rpm, 2 A, encoder", "")
         .panel(time_constant(used))
-        .panel(
-            Panel::new("time (s)", "flux angle error (° electrical)")
-                .with(Series::line("tracked", angle(used)))
-                .with(Series::line("not tracked", angle(unused))),
-        )
+        .panel(error)
 }
 
 fn speed_figure(moments: &[WarmingMoment]) -> Figure {

@@ -92,19 +92,14 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
     let at = |low, high| {
         Series::limit("crossover by the rule", vec![(hz(rule.v), low), (hz(rule.v), high)])
     };
-    let marks = |marks: [(&str, &str); 2], hz: f64| {
-        let values = marks.map(|(place, quantity)| (hz, printed(place, quantity)));
-        Series::points("printed", values.to_vec())
-    };
-    let hz = printed("Figure 24", "crossover, fictitious");
-    let gains = marks([("Figure 25", "gain with the zero at the crossover"); 2], hz);
-    let phases = marks(
-        [
-            ("section 3.8", "phase desired at the crossover"),
-            ("section 3.8", "phase of the plant with integrator at the crossover"),
-        ],
-        hz,
-    );
+    let crossover = printed("Figure 24", "crossover, fictitious");
+    let mark = |place, quantity| (crossover, printed(place, quantity));
+    let gains = vec![mark("Figure 25", "gain with the zero at the crossover"); 2];
+    let phases = vec![
+        mark("section 3.8", "phase desired at the crossover"),
+        mark("section 3.8", "phase of the plant with integrator at the crossover"),
+    ];
+    let [gains, phases] = [gains, phases].map(|marks| Series::points("printed", marks));
     Figure::new("w-plane", "Identified plant of Eq. 3.34 in the w plane", "Figures 23, 24, 25")
         .panel(gain.y_range(-100.0, 20.0).with(at(-100.0, 20.0)).with(gains))
         .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)).with(phases))

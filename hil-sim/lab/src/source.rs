@@ -21,10 +21,11 @@ const FILES: [&str; 2] =
     [include_str!("../source/barroso-2017.toml"), include_str!("../source/jacobina-1996.toml")];
 
 /// What a printed value is to its source.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A rating, reading or specification that the source starts from.
+    #[default]
     Input,
     /// What the source computed, designed, identified or measured.
     Result,
@@ -35,7 +36,7 @@ pub enum Kind {
 }
 
 /// A printed value.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Printed {
     /// `S0` or `S1`.
     pub source: String,
@@ -106,24 +107,10 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
     for File { source, chapter, .. } in files() {
         for Chapter { id, name, printed, table } in chapter {
             let chapter = name;
-            let mut add = |texts: [&str; 5], kind, formula: Option<String>, slip| {
-                let [place, quantity, unit, value, name] = texts.map(str::to_owned);
+            let mut add = |texts: [&str; 4], rest: Printed| {
+                let [place, quantity, unit, value] = texts.map(str::to_owned);
                 let (source, chapter, id) = (source.clone(), chapter.clone(), id.clone());
-                let taken = AtomicBool::new(false);
-                all.push(Printed {
-                    source,
-                    chapter,
-                    id,
-                    name,
-                    place,
-                    quantity,
-                    unit,
-                    value,
-                    kind,
-                    formula,
-                    slip,
-                    taken,
-                });
+                all.push(Printed { source, chapter, id, place, quantity, unit, value, ..rest });
             };
             for row in &printed {
                 let [place, quantity, unit, value, kind, more @ ..] = &row[..] else {
@@ -132,8 +119,10 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                 let (kind, name) = kind.split_once(' ').unwrap_or((kind, ""));
                 let kind = toml::Value::from(kind).try_into();
                 let kind = kind.expect("input, result, graph or claim");
-                let more = |k: usize| more.get(k).cloned();
-                add([place, quantity, unit, value, name], kind, more(0), more(1));
+                let [formula, slip] = [0, 1].map(|k| more.get(k).cloned());
+                let name = name.to_owned();
+                let rest = Printed { kind, name, formula, slip, ..Printed::default() };
+                add([place, quantity, unit, value], rest);
             }
             for Cells { place, kind, columns, rows } in &table {
                 for row in rows {
@@ -141,7 +130,8 @@ pub static PRINTED: LazyLock<Vec<Printed>> = LazyLock::new(|| {
                     for (column, value) in columns.iter().zip(&row[1..]) {
                         let formula =
                             column.get(2).map(|text| text.replace("{| ", &format!("{{{place} | ")));
-                        add([&place, &column[0], &column[1], value, ""], *kind, formula, None);
+                        let rest = Printed { kind: *kind, formula, ..Printed::default() };
+                        add([&place, &column[0], &column[1], value], rest);
                     }
                 }
             }

@@ -15,8 +15,8 @@ pub struct Evidence {
     metrics: HashMap<String, f64>,
     /// What was compared with a value that is not in the list.
     pub astray: Vec<String>,
-    /// Figures of the sources: the experiment, and its figures.
-    figures: Vec<(String, Vec<Figure>)>,
+    /// Figures of the sources, each with its experiment.
+    figures: Vec<(String, Figure)>,
 }
 
 /// What follows from the print itself; experiments add theirs.
@@ -51,8 +51,8 @@ impl Evidence {
             known.1.used = known.1.used.or(ours.used);
         }
         let shown = |figure: &&Figure| figure.source.contains("Figure");
-        let figures: Vec<_> = outcome.figures.iter().filter(shown).cloned().collect();
-        self.figures.push((experiment.to_owned(), figures));
+        let figures = outcome.figures.iter().filter(shown).cloned();
+        self.figures.extend(figures.map(|figure| (experiment.to_owned(), figure)));
     }
 
     /// The experiments that report a place; none of what follows from the print itself.
@@ -202,23 +202,21 @@ impl Evidence {
             let values = chapter.outcome.tables[0].rows.len() as f64;
             chapter.outcome.metrics.set("printed_values", values);
         }
-        for (experiment, figures) in &self.figures {
+        for (experiment, figure) in &self.figures {
             let Some(&home) = homes.get(&**experiment) else { continue };
-            for figure in figures {
-                // In the chapter where the source has it, if the list has values of it.
-                let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
-                let place = format!("Figure {number}");
-                let is_there = |p: &&Printed| p.source == chapters[home].source && p.place == place;
-                let there = PRINTED.iter().find(is_there);
-                let at = there.and_then(|p| chapters.iter().position(|chapter| chapter.is_of(p)));
-                let chapter = &mut chapters[at.unwrap_or(home)];
-                index.record([
-                    ("figure", Cell::from(&*figure.source)),
-                    ("section", chapter.name.as_str().into()),
-                    ("what it shows", figure.title.as_str().into()),
-                ]);
-                chapter.outcome.figures.push(figure.clone());
-            }
+            // In the chapter where the source has it, if the list has values of it.
+            let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
+            let place = format!("Figure {number}");
+            let is_there = |p: &&Printed| p.source == chapters[home].source && p.place == place;
+            let there = PRINTED.iter().find(is_there);
+            let at = there.and_then(|p| chapters.iter().position(|chapter| chapter.is_of(p)));
+            let chapter = &mut chapters[at.unwrap_or(home)];
+            index.record([
+                ("figure", Cell::from(&*figure.source)),
+                ("section", chapter.name.as_str().into()),
+                ("what it shows", figure.title.as_str().into()),
+            ]);
+            chapter.outcome.figures.push(figure.clone());
         }
         chapters[0].outcome.tables.push(index);
         chapters
@@ -244,10 +242,8 @@ impl Evidence {
         outcome.tables.push(Table::new("Errata", &[]).records(errata));
         let faults = self.faults();
         if !faults.is_empty() {
-            outcome.texts.push((
-                "Without a verdict, or no longer as the errata say".into(),
-                faults.join("\n"),
-            ));
+            let title = "Without a verdict, or no longer as the errata say";
+            outcome.texts.push((title.into(), faults.join("\n")));
         }
         outcome.remark(
             "S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996. Recomputed: from the source's own numbers. Simulated: by \
