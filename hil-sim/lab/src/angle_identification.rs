@@ -158,13 +158,11 @@ fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
     let name = demodulation.name();
     let title = format!("{name}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %");
     let turn = p.record.u.iter().map(|u| u.to_degrees() / 1e3).collect::<Vec<_>>();
-    Figure::new(format!("fit_{name}"), title, "Figure 34")
-        .panel(
-            Panel::new("time (s)", format!("signal ({})", demodulation.unit()))
-                .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
-                .with(Series::reference("Eq. 3.43", line(&model))),
-        )
-        .panel(Panel::new("time (s)", "turn of the axis (°)").with(Series::line("u", line(&turn))))
+    let signal = Panel::new("time (s)", format!("signal ({})", demodulation.unit()))
+        .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
+        .with(Series::reference("Eq. 3.43", line(&model)));
+    let turn = Panel::new("time (s)", "turn of the axis (°)").with(Series::line("u", line(&turn)));
+    Figure::new(format!("fit_{name}"), title, "Figure 34").panel(signal).panel(turn)
 }
 
 fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
@@ -187,11 +185,8 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         TABLE_6_A.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, (iq, p)| {
             // Over a carrier period: the rest is ripple.
             let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
-            let line = pick(p)
-                .chunks(5)
-                .enumerate()
-                .map(|(n, c)| ((n as f64 * 5.0 + 2.0) / RATE_HZ * 1e3, mean(c)))
-                .collect();
+            let point = |(n, c): (usize, _)| ((n as f64 * 5.0 + 2.0) / RATE_HZ * 1e3, mean(c));
+            let line = pick(p).chunks(5).enumerate().map(point).collect();
             panel.with(Series::line(format!("iq = {iq} A"), line))
         })
     };

@@ -1,7 +1,5 @@
 //! Dead time and its compensation, section 3.9.
 
-use sim_bench::plant::Complex;
-
 use crate::prelude::*;
 
 /// Figures 28 and 29.
@@ -26,7 +24,6 @@ const HARMONICS: [i32; 4] = [-5, 7, -11, 13];
 
 /// One run.
 struct Case {
-    name: &'static str,
     /// Over the angle of the current of phase a, degrees: voltage error along phase a, V, and
     /// current of phase a, A.
     error: Vec<(f64, f64)>,
@@ -37,8 +34,8 @@ struct Case {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let cases =
-        [case(context, "without compensation", false)?, case(context, "with compensation", true)?];
+    let cases = [case(context, false)?, case(context, true)?];
+    let names = [("without compensation", "uncompensated"), ("with compensation", "compensated")];
     let mut outcome = Outcome::default();
     let heads =
         ["", "voltage error (V rms)", "5th (%)", "7th (%)", "11th (%)", "13th (%)", "all four (%)"];
@@ -48,15 +45,15 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     ));
     let mut voltage = Panel::new("angle of the current (°)", "voltage error along phase a (V)");
     let mut current = Panel::new("angle of the current (°)", "current of phase a (A)");
-    for (c, key) in cases.iter().zip(["uncompensated", "compensated"]) {
+    for (c, (name, key)) in cases.iter().zip(names) {
         let total = c.harmonics.iter().map(|h| h * h).sum::<f64>().sqrt();
         outcome.metrics.set(format!("voltage_error_{key}_rms_v"), c.error_rms);
         outcome.metrics.set(format!("current_distortion_{key}_pct"), total * 100.0);
-        let mut row = vec![Cell::from(c.name), Cell::fixed(c.error_rms, 3)];
+        let mut row = vec![Cell::from(name), Cell::fixed(c.error_rms, 3)];
         row.extend(c.harmonics.iter().chain([&total]).map(|h| Cell::fixed(h * 100.0, 3)));
         table.row(row);
-        voltage = voltage.with(Series::line(c.name, c.error.clone()));
-        current = current.with(Series::line(c.name, c.current.clone()));
+        voltage = voltage.with(Series::line(name, c.error.clone()));
+        current = current.with(Series::line(name, c.current.clone()));
     }
     outcome.tables.push(table);
     let i = &context.config.inverter;
@@ -105,17 +102,13 @@ fn edges(context: &Context<'_>) -> [Figure; 2] {
     ] {
         panel = panel.with(Series::line(name, steps(high, &[change], end, offset)));
     }
-    let (on, off, end) = (10.0, 40.0, 60.0);
+    let (on, off, end, half) = (10.0, 40.0, 60.0, 0.5 * dead);
     let mut pulse = Panel::new("time (µs)", "low, high; offset").y_range(-0.2, 5.7);
     for (name, changes, offset) in [
         ("ideal pulse", [on, off], 4.5),
         ("actual, current into the motor", [on + delay + dead, off + delay], 3.0),
         ("actual, current out of the motor", [on + delay, off + delay + dead], 1.5),
-        (
-            "compensated, current into the motor",
-            [on + delay + 0.5 * dead, off + delay + 0.5 * dead],
-            0.0,
-        ),
+        ("compensated, current into the motor", [on + delay + half, off + delay + half], 0.0),
     ] {
         pulse = pulse.with(Series::line(name, steps(false, &changes, end, offset)));
     }
@@ -126,7 +119,7 @@ fn edges(context: &Context<'_>) -> [Figure; 2] {
     ]
 }
 
-fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<Case, Error> {
+fn case(context: &Context<'_>, compensate: bool) -> Result<Case, Error> {
     let mut config = context.config.clone();
     config.drive.angle_source = AngleSource::Encoder;
     config.inverter.switched = true;
@@ -142,8 +135,8 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     let mut sums = [(0.0, 0.0, 0u32); BINS];
     let mut error_stats = Stats::default();
     // Mean of i e^(-j n angle) over the run: complex amplitude of harmonic n.
-    let mut amplitudes = [Complex::ZERO; 5];
-    let mut wanted = Complex::ZERO;
+    let mut amplitudes = [Complex64::ZERO; 5];
+    let mut wanted = Complex64::ZERO;
     // Whole turns of the flux, so that the fundamental leaks into no harmonic.
     let mut turned = 0.0;
     let mut last = rig.plant.rotor_flux_angle();
@@ -161,13 +154,13 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         let error = rig.plant.applied_voltage() - wanted;
         let t = rig.drive.telemetry();
         let lead = TAU * (f64::from(t.phi.to_turns()) + 1.5 * f64::from(t.flux_freq));
-        wanted = Complex::new(t.voltage.d.into(), t.voltage.q.into()) * Complex::cis(lead);
+        wanted = Complex64::new(t.voltage.d.into(), t.voltage.q.into()) * Complex64::cis(lead);
 
         error_stats.push(error.norm());
         let bin = &mut sums[((angle / TAU).rem_euclid(1.0) * BINS as f64) as usize % BINS];
         *bin = (bin.0 + error.re, bin.1 + i.re, bin.2 + 1);
         for (sum, n) in amplitudes.iter_mut().zip([1].iter().chain(&HARMONICS)) {
-            *sum += i * Complex::cis(-f64::from(*n) * phi);
+            *sum += i * Complex64::cis(-f64::from(*n) * phi);
         }
     }
     let points = |of: fn(&(f64, f64, u32)) -> f64| {
@@ -176,7 +169,6 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         (0..BINS).map(|k| (centre(k), of(bin(k)) / f64::from(bin(k).2))).collect()
     };
     Ok(Case {
-        name,
         error: points(|b| b.0),
         current: points(|b| b.1),
         error_rms: error_stats.rms(),

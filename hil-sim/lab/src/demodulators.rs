@@ -4,12 +4,13 @@ pub(super) mod demodulation;
 mod signal;
 pub(super) mod tracked;
 
+use sim_bench::learning;
 use sim_bench::steady::{OperatingPoint, SteadyRun, steady_run};
 
 use crate::injection_map::{self, Curve, Variant};
 use crate::prelude::*;
 use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
-use signal::{SETTLED_S, SignalQuality};
+use signal::{SETTLED_S, SignalQuality, signal_quality};
 use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.
@@ -41,6 +42,45 @@ struct DemodulationResults {
 }
 
 impl DemodulationResults {
+    fn of(demodulation: &Demodulation, context: &Context<'_>) -> Result<Self, Error> {
+        let (config, seed) = (context.config, context.seed);
+        let mut isotropic = config.clone();
+        injection_map::take_saliency(&mut isotropic);
+        let map = |saliency: bool| {
+            let (demodulator, compensate) = (demodulation.0, !config.drive.ignore_delays);
+            let variant = Variant { demodulator, saliency, compensate, ..injection_map::LITERAL };
+            let curve = |&iq: &f64| injection_map::curve(config, seed, variant, iq);
+            IQ_A.par_iter().map(curve).collect::<Result<Vec<_>, _>>()
+        };
+        let at_each = |config: &Config| {
+            let config = demodulation.config(config);
+            let quality = |&iq: &f64| signal_quality(Rig::oriented(&config, seed, iq, SETTLED_S)?);
+            IQ_A.par_iter().map(quality).collect::<Result<Vec<_>, _>>()
+        };
+        let learned = learning::reference_of(demodulation.0, &demodulation.config(config), seed)?;
+        let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
+            let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
+            let case = |&rpm: &f64| OperatingPoint { rpm, iq: RUN_IQ_A, seed };
+            let turning = SPEEDS_RPM.par_iter().map(|rpm| steady_run(&config, case(rpm), 1.0));
+            let turning = turning.collect::<Result<_, _>>()?;
+            Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
+        };
+        let mut found = Self {
+            maps: [map(true)?, map(false)?],
+            seen: at_each(config)?,
+            isotropic: at_each(&isotropic)?,
+            delay: None,
+            tracked: ReferenceKind::VALUES
+                .iter()
+                .map(|&kind| track(kind))
+                .collect::<Result<_, _>>()?,
+        };
+        if found.isotropic_share() < 0.5 {
+            found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
+        }
+        Ok(found)
+    }
+
     fn at_one_ampere(&self) -> (&SignalQuality, &SignalQuality) {
         let one = IQ_A.iter().position(|&iq| iq == DELAY_IQ_A).unwrap_or(0);
         (&self.seen[one], &self.isotropic[one])
@@ -61,7 +101,7 @@ struct ClosedLoop {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let found = context.in_parallel("demodulators", &DEMODULATIONS, |_, demodulation| {
-        findings(demodulation, context.config, context.seed)
+        DemodulationResults::of(demodulation, context)
     })?;
 
     let mut outcome = Outcome::default();
@@ -93,47 +133,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
-}
-
-fn findings(
-    demodulation: &Demodulation,
-    config: &Config,
-    seed: u64,
-) -> Result<DemodulationResults, Error> {
-    let mut isotropic = config.clone();
-    injection_map::take_saliency(&mut isotropic);
-    let map = |saliency: bool| {
-        let (demodulator, compensate) = (demodulation.0, !config.drive.ignore_delays);
-        let variant = Variant { demodulator, saliency, compensate, ..injection_map::LITERAL };
-        IQ_A.par_iter()
-            .map(|&iq| injection_map::curve(config, seed, variant, iq))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let at_each = |config: &Config| {
-        let config = demodulation.config(config);
-        IQ_A.par_iter()
-            .map(|&iq| signal::signal_quality(Rig::oriented(&config, seed, iq, SETTLED_S)?))
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let learned = demodulation.learn(config, seed)?;
-    let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
-        let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
-        let case = |&rpm: &f64| OperatingPoint { rpm, iq: RUN_IQ_A, seed };
-        let turning = SPEEDS_RPM.par_iter().map(|rpm| steady_run(&config, case(rpm), 1.0));
-        let turning = turning.collect::<Result<_, _>>()?;
-        Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
-    };
-    let mut found = DemodulationResults {
-        maps: [map(true)?, map(false)?],
-        seen: at_each(config)?,
-        isotropic: at_each(&isotropic)?,
-        delay: None,
-        tracked: ReferenceKind::VALUES.iter().map(|&kind| track(kind)).collect::<Result<_, _>>()?,
-    };
-    if found.isotropic_share() < 0.5 {
-        found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
-    }
-    Ok(found)
 }
 
 fn degrees(radians: f64) -> f64 {

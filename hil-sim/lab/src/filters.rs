@@ -82,10 +82,8 @@ fn bode(filters: &[ComparedFilter]) -> Figure {
 
 fn stop_band(lpf: &ComparedFilter) -> Figure {
     let along = |response: &dyn Fn(f64) -> Complex64| {
-        (0..=900)
-            .map(|k| 440.0 + f64::from(k) * 0.25)
-            .map(|hz| (hz, decibels(response(omega_t(hz)))))
-            .collect()
+        let hz = (0..=900).map(|k| 440.0 + f64::from(k) * 0.25);
+        hz.map(|hz| (hz, decibels(response(omega_t(hz))))).collect()
     };
     let panel = Panel::new("frequency (Hz)", "gain (dB)")
         .y_range(-80.0, 5.0)
@@ -147,14 +145,18 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     }
     let [pass, stop] = [edges_hz(&BPF, -0.6), edges_hz(&LPF_AS_PRINTED, -40.0)];
     let stop = [stop[0], stop[stop.len() - 1]];
-    let carrier = CARRIER_HZ;
     outcome.metrics.set("lpf_stop_from_hz", stop[0]);
     outcome.metrics.set("lpf_stop_to_hz", stop[1]);
-    outcome.metrics.set("carrier_from_edge_hz", stop[1] - carrier);
+    outcome.metrics.set("carrier_from_edge_hz", stop[1] - CARRIER_HZ);
     // PP's own specification: the others of least order that meet it.
-    let edge = stop_edge(&filters[2]);
+    let edges = crossings(|hz| decibels(filters[2].direct(omega_t(hz))) + 60.0);
+    let edge = edges.first().copied().unwrap_or(f64::NAN);
+    let warped = |hz: f64| (0.5 * omega_t(hz)).tan();
     let ratio = warped(edge) / warped(100.0);
-    let delay = |prototype: Prototype| group_delay(&prototype.digital(Band::Low(100.0)));
+    // Group delay near dc, samples.
+    let w = 1e-4;
+    let response = |prototype: Prototype| direct::response(&prototype.digital(Band::Low(100.0)), w);
+    let delay = |prototype: Prototype| -response(prototype).arg() / w;
     let elliptic = delay(pp);
     let delays = [
         ("butterworth", delay(butterworth(9, 0.5))),
@@ -169,7 +171,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     let fewest = delays[1].1.min(delays[2].1);
     let within = pass[0] < stop[0] && stop[1] < pass[1];
     outcome.compared.extend([
-        named("stop_band_has_carrier").recomputed((stop[0]..stop[1]).contains(&carrier)),
+        named("stop_band_has_carrier").recomputed((stop[0]..stop[1]).contains(&CARRIER_HZ)),
         named("pass_band_has_stop_band").recomputed(within),
         named("less_delay_than_butterworth").recomputed(elliptic < delays[0].1),
         named("less_delay_than_chebyshev").recomputed(elliptic < fewest),
@@ -177,22 +179,6 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     outcome.metrics.set("lpf_currents_high_by_pct", 100.0 * (1.0 / LPF_AS_PRINTED.dc_gain() - 1.0));
     outcome.metrics.set("bpf_gain_dc_db", 20.0 * BPF.dc_gain().log10());
     outcome.metrics.set("leak_of_an_ampere_ma", 1e3 * BPF.dc_gain());
-}
-
-/// tan(omega T / 2).
-fn warped(hz: f64) -> f64 {
-    (0.5 * omega_t(hz)).tan()
-}
-
-/// Where PP is 60 dB down, Hz.
-fn stop_edge(pp: &ComparedFilter) -> f64 {
-    crossings(|hz| decibels(pp.direct(omega_t(hz))) + 60.0).first().copied().unwrap_or(f64::NAN)
-}
-
-/// At dc, samples.
-fn group_delay(filter: &[Vec<f64>; 2]) -> f64 {
-    let h = 1e-4;
-    -direct::response(filter, h).arg() / h
 }
 
 /// Numerator and denominator of sections in one.

@@ -3,8 +3,7 @@
 
 use crate::identification::printed::{Case, SPEEDS};
 use crate::identification::study::{Entry, MODELS, TRIALS, errors_of, tables};
-use crate::identification::trial::Noise;
-use crate::identification::{Parameters, Signal, Trial};
+use crate::identification::{Noise, Parameters, Signal, Trial};
 use crate::prelude::*;
 
 /// Tables 2, 3 and 5.

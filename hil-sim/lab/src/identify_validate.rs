@@ -1,11 +1,9 @@
 //! Measured against simulated current, with estimated and with classical parameters: Figure 5 and
 //! Tables 6 and 7 of Jacobina, Lima, Ribeiro 1996.
 
-use crate::identification::models::model_c;
 use crate::identification::printed::Case;
 use crate::identification::study::errors;
-use crate::identification::trial::Noise;
-use crate::identification::{Parameters, Signal, Trial};
+use crate::identification::{Noise, Parameters, Signal, Trial, model_c};
 use crate::prelude::*;
 
 /// Figure 5, Tables 6 and 7.
@@ -110,12 +108,11 @@ fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome)
         let points = |of: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
             (0..measured.len()).map(|n| (n as f64 * H, of(n))).collect()
         };
-        figure = figure.panel(
-            Panel::new("time (s)", format!("i_d, {name} (A)"))
-                .with(Series::reference("machine", points(&|n| measured[n].re)))
-                .with(Series::line("simulated", points(&|n| simulated[n].re)))
-                .with(Series::line("error", points(&|n| measured[n].re - simulated[n].re))),
-        );
+        let panel = Panel::new("time (s)", format!("i_d, {name} (A)"))
+            .with(Series::reference("machine", points(&|n| measured[n].re)))
+            .with(Series::line("simulated", points(&|n| simulated[n].re)))
+            .with(Series::line("error", points(&|n| measured[n].re - simulated[n].re)));
+        figure = figure.panel(panel);
     }
     outcome.figures.push(figure);
 }

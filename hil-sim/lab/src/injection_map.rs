@@ -119,11 +119,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// A family of curves, one a torque current, A.
 pub(super) fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
-    iq_a.iter()
-        .zip(family)
-        .fold(Panel::new("φ̂₂ − θ (° electrical)", y), |panel, (iq, curve)| {
-            panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
-        })
+    let line = |(iq, curve): (&f64, &Curve)| Series::line(format!("iq = {iq} A"), curve.clone());
+    iq_a.iter().zip(family).map(line).fold(Panel::new("φ̂₂ − θ (° electrical)", y), Panel::with)
 }
 
 /// Makes the motor one without saliency.

@@ -21,7 +21,6 @@ use drive_core::filter::{LPF, LpfState};
 use drive_core::flux::GainSchedule;
 use drive_core::io::PERIOD_S;
 use drive_settings::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource};
-use sim_bench::plant::{MachineSettings, MechanicsSettings};
 
 use crate::prelude::*;
 

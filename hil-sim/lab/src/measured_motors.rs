@@ -2,13 +2,9 @@
 
 use std::f64::consts::SQRT_2;
 
-use num_complex::Complex;
 use sim_bench::config::Value;
 use sim_bench::config::motors::{self, Motor};
-use sim_bench::plant::{
-    ElectricalState as _, EnergyMachine, EnergyState, MachineModel as _, Mechanics,
-    MechanicsSettings, MotorModel, phases,
-};
+use sim_bench::plant::{EnergyState, phases};
 
 use crate::prelude::*;
 use crate::saliency::steady::at_voltage;
@@ -87,7 +83,7 @@ impl Supplied {
     /// State at the electrical speed `w`, rad/s.
     fn state(&self, w: f64) -> Result<EnergyState, Error> {
         // The stator flux of an ideal winding, and as much in the rotor.
-        let flux = Complex::new(0.0, -0.97 * self.v / self.w_s);
+        let flux = Complex64::new(0.0, -0.97 * self.v / self.w_s);
         let mut start = EnergyState::of_fluxes([flux; 4]);
         self.machine.settle(&mut start);
         at_voltage(&self.machine, self.v.into(), (self.w_s, w), &start)
@@ -125,11 +121,9 @@ impl Supplied {
         let shaft = Mechanics::new(&self.shaft).map_err(Error::refused)?;
         let (mut motor, h, mut peak) = (MotorModel::new(self.machine, shaft), 50e-6, 0.0);
         for k in 0..1000 {
-            motor.step(Complex::from_polar(self.v, self.w_s * h * (f64::from(k) + 0.5)), h);
-            peak = phases(motor.state.electrical.current())
-                .into_iter()
-                .map(f64::abs)
-                .fold(peak, f64::max);
+            motor.step(Complex64::from_polar(self.v, self.w_s * h * (f64::from(k) + 0.5)), h);
+            let currents = phases(motor.state.electrical.current());
+            peak = currents.into_iter().map(f64::abs).fold(peak, f64::max);
         }
         Ok(peak)
     }

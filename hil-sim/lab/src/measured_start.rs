@@ -1,9 +1,6 @@
 //! A recorded start beside the simulated motor at the recorded voltages.
 
-use sim_bench::plant::{
-    ElectricalState as _, EnergyMachine, IronSettings, Load, MachineModel as _, Mechanics,
-    MotorModel,
-};
+use sim_bench::plant::IronSettings;
 
 use crate::identify_trace::{Reading, Voltages, read, rms};
 use crate::prelude::*;

@@ -73,12 +73,12 @@ fn vectors(inverter: &Inverter) -> Figure {
     let inner = inverter.vdc / 3.0_f64.sqrt();
     let corners = around(6, &on(2.0 / 3.0 * inverter.vdc));
     let hexagon = Series::reference("hexagon", corners.clone());
-    let mut panel = Panel::new("α (V)", "β (V)").equal_axes().with(hexagon);
+    let panel = Panel::new("α (V)", "β (V)").equal_axes().with(hexagon);
     let names = ["U_0", "U_60", "U_120", "U_180", "U_240", "U_300"];
-    for (name, corner) in names.into_iter().zip(corners) {
-        panel = panel.with(Series::points(name, vec![corner]));
-    }
-    let panel = panel
+    let corners = names.into_iter().zip(corners);
+    let corners = corners.map(|(name, corner)| Series::points(name, vec![corner]));
+    let panel = corners
+        .fold(panel, Panel::with)
         .with(Series::limit("largest circle", around(360, &on(inner))))
         .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
         .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));

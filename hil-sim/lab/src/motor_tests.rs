@@ -1,7 +1,5 @@
 //! The tests that gave Table 5, on the simulated motor.
 
-use sim_bench::plant::MachineSettings;
-
 use crate::identification::bench_tests::{Readings, Shaft, measure};
 use crate::prelude::*;
 
@@ -23,10 +21,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (readings, free) = (on_the_bench(Shaft::Driven)?, on_the_bench(Shaft::Free)?);
     let mut outcome = Outcome::default();
     let values = |m: MachineSettings| [m.rs, m.rr, m.lls, m.llr, m.lm];
-    let names =
-        ["r_s", "r_r", "l_l1", "l_l2", "l_m"].into_iter().zip(["ohm", "ohm", "h", "h", "h"]);
+    let names = [("r_s", "ohm"), ("r_r", "ohm"), ("l_l1", "h"), ("l_l2", "h"), ("l_m", "h")];
     let found = values(readings.as_printed()).into_iter().zip(values(readings.exact()));
-    for ((name, unit), (printed, exact)) in names.zip(found) {
+    for ((name, unit), (printed, exact)) in names.into_iter().zip(found) {
         outcome.metrics.set(format!("{name}_as_printed_{unit}"), printed);
         outcome.metrics.set(format!("{name}_exact_{unit}"), exact);
     }

@@ -133,10 +133,8 @@ fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, E
     let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
     let predicted = linear.response(case.disturbance, AFTER_S);
 
-    let runs: Vec<_> = (0..SEEDS)
-        .into_par_iter()
-        .map(|n| one(&config, &case, seed.wrapping_add(n)))
-        .collect::<Result<_, _>>()?;
+    let run = |n| one(&config, &case, seed.wrapping_add(n));
+    let runs: Vec<_> = (0..SEEDS).into_par_iter().map(run).collect::<Result<_, _>>()?;
     let mean = |of: usize| -> Vec<f64> {
         let at = |k: usize| runs.iter().map(|(points, ..)| points[k][of] / SEEDS as f64).sum();
         (0..predicted.angle_deg.len()).map(at).collect()

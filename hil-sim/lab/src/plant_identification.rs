@@ -137,19 +137,17 @@ struct IdentifiedPlant {
     rms: f64,
 }
 
-/// With two coefficients of the voltage where the delay is no whole number of samples: the current's
-/// analog filter has 0.18.
-fn first_order(
-    u: &[f64],
-    y: &[f64],
-    inputs: usize,
-    delay: usize,
-) -> Result<IdentifiedPlant, Error> {
-    let orders = Orders { outputs: 1, inputs, delay };
-    let Arx { a, b, condition, rms } =
-        fit(u, y, orders).map_err(|e| Error::Refused(format!("least squares: {e}")))?;
-    let b = [b[0], b.get(1).copied().unwrap_or(0.0)];
-    Ok(IdentifiedPlant { plant: FirstOrder { k: b[0] + b[1], p: -a[0] }, b, delay, condition, rms })
+impl IdentifiedPlant {
+    /// With two coefficients of the voltage where the delay is no whole number of samples: the current's
+    /// analog filter has 0.18.
+    fn fit(u: &[f64], y: &[f64], inputs: usize, delay: usize) -> Result<Self, Error> {
+        let refused = |reason| Error::Refused(format!("least squares: {reason}"));
+        let Arx { a, b, condition, rms } =
+            fit(u, y, Orders { outputs: 1, inputs, delay }).map_err(refused)?;
+        let b = [b[0], b.get(1).copied().unwrap_or(0.0)];
+        let plant = FirstOrder { k: b[0] + b[1], p: -a[0] };
+        Ok(Self { plant, b, delay, condition, rms })
+    }
 }
 
 fn bench(context: &Context<'_>) -> Result<Rig, Error> {
@@ -170,12 +168,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for trial in &TRIALS {
         let mut rig = bench(context)?;
         let record = (trial.record)(&mut rig)?;
-        let printed = first_order(&record.u, &record.y, 1, 0)?;
+        let printed = IdentifiedPlant::fit(&record.u, &record.y, 1, 0)?;
         let u = record.alike();
-        let found = DELAYS
-            .iter()
-            .map(|&delay| first_order(&u, &record.y, 2, delay))
-            .collect::<Result<Vec<_>, _>>()?;
+        let with = |&delay: &usize| IdentifiedPlant::fit(&u, &record.y, 2, delay);
+        let found = DELAYS.iter().map(with).collect::<Result<Vec<_>, _>>()?;
         let best = found.iter().copied().reduce(|a, b| if b.rms < a.rms { b } else { a });
         let best = best.ok_or_else(|| Error::Internal("no delay was tried".to_owned()))?;
         for (how, one) in [("as printed", printed), ("filtered alike", best)] {
@@ -265,7 +261,7 @@ fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
         Ok(found) => format!("accepted, condition {:.1e}", found.condition),
     };
     let still = still.without_mean();
-    let noise = first_order(&still.u, &still.y, 1, 0)?;
+    let noise = IdentifiedPlant::fit(&still.u, &still.y, 1, 0)?;
     Ok(vec![
         format!("A constant voltage and current is {verdict}."),
         format!(

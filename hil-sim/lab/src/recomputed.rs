@@ -2,7 +2,7 @@
 
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_settings::tuning::rule_3_8;
-use sim_bench::plant::{InverterSettings, MachineSettings};
+use sim_bench::plant::InverterSettings;
 
 use crate::identification::bench_tests::Readings;
 use crate::prelude::*;
@@ -44,11 +44,8 @@ fn constants(outcome: &mut Outcome) {
     let both = |plant: f64, drive: f32| if plant as f32 == drive { plant } else { f64::NAN };
     let three = |plant: f64, bench: f64, drive: f32| both(both(plant, bench as f32), drive);
     let bench = config.motor;
-    let leakage = three(
-        both(motor.lls, motor.llr as f32),
-        both(bench.l_ls, bench.l_lr as f32),
-        drive.motor.l_ls,
-    );
+    let of_plant = both(motor.lls, motor.llr as f32);
+    let leakage = three(of_plant, both(bench.l_ls, bench.l_lr as f32), drive.motor.l_ls);
     let pii = drive.injection.printed;
     #[rustfmt::skip] // a constant a line
     let constants = [
@@ -99,11 +96,6 @@ fn position_loop(outcome: &mut Outcome) {
     let unknown = "inertia, friction and the unit of the position";
     let of = |quantity| beside("Eq. 4.1", quantity).unknown(unknown);
     outcome.compared.extend(["gain", "pole"].map(of));
-}
-
-/// Eq. 2.7 with L_m²/L_r, beside 0.7 A of direct current, Nm/A.
-pub fn torque_per_ampere() -> f64 {
-    source::value_of("S1", "torque_per_ampere").unwrap_or(f64::NAN)
 }
 
 /// Fictitious over real frequency.

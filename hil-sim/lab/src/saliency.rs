@@ -4,9 +4,8 @@ pub(super) mod steady;
 
 use std::f64::consts::FRAC_PI_2;
 
-use num_complex::Complex;
 use sim_bench::config::flux_level_a;
-use sim_bench::plant::{EnergyMachine, EnergyState, Machine, MachineSettings, MachineState};
+use sim_bench::plant::{EnergyState, Machine, MachineState};
 
 use steady::Listed;
 
@@ -63,14 +62,13 @@ impl Probe {
         let plant = plant_settings(config);
         let settings = plant.machine;
         let machine = match plant.iron {
-            None => {
-                ProbeModel::A(Machine::new(&settings, &plant.saliency).map_err(Error::refused)?)
-            }
+            None => Machine::new(&settings, &plant.saliency).map(ProbeModel::A),
             Some(mut iron) => {
                 (iron.slots, iron.stator_fixed) = (0.0, 0.0);
-                ProbeModel::Energy(EnergyMachine::new(&settings, &iron).map_err(Error::refused)?)
+                EnergyMachine::new(&settings, &iron).map(ProbeModel::Energy)
             }
         };
+        let machine = machine.map_err(Error::refused)?;
         let i_d = match config.model.plant {
             PlantModel::A => config.drive.i_d().into(),
             _ => flux_level_a(config),
@@ -100,13 +98,13 @@ impl Probe {
     /// Saliency without load, relative (positive is low inductance along the flux), and the mean inductance, H.
     pub fn at_rest(&self, i_d: f64) -> Option<(f64, f64)> {
         let [along, across] = self.admittance(i_d, 0.0, 0.0)?;
-        let inductance = |y: Complex<f64>| (1.0 / y).im / CARRIER;
+        let inductance = |y: Complex64| (1.0 / y).im / CARRIER;
         let (d, q) = (inductance(along[0]), inductance(across[1]));
         Some(((q - d) / (q + d), 0.5 * (q + d)))
     }
 
-    fn admittance(&self, i_d: f64, i_q: f64, e: f64) -> Option<[[Complex<f64>; 2]; 2]> {
-        let i = Complex::new(i_d, i_q) * Complex::cis(-e);
+    fn admittance(&self, i_d: f64, i_q: f64, e: f64) -> Option<[[Complex64; 2]; 2]> {
+        let i = Complex64::new(i_d, i_q) * Complex64::cis(-e);
         if i.re < LEAST_DIRECT * i.norm() {
             return None;
         }
@@ -126,16 +124,16 @@ impl Probe {
     fn of<M: Listed>(
         &self,
         machine: &M,
-        i: Complex<f64>,
-        linear: impl Fn(Complex<f64>, f64, Complex<f64>) -> M::State,
-    ) -> Option<[[Complex<f64>; 2]; 2]> {
+        i: Complex64,
+        linear: impl Fn(Complex64, f64, Complex64) -> M::State,
+    ) -> Option<[[Complex64; 2]; 2]> {
         let m = &self.settings;
-        let guess = |i: Complex<f64>| {
+        let guess = |i: Complex64| {
             // psi = Lm i_d, i_r = -j Lm/Lr i_q
             let (psi, share) = (m.lm * i.re, m.lm / (m.lm + m.llr));
             let slip = m.rr * share * i.im / psi;
-            let main = Complex::new(psi, m.llr * share * i.im);
-            let v = i * m.rs + Complex::new(0.0, slip) * (main + i * m.lls);
+            let main = Complex64::new(psi, m.llr * share * i.im);
+            let v = i * m.rs + Complex64::new(0.0, slip) * (main + i * m.lls);
             (linear(i, psi, main), v, slip)
         };
         let psi = m.lm * i.re;
@@ -144,7 +142,7 @@ impl Probe {
                 // From no load on, step by step.
                 (0..=LOAD_STEPS).try_fold(guess(i.re.into()), |start, k| {
                     let share = f64::from(k) / f64::from(LOAD_STEPS);
-                    steady::at_current(machine, Complex::new(i.re, share * i.im), &start, psi)
+                    steady::at_current(machine, Complex64::new(i.re, share * i.im), &start, psi)
                 })
             })
             .ok()?;
@@ -198,15 +196,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          angle errors from -60° to 90° with the signal of no error, where a drive may lock falsely.",
     );
     for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
-        let cell = |e: i32| {
-            let found = curve.iter().find(|point| point.0 == f64::from(e));
-            Cell::or_dash(found.map(|point| Cell::fixed(100.0 * point.1, 2)))
-        };
+        let q = |e: i32| curve.iter().find(|point| point.0 == f64::from(e)).map(|point| point.1);
+        let cell = |e: i32| Cell::fixed_or_dash(q(e).map(|q| 100.0 * q), 2);
         let i_q_text = format!("{:.2}", i_q);
         let head = ("iq (A)".to_owned(), Cell::from(i_q_text.clone()));
         map.record(std::iter::once(head).chain(SHOWN_DEG.map(|e| (format!("{e}°"), cell(e)))));
-        let at_zero = curve.iter().find(|point| point.0 == 0.0).map(|point| point.1);
-        let zeros = at_zero.map(|q| Probe::second_zeros(curve, q)).unwrap_or_default();
+        let zeros = q(0).map(|q| Probe::second_zeros(curve, q)).unwrap_or_default();
         let zeros: Vec<String> = zeros.iter().map(|e| format!("{e:.0}°")).collect();
         let of_rest = slope.zip(slopes[0].filter(|k0| k0.abs() > NOTHING)).map(|(k, k0)| k / k0);
         let zeros = if zeros.is_empty() { "-".to_owned() } else { zeros.join(", ") };

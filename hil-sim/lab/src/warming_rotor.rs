@@ -2,8 +2,7 @@
 
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 
-use crate::identification::models::model_d;
-use crate::identification::{Delta, Estimate};
+use crate::identification::{Delta, Estimate, model_d};
 use crate::prelude::*;
 
 /// Calls of `refine` per second.

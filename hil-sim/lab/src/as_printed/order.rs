@@ -41,13 +41,11 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
 
 /// Largest distance of the currents from their mean over the second half of a second after a step of both, A.
 fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
-    let motor = motor_plant(&drive_settings::Settings::default().motor.into(), PERIOD_S)
-        .map_err(Error::refused)?;
+    let motor = motor_plant(&Settings::default().motor.into(), PERIOD_S).map_err(Error::refused)?;
     let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
     let turn = std::f64::consts::TAU * frame_hz * PERIOD_S;
     let reference = Complex64::new(0.7, 1.0);
-    let (mut i, mut u, mut delayed, mut before) =
-        (Complex64::ZERO, Complex64::ZERO, Complex64::ZERO, Complex64::ZERO);
+    let [mut i, mut u, mut delayed, mut before] = [Complex64::ZERO; 4];
     let mut filter = LpfState::default();
     let mut late = Vec::new();
     for n in 0..SAMPLES {

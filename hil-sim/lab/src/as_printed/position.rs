@@ -24,10 +24,9 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     };
     // Peak to peak over the last second.
     let swing = |trace: &Trace| {
-        let late = trace.degrees.iter().filter(|(t, _)| *t > SECONDS - 1.0).map(|p| p.1);
-        let (low, high) =
-            late.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
-        high - low
+        let late = trace.degrees.iter().filter(|(t, _)| *t > SECONDS - 1.0);
+        let late = sorted(late.map(|(_, degrees)| *degrees));
+        late[late.len() - 1] - late[0]
     };
     outcome.metrics.set("figure_37_printed_swing_deg", swing(&literal));
     outcome.metrics.set("figure_37_ours_swing_deg", swing(&ours));
@@ -41,12 +40,9 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     ]);
     let target = vec![(0.0, 1800.0), (SECONDS, 1800.0)];
     let stop = printed("Figure 37", "time at which the quadrature current is zero") / 1e3;
-    let figure = Figure::new(
-        "position",
-        "Five turns with the encoder on the plant of Eq. 4.1 (its unit taken as radians): the printed controller, and the \
-         cascade of the drive",
-        "Figure 37",
-    );
+    let title = "Five turns with the encoder on the plant of Eq. 4.1 (its unit taken as radians): the printed controller, and the \
+         cascade of the drive";
+    let figure = Figure::new("position", title, "Figure 37");
     let panel = Panel::new("time (s)", "position (°)")
         .with(Series::line("printed controller", literal.degrees))
         .with(Series::line("cascade of the drive", ours.degrees))
@@ -91,7 +87,8 @@ fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     let time_constant = -1.0 / (rate * plant.p.ln());
     // rad/s per ampere in the steady state, and newton metres per ampere.
     let per_ampere = plant.k * rate / (1.0 - plant.p);
-    let torque = crate::recomputed::torque_per_ampere();
+    // Eq. 2.7 with L_m²/L_r, beside 0.7 A of direct current, Nm/A.
+    let torque = source::value_of("S1", "torque_per_ampere").unwrap_or(f64::NAN);
     config.motor.friction = torque / per_ampere;
     config.motor.inertia = time_constant * config.motor.friction;
     config.drive.motor.inertia = config.motor.inertia as f32;

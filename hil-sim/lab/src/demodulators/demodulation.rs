@@ -2,7 +2,6 @@
 
 use drive_core::table::ReferenceTable;
 use drive_settings::words;
-use sim_bench::learning;
 
 use crate::injection_map::PP;
 use crate::prelude::*;
@@ -74,15 +73,6 @@ impl Demodulation {
     /// Unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
         if self.0 == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
-    }
-
-    /// The reference that it learns on this motor.
-    ///
-    /// # Errors
-    /// As [`learning::reference_of`].
-    pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
-        let config = self.config(config);
-        learning::reference_of(self.0, &config, seed)
     }
 
     /// The configuration with the drive of this kind, if the demodulation has one.

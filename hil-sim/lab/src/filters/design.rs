@@ -6,8 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use num_complex::Complex64;
-use sim_bench::bode::RATE;
+use crate::prelude::*;
 
 const J: Complex64 = Complex64::I;
 const ONE: Complex64 = Complex64::ONE;

@@ -9,8 +9,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::NotIdentifiable;
 use super::batch::least_squares;
-use super::models::NotIdentifiable;
 
 /// Orders of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

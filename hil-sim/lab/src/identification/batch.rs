@@ -3,8 +3,7 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector, Matrix4, Vector4};
 
-use super::models::NotIdentifiable;
-use super::{Complex, Delta, FirstOrderTheta};
+use super::{Complex, Delta, FirstOrderTheta, NotIdentifiable};
 
 /// Largest ratio of the singular values of a regression, its columns scaled to the same length,
 /// that still gives a result. Clean six-step data have up to 1e5, a constant signal above 6e9.
@@ -130,15 +129,7 @@ impl Data {
         let a = DMatrix::from_fn(2 * rows.len(), 7, |row, column| {
             let [di, i, dv, v] = rows[row / 2].1;
             let turned = |x: Complex| Complex::new(x.im, -x.re);
-            let x = match column {
-                0 => di,
-                1 => turned(di),
-                2 => i,
-                3 => turned(i),
-                4 => dv,
-                5 => v,
-                _ => turned(v),
-            };
+            let x = [di, turned(di), i, turned(i), dv, v, turned(v)][column];
             if row.is_multiple_of(2) { x.re } else { x.im }
         });
         let theta = least_squares(a, parts(rows.iter().map(|row| &row.0)))?.theta;

@@ -1,14 +1,12 @@
 //! The direct-current, locked-rotor and no-load tests of section 3.6 of Barroso (2017): from readings
 //! of meters to the equivalent circuit (Figure 21), and the readings that a simulated motor gives.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::SQRT_2;
 
-use sim_bench::plant::{
-    Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel, PlantError,
-    SaliencySettings,
-};
+use sim_bench::plant::{Machine, PlantError, SaliencySettings};
 
 use super::Complex;
+use crate::prelude::*;
 
 /// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
 /// values, rms.

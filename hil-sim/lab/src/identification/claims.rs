@@ -1,11 +1,8 @@
 //! The claims of section 5 about Tables 1 to 5, counted in the tables themselves.
 
-use sim_bench::outcome::{Compared, Metrics};
-
-use super::models::model_c;
 use super::printed::{Case, PERIODS, SPEEDS, error};
-use super::{CurrentVoltage, Parameters, Signal};
-use crate::source::named;
+use super::{CurrentVoltage, Parameters, Signal, model_c};
+use crate::prelude::*;
 
 /// A row of the tables: model, speed, parameter.
 type Row = (&'static str, f64, &'static str);

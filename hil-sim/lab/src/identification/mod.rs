@@ -30,7 +30,7 @@ pub mod trial;
 
 pub use batch::{Data, Regression};
 pub use model::{Continuous, CurrentVoltage, Delta, FirstOrderTheta, Parameters, Step};
-pub use models::{Estimate, NotIdentifiable};
-pub use trial::{Signal, Trial};
+pub use models::{Estimate, NotIdentifiable, Value, model_b, model_c, model_d};
+pub use trial::{Noise, Signal, Trial};
 
 pub use sim_bench::plant::Complex;

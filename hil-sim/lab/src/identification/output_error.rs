@@ -12,8 +12,7 @@
 use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::batch::parts;
-use super::models::NotIdentifiable;
-use super::{Complex, Parameters};
+use super::{Complex, NotIdentifiable, Parameters};
 
 /// Most steps from one start.
 const STEPS: u32 = 60;

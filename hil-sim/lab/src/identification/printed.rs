@@ -54,10 +54,7 @@ pub fn place(model: &str, case: Case, parameter: &str) -> [String; 2] {
 
 /// The printed error, %.
 pub fn error(model: &str, case: Case, parameter: &str) -> Option<f64> {
-    let printed = match model {
-        "A" | "C" => true,
-        _ => model == "B" && case.speed == SPEEDS[0],
-    };
+    let printed = ["A", "C"].contains(&model) || (model == "B" && case.speed == SPEEDS[0]);
     let [place, quantity] = place(model, case, parameter);
     printed.then(|| source::number("S0", &place, &quantity))
 }

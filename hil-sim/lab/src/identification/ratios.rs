@@ -1,9 +1,8 @@
 //! Which machine the tables were made with: numbers that follow from the print and do not depend on
 //! the noise, beside the same numbers of two machines.
 
-use super::models::model_b;
 use super::printed::{self, Case, PERIODS, SPEEDS};
-use super::{CurrentVoltage, FirstOrderTheta, Parameters, Signal};
+use super::{CurrentVoltage, FirstOrderTheta, Parameters, Signal, model_b};
 
 /// A number that does not depend on the noise, as printed and for two machines.
 #[derive(Clone, Copy, Debug)]

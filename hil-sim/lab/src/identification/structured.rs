@@ -8,8 +8,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector4};
 
-use super::models::{NotIdentifiable, model_c, model_d};
-use super::{Delta, Parameters, Regression};
+use super::{Delta, NotIdentifiable, Parameters, Regression, model_c, model_d};
 
 /// Most steps from one start.
 const STEPS: u32 = 200;

@@ -1,10 +1,8 @@
 //! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
-use super::models::{model_b, model_c, model_d};
 use super::printed::{self, Case};
 use super::structured::model_s;
-use super::trial::Noise;
-use super::{CurrentVoltage, Estimate, Parameters, Trial};
+use super::{CurrentVoltage, Estimate, Noise, Parameters, Trial, model_b, model_c, model_d};
 
 use crate::prelude::*;
 
@@ -150,11 +148,10 @@ pub fn tables(
     let mut outcome = Outcome::default();
     let entries = seeds[0].clone();
     for (k, entry) in entries.iter().enumerate().filter(|(_, entry)| entry.printed_pct.is_some()) {
-        let over = seeds.iter().map(|seed| seed[k].ours_pct);
-        let (low, high) =
-            over.fold((f64::MAX, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+        let over = sorted(seeds.iter().map(|seed| seed[k].ours_pct));
+        let ends = [over[0], over[over.len() - 1]];
         let [place, quantity] = printed::place(entry.model, entry.case, entry.parameter);
-        let ours = Compared { seeds: Some([low, high]), ..Compared::with("S0", place, quantity) };
+        let ours = Compared { seeds: Some(ends), ..Compared::with("S0", place, quantity) };
         outcome.compared.push(ours.simulated(entry.ours_pct));
     }
     outcome.metrics.set("within_factor_2", share(&entries));

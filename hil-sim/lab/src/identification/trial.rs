@@ -1,13 +1,10 @@
 //! One simulated measurement of section 5: machine at constant speed, noise, filters.
 
-use std::f64::consts::TAU;
-
 use nalgebra::Vector2;
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::signals::{Filter, noise, six_step, six_step_and_schroeder};
 use super::{Complex, Data, Parameters};
+use crate::prelude::*;
 
 /// Simulation step of the paper, s.
 const FINE: f64 = 5e-6;

@@ -69,14 +69,13 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
 fn signal(seed: u64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let phases = Uniform::new(0.0, TAU);
-    let lines: Vec<(f64, f64, f64)> = BAND
-        .map(|hz| {
-            let amplitude =
-                1.0 - 0.6 * f64::from(hz - BAND.start()) / f64::from(BAND.end() - BAND.start());
-            let phase = phases.map_or(0.0, |phases| phases.sample(&mut random));
-            (omega_t(f64::from(hz)), amplitude, phase)
-        })
-        .collect();
+    let width = f64::from(BAND.end() - BAND.start());
+    let line = |hz: u32| {
+        let amplitude = 1.0 - 0.6 * f64::from(hz - BAND.start()) / width;
+        let phase = phases.map_or(0.0, |phases| phases.sample(&mut random));
+        (omega_t(f64::from(hz)), amplitude, phase)
+    };
+    let lines: Vec<_> = BAND.map(line).collect();
     let at = |k: usize| {
         lines.iter().map(|(w, amplitude, phase)| amplitude * (w * k as f64 + phase).cos()).sum()
     };

@@ -1,9 +1,7 @@
 //! Steady states of a machine model, and its small-signal behaviour about them.
 
-use nalgebra::{Complex, DMatrix, DVector};
-use sim_bench::plant::{
-    EnergyMachine, EnergyRate, EnergyState, Machine, MachineModel, MachineState, Rate,
-};
+use nalgebra::{DMatrix, DVector};
+use sim_bench::plant::{EnergyRate, EnergyState, Machine, MachineState, Rate};
 
 use crate::prelude::*;
 
@@ -14,37 +12,37 @@ const ITERATIONS: usize = 60;
 /// A machine whose integrated state is a list of space vectors that all turn with the flux.
 pub(crate) trait Listed: MachineModel {
     /// The integrated vectors, in an order that stays.
-    fn list(&self, x: &Self::State) -> Vec<Complex<f64>>;
+    fn list(&self, x: &Self::State) -> Vec<Complex64>;
     /// Their rates, in the same order.
-    fn rates(&self, k: &Rate<Self>) -> Vec<Complex<f64>>;
+    fn rates(&self, k: &Rate<Self>) -> Vec<Complex64>;
     /// The state with these vectors.
-    fn state(&self, list: &[Complex<f64>]) -> Self::State;
+    fn state(&self, list: &[Complex64]) -> Self::State;
 }
 
 impl Listed for Machine {
-    fn list(&self, x: &MachineState) -> Vec<Complex<f64>> {
+    fn list(&self, x: &MachineState) -> Vec<Complex64> {
         vec![x.i, x.psi, x.i_lp]
     }
 
-    fn rates(&self, k: &MachineState) -> Vec<Complex<f64>> {
+    fn rates(&self, k: &MachineState) -> Vec<Complex64> {
         self.list(k)
     }
 
-    fn state(&self, list: &[Complex<f64>]) -> MachineState {
+    fn state(&self, list: &[Complex64]) -> MachineState {
         MachineState { i: list[0], psi: list[1], i_lp: list[2] }
     }
 }
 
 impl Listed for EnergyMachine {
-    fn list(&self, x: &EnergyState) -> Vec<Complex<f64>> {
+    fn list(&self, x: &EnergyState) -> Vec<Complex64> {
         integrated(self, [x.psi_s, x.psi_r, x.psi_deep, x.psi_iron])
     }
 
-    fn rates(&self, k: &EnergyRate) -> Vec<Complex<f64>> {
+    fn rates(&self, k: &EnergyRate) -> Vec<Complex64> {
         integrated(self, [k.psi_s, k.psi_r, k.psi_deep, k.psi_iron])
     }
 
-    fn state(&self, list: &[Complex<f64>]) -> EnergyState {
+    fn state(&self, list: &[Complex64]) -> EnergyState {
         let mut rest = list[2..].iter();
         let mut next = |there: bool| if there { rest.next().copied() } else { None };
         let psi_deep = next(self.has_skin_effect()).unwrap_or_default();
@@ -57,18 +55,18 @@ impl Listed for EnergyMachine {
 }
 
 /// Those of stator, rotor, bottom of the bars and iron that the machine integrates.
-fn integrated(machine: &EnergyMachine, all: [Complex<f64>; 4]) -> Vec<Complex<f64>> {
+fn integrated(machine: &EnergyMachine, all: [Complex64; 4]) -> Vec<Complex64> {
     let there = [true, true, machine.has_skin_effect(), machine.has_iron_loss()];
     all.into_iter().zip(there).filter(|(_, there)| *there).map(|(z, _)| z).collect()
 }
 
 /// Real and imaginary parts behind each other.
-fn flat(list: &[Complex<f64>]) -> Vec<f64> {
+fn flat(list: &[Complex64]) -> Vec<f64> {
     list.iter().flat_map(|z| [z.re, z.im]).collect()
 }
 
-fn listed(flat: &[f64]) -> Vec<Complex<f64>> {
-    flat.chunks(2).map(|z| Complex::new(z[0], z[1])).collect()
+fn listed(flat: &[f64]) -> Vec<Complex64> {
+    flat.chunks(2).map(|z| Complex64::new(z[0], z[1])).collect()
 }
 
 /// The root of `f` near `start`, by Newton's rule with a line search; `sizes` are typical sizes of the unknowns.
@@ -104,21 +102,19 @@ pub(crate) fn root(
 
 /// Central differences of `f` at `y`.
 fn jacobian(f: impl Fn(&[f64]) -> Vec<f64>, y: &[f64], sizes: &[f64]) -> DMatrix<f64> {
-    let columns: Vec<DVector<f64>> = (0..y.len())
-        .map(|k| {
-            let at = |sign: f64| {
-                let mut y = y.to_vec();
-                y[k] += sign * STEP * sizes[k];
-                DVector::from_vec(f(&y))
-            };
-            (at(1.0) - at(-1.0)) / (2.0 * STEP * sizes[k])
-        })
-        .collect();
-    DMatrix::from_columns(&columns)
+    let column = |k: usize| {
+        let at = |sign: f64| {
+            let mut y = y.to_vec();
+            y[k] += sign * STEP * sizes[k];
+            DVector::from_vec(f(&y))
+        };
+        (at(1.0) - at(-1.0)) / (2.0 * STEP * sizes[k])
+    };
+    DMatrix::from_columns(&(0..y.len()).map(column).collect::<Vec<_>>())
 }
 
 /// A first guess of a steady state: state, terminal voltage, V, and slip, rad/s.
-pub(crate) type Guess<M> = (<M as MachineModel>::State, Complex<f64>, f64);
+pub(crate) type Guess<M> = (<M as MachineModel>::State, Complex64, f64);
 
 /// The steady state at the stator current `i`, A, in the frame of the rotor flux, with the shaft locked.
 ///
@@ -126,11 +122,10 @@ pub(crate) type Guess<M> = (<M as MachineModel>::State, Complex<f64>, f64);
 /// As [`root`].
 pub(crate) fn at_current<M: Listed>(
     machine: &M,
-    i: Complex<f64>,
+    i: Complex64,
     start: &Guess<M>,
     flux: f64,
 ) -> Result<Guess<M>, Error> {
-    use sim_bench::plant::ElectricalState as _;
     let mut y = flat(&machine.list(&start.0));
     let n = y.len();
     y.extend([start.1.re, start.1.im, start.2]);
@@ -138,18 +133,17 @@ pub(crate) fn at_current<M: Listed>(
     let residual = |y: &[f64]| {
         let list = listed(&y[..n]);
         let x = machine.state(&list);
-        let (v, slip) = (Complex::new(y[n], y[n + 1]), y[n + 2]);
+        let (v, slip) = (Complex64::new(y[n], y[n + 1]), y[n + 2]);
         let rates = machine.rates(&machine.derivative(&x, v, 0.0));
-        let turning = list.iter().map(|z| Complex::new(0.0, slip) * z);
-        let mut residual: Vec<Complex<f64>> =
-            rates.iter().zip(turning).map(|(a, b)| a - b).collect();
+        let turning = list.iter().map(|z| Complex64::new(0.0, slip) * z);
+        let mut residual: Vec<Complex64> = rates.iter().zip(turning).map(|(a, b)| a - b).collect();
         residual.push(x.current() - i);
         let mut residual = flat(&residual);
         residual.push(x.rotor_flux().im);
         residual
     };
     let found = root(residual, y, &sizes)?;
-    let v = Complex::new(found[n], found[n + 1]);
+    let v = Complex64::new(found[n], found[n + 1]);
     Ok((machine.state(&listed(&found[..n])), v, found[n + 2]))
 }
 
@@ -159,7 +153,7 @@ pub(crate) fn at_current<M: Listed>(
 /// As [`root`].
 pub(crate) fn at_voltage<M: Listed>(
     machine: &M,
-    v: Complex<f64>,
+    v: Complex64,
     (w_s, w): (f64, f64),
     start: &M::State,
 ) -> Result<M::State, Error> {
@@ -168,7 +162,7 @@ pub(crate) fn at_voltage<M: Listed>(
     let residual = |y: &[f64]| {
         let list = listed(y);
         let rates = machine.rates(&machine.derivative(&machine.state(&list), v, w));
-        let turning = list.iter().map(|z| Complex::new(0.0, w_s) * z);
+        let turning = list.iter().map(|z| Complex64::new(0.0, w_s) * z);
         flat(&rates.iter().zip(turning).map(|(a, b)| a - b).collect::<Vec<_>>())
     };
     Ok(machine.state(&listed(&root(residual, y, &sizes)?)))
@@ -181,21 +175,20 @@ pub(crate) fn admittance<M: Listed>(
     x: &M::State,
     w: f64,
     flux: f64,
-) -> Option<[[Complex<f64>; 2]; 2]> {
-    use sim_bench::plant::ElectricalState as _;
+) -> Option<[[Complex64; 2]; 2]> {
     let y = flat(&machine.list(x));
     let sizes = vec![flux; y.len()];
-    let rates = |y: &[f64], v: Complex<f64>| {
+    let rates = |y: &[f64], v: Complex64| {
         flat(&machine.rates(&machine.derivative(&machine.state(&listed(y)), v, 0.0)))
     };
-    let a = jacobian(|y| rates(y, Complex::default()), &y, &sizes);
+    let a = jacobian(|y| rates(y, Complex64::default()), &y, &sizes);
     let c = jacobian(|y| flat(&[machine.state(&listed(y)).current()]), &y, &sizes);
-    let still = DVector::from_vec(rates(&y, Complex::default()));
-    let by = |v: Complex<f64>| DVector::from_vec(rates(&y, v)) - &still;
-    let b = DMatrix::from_columns(&[by(Complex::new(1.0, 0.0)), by(Complex::new(0.0, 1.0))]);
-    let complex = |m: &DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
-    let identity = DMatrix::<Complex<f64>>::identity(y.len(), y.len());
-    let response = (identity * Complex::new(0.0, w) - complex(&a)).lu().solve(&complex(&b))?;
+    let still = DVector::from_vec(rates(&y, Complex64::default()));
+    let by = |v: Complex64| DVector::from_vec(rates(&y, v)) - &still;
+    let b = DMatrix::from_columns(&[by(Complex64::new(1.0, 0.0)), by(Complex64::new(0.0, 1.0))]);
+    let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
+    let identity = DMatrix::<Complex64>::identity(y.len(), y.len());
+    let response = (identity * Complex64::new(0.0, w) - complex(&a)).lu().solve(&complex(&b))?;
     let currents = complex(&c) * response;
     Some([0, 1].map(|k| [currents[(0, k)], currents[(1, k)]]))
 }
