@@ -15,10 +15,8 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
 use crate::console;
-use crate::error::{message, parser_text, printable};
 use crate::experiments;
 use crate::first_light;
-use crate::input::{Input, OUT};
 use crate::passport;
 use crate::prelude::*;
 pub use run::json;

@@ -1,10 +1,6 @@
 //! Frequency responses as panels.
 
-use std::f64::consts::TAU;
-
-use num_complex::Complex64;
-
-use crate::outcome::{Panel, Series};
+use crate::prelude::*;
 
 /// Control rate, Hz.
 pub const RATE: f64 = 6000.0;

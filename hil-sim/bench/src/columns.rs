@@ -53,12 +53,10 @@ impl Columns {
         for record in reader.records() {
             let record = record.map_err(of_csv)?;
             let line = record.position().map_or(0, csv::Position::line);
-            let number = |(cell, name): (&str, &String)| match cell.parse::<f64>() {
-                Ok(number) if number.is_finite() => Ok(number),
-                _ => Err(failed(
-                    Some(line),
-                    format!("{} = `{}` is not a finite number", cut(name), cut(cell)),
-                )),
+            let number = |(cell, name): (&str, &String)| {
+                let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
+                let problem = || format!("{} = `{}` is not a finite number", cut(name), cut(cell));
+                number.ok_or_else(|| failed(Some(line), problem()))
             };
             rows.push((line, record.iter().zip(&names).map(number).collect::<Result<_, _>>()?));
         }

@@ -26,7 +26,7 @@ pub use keys::*;
 pub use plant::{current_lines, flux_level_a, open_phase, plant_settings};
 pub use value::{Allowed, Value};
 
-use crate::error::Error;
+use crate::error::{Error, cut};
 use motors::Motor;
 
 /// Prefix of the keys that set the drive alone.
@@ -37,7 +37,7 @@ impl Config {
     ///
     /// # Errors
     /// As [`Config::of_motor`] and [`file::read`], [`Error::Data`] for an assignment of the file that [`Config::set`]
-    /// refuses, [`Error::Assignment`] for an assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
+    /// refuses, [`Error::Refused`] for an assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
     /// other: they are checked when the drive is built.
     pub fn load(
         motor: Option<&str>,
@@ -103,10 +103,9 @@ impl Config {
         if *m == MotorConfig::default() {
             return "Table 5".to_owned();
         }
-        format!(
-            "r_s {} ohm, r_r {} ohm, l_ls {} H, l_lr {} H, l_m {} H, {} pole pairs",
-            m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m, m.pole_pairs
-        )
+        let MotorConfig { r_s, r_r, l_ls, l_lr, l_m, pole_pairs, .. } = m;
+        let inductances = format!("l_ls {l_ls} H, l_lr {l_lr} H, l_m {l_m} H");
+        format!("r_s {r_s} ohm, r_r {r_r} ohm, {inductances}, {pole_pairs} pole pairs")
     }
 
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
@@ -193,11 +192,11 @@ pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
 /// Name and value of an assignment `KEY=VALUE`.
 ///
 /// # Errors
-/// [`Error::Assignment`] without an equals sign.
+/// [`Error::Refused`] without an equals sign.
 pub fn assigned(assignment: &str) -> Result<(&str, &str), Error> {
-    let (name, value) =
-        assignment.split_once('=').ok_or_else(|| Error::Assignment(assignment.to_owned()))?;
-    Ok((name.trim(), value))
+    let refused = |given| format!("`{given}`: write KEY=VALUE, for example --set motor.r_s=5.4");
+    let pair = assignment.split_once('=').ok_or_else(|| Error::Refused(refused(cut(assignment))));
+    pair.map(|(name, value)| (name.trim(), value))
 }
 
 /// The keys that an assignment to `name` sets; the name may be an old one.

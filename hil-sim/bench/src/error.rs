@@ -30,19 +30,6 @@ pub enum Error {
         /// The values that are allowed, with their unit.
         allowed: String,
     },
-    /// `--set` without an equals sign.
-    #[error("`{}`: write KEY=VALUE, for example --set motor.r_s=5.4", cut(.0))]
-    Assignment(String),
-    /// The experiment does not use a key that was set for it.
-    #[error("{} does not use `{}`; it uses: {uses}", cut(.name), cut(.key))]
-    UnusedKey {
-        /// The experiment, or the group.
-        name: String,
-        /// The key.
-        key: String,
-        /// The keys it uses.
-        uses: String,
-    },
     /// A file cannot be read, or is not used as it stands.
     #[error("{}{}: {problem}", .path.display(), line_text(.line))]
     Data {
@@ -62,13 +49,11 @@ pub enum Error {
         reason: String,
     },
     /// Some experiments of a report were refused or lost; the others are in it.
-    #[error("{failed} of {all} experiments failed: {}", .names.join(", "))]
+    #[error("{} of {all} experiments failed: {}", .names.len(), .names.join(", "))]
     Incomplete {
-        /// How many failed.
-        failed: usize,
         /// How many there are.
         all: usize,
-        /// Their names.
+        /// The names of those that failed.
         names: Vec<String>,
     },
     /// Each value is in its range, but a model, a filter or a design rule refuses their combination.

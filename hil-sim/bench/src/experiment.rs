@@ -2,12 +2,8 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use crate::config::{Config, Key, plant_settings};
-use crate::error::Error;
-use crate::outcome::Outcome;
-use crate::progress::Progress;
+use crate::config::Key;
+use crate::prelude::*;
 
 /// Input of an experiment.
 pub struct Context<'a> {

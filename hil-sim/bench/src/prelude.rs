@@ -11,14 +11,16 @@ pub use rayon::prelude::*;
 pub use serde::{Deserialize, Serialize};
 
 pub use crate::columns;
-pub use crate::config::{Config, LoadMode, PlantModel, built, check_model, plant_settings};
+pub use crate::config::{
+    Config, LoadMode, PlantModel, built, check_model, open_phase, plant_settings,
+};
 pub use crate::error::Error;
 pub use crate::experiment::{
     BENCH, Context, DRIVE, Experiment, FREE_SHAFT, LOST_DEG, SPEED_LOOP, TRACKING, TURNING,
     assumptions,
 };
 pub use crate::outcome::{Cell, Column, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
-pub use crate::plant::Load;
+pub use crate::plant::{Load, Plant};
 pub use crate::progress::Progress;
 pub use crate::rig::{Point, RATE_HZ, Rig, fault_text, tracks, wrapped_degrees};
 pub use crate::statistics::{Study, or_refusal, seed_of, whole};

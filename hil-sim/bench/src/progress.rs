@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 
 /// Makes the progress bars of a command.
 #[derive(Clone)]
@@ -23,7 +23,7 @@ impl Progress {
 
     /// A bar for `length` units of work.
     pub fn bar(&self, label: &str, length: u64) -> Bar {
-        let bar = self.0.add(ProgressBar::new(length));
+        let bar = self.0.add(ProgressBar::new(length).with_finish(ProgressFinish::AndClear));
         let template = "{msg:24} {bar:32} {percent:>3}% {elapsed}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
@@ -46,11 +46,5 @@ impl Bar {
     /// Changes the label.
     pub fn label(&self, label: &str) {
         self.0.set_message(label.to_owned());
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
     }
 }

@@ -1,19 +1,11 @@
 //! The bench: a drive, a plant, and the one period between them.
 
-use std::f64::consts::TAU;
-
-use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
-use drive_core::{
-    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
-};
-use drive_settings::Settings;
+use drive_core::{Compare, FrontEndState, Sample};
 
-use crate::config::{self, Config, built, plant_settings};
-use crate::error::Error;
-use crate::plant::{Load, Plant, PlantSettings};
-use crate::stats::Stats;
+use crate::plant::PlantSettings;
+use crate::prelude::*;
 
 /// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;
@@ -105,12 +97,12 @@ impl Rig {
     /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`], [`Rig::learn`] and [`config::check_model`].
+    /// As [`Rig::new`], [`Rig::learn`] and [`check_model`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
-        config::check_model(config)?;
+        check_model(config)?;
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
-        rig.plant.set_open_phase(config::open_phase(config)).map_err(Error::refused)?;
+        rig.plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
         if config.prepare.learn && tracks(&config.drive) {
             rig.set_load(Load::Locked)?;
             rig.learn()?;
@@ -138,9 +130,8 @@ impl Rig {
                 }
                 (State::Fault(fault), learned) => {
                     let found = learned.map_or(String::new(), |learned| format!(": {learned}"));
-                    return Err(Error::Refused(format!(
-                        "the drive does not learn: {fault}{found}"
-                    )));
+                    let why = format!("the drive does not learn: {fault}{found}");
+                    return Err(Error::Refused(why));
                 }
                 _ => {}
             }
@@ -166,7 +157,7 @@ impl Rig {
         let mut config = config.clone();
         config.drive.angle_source = AngleSource::Encoder;
         config.drive.injection.beside_encoder = true;
-        config.load.mode = config::LoadMode::Locked;
+        config.load.mode = LoadMode::Locked;
         let mut rig = Self::started(&config, seed, Mode::Torque)?;
         rig.settle(&Command::Torque(iq as f32), seconds)?;
         Ok(rig)
@@ -221,8 +212,17 @@ impl Rig {
     /// One PWM period: the truth at the instant of its sample, and the estimates of the drive from that sample.
     #[inline(never)] // compiled once, not with every closure that looks at points
     fn point(&mut self) -> Point {
-        let mut point = self.truth();
-        let phi = self.plant.rotor_flux_angle();
+        let (plant, phi) = (&self.plant, self.plant.rotor_flux_angle());
+        let mut point = Point {
+            t: self.time(),
+            torque: plant.torque(),
+            torque_per_flux_ampere: plant.torque_factor(),
+            flux: plant.rotor_flux().norm(),
+            current: plant.current().norm(),
+            speed_rpm: plant.mechanical_speed() * 60.0 / TAU,
+            turns: plant.mechanical_angle() / TAU,
+            ..Point::default()
+        };
         self.step();
         let telemetry = self.drive.telemetry();
         let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
@@ -235,8 +235,7 @@ impl Rig {
         point.carrier = f64::from(telemetry.carrier_squared).sqrt();
         point.speed_estimate_rpm = rpm(telemetry.rotor_freq);
         point.turns_estimate = telemetry.turns.into();
-        let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
-        point.angle_error_deg = wrapped_degrees(error);
+        point.angle_error_deg = wrapped_degrees(phi - f64::from(telemetry.phi.to_turns()) * TAU);
         point
     }
 
@@ -273,9 +272,8 @@ impl Rig {
     /// # Errors
     /// When the drive refuses it.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
-        self.drive
-            .command(command)
-            .map_err(|e| Error::Refused(format!("the drive refuses {}: {e}", words(command))))
+        let refused = |e| Error::Refused(format!("the drive refuses {}: {e}", words(command)));
+        self.drive.command(command).map_err(refused)
     }
 
     /// Gives the drive a command, and time to settle.
@@ -299,20 +297,6 @@ impl Rig {
     /// When the load is out of range.
     pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
         self.plant.set_load(load).map_err(Error::refused)
-    }
-
-    fn truth(&self) -> Point {
-        let plant = &self.plant;
-        Point {
-            t: self.time(),
-            torque: plant.torque(),
-            torque_per_flux_ampere: plant.torque_factor(),
-            flux: plant.rotor_flux().norm(),
-            current: plant.current().norm(),
-            speed_rpm: plant.mechanical_speed() * 60.0 / TAU,
-            turns: plant.mechanical_angle() / TAU,
-            ..Point::default()
-        }
     }
 }
 

@@ -3,13 +3,10 @@
 
 pub mod fault_code;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::error::Error;
-use crate::experiment::{Context, Experiment};
-use crate::outcome::Outcome;
+use crate::prelude::*;
 
 /// A statistical experiment.
 pub trait Study: Sized + Sync {
@@ -107,12 +104,9 @@ fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> R
 fn value<S: Study>(number: usize, record: &S::Record) -> Result<Value, Error> {
     let lost = |e| Error::Internal(format!("the record of run {number} is not kept exactly: {e}"));
     let value = serde_json::to_value(record).map_err(lost)?;
-    read::<S>(value.clone()).and_then(serde_json::to_value).map_err(lost).and_then(|again| {
-        match again == value {
-            true => Ok(value),
-            false => Err(Error::Internal(format!("the record of run {number} changes: {again}"))),
-        }
-    })
+    let again = read::<S>(value.clone()).and_then(serde_json::to_value).map_err(lost)?;
+    let changes = || Error::Internal(format!("the record of run {number} changes: {again}"));
+    if again == value { Ok(value) } else { Err(changes()) }
 }
 
 fn read<S: Study>(value: Value) -> serde_json::Result<S::Record> {

@@ -17,7 +17,7 @@ pub struct OperatingPoint {
 }
 
 /// Result of a run.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct SteadyRun {
     /// Operating point and seed.
     pub case: OperatingPoint,
@@ -99,13 +99,7 @@ pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
     if let Some(fault) = rig.drive.state().fault() {
-        return Ok(SteadyRun {
-            case,
-            error: Stats::default(),
-            torque: 0.0,
-            lost: true,
-            fault: Some(fault),
-        });
+        return Ok(SteadyRun { case, lost: true, fault: Some(fault), ..SteadyRun::default() });
     }
     rig.settle(&Command::Torque(case.iq as f32), 1.0)?;
     let [error, torque] = rig.stats(seconds, |p| [p.angle_error_deg, p.torque]);

@@ -5,9 +5,7 @@ use serde_json::json;
 use crate::config::motors::Motor;
 use crate::config::{Key, Value, file};
 use crate::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
-use crate::input::Input;
 use crate::prelude::*;
-use crate::report;
 
 /// All experiments as JSON; as text those of every day, or the others.
 ///
@@ -123,17 +121,13 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
         let unit = Key::named(key)?.first().map_or("", |key| key.unit());
         table.row([key, &value.to_string(), unit, why].map(Cell::from));
     }
-    let m = config.drive.motor;
+    let Motor { name, title, about, .. } = motor;
+    let (about, table) = (about.trim(), report::table(&table));
+    let (m, carrier) = (config.drive.motor, config.drive.carrier_v());
+    let (leakage, tau_r) = (1e3 * m.sigma_l_s(), 1e3 * m.tau_r());
+    let lines = motor.console_lines().join("\n");
     Ok(format!(
-        "{}: {}\n\n{}\n\n{}\nLeakage inductance {:.4} mH, rotor time constant {:.0} ms, carrier {:.1} V.\n\n\
-         At the console, with the scales of your board:\n{}\n",
-        motor.name,
-        motor.title,
-        motor.about.trim(),
-        report::table(&table),
-        1e3 * m.sigma_l_s(),
-        1e3 * m.tau_r(),
-        config.drive.carrier_v(),
-        motor.console_lines().join("\n"),
+        "{name}: {title}\n\n{about}\n\n{table}\nLeakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
+         carrier {carrier:.1} V.\n\nAt the console, with the scales of your board:\n{lines}\n"
     ))
 }

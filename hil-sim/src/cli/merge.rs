@@ -1,26 +1,19 @@
 //! Shards that are merged.
 
 use super::run::{self, Output, Run};
-use crate::input::Input;
 use crate::prelude::*;
-use crate::shards;
+use crate::shards::{self, Merged};
 
 /// Merges shards, prints the JSON object of the whole run, and writes its page and its CSV files where wanted.
 ///
 /// # Errors
 /// As [`shards::merge`]; [`Error::Write`]; [`Error::Lost`] after all is written.
 pub fn merge(files: &[PathBuf], out: Option<PathBuf>, csv: Option<PathBuf>) -> Result<(), Error> {
-    let merged = shards::merge(files)?;
-    let input = Input { seed: merged.seed, quiet: true, ..Input::default() };
+    let Merged { experiment, config, seed, outcome } = shards::merge(files)?;
+    let input = Input { seed, quiet: true, ..Input::default() };
     let output = Output { out, json: true, csv };
-    let name = merged.experiment.name;
-    let run = Run {
-        experiment: merged.experiment,
-        input: &input,
-        config: &merged.config,
-        command: format!("run {name}"),
-    };
-    let object = run.write(&merged.outcome, &output)?;
-    run::print(&[object], &output)?;
-    run::check_lost(name, &merged.outcome)
+    let command = format!("run {}", experiment.name);
+    let run = Run { experiment, input: &input, config: &config, command };
+    run::print(&[run.write(&outcome, &output)?], &output)?;
+    run::check_lost(experiment.name, &outcome)
 }

@@ -1,12 +1,8 @@
 //! A part of the runs of a statistical experiment, and runs that are continued.
 
-use clap::Args;
-
 use super::say;
-use crate::error::message;
 use crate::experiments;
 use crate::prelude::*;
-use crate::report;
 use crate::shards::{self, Header, Journal, Shard};
 
 /// Which runs are done, and where they are kept.

@@ -6,7 +6,6 @@ use super::run::Run;
 use super::{say, used};
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, EXPERIMENTS};
-use crate::input::Input;
 use crate::outcome::Origin;
 use crate::prelude::*;
 use crate::progress::Bar;
@@ -65,34 +64,27 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
         experiments.par_iter().map(|experiment| running.run(experiment, &context)).collect();
     drop(bar);
 
-    let run = |experiment: &'_ Experiment| format!("run {}", experiment.name);
-    let runs: Vec<_> = experiments
-        .iter()
-        .map(|experiment| Run { experiment, input, config: &config, command: run(experiment) })
-        .collect();
-
     let mut evidence = Evidence::default();
-    for (run, outcome) in runs.iter().zip(&outcomes) {
-        evidence.add(run.experiment.name, outcome);
+    for (experiment, outcome) in experiments.iter().zip(&outcomes) {
+        evidence.add(experiment.name, outcome);
     }
     let chapters = evidence.chapters();
     let command = |run: &String| input.command(&format!("run {run}"), &config);
-    let commands =
-        chapters.iter().map(|chapter| chapter.runs.iter().map(command).collect::<Vec<_>>());
-    let commands: Vec<_> = commands.map(|commands| commands.join("\n")).collect();
     let mut sections: Vec<_> = chapters
         .iter()
-        .zip(commands)
-        .map(|(chapter, command)| Section {
+        .map(|chapter| Section {
             name: &chapter.name,
             stands_for: chapter.source,
             about: &chapter.about,
-            command,
+            command: chapter.runs.iter().map(command).collect::<Vec<_>>().join("\n"),
             outcome: &chapter.outcome,
         })
         .collect();
     if of == Of::All {
-        sections.extend(runs.iter().zip(&outcomes).map(|(run, outcome)| run.section(outcome)));
+        for (experiment, outcome) in experiments.iter().zip(&outcomes) {
+            let command = format!("run {}", experiment.name);
+            sections.push(Run { experiment, input, config: &config, command }.section(outcome));
+        }
     }
     let origin = Origin::new(input.seed, &config.changes());
     let (file, title) = match of {
@@ -111,10 +103,8 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
             names.push(experiment.name.to_owned());
         }
     }
-    match names.len() {
-        0 => Ok(()),
-        failed => Err(Error::Incomplete { failed, all: experiments.len(), names }),
-    }
+    let all = experiments.len();
+    if names.is_empty() { Ok(()) } else { Err(Error::Incomplete { all, names }) }
 }
 
 #[cfg(test)]

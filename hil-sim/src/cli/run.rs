@@ -1,13 +1,11 @@
 //! One experiment, or a group of them.
 
-use clap::Args;
 use trace::Voltages;
 
 use super::part::Part;
 use super::{say, used};
 use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, identify_trace as trace, scenario};
-use crate::input::{Input, OUT};
 use crate::outcome::{self, Origin};
 use crate::passport;
 use crate::prelude::*;
@@ -58,10 +56,10 @@ pub struct Trace {
     voltages: Voltages,
     /// Rows by which a voltage acts after the currents of its row [default: 0; commanded: 1 and the delay of the current
     /// filter, as the drive records it]
-    #[arg(long, value_name = "ROWS", value_parser = delay, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ROWS", value_parser = |text: &str| within(text, -1.0, 10.0, "rows"), allow_negative_numbers = true)]
     delay: Option<f64>,
     /// Voltage that the inverter loses at each phase current [default: 0; commanded: found]
-    #[arg(long, value_name = "V", value_parser = drop_v, allow_negative_numbers = true)]
+    #[arg(long, value_name = "V", value_parser = |text: &str| within(text, 0.0, 100.0, "V"), allow_negative_numbers = true)]
     drop: Option<f64>,
     /// Passport of the motor that was found, with nameplate and dc link of --motor
     #[arg(long, value_name = "FILE.json", requires = "motor")]
@@ -79,14 +77,10 @@ fn voltages(text: &str) -> Result<Voltages, String> {
     known.copied().ok_or_else(|| format!("allowed: {}", Voltages::WORDS.join(", ")))
 }
 
-fn delay(text: &str) -> Result<f64, String> {
-    let rows = text.parse().ok().filter(|rows| (-1.0..=10.0).contains(rows));
-    rows.ok_or_else(|| "allowed: -1 to 10 rows".to_owned())
-}
-
-fn drop_v(text: &str) -> Result<f64, String> {
-    let drop_v = text.parse().ok().filter(|drop_v| (0.0..=100.0).contains(drop_v));
-    drop_v.ok_or_else(|| "allowed: 0 to 100 V".to_owned())
+/// Reads a number from `least` to `most`.
+fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+    number.ok_or_else(|| format!("allowed: {least} to {most} {unit}"))
 }
 
 /// A run, as the functions that write its results need it.
@@ -98,8 +92,8 @@ pub struct Run<'a> {
     pub command: String,
 }
 
-impl Run<'_> {
-    pub fn section<'a>(&'a self, outcome: &'a Outcome) -> Section<'a> {
+impl<'a> Run<'a> {
+    pub fn section(&self, outcome: &'a Outcome) -> Section<'a> {
         let Experiment { name, stands_for, about, .. } = self.experiment;
         let command = self.input.command(&self.command, self.config);
         Section { name, stands_for, about, command, outcome }
@@ -233,8 +227,7 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
         command.push_str(&format!(" --column {column}"));
     }
     let run = Run { experiment: &trace::EXPERIMENT, input, config: &config, command };
-    let object = run.write(&outcome, output)?;
-    print(&[object], output)
+    print(&[run.write(&outcome, output)?], output)
 }
 
 /// Prints the JSON objects, if they are wanted.

@@ -1,8 +1,6 @@
 //! Refusal of keys that an experiment does not use.
 
 use crate::config::{assigned, file, keys_of};
-use crate::error::message;
-use crate::input::Input;
 use crate::prelude::*;
 
 /// Checks that each key set by `--set` or `--seconds` is used by one of the experiments that `name` stands for. A
@@ -10,7 +8,7 @@ use crate::prelude::*;
 /// unless they leave the configuration as it is.
 ///
 /// # Errors
-/// [`Error::UnusedKey`]; as [`assigned`], [`keys_of`] and [`file::read`].
+/// [`Error::Refused`]; as [`assigned`], [`keys_of`] and [`file::read`].
 pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(), Error> {
     let is_used = |key: &str| -> Result<bool, Error> {
         let keys = keys_of(key)?;
@@ -28,7 +26,8 @@ pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(
                 [one] => one.uses_text(),
                 _ => "see `list --json`".to_owned(),
             };
-            return Err(Error::UnusedKey { name: name.to_owned(), key: key.to_owned(), uses });
+            let (name, key) = (cut(name), cut(key));
+            return Err(Error::Refused(format!("{name} does not use `{key}`; it uses: {uses}")));
         }
     }
     let Some(path) = &input.config else { return Ok(()) };

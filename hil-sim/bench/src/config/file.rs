@@ -59,9 +59,8 @@ pub fn toml(config: &Config, keys: &[Key]) -> String {
     let names: Vec<&str> = Key::all().map(Key::name).collect();
     // A name that is also the beginning of others cannot be a table.
     let table_of = |name: &str| {
-        name.split_once('.')
-            .filter(|(table, _)| !names.contains(table))
-            .map(|(table, rest)| (table.to_owned(), rest.to_owned()))
+        let split = name.split_once('.').filter(|(table, _)| !names.contains(table));
+        split.map(|(table, rest)| (table.to_owned(), rest.to_owned()))
     };
     let mut tables: Vec<(String, String)> = vec![(String::new(), String::new())];
     for key in keys {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use drive_settings::entry::Entry;
 use drive_settings::{SETTINGS, Settings, find, value as drive};
 
-use super::value::Field as _;
+use super::value::{Field as _, double};
 use super::{Allowed, BENCH, BenchKey, Config, DRIVE, PlantModel, Value};
 use crate::error::Error;
 
@@ -105,8 +105,8 @@ impl Key {
 
     /// The values it can have, in words, with the unit.
     pub fn allowed_text(self) -> String {
-        let auto =
-            if matches!(self, Self::Drive(entry) if entry.has_rule()) { ", or auto" } else { "" };
+        let has_rule = matches!(self, Self::Drive(entry) if entry.has_rule());
+        let auto = if has_rule { ", or auto" } else { "" };
         format!("{}{auto}", self.allowed().describe(self.unit()))
     }
 
@@ -116,7 +116,7 @@ impl Key {
             Self::Bench(key) => (key.get)(config),
             Self::After(key) => config.after.get(key.name).cloned().unwrap_or(Value::Unset),
             Self::Drive(entry) => match entry.get(&config.drive) {
-                drive::Value::Number(value) => Value::of_single(value),
+                drive::Value::Number(value) => Value::Number(double(value)),
                 drive::Value::Whole(value) => Value::Number(value.into()),
                 drive::Value::Word(word) => Value::Word(word.to_owned()),
                 drive::Value::Auto => Value::Word(drive::AUTO.to_owned()),
@@ -133,23 +133,11 @@ impl Key {
             Self::Bench(key) => (key.set)(config, value),
             Self::After(key) => set_after(config, key, value),
             Self::Drive(entry) => {
-                let text = match value {
-                    Value::Switch(on) => drive::Words::word(*on).to_owned(),
-                    other => other.to_string(),
-                };
-                let value = entry.parse(&text).map_err(reason)?;
+                let value = entry.parse(&value.to_string()).map_err(reason)?;
                 entry.set(&mut config.drive, value);
                 Ok(())
             }
         }
-    }
-}
-
-/// The shortest decimal fraction that stands for a number in single precision.
-fn double(number: f32) -> f64 {
-    match Value::of_single(number) {
-        Value::Number(number) => number,
-        _ => number.into(),
     }
 }
 
@@ -197,15 +185,11 @@ pub fn check_model(config: &Config) -> Result<(), Error> {
         (name.starts_with(other) || is_a && name == "flux_level")
             && key.get(config) != key.get(&default)
     });
-    match idle {
-        None => Ok(()),
-        Some(key) => Err(Error::Refused(format!(
-            "{} = {}: plant = {} does not use it; it acts with {remedy}",
-            key.name(),
-            key.get(config),
-            config.model.plant.to_value()
-        ))),
-    }
+    idle.map_or(Ok(()), |key| {
+        let (key, value, plant) = (key.name(), key.get(config), config.model.plant.to_value());
+        let why = format!("plant = {plant} does not use it; it acts with {remedy}");
+        Err(Error::Refused(format!("{key} = {value}: {why}")))
+    })
 }
 
 impl Config {

@@ -131,10 +131,8 @@ impl Motor {
             let sources = self.source.iter().flat_map(|source| &source.keys);
             let count = sources.filter(|known| **known == key).count();
             if count > 1 || count == 0 && !self.is_own() {
-                return Err(Error::Refused(format!(
-                    "motor {name}: {} has {count} sources; one [[source]] must name it",
-                    cut(&key)
-                )));
+                let why = format!("{} has {count} sources; one [[source]] must name it", cut(&key));
+                return Err(Error::Refused(format!("motor {name}: {why}")));
             }
             config.set(&key, &value)?;
         }

@@ -30,11 +30,6 @@ impl Value {
         }
     }
 
-    /// From a number in single precision: the shortest decimal fraction that stands for it.
-    pub fn of_single(number: f32) -> Self {
-        number.to_string().parse().map_or(Self::Unset, Self::Number)
-    }
-
     /// From a TOML value; a date or an array becomes a word, which no key takes.
     pub fn from_toml(value: &toml::Value) -> Self {
         match value {
@@ -56,6 +51,11 @@ impl fmt::Display for Value {
             Self::Unset => f.write_str("-"),
         }
     }
+}
+
+/// The shortest decimal fraction that stands for a number in single precision.
+pub fn double(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(number.into())
 }
 
 /// The values a key allows.

@@ -5,7 +5,26 @@ use drive_settings::words;
 
 use super::value::{Allowed, Field, Value};
 
-words! {
+/// Words that are values of keys.
+macro_rules! words_of_keys {
+    ($($(#[$about:meta])* pub enum $type:ident { $($words:tt)+ })+) => {$(
+        words! { $(#[$about])* pub enum $type { $($words)+ } }
+
+        impl Field for $type {
+            fn to_value(&self) -> Value {
+                Value::Word(self.word().to_owned())
+            }
+
+            fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
+                let is = |word: &&str| matches!(value, Value::Word(given) if given == word);
+                let place = Self::WORDS.iter().position(is);
+                place.map(Self::at).ok_or("not one of the words")
+            }
+        }
+    )+};
+}
+
+words_of_keys! {
     /// Load on the shaft.
     pub enum LoadMode {
         /// Shaft blocked.
@@ -15,9 +34,7 @@ words! {
         /// A dynamometer holds `load.speed_rpm`.
         Speed = "speed",
     }
-}
 
-words! {
     /// Model of the motor: model A with its assumed saliency, or a family of iron from which saliency emerges.
     pub enum PlantModel {
         /// Model A.
@@ -47,9 +64,7 @@ words! {
         /// Teeth, main flux, leakages and skin effect.
         F = "f",
     }
-}
 
-words! {
     /// Flux at which the numbers of a family hold.
     pub enum FluxLevel {
         /// That of a direct current of 0.7 A with the dissertation's motor, in proportion to the rated current.
@@ -57,9 +72,7 @@ words! {
         /// The smaller of the rated flux and that of 0.55 times the peak of the rated current.
         High = "high",
     }
-}
 
-words! {
     /// Which runs the battery consists of.
     pub enum BatteryRuns {
         /// The twelve kinds.
@@ -75,9 +88,7 @@ words! {
         /// The shaft dragged through zero stator frequency under torque.
         Dragged = "dragged",
     }
-}
 
-words! {
     /// What the drive is asked for in runs over the whole speed range.
     pub enum RangeKind {
         /// Constant torque at constant speed.
@@ -105,9 +116,7 @@ words! {
         /// Sag of the dc link under torque.
         Sag = "sag",
     }
-}
 
-words! {
     /// A phase that is interrupted between inverter and motor.
     pub enum OpenPhase {
         /// None.
@@ -120,20 +129,3 @@ words! {
         C = "c",
     }
 }
-
-macro_rules! fields {
-    ($($type:ident)+) => {$(
-        impl Field for $type {
-            fn to_value(&self) -> Value {
-                Value::Word(self.word().to_owned())
-            }
-
-            fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
-                let is = |word: &&str| matches!(value, Value::Word(given) if given == word);
-                let place = Self::WORDS.iter().position(is);
-                place.map(Self::at).ok_or("not one of the words")
-            }
-        }
-    )+};
-}
-fields!(LoadMode PlantModel FluxLevel BatteryRuns RangeKind OpenPhase);

@@ -52,8 +52,7 @@ impl Figure {
 
     /// All series of all panels, with their names.
     pub fn curves(&self) -> Vec<Curve<'_>> {
-        let mut taken = Vec::new();
-        let mut curves = Vec::new();
+        let (mut taken, mut curves) = (Vec::new(), Vec::new());
         for panel in &self.panels {
             for series in &panel.series {
                 let name = name::of_curve(&panel.y_label, &series.name);
