@@ -28,7 +28,6 @@ pub use sim_bench::{learning, statistics};
 pub use sim_lab::*;
 use statistics::Statistical;
 
-use crate::error::cut;
 use crate::prelude::*;
 
 /// All experiments, in the order of the report.
@@ -121,10 +120,9 @@ pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     let found = STATISTICAL.iter().find(|statistical| statistical.experiment.name == name);
     found.ok_or_else(|| {
         let known: Vec<_> = STATISTICAL.iter().map(|known| known.experiment.name).collect();
+        let (name, known) = (cut(name), known.join(", "));
         Error::Refused(format!(
-            "{} does not consist of independent runs; those that do: {}",
-            cut(name),
-            known.join(", ")
+            "{name} does not consist of independent runs; those that do: {known}"
         ))
     })
 }
@@ -144,11 +142,11 @@ pub fn check_file(experiment: &Experiment, file: Option<&Path>) -> Result<(), Er
     let (name, with) = (experiment.name, WITH_INPUT.iter().map(|with| with.name));
     match (with.clone().any(|with| with == name), file) {
         (true, None) => Err(Error::Refused(format!("{name} needs --input FILE"))),
-        (false, Some(file)) => Err(Error::Refused(format!(
-            "--input {}: {name} takes no file; allowed with: {}",
-            file.display(),
-            with.collect::<Vec<_>>().join(", ")
-        ))),
+        (false, Some(file)) => {
+            let (file, with) = (file.display(), with.collect::<Vec<_>>().join(", "));
+            let why = format!("{name} takes no file; allowed with: {with}");
+            Err(Error::Refused(format!("--input {file}: {why}")))
+        }
         _ => Ok(()),
     }
 }
@@ -170,14 +168,11 @@ pub fn named(name: &str) -> Vec<&str> {
 /// # Errors
 /// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with what took the place of an experiment that is gone.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
-    let mut all = EXPERIMENTS.iter().chain(WITH_INPUT);
-    if let Some(experiment) = all.find(|experiment| experiment.name == name) {
-        return Ok(experiment);
-    }
-    let names = EXPERIMENTS.iter().chain(WITH_INPUT).map(|experiment| experiment.name);
-    Err(match REPLACED.iter().find(|(old, _)| *old == name) {
+    let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
+    let found = all().find(|experiment| experiment.name == name);
+    found.ok_or_else(|| match REPLACED.iter().find(|(old, _)| *old == name) {
         Some((_, by)) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
-        None => Error::unknown("experiment", name, names),
+        None => Error::unknown("experiment", name, all().map(|experiment| experiment.name)),
     })
 }
 

@@ -134,7 +134,9 @@ impl Study for Battery {
                 let [always, after] = self.sizes(number);
                 disturbed::add(&mut bench, &disturbed::ALWAYS, &always);
                 disturbed::add(&mut bench, &disturbed::AFTER, &after);
-                kind.add(&mut bench);
+                if let Kind::Dragged(asymmetry) = kind {
+                    asymmetry.add(&mut bench);
+                }
                 trial(&bench, drive, kind, seed)
             }
             Err(fault) => Ok(Trial { kind: Some(kind), ..Trial::unlearned(seed, *fault) }),

@@ -71,9 +71,8 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             let response = step(plant, filtered);
             let samples = settling(&response);
             let prefix = format!("{key}_{filter_key}");
-            outcome
-                .metrics
-                .set(format!("{prefix}_overshoot_percent"), 100.0 * overshoot(&response));
+            let percent = 100.0 * overshoot(&response);
+            outcome.metrics.set(format!("{prefix}_overshoot_percent"), percent);
             outcome.metrics.set(format!("{prefix}_settling_samples"), samples as f64);
             let points = (0..).map(|k| PERIOD_MS * f64::from(k)).zip(response).collect();
             panel = panel.with(Series::line(label, points));

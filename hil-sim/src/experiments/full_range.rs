@@ -71,10 +71,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 /// When the settings are refused.
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
-    match tracks(&config.drive) {
-        true => learned(config, drive, seed),
-        false => Ok(Ok(drive)),
-    }
+    if tracks(&config.drive) { learned(config, drive, seed) } else { Ok(Ok(drive)) }
 }
 
 /// The runs: of each case one after the other, so that shards have their part of each.

@@ -216,21 +216,17 @@ impl LockMonitor {
         let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
         outcome.metrics.set("over_speed_late", late.len() as f64);
         outcome.metrics.set("over_speed_latest_s", latest);
-        let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &[])
-            .note("The drive goes by its estimate, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
-        table.record([
+        let row = [
             ("limit (rpm)", Cell::fixed(limit, 0)),
             ("trials", Cell::fixed(trials.len() as f64, 0)),
             ("off before the limit", Cell::fixed(before as f64, 0)),
             ("latest after it (s)", Cell::fixed(latest, 3)),
             ("not in time", Cell::fixed(late.len() as f64, 0)),
-        ]);
-        outcome.tables.push(table);
-        outcome.tables.extend(self.listed(
-            "Over-speed not in time",
-            &["seed", "iq (A)", "rpm/s"],
-            late,
-        ));
+        ];
+        let table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &[]).records([row]);
+        outcome.tables.push(table.note("The drive goes by its estimate, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier."));
+        let heads = ["seed", "iq (A)", "rpm/s"];
+        outcome.tables.extend(self.listed("Over-speed not in time", &heads, late));
     }
 
     fn starts(&self, all: &[Trial], outcome: &mut Outcome) {

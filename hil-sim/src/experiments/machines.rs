@@ -192,13 +192,11 @@ impl Study for Machines {
         let points = |of: fn(&Machine) -> f64| {
             learned().map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
         };
-        outcome.figures.push(
-            Figure::new("machines", "Worst of 16 runs over the saliency of the machine", "").panel(
-                Panel::new("saliency fixed to the flux (%)", "angle error (°)")
-                    .with(Series::points("largest", points(Machine::largest)))
-                    .with(Series::points("rms", points(Machine::rms))),
-            ),
-        );
+        let panel = Panel::new("saliency fixed to the flux (%)", "angle error (°)")
+            .with(Series::points("largest", points(Machine::largest)))
+            .with(Series::points("rms", points(Machine::rms)));
+        let title = "Worst of 16 runs over the saliency of the machine";
+        outcome.figures.push(Figure::new("machines", title, "").panel(panel));
         outcome.remarks = assumptions(context.config);
         Ok(outcome)
     }

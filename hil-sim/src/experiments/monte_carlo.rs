@@ -89,14 +89,12 @@ impl Study for MonteCarlo {
         let worst = by_rms.into_iter().take(WORST).enumerate();
         outcome.tables.push(Table::of("Worst runs", &columns, worst));
         let points = |of: fn(&SteadyRun) -> f64| kept.iter().map(|r| (r.case.iq, of(r))).collect();
-        outcome.figures.push(
-            Figure::new("runs", "Angle error of every run over its torque current", "").panel(
-                Panel::new("quadrature current (A)", "angle error (°)")
-                    .with(Series::points("largest", points(|r| r.error.largest())))
-                    .with(Series::points("rms", points(|r| r.error.rms())))
-                    .with(Series::points("mean", points(|r| r.error.mean()))),
-            ),
-        );
+        let panel = Panel::new("quadrature current (A)", "angle error (°)")
+            .with(Series::points("largest", points(|r| r.error.largest())))
+            .with(Series::points("rms", points(|r| r.error.rms())))
+            .with(Series::points("mean", points(|r| r.error.mean())));
+        let title = "Angle error of every run over its torque current";
+        outcome.figures.push(Figure::new("runs", title, "").panel(panel));
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(format!(
             "Speeds within ±{} rpm. Lost: beyond 45° at any time, or stopped by the drive; lost \

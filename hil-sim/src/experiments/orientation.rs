@@ -45,13 +45,11 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("angle_error_uncompensated_max_deg", largest(without));
     let torque = with.iter().map(|x| (x.1 - 1.0).abs()).fold(0.0, f64::max);
     outcome.metrics.set("torque_error_max_pct", torque * 100.0);
-    outcome.figures.push(
-        Figure::new("orientation", "Flux angle error over speed", "Eq. 2.10").panel(
-            Panel::new("speed (rpm)", "mean flux angle error (° electrical)")
-                .with(line("delays compensated", with))
-                .with(line("delays left in", without)),
-        ),
-    );
+    let panel = Panel::new("speed (rpm)", "mean flux angle error (° electrical)")
+        .with(line("delays compensated", with))
+        .with(line("delays left in", without));
+    let figure = Figure::new("orientation", "Flux angle error over speed", "Eq. 2.10");
+    outcome.figures.push(figure.panel(panel));
     outcome.remark(
         "The current is measured 1.53 samples late by the low-pass and 0.18 by the analog filter; \
          left in, the frame is turned by that many samples times the speed.",

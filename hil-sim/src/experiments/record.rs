@@ -6,8 +6,6 @@ use self::held::{Held, Standstill, reversing};
 use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
 use super::torque_limit::{BEYOND_A, TorqueLimit};
-use crate::config::open_phase;
-use crate::plant::Plant;
 use crate::prelude::*;
 
 /// Not in the source.
@@ -76,12 +74,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         m.set(format!("{key}_lost"), f64::from(u8::from(lost)));
     }
     for ((course, sign), held) in COURSES.iter().zip(&held) {
-        let name = || format!("{} at {:+.2} Nm", course.name, torque.nm * sign);
-        if let Some(fault) = &held.fault {
-            outcome.faults.push(format!("{}: {fault}", name()));
-        } else if held.is_lost() {
-            outcome.faults.push(format!("{}: angle lost", name()));
-        }
+        let why = held.fault.as_deref().or(held.is_lost().then_some("angle lost"));
+        let text = |why| format!("{} at {:+.2} Nm: {why}", course.name, torque.nm * sign);
+        outcome.faults.extend(why.map(text));
     }
     outcome.tables.push(held_table(&held, &torque));
     for course in [STANDSTILL, REVERSAL] {

@@ -12,7 +12,6 @@ pub use quantity::{QUANTITIES, Seen};
 pub use record::Record;
 
 use self::file::{Ramp, Text};
-use crate::config::{Key, Value};
 use crate::prelude::*;
 
 /// Experiments that are scenarios of the program, each with the name of its file, what it stands for, the keys that it uses,
@@ -246,9 +245,8 @@ impl Scenario {
         if record.config.drive.angle_source == AngleSource::Injection {
             outcome.remarks.extend(assumptions(context.config));
         }
-        outcome
-            .remarks
-            .extend(self.text.remarks.iter().map(|text| self.filled(text, context.config)));
+        let filled = |text: &String| self.filled(text, context.config);
+        outcome.remarks.extend(self.text.remarks.iter().map(filled));
         Ok(outcome)
     }
 }

@@ -25,6 +25,9 @@ const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
 /// the resistance known.
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
+/// A load, Nm, and what the drive believes.
+type Case = (f64, (f64, bool));
+
 /// A position held under a load.
 #[derive(Default)]
 struct HeldPosition {
@@ -52,14 +55,8 @@ impl HeldPosition {
 }
 
 /// Holds position zero for some seconds, once the load stands.
-fn hold(
-    config: &Config,
-    seed: u64,
-    load_nm: f64,
-    belief: (f64, bool),
-    seconds: f64,
-) -> Result<HeldPosition, Error> {
-    let mut config = config.clone();
+fn hold(config: &Config, seed: u64, case: Case, seconds: f64) -> Result<HeldPosition, Error> {
+    let ((load_nm, belief), mut config) = (case, config.clone());
     config.drive.angle_source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
     config.load.torque_nm = None;
@@ -97,21 +94,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
     let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
-    let cases: Vec<(f64, (f64, bool))> =
-        BELIEFS.iter().flat_map(|&b| loads.iter().map(move |&l| (l, b))).collect();
-    let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
-        hold(config, seed.wrapping_add(number), load, belief, hold_s)
+    let cases: Vec<Case> = BELIEFS.iter().flat_map(|&b| loads.map(|load| (load, b))).collect();
+    let held = context.in_parallel("sensorless-position", &cases, |number, &case| {
+        hold(config, seed.wrapping_add(number), case, hold_s)
     })?;
 
     let mut outcome = Outcome::default();
     for (record, which) in [(&with, "with the encoder"), (&without, "without it")] {
         outcome.faults.extend(record.fault.iter().map(|fault| format!("{which}: {fault}")));
     }
-    let stopped = |h: &HeldPosition| {
-        let fault = h.fault.as_ref()?;
-        Some(format!("held under {} Nm: {fault}", h.load_nm))
-    };
-    outcome.faults.extend(held.iter().filter_map(stopped));
+    for HeldPosition { load_nm, fault, .. } in &held {
+        let text = |fault| format!("held under {load_nm} Nm: {fault}");
+        outcome.faults.extend(fault.as_ref().map(text));
+    }
     let m = &mut outcome.metrics;
     for (record, suffix) in [(&without, ""), (&with, "_encoder")] {
         let mut set = |name: &str, unit: &str, of: &str, statistic: Statistic| {

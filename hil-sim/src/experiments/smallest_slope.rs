@@ -106,14 +106,12 @@ impl Study for SmallestSlope {
             let points = regulated.filter_map(|step| Some((step.slope?, of(&step.summary))));
             Series::points(name, points.collect())
         };
-        outcome.figures.push(
-            Figure::new("slope", "Angle error over the slope of the saliency signal", "").panel(
-                Panel::new("slope dq/de (1/rad)", "angle error (°)")
-                    .with(points("largest", |s| s.error().largest()))
-                    .with(points("99 %", |s| s.p99_deg()))
-                    .with(points("rms", |s| s.error().rms())),
-            ),
-        );
+        let panel = Panel::new("slope dq/de (1/rad)", "angle error (°)")
+            .with(points("largest", |s| s.error().largest()))
+            .with(points("99 %", |s| s.p99_deg()))
+            .with(points("rms", |s| s.error().rms()));
+        let title = "Angle error over the slope of the saliency signal";
+        outcome.figures.push(Figure::new("slope", title, "").panel(panel));
         outcome.remarks = assumptions(context.config);
         Ok(outcome)
     }

@@ -20,6 +20,8 @@ const LINKS: [f64; 3] = [230.0 / 311.0, 270.0 / 311.0, 1.0];
 /// Time under torque before it is measured, s: field weakening and its trim have settled; and the time of the mean.
 const SETTLING_S: f64 = 2.0;
 const MEAN_S: f64 = 0.5;
+/// Signs of the torque, and their names.
+const SIGNS: [(f64, &str); 2] = [(1.0, "motoring"), (-1.0, "generating")];
 
 /// A point of the curve.
 #[derive(Clone, Copy)]
@@ -36,17 +38,14 @@ type Measured = Option<(f64, f64)>;
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let config = for_the_range(context.config)?;
     let (drive, limit) = learned_limit(&config, context.seed)?;
-    let mut points = Vec::new();
-    for sign in [1.0, -1.0] {
-        for link in LINKS {
-            let at = |n: u32| Point { rpm: f64::from(n) * STEP_RPM, link, sign };
-            points.extend((0..=STEPS).map(at));
-        }
-    }
+    let curves = SIGNS.iter().flat_map(|&(sign, _)| LINKS.map(|link| (sign, link)));
+    let rpm = || (0..=STEPS).map(|n| f64::from(n) * STEP_RPM);
+    let points: Vec<_> =
+        curves.flat_map(|(sign, link)| rpm().map(move |rpm| Point { rpm, link, sign })).collect();
     let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
         measure(&config, &drive, point, context.seed.wrapping_add(number))
     })?;
-    Ok(outcome(&config, &limit, &points, &measured))
+    Ok(outcome(&config, &limit, &points.into_iter().zip(measured).collect::<Vec<_>>()))
 }
 
 /// Mean torque, Nm, in the direction asked for, and largest phase current, A.
@@ -60,20 +59,15 @@ fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Me
     Ok(still.then(|| (point.sign * bench.torque.mean(), bench.trial.peak_a)))
 }
 
-fn outcome(
-    config: &Config,
-    limit: &TorqueLimit,
-    points: &[Point],
-    measured: &[Measured],
-) -> Outcome {
+fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)]) -> Outcome {
     let mut outcome = Outcome::default();
     let mut table = Table::new("Largest torque", &[]);
     let mut figure = Figure::new("envelope", "Largest torque over the speed", "");
     let volts = |link: f64| format!("{:.0} V", link * config.inverter.dc_link_v);
     let at = |sign: f64, link: f64| {
-        points.iter().zip(measured).filter(move |(p, _)| p.sign == sign && p.link == link)
+        measured.iter().filter(move |(p, _)| p.sign == sign && p.link == link)
     };
-    for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
+    for (sign, word) in SIGNS {
         let mut panel = Panel::new("speed (rpm)", format!("torque, {word} (Nm)"));
         for link in LINKS {
             let curve = at(sign, link).filter_map(|(p, m)| Some((config.rpm(p.rpm), (*m)?.0)));
@@ -86,7 +80,7 @@ fn outcome(
     for n in 0..=STEPS {
         let rpm = f64::from(n) * STEP_RPM;
         let mut row = vec![("speed (rpm)".to_owned(), Cell::fixed(config.rpm(rpm), 0))];
-        for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
+        for (sign, word) in SIGNS {
             for link in LINKS {
                 let found = at(sign, link).find(|(p, _)| p.rpm == rpm).and_then(|(_, m)| *m);
                 let cell =
@@ -103,13 +97,13 @@ fn outcome(
     m.set("torque_limit_nm", limit.nm);
     m.set("torque_limit_pct_of_rated", limit.percent);
     m.set("torque_rated_nm", config.rated_nm());
-    for (point, nm) in points.iter().zip(measured).filter_map(|(p, m)| Some((p, (*m)?.0))) {
+    for (point, nm) in measured.iter().filter_map(|(p, m)| Some((p, (*m)?.0))) {
         let word = if point.sign > 0.0 { "motoring" } else { "generating" };
         let link = (point.link * config.inverter.dc_link_v).round();
         m.set(format!("torque_{word}_{link}_v_{}_rpm_nm", point.rpm), nm);
     }
-    m.set("points_lost", measured.iter().filter(|m| m.is_none()).count() as f64);
-    let peak = measured.iter().flatten().map(|(_, peak)| *peak).fold(0.0, f64::max);
+    m.set("points_lost", measured.iter().filter(|(_, m)| m.is_none()).count() as f64);
+    let peak = measured.iter().filter_map(|(_, m)| Some((*m)?.1)).fold(0.0, f64::max);
     m.set("current_peak_a", peak);
     outcome.tables.push(table.note("-: the drive did not start, or did not regulate to the end."));
     outcome.figures.push(figure);

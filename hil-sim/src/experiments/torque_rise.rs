@@ -41,10 +41,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = for_the_range(context.config)?;
     config.prepare.learn = true;
     let rig = prepared(&config, context.seed)?;
-    let cases: Vec<Case> = SPEEDS_RPM
-        .iter()
-        .flat_map(|&rpm| [1.0, -1.0].map(|sign| (config.rpm(rpm), sign)))
-        .collect();
+    let both = |&rpm: &f64| [1.0, -1.0].map(|sign| (config.rpm(rpm), sign));
+    let cases: Vec<Case> = SPEEDS_RPM.iter().flat_map(both).collect();
     let seen = context.in_parallel("torque-rise", &cases, |_, &case| step(&config, &rig, case))?;
     let mut outcome = Outcome { remarks: assumptions(&config), ..Outcome::default() };
     outcome.tables.push(table(&config, &cases, &seen, &mut outcome.metrics));

@@ -1,7 +1,6 @@
 //! A drive and a plant in a run of the battery, and what is seen of them.
 
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
-use crate::config::open_phase;
 use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
@@ -116,33 +115,25 @@ impl Bench {
 
     /// One period.
     fn step(&mut self) {
-        let is_recorded = self.trace.is_some() && self.rig.periods().is_multiple_of(TRACE_EVERY);
-        let t = self.time();
+        let (t, is_recorded) = (self.time(), self.rig.periods().is_multiple_of(TRACE_EVERY));
         self.rig.step();
         let (plant, seen) = (&self.rig.plant, &mut self.trial);
         seen.peak_a = plant.phase_currents().iter().fold(seen.peak_a, |a, i| a.max(i.abs()));
         let (least, most) = seen.dc_link_v;
         let v = plant.dc_link();
         seen.dc_link_v = (least.min(v), most.max(v));
-        if is_recorded {
-            self.record(t);
+        if let Some(trace) = self.trace.as_mut().filter(|_| is_recorded) {
+            let regulates = self.rig.drive.state().regulates();
+            trace.push(Moment {
+                t,
+                error_deg: if regulates { self.error_deg } else { f64::NAN },
+                rpm: plant.mechanical_speed() * 60.0 / TAU,
+                torque: plant.torque(),
+                current: plant.current().norm(),
+                flux: plant.rotor_flux(),
+                dc_link: v,
+            });
         }
-    }
-
-    /// Adds a moment to the record.
-    fn record(&mut self, t: f64) {
-        let (plant, error_deg) = (&self.rig.plant, self.error_deg);
-        let Some(trace) = &mut self.trace else { return };
-        let regulates = self.rig.drive.state().regulates();
-        trace.push(Moment {
-            t,
-            error_deg: if regulates { error_deg } else { f64::NAN },
-            rpm: plant.mechanical_speed() * 60.0 / TAU,
-            torque: plant.torque(),
-            current: plant.current().norm(),
-            flux: plant.rotor_flux(),
-            dc_link: plant.dc_link(),
-        });
     }
 
     /// For some seconds, whatever the drive does.

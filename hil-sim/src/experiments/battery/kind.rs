@@ -169,12 +169,6 @@ impl Part {
     fn dragged(i_q: f64, rpm: (f64, f64), rate: f64) -> Self {
         Self { shaft_rpm: Some(rpm), ..Self::constant(i_q, (rpm.1 - rpm.0).abs() / rate) }
     }
-
-    /// A load that comes and goes while a speed is held, rpm.
-    fn loaded(rpm: f64, load: LoadTorque) -> Vec<Self> {
-        let loaded = Self { load, ..Self::constant(rpm, 2.0) };
-        vec![Self::constant(rpm, 1.5), loaded, Self::constant(rpm, 1.0)]
-    }
 }
 
 /// The shaft in a run.
@@ -214,13 +208,6 @@ impl Kind {
     /// Whether the flux is turned: then a stop is no failure.
     pub fn turns_flux(self) -> bool {
         matches!(self, Self::Forced(_) | Self::Restless { forced: true, .. })
-    }
-
-    /// Adds to the bench what belongs to the kind.
-    pub fn add(self, config: &mut Config) {
-        if let Self::Dragged(asymmetry) = self {
-            asymmetry.add(config);
-        }
     }
 
     /// The shaft.
@@ -268,7 +255,9 @@ impl Kind {
                     Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
                     _ => LoadTorque::Nm(sign * LOAD_NM),
                 };
-                Part::loaded(rpm, load)
+                // It comes and goes while the speed is held.
+                let loaded = Part { load, ..Part::constant(rpm, 2.0) };
+                vec![Part::constant(rpm, 1.5), loaded, Part::constant(rpm, 1.0)]
             }
             Self::Forced(_) => {
                 let i_q = sign * random.random_range(0.0..=MOST_A);

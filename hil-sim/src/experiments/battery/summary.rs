@@ -1,7 +1,5 @@
 //! The verdict over many runs of the battery.
 
-use std::collections::BTreeMap;
-
 use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
 use crate::prelude::*;
@@ -197,11 +195,10 @@ pub fn figure(trials: &[Trial]) -> Figure {
         let regulated = (0..).zip(trials).filter(|(_, trial)| trial.error.count() > 0);
         regulated.map(|(number, trial)| (f64::from(number), of(trial))).collect()
     };
-    Figure::new("runs", "Angle error of every run", "").panel(
-        Panel::new("number of the run", "angle error (°)")
-            .with(Series::points("largest", points(|trial| trial.error.largest())))
-            .with(Series::points("rms", points(|trial| trial.error.rms()))),
-    )
+    let panel = Panel::new("number of the run", "angle error (°)")
+        .with(Series::points("largest", points(|trial| trial.error.largest())))
+        .with(Series::points("rms", points(|trial| trial.error.rms())));
+    Figure::new("runs", "Angle error of every run", "").panel(panel)
 }
 
 #[cfg(test)]

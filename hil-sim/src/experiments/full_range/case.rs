@@ -1,6 +1,5 @@
 //! What is run: each kind in the regions of the speed that it is for.
 
-use crate::config::RangeKind;
 use crate::experiments::battery::Shaft;
 use crate::prelude::*;
 

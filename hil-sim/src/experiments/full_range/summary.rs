@@ -1,7 +1,6 @@
 //! The verdict over the runs, per kind and region.
 
 use super::case::Case;
-use crate::config::RangeKind;
 use crate::experiments::battery::{Moment, Refused, Trial};
 use crate::prelude::*;
 

@@ -1,7 +1,6 @@
 //! One run, and what is recorded of it.
 
 use super::case::Case;
-use crate::config::RangeKind;
 use crate::experiments::battery::{
     Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
     nominal_limit_a, torque_nm,
@@ -140,8 +139,12 @@ impl<'a> Run<'a> {
         let step = sign * STEP_A.min(nominal_limit_a(self.config) / self.config.amperes(1.0));
         let loaded = |nm: f64| Part { load: LoadTorque::Nm(nm), ..Part::constant(rpm, 1.0) };
         match self.case.kind {
+            RangeKind::TurningStart => {}
+            RangeKind::Ramps | RangeKind::HotRamps => self.start()?,
+            _ => self.up_to_speed()?,
+        }
+        match self.case.kind {
             RangeKind::Constant | RangeKind::WrongParameters => {
-                self.up_to_speed()?;
                 self.counted(0.5, &[Part::constant(i_q, 3.5)])?;
                 let nm = |a: f64| torque_nm(self.config, a);
                 let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
@@ -151,24 +154,20 @@ impl<'a> Run<'a> {
                 Ok(())
             }
             RangeKind::Reversals => {
-                self.up_to_speed()?;
                 let steps = [step, -step, step, 0.0, -step].map(|a| Part::constant(a, 0.6));
                 self.counted(0.5, &steps)
             }
             RangeKind::LoadSteps => {
-                self.up_to_speed()?;
                 let nm = sign * LOAD_NM;
                 self.counted(0.0, &[nm, 0.0, -nm, 0.0].map(loaded))
             }
             RangeKind::Ramps | RangeKind::HotRamps => self.ramps(),
             RangeKind::TurnedFlux => {
-                self.up_to_speed()?;
                 let turned = Part { turn_deg: self.turn_deg, ..Part::constant(i_q, 3.0) };
                 self.counted(0.5, &[Part::constant(i_q, 1.0), turned])
             }
             RangeKind::TurningStart => self.turning_start(),
             RangeKind::ResidualStart => {
-                self.up_to_speed()?;
                 // Refused by a drive that has stopped itself.
                 let _ = self.bench.rig.command(&Command::Stop(Stop::Coast));
                 self.bench.wait(LONGEST_START_S);
@@ -177,7 +176,6 @@ impl<'a> Run<'a> {
             }
             RangeKind::Braking => self.braking(),
             RangeKind::Outage => {
-                self.up_to_speed()?;
                 let nominal = self.config.inverter.dc_link_v;
                 self.bench.counted_from = Some(self.bench.time());
                 for (mains, seconds) in [(0.0, OUTAGE_S), (nominal, 2.0)] {
@@ -231,7 +229,6 @@ impl<'a> Run<'a> {
 
     /// Through zero and back; on the way the motor warms up, or not.
     fn ramps(&mut self) -> Result<(), End> {
-        self.start()?;
         let rate = f64::from(self.config.drive.ramp_rpm_per_s());
         let once = self.config.rpm(self.rpm.abs()) / rate;
         let rpm = self.rpm;
@@ -275,7 +272,6 @@ impl<'a> Run<'a> {
 
     /// From full speed to standstill.
     fn braking(&mut self) -> Result<(), End> {
-        self.up_to_speed()?;
         let from = self.bench.time();
         self.bench.counted_from = Some(from);
         let stopped = self.config.rpm(STOPPED_RPM) * TAU / 60.0;
@@ -291,7 +287,6 @@ impl<'a> Run<'a> {
 
     /// A stiff dc link goes down and comes back under torque.
     fn sag(&mut self) -> Result<(), End> {
-        self.up_to_speed()?;
         self.counted(0.5, &[Part::constant(self.i_q, 1.0)])?;
         let nominal = self.config.inverter.dc_link_v;
         for (from, to) in [(1.0, SAG), (SAG, 1.0)] {

@@ -76,11 +76,9 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
     let mut rig = at_speed(config, case)?;
     rig.wait(0.8 + random.random_range(0.0..0.2));
     if let Some(fault) = fault(&rig) {
-        return Err(Error::Refused(format!(
-            "seed {}: fault {} before the angle was forced off",
-            case.seed,
-            fault.code()
-        )));
+        let (seed, fault) = (case.seed, fault.code());
+        let why = format!("seed {seed}: fault {fault} before the angle was forced off");
+        return Err(Error::Refused(why));
     }
     rig.plant.turn_rotor_flux(degrees.to_radians());
     let (start, mut wrong_s, mut loss) = (rig.time(), 0.0, Vec::new());
@@ -230,7 +228,6 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
         rig
     };
     if fault(&rig).is_none() {
-        result.accepted = true;
         rig.run(0.5, |p| result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs()));
         // A drive that stops by itself in this time has not accepted the start.
         result.accepted = fault(&rig).is_none();

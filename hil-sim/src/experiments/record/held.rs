@@ -1,6 +1,5 @@
 //! Torque held on a shaft that a dynamometer turns.
 
-use crate::plant::Plant;
 use crate::prelude::*;
 
 /// Pace of the dynamometer, s, and of the lines of the figures.

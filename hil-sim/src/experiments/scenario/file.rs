@@ -1,12 +1,9 @@
 //! Scenarios as they are written: a TOML file, or the rows of a CSV file.
 
-use std::collections::BTreeMap;
-
 use toml::Spanned;
 
 use super::quantity::Named;
 use super::{Part, REFERENCES, Reference, Scenario, Shaft};
-use crate::bounded;
 use crate::columns::Columns;
 use crate::config::{Value, flattened};
 use crate::error::{cut, parser_text, unknown};
