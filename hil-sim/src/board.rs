@@ -12,8 +12,6 @@ use std::process::{Child, Command, Stdio};
 
 use clap::{Args, ValueEnum};
 
-use crate::config::Value;
-use crate::input::{Input, OUT};
 use crate::prelude::*;
 
 /// Options of a session with the virtual board.
@@ -90,19 +88,16 @@ impl Options {
     pub fn config(&self) -> Result<Config, Error> {
         let mut config = self.input.config()?;
         let words: Vec<&str> = self.load.iter().flatten().map(String::as_str).collect();
+        let refused = |why: &str| Err(Error::Refused(format!("--load {}: {why}", words[0])));
         match words[..] {
             [] => {}
-            ["speed"] => {
-                return Err(Error::Refused("--load speed: write --load speed RPM".into()));
-            }
+            ["speed"] => return refused("write --load speed RPM"),
             ["speed", rpm] => {
                 config.set("load.mode", &Value::from_text("speed"))?;
                 config.set("load.speed_rpm", &Value::from_text(rpm))?;
             }
             [mode] => config.set("load.mode", &Value::from_text(mode))?,
-            [mode, ..] => {
-                return Err(Error::Refused(format!("--load {mode}: only speed takes a number")));
-            }
+            _ => return refused("only speed takes a number"),
         }
         Ok(config)
     }

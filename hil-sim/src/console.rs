@@ -15,11 +15,8 @@ pub mod transfer;
 pub mod update;
 
 use std::io::IsTerminal as _;
-use std::time::Duration;
 
-use clap::Args;
-
-use crate::error::Error;
+use crate::prelude::*;
 use link::Link;
 use session::Session;
 

@@ -10,7 +10,6 @@ pub mod wire;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use person::Terminal;

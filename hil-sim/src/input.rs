@@ -1,8 +1,5 @@
 //! The options that all simulating commands share.
 
-use clap::Args;
-
-use crate::config::Value;
 use crate::prelude::*;
 
 /// The options that describe a simulation.

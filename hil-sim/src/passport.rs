@@ -1,21 +1,14 @@
 //! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from what `commission` and `learn` tell at the console.
 
-use std::collections::BTreeMap;
-
-use clap::Args;
 use serde_json::Value;
 
-use crate::bounded;
-use crate::config::Key;
 use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
 use crate::console::answer::split_tag;
-use crate::error::parser_text;
 use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
 use crate::prelude::*;
-use crate::report;
 
 /// What the twin takes from the settings of the drive beside what every motor file must say; `auto` is left to its rule.
 const ALSO: &str = "motor.inertia inverter.drop_v current_plant sequence.flux sequence.i_d limits.current_a observer.leakage_share observer.leakage_slope";

@@ -9,7 +9,6 @@ mod journal;
 mod merge;
 mod rows;
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 use std::sync::{Mutex, PoisonError};
@@ -51,9 +50,8 @@ impl Shard {
 
     /// The shard of this process in an array of jobs, by the variables of the scheduler.
     fn of_array(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
-        let Some((index, count, first)) =
-            ARRAYS.iter().find(|(index, ..)| variable(index).is_some())
-        else {
+        let found = ARRAYS.iter().find(|(index, ..)| variable(index).is_some());
+        let Some((index, count, first)) = found else {
             let names = ARRAYS.map(|(index, ..)| index).join(", ");
             return Err(format!("this is no array of jobs: none of {names} is set"));
         };

@@ -4,7 +4,6 @@
 use std::io::{BufRead as _, BufReader, IsTerminal as _};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
 
 use crate::prelude::*;
 
@@ -58,15 +57,9 @@ fn lines_of(name: &str, mut command: Command) -> Result<Vec<String>, Error> {
         let lines: Result<Vec<_>, _> = lines.collect();
         child.wait().and_then(|status| Ok((status, lines?)))
     };
-    let done = if std::io::stderr().is_terminal() {
-        run()
-    } else {
-        while_saying(
-            INTERVAL,
-            |passed| eprintln!("{name}: building for {} s", passed.as_secs()),
-            run,
-        )
-    };
+    let say = |passed: Duration| eprintln!("{name}: building for {} s", passed.as_secs());
+    let is_terminal = std::io::stderr().is_terminal();
+    let done = if is_terminal { run() } else { while_saying(INTERVAL, say, run) };
     match done {
         Ok((status, lines)) if status.success() => Ok(lines),
         Ok((status, _)) => Err(failed(name, status)),

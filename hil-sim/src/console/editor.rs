@@ -58,12 +58,10 @@ pub fn run(port: &str, connect: impl FnOnce(Show) -> Link) -> Result<(), Error> 
         lines.iter().for_each(|line| drop(printer.print(format!("{line}\n"))));
     });
     let mut session = Session::new(connect(Box::new(move |line| drop(send.send(line.to_owned())))));
-    match Catalogue::read(session.link()) {
+    match Catalogue::read(&mut session.link) {
         Ok(catalogue) => {
-            println!(
-                "{port}: {} settings; !help lists the commands of this program",
-                catalogue.settings()
-            );
+            let settings = catalogue.settings();
+            println!("{port}: {settings} settings; !help lists the commands of this program");
             editor.set_helper(Some(Completion(catalogue)));
         }
         Err(why) => println!("{port}: {why}; Tab completes nothing"),

@@ -256,25 +256,21 @@ fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
             Ok(0) => break,
             Ok(read) => {
                 for byte in &buffer[..read] {
-                    let byte = match splitter.push(*byte) {
-                        Piece::Text(byte) => byte,
-                        Piece::Nothing => continue,
-                        Piece::Frame(frame) => {
-                            (locked(route).frames)(Some(frame));
-                            continue;
+                    match splitter.push(*byte) {
+                        Piece::Nothing => {}
+                        Piece::Frame(frame) => (locked(route).frames)(Some(frame)),
+                        Piece::Damaged => (locked(route).frames)(None),
+                        Piece::Text(byte)
+                            if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST =>
+                        {
+                            line.push(byte);
                         }
-                        Piece::Damaged => {
-                            (locked(route).frames)(None);
-                            continue;
+                        Piece::Text(_) => {
+                            let text = readable(&std::mem::take(&mut line));
+                            if !text.is_empty() {
+                                locked(route).line(text);
+                            }
                         }
-                    };
-                    if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST {
-                        line.push(byte);
-                        continue;
-                    }
-                    let text = readable(&std::mem::take(&mut line));
-                    if !text.is_empty() {
-                        locked(route).line(text);
                     }
                 }
             }

@@ -1,14 +1,9 @@
 //! A line is entered: a command of this program is done, all others go to the drive.
 
-use std::time::{Duration, Instant};
-
 use super::link::{Link, LinkError};
 use super::own::{HELP, Own};
 use super::transfer;
-use crate::bounded;
-use crate::error::cut;
 use crate::prelude::*;
-use crate::report;
 
 /// Time between two lines about the progress of a restore.
 const PROGRESS: Duration = Duration::from_secs(5);
@@ -26,7 +21,8 @@ pub enum Flow {
 
 /// A conversation with a drive.
 pub struct Session {
-    link: Link,
+    /// The connection.
+    pub link: Link,
 }
 
 impl Session {
@@ -34,11 +30,6 @@ impl Session {
     pub fn new(mut link: Link) -> Self {
         link.begin();
         Self { link }
-    }
-
-    /// The connection.
-    pub fn link(&mut self) -> &mut Link {
-        &mut self.link
     }
 
     /// Enters lines up to the first that fails; the answers go to standard output.
@@ -50,10 +41,8 @@ impl Session {
             match self.enter(&line, |line| println!("{line}"))? {
                 Flow::Next => {}
                 Flow::Refused(why) => {
-                    return Err(Error::Internal(format!(
-                        "the drive refuses `{}`: {why}",
-                        cut(line.trim())
-                    )));
+                    let line = cut(line.trim());
+                    return Err(Error::Internal(format!("the drive refuses `{line}`: {why}")));
                 }
                 Flow::Quit => break,
             }

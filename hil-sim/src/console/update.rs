@@ -6,15 +6,12 @@
 //! Own code for the protocol: no crate of it is maintained, and it is nine commands of a few bytes.
 
 use std::io::ErrorKind;
-use std::time::{Duration, Instant};
 
-use clap::Args;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serialport::Parity;
 
 use super::Port;
 use crate::board;
-use crate::bounded;
 use crate::prelude::*;
 
 /// Options of an update.
@@ -85,17 +82,15 @@ impl Image {
             digest.update(piece.ok_or("cut short")?);
         }
         let check = digest.finalize();
-        match word(list + 32) {
-            Some(found) if found == check && bytes.len() <= STORED => {
-                let page = &bytes[..PAGE];
-                let at = page.windows(MAGIC.len()).position(|window| window == MAGIC);
-                let name = at.and_then(|at| page.get(at + MAGIC.len()..)?.get(..NAME));
-                let text = |name| String::from_utf8_lossy(name).trim_end_matches('\0').to_owned();
-                let board = name.map(text);
-                Ok(Self { bytes, check, board })
-            }
-            _ => Err("its check sum is wrong"),
+        if word(list + 32) != Some(check) || bytes.len() > STORED {
+            return Err("its check sum is wrong");
         }
+        let page = &bytes[..PAGE];
+        let at = page.windows(MAGIC.len()).position(|window| window == MAGIC);
+        let name = at.and_then(|at| page.get(at + MAGIC.len()..)?.get(..NAME));
+        let text = |name| String::from_utf8_lossy(name).trim_end_matches('\0').to_owned();
+        let board = name.map(text);
+        Ok(Self { bytes, check, board })
     }
 
     /// Passes if the image is for the board that is there, as far as both are known.

@@ -1,9 +1,6 @@
 //! The evidence: a TOML file that says which board did what, step by step. It is written whole before and after every step.
 
-use crate::bounded;
-use crate::error::{cut, parser_text};
 use crate::prelude::*;
-use crate::report;
 
 /// Version of the file.
 pub const SCHEMA: u32 = 1;
@@ -81,11 +78,9 @@ impl Evidence {
     /// The text for the person.
     pub fn is_of(&self, found: &str) -> Result<(), String> {
         let own = format!("board {}, build {}", self.board, self.build);
-        let other = format!(
-            "{found}: allowed is {}; another image begins with a new evidence file",
-            cut(&own)
-        );
-        if found == own { Ok(()) } else { Err(other) }
+        let other = "another image begins with a new evidence file";
+        let refused = || Err(format!("{found}: allowed is {}; {other}", cut(&own)));
+        if found == own { Ok(()) } else { refused() }
     }
 
     /// The last attempt.

@@ -1,8 +1,6 @@
 //! The steps as data. [`Table::next`] alone hands out a step to walk through, so that nothing switches the stage on before gates and
 //! fault input were judged.
 
-use std::collections::BTreeMap;
-
 use super::evidence::{Evidence, Verdict};
 
 use crate::prelude::*;

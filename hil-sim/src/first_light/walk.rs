@@ -1,6 +1,5 @@
 //! Walks through the table: one step after the other, each judged, until one gives doubt.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +8,7 @@ use super::evidence::{Evidence, Record, SCHEMA, Verdict};
 use super::person::Person;
 use super::table::{Act, Board, Limits, Read, Ready, Table};
 use super::wire::Wire;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// `command.timeout_s` while a step may switch the stage on: a drive that hears nothing for so long stops by itself.
 pub const TIMEOUT_S: u32 = 2;
@@ -323,11 +322,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     fn noise(&mut self, signal: &str) -> Checked {
         let mut rows = self.said.iter().map(|line| line.split(',').collect::<Vec<_>>());
         let column = rows.by_ref().find_map(|row| row.iter().position(|name| *name == signal));
-        let values = rows.filter_map(|row| row.get(column?)?.parse::<f64>().ok());
-        let values: Vec<f64> = values.collect();
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let rms = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let values: Vec<f64> = rows.filter_map(|row| row.get(column?)?.parse().ok()).collect();
+        let mean = Stats::of(values.iter().copied()).mean();
+        let rms = Stats::of(values.iter().map(|value| value - mean)).rms();
         let limits = |ends: [&str; 2]| ends.map(str::to_owned);
         let (about, noise) = (limits(["0-MEAN", "MEAN"]), limits(["0", "NOISE"]));
         self.judge(&format!("mean of {signal}"), mean, "A", &about, 0.0)?;

@@ -2,11 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 
 use crate::console::link::{Answer, Link, LinkError, Urgent, locked};
 use crate::console::open;
-use crate::error::Error;
+use crate::prelude::*;
 
 /// Time between two signs of life: a quarter of the time after which the drive stops ([`super::walk::TIMEOUT_S`]).
 const ALIVE: Duration = Duration::from_millis(500);

@@ -1,6 +1,7 @@
 //! Figures and tables as CSV.
 
 use std::collections::HashMap;
+use std::iter::once;
 
 use crate::outcome::name::{snake, unique};
 use crate::prelude::*;
@@ -43,14 +44,11 @@ fn of_figure(figure: &Figure) -> Result<String, Error> {
     }
     let columns: Vec<_> = columns.into_iter().flatten().collect();
     let mut taken = Vec::new();
-    let heads = columns.iter().map(|(name, _)| unique(name.clone(), &mut taken)).collect();
+    let heads: Vec<_> = columns.iter().map(|(name, _)| unique(name.clone(), &mut taken)).collect();
     let length = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
-    let row = |k: usize| {
-        columns
-            .iter()
-            .map(move |(_, values)| values.get(k).map_or_else(String::new, |v| number(*v)))
-    };
-    records(heads, (0..length).map(|k| row(k).collect()))
+    let cell = |values: &[f64], k| values.get(k).map_or_else(String::new, |v| number(*v));
+    let row = |k| columns.iter().map(|(_, values)| cell(values, k)).collect();
+    written(once(heads).chain((0..length).map(row)))
 }
 
 /// A table.
@@ -67,8 +65,8 @@ pub fn of_table(table: &Table) -> Result<String, Error> {
         Cell::Text(text) => text.clone(),
         Cell::Number { value, .. } => number(*value),
     };
-    let heads = table.columns.iter().map(&mut head).collect();
-    records(heads, table.rows.iter().map(|row| row.iter().map(text).collect()))
+    let heads: Vec<_> = table.columns.iter().map(&mut head).collect();
+    written(once(heads).chain(table.rows.iter().map(|row| row.iter().map(text).collect())))
 }
 
 /// A number with all its digits; nothing for what is not finite.
@@ -76,24 +74,12 @@ fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
-fn records(heads: Vec<String>, rows: impl Iterator<Item = Vec<String>>) -> Result<String, Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in std::iter::once(heads).chain(rows) {
-        writer.write_record(row).map_err(internal)?;
-    }
-    text(writer)
-}
-
-/// Records whose fields are the columns.
-fn written<T: serde::Serialize>(records: &[T]) -> Result<String, Error> {
+/// Records whose fields are the columns, or lists of cells.
+fn written(records: impl IntoIterator<Item: Serialize>) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for record in records {
         writer.serialize(record).map_err(internal)?;
     }
-    text(writer)
-}
-
-fn text(writer: csv::Writer<Vec<u8>>) -> Result<String, Error> {
     String::from_utf8(writer.into_inner().map_err(internal)?).map_err(internal)
 }
 

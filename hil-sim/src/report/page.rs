@@ -83,13 +83,12 @@ fn write_results(body: &mut String, sections: &[Section<'_>]) {
             Some(_) => "<span class=\"lost\">failed</span>".to_owned(),
             None => metrics.lost(),
         };
+        let (about, source) = (prose(section.about), prose(section.stands_for));
         let _ = writeln!(
             body,
             "<tr><td><a href=\"#{name}\">{name}</a></td>\
-             <td>{} <span class=\"source\">{}</span></td>\
-             <td>{what}</td><td class=\"number\">{value}</td><td>{lost}</td></tr>",
-            prose(section.about),
-            prose(section.stands_for),
+             <td>{about} <span class=\"source\">{source}</span></td>\
+             <td>{what}</td><td class=\"number\">{value}</td><td>{lost}</td></tr>"
         );
     }
     body.push_str("</tbody></table></nav>\n");
@@ -125,17 +124,16 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
         write_table(body, &Table::of_steps(steps));
     }
     for (figure, number) in outcome.figures.iter().zip(1..) {
-        let source = if figure.source.is_empty() {
-            String::new()
-        } else {
-            format!(" <span class=\"source\">{}</span>", prose(&figure.source))
+        let source = match figure.source.as_str() {
+            "" => String::new(),
+            source => format!(" <span class=\"source\">{}</span>", prose(source)),
         };
+        let title = prose(figure.title.trim_end_matches('.'));
+        let panels = plot::panels(figure)?.concat();
         let _ = writeln!(
             body,
-            "<figure>\n<div class=\"scroll\">\n{}</div>\n\
-             <figcaption><b>{name}, plot {number}.</b> {}.{source}</figcaption>\n</figure>",
-            plot::panels(figure)?.concat(),
-            prose(figure.title.trim_end_matches('.')),
+            "<figure>\n<div class=\"scroll\">\n{panels}</div>\n\
+             <figcaption><b>{name}, plot {number}.</b> {title}.{source}</figcaption>\n</figure>"
         );
     }
     for table in &outcome.tables {

@@ -180,10 +180,8 @@ fn titled(drawing: &str, panel: &Panel, frame: &Frame<'_>) -> String {
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let title = escape(&titles.next().unwrap_or_default());
-        text += &format!(
-            "<circle {}",
-            part.replacen("/>", &format!("><title>{title}</title></circle>"), 1)
-        );
+        let titled = part.replacen("/>", &format!("><title>{title}</title></circle>"), 1);
+        text += &format!("<circle {titled}");
     }
     text
 }
@@ -243,11 +241,8 @@ where
     let mut mesh = chart.configure_mesh();
     mesh.label_style(font(TEXT_PX)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
-    mesh.x_labels(if frame.width == WIDE { 10 } else { 5 }).y_labels(if panel.switch {
-        2
-    } else {
-        7
-    });
+    mesh.x_labels(if frame.width == WIDE { 10 } else { 5 });
+    mesh.y_labels(if panel.switch { 2 } else { 7 });
     mesh.y_desc(signs(&panel.y_label)).y_label_formatter(&number);
     mesh.axis_desc_style(font_beside(&panel.y_label));
     mesh.set_all_tick_mark_size(3 * SCALE);

@@ -1,12 +1,8 @@
 //! What runs must have in common to belong together.
 
-use std::collections::BTreeMap;
-
 use serde_json::Value as Json;
 
 use super::Shard;
-use crate::config::{Key, Value};
-use crate::error::cut;
 use crate::outcome::{Origin, SCHEMA_VERSION};
 use crate::prelude::*;
 

@@ -6,7 +6,6 @@ use std::io::{Seek as _, SeekFrom, Write as _};
 use std::sync::{Mutex, PoisonError};
 
 use super::{Header, Run};
-use crate::bounded;
 use crate::prelude::*;
 
 /// A file that is read.

@@ -1,12 +1,9 @@
 //! The outcome of a whole run from its shards.
 
-use std::collections::BTreeMap;
-
 use serde_json::Value;
 
 use super::Header;
 use super::journal::Lines;
-use crate::bounded;
 use crate::experiments::statistical;
 use crate::prelude::*;
 
@@ -30,8 +27,8 @@ pub struct Merged {
 pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
     let mut files: Vec<(&Path, Lines)> = Vec::new();
     for path in paths {
-        let bytes =
-            bounded::bytes(path, bounded::RUNS_MIB).map_err(|e| data(path, e.to_string()))?;
+        let bytes = bounded::bytes(path, bounded::RUNS_MIB);
+        let bytes = bytes.map_err(|e| data(path, e.to_string()))?;
         files.push((path, Lines::of(path, &bytes)?));
     }
     let Some((first_path, first)) = files.first() else {
@@ -52,9 +49,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
             return Err(data(path, format!("shard {shard} is in {} already", before.display())));
         }
         if let Some(line) = file.torn {
-            let problem =
-                format!("line {line} is torn; do this shard again, or continue it with --resume");
-            return Err(data(path, problem));
+            let remedy = "do this shard again, or continue it with --resume";
+            return Err(data(path, format!("line {line} is torn; {remedy}")));
         }
         records.extend(file.runs.into_iter().map(|run| (run.run, run.record)));
         let missing = shard.numbers(header.runs).filter(|run| !records.contains_key(run));
@@ -65,10 +61,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         }
     }
     let count = header.shard.count;
-    let missing: Vec<String> = (1..=count)
-        .filter(|index| !places.contains_key(index))
-        .map(|index| format!("{index}/{count}"))
-        .collect();
+    let missing = (1..=count).filter(|index| !places.contains_key(index));
+    let missing: Vec<_> = missing.map(|index| format!("{index}/{count}")).collect();
     if !missing.is_empty() {
         let (number, some) = (missing.len(), listed(&missing));
         return Err(Error::Refused(format!("{number} of {count} shards are missing: {some}")));
@@ -92,10 +86,9 @@ fn listed(all: &[String]) -> String {
 /// Checks that this program is the one that made the shards: the outcome is computed here.
 fn check_program(path: &Path, header: &Header, config: &Config) -> Result<(), Error> {
     let own = Header::new(&header.experiment, config, header.seed, header.shard, header.runs)?;
-    let problem = |difference| {
-        data(path, format!("not made by this program, which has to merge it: {difference}"))
-    };
-    header.difference(&own).map_or(Ok(()), |difference: String| Err(problem(difference)))
+    let what = "not made by this program, which has to merge it";
+    let problem = |difference| Err(data(path, format!("{what}: {difference}")));
+    header.difference(&own).map_or(Ok(()), problem)
 }
 
 fn data(path: &Path, problem: String) -> Error {

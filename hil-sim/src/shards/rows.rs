@@ -41,18 +41,18 @@ fn flatten(name: String, value: &Value, into: &mut Vec<(String, Cell)>) {
         Value::String(text) => into.push((name, Cell::from(text.as_str()))),
         Value::Array(values) if values.iter().any(Value::is_array) => {}
         Value::Array(values) => {
-            (1..)
-                .zip(values)
-                .for_each(|(n, value): (u32, _)| flatten(under(&n.to_string()), value, into));
+            for (n, value) in values.iter().enumerate() {
+                flatten(under(&(n + 1).to_string()), value, into);
+            }
         }
         Value::Object(fields) => {
             match (serde_json::from_value::<Stats>(value.clone()), fields.iter().next()) {
                 (Ok(error), _) if error.count() > 0 => {
-                    let values =
-                        [("rms", error.rms()), ("mean", error.mean()), ("max", error.largest())];
-                    into.extend(
-                        values.map(|(of, value)| (under(&format!("{of}_deg")), number(value))),
-                    );
+                    into.extend([
+                        (under("rms_deg"), number(error.rms())),
+                        (under("mean_deg"), number(error.mean())),
+                        (under("max_deg"), number(error.largest())),
+                    ]);
                 }
                 (Ok(_), _) => {}
                 // The variants of an enumeration.

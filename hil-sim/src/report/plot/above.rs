@@ -6,7 +6,7 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::colours::{self, MARKER, dash, is_coloured, pen, pen_of};
+use super::colours::{self, MARKER, dash, pen, pen_of};
 use super::{Area, Failure, LEFT, RIGHT, SCALE, TEXT_PX, font};
 use crate::outcome::{Panel, Series, Style};
 use crate::report::prose::signs;
@@ -20,7 +20,7 @@ const EVENT_ROW: i32 = 15 * SCALE;
 pub fn places(panel: &Panel) -> impl Iterator<Item = (usize, &Series)> {
     let mut next = 0;
     panel.series.iter().map(move |series| {
-        next += usize::from(is_coloured(series.style) && !series.like_previous);
+        next += usize::from(dash(series.style).is_none() && !series.like_previous);
         (usize::saturating_sub(next, 1), series)
     })
 }

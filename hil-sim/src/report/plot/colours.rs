@@ -47,12 +47,7 @@ pub fn pen_of(style: Style, place: usize) -> ShapeStyle {
     }
 }
 
-/// Whether a series has a colour of its own.
-pub fn is_coloured(style: Style) -> bool {
-    matches!(style, Style::Line | Style::Points)
-}
-
-/// Length of the dashes of a dashed line.
+/// Length of the dashes of a dashed line; a series without them has a colour of its own.
 pub fn dash(style: Style) -> Option<i32> {
     match style {
         Style::Line | Style::Points => None,
