@@ -1,6 +1,11 @@
 //! The options that all simulating commands share.
 
-use crate::prelude::*;
+use std::path::PathBuf;
+
+use clap::Args;
+use sim_bench::prelude::*;
+
+use crate::config::Value;
 
 /// The options that describe a simulation.
 #[derive(Args, Clone, Default)]

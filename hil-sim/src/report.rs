@@ -10,7 +10,9 @@ mod prose;
 
 use std::io::Write as _;
 
-use crate::prelude::*;
+use std::path::Path;
+
+use sim_bench::prelude::*;
 
 pub use console::{paragraph, table, text};
 pub use csv::{csv, of_table};

@@ -1,9 +1,11 @@
 //! An experiment: one function from a [`Context`] to an [`Outcome`].
 
+use crate::config::{Config, Key, plant_settings};
+use crate::error::Error;
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+use rayon::prelude::*;
 use std::path::Path;
-
-use crate::config::Key;
-use crate::prelude::*;
 
 /// Input of an experiment.
 pub struct Context<'a> {

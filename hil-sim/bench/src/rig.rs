@@ -1,11 +1,17 @@
 //! The bench: a drive, a plant, and the one period between them.
 
+use crate::config::{Config, LoadMode, built, check_model, open_phase, plant_settings};
+use crate::error::Error;
+use crate::plant::{Load, Plant, PlantSettings};
+use crate::stats::Stats;
+use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
-use drive_core::{Compare, FrontEndState, Sample};
-
-use crate::plant::PlantSettings;
-use crate::prelude::*;
+use drive_core::{
+    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
+};
+use drive_settings::Settings;
+use std::f64::consts::TAU;
 
 /// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;

@@ -3,10 +3,12 @@
 
 pub mod fault_code;
 
+use crate::error::Error;
+use crate::experiment::{Context, Experiment};
+use crate::outcome::Outcome;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-
-use crate::prelude::*;
 
 /// A statistical experiment.
 pub trait Study: Sized + Sync {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::iter::once;
 
 use crate::outcome::name::{snake, unique};
-use crate::prelude::*;
+use sim_bench::prelude::*;
 
 /// The files of an outcome, each with its name without folder and without the experiment's name: one a figure,
 /// `levels.csv`, and one a table, `table-1.csv` and so on.
