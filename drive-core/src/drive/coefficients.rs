@@ -187,6 +187,8 @@ pub struct SequenceSteps {
     pub verify: u32,
     /// Electrical speed up to which the shaft counts as standing, turns per period.
     pub standing_freq: f32,
+    /// The same of a free shaft that the small angle error of a healthy drive has pushed while the lock was verified.
+    pub pushed_freq: f32,
     /// A per period.
     pub stop_ramp: f32,
 }

@@ -431,7 +431,7 @@ impl Field {
     #[cold]
     fn verify(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
         if k.elapsed >= c.sequence.verify {
-            if !k.stands(c) {
+            if k.seen.rotor_freq.abs() > c.sequence.pushed_freq {
                 return Err(Fault::LostLock);
             }
             let phase = Self::behind_the_flux(k);

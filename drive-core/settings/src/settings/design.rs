@@ -25,6 +25,8 @@ const VERIFY_S: f32 = 0.3;
 /// Rated frequency, Hz, up to which 1 Hz counts as standing, 30 rpm of four poles; in proportion above it. An angle that is right to some
 /// degrees turns a shaft that nothing holds.
 const STANDING_OF_HZ: f32 = 60.0;
+/// Angle error, rad, that may push a free shaft while the lock is verified. A wrong lock pushes it ten times as hard.
+const PUSHING_ERROR: f32 = 0.1;
 /// Rotor time constants in which flux decays before the asymmetry is measured: the saliency, in its square, to 0.25 %.
 const DECAY_T: f32 = 3.0;
 /// Time between two steps of the thermal loads, s.
@@ -94,6 +96,9 @@ impl Settings {
             share: self.observer.leakage_share,
             slope: self.observer.leakage_slope,
         };
+        let standing_freq = PERIOD_S * (self.nameplate.frequency_hz / STANDING_OF_HZ).max(1.0);
+        let torque = m.torque_per_ampere(i_d) * PUSHING_ERROR * i_d;
+        let pushed_freq = self.freq_of_rpm(60.0 / TAU * torque / m.inertia * VERIFY_S);
         Ok(Coefficients {
             front_end: FrontEnd {
                 current_a: s.of_code(s.current_a),
@@ -172,7 +177,8 @@ impl Settings {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),
                 verify: periods(VERIFY_S),
-                standing_freq: PERIOD_S * (self.nameplate.frequency_hz / STANDING_OF_HZ).max(1.0),
+                standing_freq,
+                pushed_freq: standing_freq.max(pushed_freq),
                 stop_ramp: self.stop_a_per_s() * PERIOD_S,
             },
         })
