@@ -108,7 +108,9 @@ impl Case {
     fn response(&self, config: &Config, source: AngleSource, seed: u64) -> Result<Response, Error> {
         let (rated_nm, rated_rpm) = (config.rated_nm(), rated_rpm(config));
         let mut rig = Rig::from_config(&self.bench(config, source), seed)?;
-        rig.start(Mode::Speed)?;
+        if or_refusal(rig.start(Mode::Speed))?.is_err() {
+            return Ok(Response { fault: rig.drive.state().fault(), ..Response::default() });
+        }
         let (wanted, band) = (self.speed * rated_rpm, RECOVERED * rated_rpm);
         rig.command(&Command::Speed(wanted as f32))?;
         let runs_up = |rig: &Rig| (turning_rpm(rig) - wanted).abs() > band && rig.fault().is_none();
