@@ -9,8 +9,8 @@
 //! ```
 //!
 //! The first level is a current at which the inverter already takes its full voltage; the flux there is on the straight beginning
-//! of the curve. An eighth level is the magnetising current of the rated flux, which the first seven have shown: its flux gives the
-//! inductance at which the drive works. Each level lasts until the voltage is at rest, at most [`DWELL_S`].
+//! of the curve. The first seven levels show the magnetising current of the rated flux. An eighth level is at that current, and its flux
+//! gives the inductance at which the drive works. Each level lasts until its voltage is at rest, at most [`LONGEST_S`].
 //!
 //! Two levels at 0.6 and 0.3 of that current, where the curve is nearly straight, then give the circuit of small changes there,
 //! by the fit of step 4. Its rotor resistance is the true one, its inductances are the slopes of the curve. (Around the magnetising

@@ -53,7 +53,7 @@ const RESISTANCE_S: f32 = 5.0;
 const RESISTANCE_DECAY: f32 = CARRIER_S / RESISTANCE_S;
 /// Largest relative deviation from the measured resistance at the start, by how much it grows in a second, and its upper limit: a winding
 /// at one and a half times its rated current warms by less than 0.2 % a second. (In a wide range from the start on, resistance and slow
-/// error ran away together while the torque current was constant, by 35 % and 12 Hz at 368 Hz rated. With a centre that follows
+/// error ran away together while the q-axis current was constant, by 35 % and 12 Hz at 368 Hz rated. If the centre follows
 /// instead, a small error of the inverter's voltage moved it for minutes, until fault 41.)
 const NEAR: f32 = 0.1;
 const WARMING_PER_S: f32 = 0.002;

@@ -18,7 +18,7 @@
 
 use crate::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 
-/// Largest angle error per deviation of the saliency, relative to that without torque current.
+/// Largest angle error per deviation of the saliency, relative to that without q-axis current.
 const MOST_GAIN: f32 = 2.0;
 
 /// Reference of the saliency and inverse slope over i_q.

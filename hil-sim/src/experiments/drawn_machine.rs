@@ -32,7 +32,7 @@ impl Circuit {
         Self::of([m.rs + more, m.rr, m.lls, m.llr, m.lm])
     }
 
-    /// The same at a magnetising current, A: with the chord of the magnetising curve there.
+    /// Circuit of the simulated motor at a magnetising current, A: its magnetising inductance is the chord of the curve there.
     pub fn at(config: &Config, i_d: f64) -> Self {
         let mut config = config.clone();
         if let Some(iron) = plant_settings(&config).iron {

@@ -10,9 +10,9 @@ pub const EXPERIMENT: Experiment = Experiment::new("shaft", run)
     .uses(&[BENCH, DRIVE])
     .not(&[&["angle_source", "shaft.load_inertia", "shaft.stiffness", "shaft.damping", "motor.inertia"]]);
 
-/// Loads as shares of the rated torque, or of this share of the torque that the drive allows if that is smaller, and speeds as shares of
-/// the rated one.
-const ALLOWED: f64 = 0.9;
+/// Full load at most, as a share of the torque that the drive allows.
+const SHARE_OF_ALLOWED_TORQUE: f64 = 0.9;
+/// Loads as shares of the full load, the rated torque at most; speeds as shares of the rated speed.
 const LOADS: [f64; 4] = [0.5, -0.5, 1.0, -1.0];
 const SPEEDS: [f64; 4] = [0.0, 0.05, 0.2, 0.8];
 /// Inertias relative to the one that the drive has in its settings.
@@ -43,7 +43,7 @@ struct Case {
     coupling_hz: Option<f64>,
 }
 
-/// What a load does to the speed.
+/// Response of the speed to a load.
 #[derive(Clone, Copy, Debug, Default)]
 struct Response {
     /// Largest deviation, rpm, and its area, percent of the rated speed times s; both positive in the direction of the load.
@@ -128,7 +128,7 @@ impl Case {
         seen.noise_pct[0] = 100.0 * torque.deviation() / rated_nm;
         let room = rig.drive.room().i_q;
         let allowed = f64::from((-room.0).min(room.1)) * last.torque_per_ampere;
-        seen.load = self.load * (ALLOWED * allowed / rated_nm).min(1.0);
+        seen.load = self.load * (SHARE_OF_ALLOWED_TORQUE * allowed / rated_nm).min(1.0);
         let direction = self.load.signum();
         let start = rig.time();
         for step in 0..steps(AFTER_S + self.ramp_s) {
@@ -221,7 +221,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "ends" => Cell::from(pair.1[0].fault.map_or("runs".to_owned(), |fault| format!("fault {}", fault.code())));
     ];
     let table = Table::of("Load on a free shaft", &columns, pairs.iter().enumerate()).note(
-        "Bound: load times delay of the speed loop over the time in which the rated torque brings the inertia to the rated speed.          Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
+        "Bound: load times delay of the speed loop over the time in which the rated torque brings the inertia to the rated speed. Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
     );
     outcome.tables.push(table);
     outcome.faults.extend(pairs.iter().filter_map(|(case, [seen, _])| {

@@ -4,9 +4,9 @@ use core::f32::consts::PI;
 
 use super::{Learning, LearningState, TURNING};
 
-/// Settling time of the torque current and the averages at every point, s, and of slip and flux, in rotor time constants. Another
-/// torque current saturates the iron in another way, and one of the other sign turns the flux in the frame. (With 0.2 the even part
-/// of the signal spread by up to 0.007 if the rotor time constant was above 0.45 s.)
+/// Settling time of the q-axis current and the averages at every point, s, and of slip and flux, in rotor time constants. If the
+/// q-axis current changes, the iron saturates in another way; if it changes its sign, the flux turns in the frame. (With 0.2, motors
+/// whose rotor time constant is above 0.45 s had an even part of the signal that spread by up to 0.007.)
 const SETTLE_S: f32 = 0.1;
 pub(super) const SETTLE_T: f32 = 1.0;
 /// Settling time at the first point, in rotor time constants, and what may be left of a change of the flux at any other,
