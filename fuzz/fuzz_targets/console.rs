@@ -2,28 +2,22 @@
 //! its answer, and an order that reached the drive came from a line that was answered without error.
 #![no_main]
 
-use std::sync::{LazyLock, OnceLock};
+use std::sync::LazyLock;
 
 use drive_core::learned::{Learned, Verdict};
-use drive_core::{Drive, Measured, State};
+use drive_core::{Measured, State};
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
 use induction_drive::console::line::UNASKED;
 use induction_drive::front::Front;
 use induction_drive::link::trace::SIGNALS;
-use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
+use induction_drive_fuzz::START;
+use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeStrip, found};
 use libfuzzer_sys::fuzz_target;
 
-#[path = "../../src/console/tests/doubles.rs"]
-mod doubles;
-use doubles::{FakeBus, FakeDrive, FakePort, FakeStrip, found};
-
 fuzz_target!(|bytes: &[u8]| {
-    let settings = FirmwareSettings::of_the_board();
-    // (The design rules take longer than all else.)
-    static DRIVE: OnceLock<Drive> = OnceLock::new();
-    let initial = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));
-    let mut drive = FakeDrive::new(initial.clone());
+    let (settings, initial) = START.clone();
+    let mut drive = FakeDrive::new(initial);
     let (mut front, mut bus) = (Front::new(settings), None::<FakeBus>);
     let (mut port, mut strip) = (FakePort::default(), FakeStrip::default());
     let mut now_ms = 0_u32;

@@ -76,9 +76,9 @@ enum Task {
         #[command(flatten)]
         which: Which,
     },
-    /// Fuzzes the console, the saved settings and the stream
+    /// Fuzzes console, bus, saved settings, learned values, stream, and the files of the simulator
     Fuzz {
-        /// Seconds for each of the three
+        /// Seconds for each of the six
         #[arg(default_value_t = 300)]
         seconds: u32,
     },
