@@ -43,8 +43,8 @@ struct Case {
     coupling_hz: Option<f64>,
 }
 
-/// Response of the speed to a load.
-#[derive(Clone, Copy, Debug, Default)]
+/// Response of the speed to a load; a run that ends in a fault, or does not start, has no figures.
+#[derive(Clone, Copy, Debug)]
 struct Response {
     /// Largest deviation, rpm, and its area, percent of the rated speed times s; both positive in the direction of the load.
     dip_rpm: f64,
@@ -58,6 +58,19 @@ struct Response {
     /// The load, in rated torques.
     load: f64,
     fault: Option<Fault>,
+}
+
+impl Response {
+    /// The same number in each place.
+    fn of(x: f64) -> Self {
+        let (noise_pct, load, fault) = ([x; 2], x, None);
+        Self { dip_rpm: x, area_pct_s: x, recovery_s: x, noise_pct, angle_deg: x, load, fault }
+    }
+
+    /// How the run ended.
+    fn end(&self) -> String {
+        self.fault.map_or("runs".to_owned(), |fault| format!("fault {}", fault.code()))
+    }
 }
 
 impl Case {
@@ -109,7 +122,7 @@ impl Case {
         let (rated_nm, rated_rpm) = (config.rated_nm(), rated_rpm(config));
         let mut rig = Rig::from_config(&self.bench(config, source), seed)?;
         if or_refusal(rig.start(Mode::Speed))?.is_err() {
-            return Ok(Response { fault: rig.drive.state().fault(), ..Response::default() });
+            return Ok(Response { fault: rig.drive.state().fault(), ..Response::of(f64::NAN) });
         }
         let (wanted, band) = (self.speed * rated_rpm, RECOVERED * rated_rpm);
         rig.command(&Command::Speed(wanted as f32))?;
@@ -118,7 +131,7 @@ impl Case {
             rig.wait(0.1);
         }
         rig.wait(BEFORE_S);
-        let mut seen = Response::default();
+        let mut seen = Response::of(0.0);
         let (mut torque, mut speed) = (Stats::default(), Stats::default());
         let mut last = Mean::default();
         for _ in 0..steps(BEFORE_S) {
@@ -148,8 +161,9 @@ impl Case {
             }
         }
         seen.noise_pct[1] = 100.0 * torque.deviation() / rated_nm;
-        seen.fault = rig.drive.state().fault();
-        Ok(seen)
+        let fault = rig.drive.state().fault();
+        let figures = if fault.is_none() { seen } else { Response::of(f64::NAN) };
+        Ok(Response { fault, load: seen.load, ..figures })
     }
 }
 
@@ -174,6 +188,11 @@ impl Mean {
         speeds.push(mean.rpm);
         mean
     }
+}
+
+/// A dash for what is not known.
+fn known(value: f64, decimals: usize) -> Cell {
+    Cell::fixed_or_dash((!value.is_nan()).then_some(value), decimals)
 }
 
 fn rated_rpm(config: &Config) -> f64 {
@@ -208,17 +227,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let columns = columns![|_, pair: &(&Case, &[Response; 2])|
         "shaft" => Cell::from(pair.0.name());
         "speed (rpm)" => Cell::fixed(pair.0.speed * rated_rpm, 0);
-        "load (%)" => Cell::fixed(100.0 * pair.1[0].load, 0);
-        "speed falls by (rpm)" => Cell::fixed(pair.1[0].dip_rpm, 1);
-        "with an encoder (rpm)" => Cell::fixed(pair.1[1].dip_rpm, 1);
-        "bound (rpm)" => Cell::fixed(bound_rpm(pair), 1);
-        "area (%s)" => Cell::fixed(pair.1[0].area_pct_s, 2);
-        "with an encoder (%s)" => Cell::fixed(pair.1[1].area_pct_s, 2);
-        "back within 2 % (s)" => Cell::fixed(pair.1[0].recovery_s, 2);
-        "torque noise before (%)" => Cell::fixed(pair.1[0].noise_pct[0], 2);
-        "after (%)" => Cell::fixed(pair.1[0].noise_pct[1], 2);
-        "largest angle error (°)" => Cell::fixed(pair.1[0].angle_deg, 1);
-        "ends" => Cell::from(pair.1[0].fault.map_or("runs".to_owned(), |fault| format!("fault {}", fault.code())));
+        "load (%)" => known(100.0 * pair.1[0].load, 0);
+        "speed falls by (rpm)" => known(pair.1[0].dip_rpm, 1);
+        "with an encoder (rpm)" => known(pair.1[1].dip_rpm, 1);
+        "bound (rpm)" => known(bound_rpm(pair), 1);
+        "area (%s)" => known(pair.1[0].area_pct_s, 2);
+        "with an encoder (%s)" => known(pair.1[1].area_pct_s, 2);
+        "back within 2 % (s)" => known(pair.1[0].recovery_s, 2);
+        "torque noise before (%)" => known(pair.1[0].noise_pct[0], 2);
+        "after (%)" => known(pair.1[0].noise_pct[1], 2);
+        "largest angle error (°)" => known(pair.1[0].angle_deg, 1);
+        "ends" => Cell::from(pair.1[0].end());
+        "with an encoder" => Cell::from(pair.1[1].end());
     ];
     let table = Table::of("Load on a free shaft", &columns, pairs.iter().enumerate()).note(
         "Bound: load times delay of the speed loop over the time in which the rated torque brings the inertia to the rated speed. Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
@@ -241,7 +261,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let half = of(&|case| is_plain(case) && case.load == 0.5 && case.speed == 0.8);
     let plain = of(&is_plain);
     let largest = |of: &[[Response; 2]], value: &dyn Fn(&[Response; 2]) -> f64| {
-        of.iter().map(value).fold(0.0, f64::max)
+        of.iter().map(value).fold(f64::NAN, f64::max)
     };
     let m = &mut outcome.metrics;
     m.set("area_half_load_pct_s", largest(&half, &|r| r[0].area_pct_s));
