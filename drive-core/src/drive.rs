@@ -40,7 +40,7 @@ use crate::flux::catch::CatchState;
 use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::flux::observer::{Induced, ObserverState};
+use crate::flux::observer::{Induced, ObserverState, Resistance};
 use crate::front_end::{FrontEnd, FrontEndState};
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Measured, Output, Sample};
@@ -369,8 +369,8 @@ impl From<Fault> for End {
 /// Measured in a run, for the next one that does not measure it again.
 #[derive(Clone, Copy, Debug, Default)]
 struct Left {
-    /// Stator resistance relative to the settings, less one.
-    resistance: f32,
+    /// Stator resistance.
+    resistance: Resistance,
     /// Voltage per phase that the inverter drops beyond its dead time, V.
     inverter_drop: f32,
     /// Asymmetry of sensors and stator beyond the learned one.

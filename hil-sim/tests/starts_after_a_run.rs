@@ -93,3 +93,25 @@ fn a_start_follows_a_run_by_voltage_and_frequency() {
         regulates(&mut rig);
     }
 }
+
+/// A light shaft that the search has moved starts as a turning one, which measures no resistance: that of the run before bounds it. (At
+/// rest the shaking of the shaft moved it by 25 %, to fault 41.)
+#[test]
+fn a_start_that_measures_no_resistance_keeps_what_was_measured() {
+    let config = Config::load(Some("marathon-0kw2"), None, &["plant=r", "prepare.learn=yes"]);
+    for seed in [1, 2] {
+        let mut rig = Rig::from_config(config.as_ref().expect("settings"), seed).expect("a bench");
+        let before = rig.drive.stator_resistance().unwrap_or_default();
+        rig.set_load(Load::Free { torque: 0.0 }).expect("a load");
+        rig.start(Mode::Speed).expect("a start");
+        let mut largest = 0.0_f32;
+        for _ in 0..200 {
+            rig.wait(0.01);
+            let deviation = rig.drive.stator_resistance().expect("an observer") - before;
+            largest = largest.max(deviation.abs());
+        }
+        println!("seed {seed}: {:.1} %", 100.0 * largest);
+        assert_eq!(rig.drive.state(), State::Speed, "seed {seed}");
+        assert!(largest < 0.12, "seed {seed}: {largest}");
+    }
+}

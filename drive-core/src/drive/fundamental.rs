@@ -56,11 +56,11 @@ impl Coefficients {
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
         if !filters {
-            s.estimator.filter.start(s.observer.resistance_decay > 0.0);
+            s.estimator.filter.start(s.observer.resistance.decay > 0.0);
         }
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
-        if let (Some(observer), true) = (&self.observer, filters && step.trust.resistance) {
-            observer.correct_resistance(&mut s.observer, resistance);
+        if self.observer.is_some() && filters && step.trust.resistance {
+            s.observer.resistance.correct(resistance);
         }
     }
 

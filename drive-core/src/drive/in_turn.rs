@@ -117,7 +117,7 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
-                let decay = s.observer.resistance_decay;
+                let decay = s.observer.resistance.decay;
                 self.estimator.predict(&mut s.estimator, step.reference.q, decay);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.measured)
@@ -217,7 +217,7 @@ impl Coefficients {
         }
         let tracked = self.observer.is_some() && trust.observes();
         let building = trust.current != Judged::Strictly;
-        let known = Known { deviation: s.observer.resistance, tracked, building };
+        let known = Known { deviation: s.observer.resistance.now, tracked, building };
         let judged = self.prediction.judge(&mut s.prediction, step.current, known);
         if trust.current == Judged::No {
             s.prediction.forget();

@@ -85,7 +85,7 @@ impl Drive {
     pub fn stator_resistance(&self) -> Option<f32> {
         match &self.phase {
             Phase::Field(field) if self.c.observer.is_some() && field.has_torque() => {
-                Some(field.observer.resistance)
+                Some(field.observer.resistance.now)
             }
             _ => None,
         }

@@ -50,8 +50,8 @@ const SEEN_AGE: f32 = 5.5;
 /// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
 /// well, with 7 s it comes to 19 %.
 const RESISTANCE_S: f32 = 5.0;
-const RESISTANCE_DECAY: f32 = CARRIER_S / RESISTANCE_S;
-/// Largest relative deviation from the measured resistance at the start, by how much it grows in a second, and its upper limit: a winding
+const DECAY: f32 = CARRIER_S / RESISTANCE_S;
+/// Largest relative deviation from the measured resistance, by how much it grows in a second, and its upper limit: a winding
 /// at one and a half times its rated current warms by less than 0.2 % a second. (In a wide range from the start on, resistance and slow
 /// error ran away together while the q-axis current was constant, by 35 % and 12 Hz at 368 Hz rated. If the centre follows
 /// instead, a small error of the inverter's voltage moved it for minutes, until fault 41.)
@@ -118,14 +118,21 @@ pub struct ObserverState {
     leakage: f32,
     /// Saliency fixed to the flux, of the last carrier period.
     flux_saliency: f32,
-    /// Stator resistance relative to the settings, less one.
-    pub resistance: f32,
-    /// The same, as this start has measured it, and the share of the deviation from that which decays in a carrier period; 0
-    /// until then.
-    measured_resistance: f32,
-    /// Largest deviation of the resistance from it.
+    /// Stator resistance.
+    pub resistance: Resistance,
+}
+
+/// The tracked stator resistance, with what bounds it. A start on a turning shaft measures none and goes on with that of the run before.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Resistance {
+    /// Relative to the settings, less one.
+    pub now: f32,
+    /// The same, as the last start at rest has measured it.
+    measured: f32,
+    /// Largest deviation from it.
     near: f32,
-    pub resistance_decay: f32,
+    /// Share of the deviation from it that decays in a carrier period; 0 until it was measured.
+    pub decay: f32,
 }
 
 /// Saliency and leakage of the fundamental wave.
@@ -172,12 +179,6 @@ impl ObserverState {
         *self = Self { flux, resistance: self.resistance, ..Self::default() };
     }
 
-    /// Takes a measured resistance, relative to the settings, less one.
-    pub fn take_resistance(&mut self, measured: f32) {
-        (self.resistance, self.measured_resistance, self.near) = (measured, measured, NEAR);
-        self.resistance_decay = RESISTANCE_DECAY;
-    }
-
     /// Takes the voltage that a step puts out, without the carrier, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
         self.latest = self.latest.wrapping_add(VOLTAGES - 1) % VOLTAGES;
@@ -193,6 +194,29 @@ impl ObserverState {
     #[cold] // its stores are not merged with those of a step
     pub fn skip(&mut self, current: AlphaBeta) {
         self.last = current;
+    }
+}
+
+impl Resistance {
+    /// Takes a measured one, relative to the settings, less one.
+    pub fn take(&mut self, measured: f32) {
+        *self = Self { now: measured, measured, near: NEAR, decay: DECAY };
+    }
+
+    /// Adds a correction of the filter; the deviation from the measured one decays.
+    pub fn correct(&mut self, correction: f32) {
+        self.near = limited(self.near + CARRIER_S * WARMING_PER_S, FARTHEST);
+        self.turn(correction - self.decay * (self.now - self.measured));
+    }
+
+    /// Adds a change.
+    fn turn(&mut self, change: f32) {
+        let range = if self.decay > 0.0 {
+            (self.measured - self.near, self.measured + self.near)
+        } else {
+            (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0)
+        };
+        self.now = within(self.now + change, range);
     }
 }
 
@@ -262,7 +286,7 @@ impl Observer {
             d: (share - s.d) * change.d - s.q * change.q,
             q: (share + s.d) * change.q - s.q * change.d,
         };
-        let r_s = self.r_s * (1.0 + state.resistance);
+        let r_s = self.r_s * (1.0 + state.resistance.now);
         let e = voltage * PERIOD_S - mean * r_s - leakage * self.leakage;
         state.change = e;
         let grown = self.rate * (self.coupled * mean.d - state.flux);
@@ -290,8 +314,7 @@ impl Observer {
     /// per period, while the observer leads; once a carrier period.
     pub fn compare_with_injection(&self, state: &mut ObserverState, error: f32, flux_freq: f32) {
         let angle = self.r_s * self.i_d / (state.flux * flux_freq * TAU);
-        let share = FROM_INJECTION * angle * limited(error, LARGEST_ERROR);
-        self.turn_resistance(state, share);
+        state.resistance.turn(FROM_INJECTION * angle * limited(error, LARGEST_ERROR));
     }
 
     /// Whether there is flux enough to show an angle and a speed.
@@ -309,23 +332,6 @@ impl Observer {
             per_angle: state.gain.q * flux_freq * (TAU / PERIOD_S),
             per_resistance: self.r_s * (1.0 / PERIOD_S) * current / state.flux,
         }
-    }
-
-    /// Adds a correction of the filter to the relative resistance, whose deviation from the measured one decays.
-    pub fn correct_resistance(&self, state: &mut ObserverState, correction: f32) {
-        let drift = state.resistance - state.measured_resistance;
-        state.near = limited(state.near + CARRIER_S * WARMING_PER_S, FARTHEST);
-        self.turn_resistance(state, correction - state.resistance_decay * drift);
-    }
-
-    /// Adds a change to the relative resistance.
-    fn turn_resistance(&self, state: &mut ObserverState, change: f32) {
-        let range = if state.resistance_decay > 0.0 {
-            (state.measured_resistance - state.near, state.measured_resistance + state.near)
-        } else {
-            (RESISTANCE.0 - 1.0, RESISTANCE.1 - 1.0)
-        };
-        state.resistance = within(state.resistance + change, range);
     }
 
     /// Current that makes the flux, A, with the magnetising inductance of the settings.
@@ -366,19 +372,16 @@ mod tests {
     /// A deviation from the measured resistance decays; one from that of the run before does not.
     #[test]
     fn the_resistance_returns_to_the_measured_one() {
-        let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
-        let observer = Observer::new(&Motor::default(), &leakage, 1.4, 0.0);
         let after = |measured: Option<f32>, seconds: f32| {
-            let mut state = ObserverState { resistance: 0.2, ..ObserverState::default() };
-            state.start(Some(&observer));
+            let mut resistance = Resistance { now: 0.2, ..Resistance::default() };
             if let Some(measured) = measured {
-                state.take_resistance(measured);
+                resistance.take(measured);
             }
-            observer.correct_resistance(&mut state, 0.05);
+            resistance.correct(0.05);
             for _ in 0..(600.0 * seconds) as usize {
-                observer.correct_resistance(&mut state, 0.0);
+                resistance.correct(0.0);
             }
-            state.resistance
+            resistance.now
         };
         assert!((after(None, 60.0) - 0.25).abs() < 1e-3);
         assert!((after(Some(-0.1), 0.0) + 0.05).abs() < 1e-3);
@@ -389,14 +392,11 @@ mod tests {
     /// A resistance that was measured bounds the tracked one to what heating can have changed since.
     #[test]
     fn the_resistance_stays_near_the_measured_one() {
-        let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
-        let observer = Observer::new(&Motor::default(), &leakage, 1.4, 0.0);
-        let mut state = ObserverState::default();
-        state.take_resistance(0.2);
+        let mut resistance = Resistance::default();
+        resistance.take(0.2);
         let mut pull = |seconds: f32, by: f32| {
-            (0..(600.0 * seconds) as usize)
-                .for_each(|_| observer.correct_resistance(&mut state, by));
-            state.resistance
+            (0..(600.0 * seconds) as usize).for_each(|_| resistance.correct(by));
+            resistance.now
         };
         assert!((pull(1.0, 0.05) - (0.2 + NEAR + WARMING_PER_S)).abs() < 1e-3);
         assert!((pull(2.0, -0.05) - (0.2 - NEAR - 3.0 * WARMING_PER_S)).abs() < 1e-3);
