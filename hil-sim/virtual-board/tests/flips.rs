@@ -2,15 +2,22 @@
 
 use anyhow::{Result, ensure};
 use drive_core::{Drive, State};
+use hil_sim::Config;
+use virtual_board::addresses::Addresses;
 use virtual_board::board::snapshot::Snapshot;
-use virtual_board::{Board, Pair};
+use virtual_board::cpu::Register;
+use virtual_board::{Board, Image, Pair};
 
 use crate::common;
 
 /// Periods behind a flip of the directed list: a start that a flip orders is through its preparation.
 const LONG: u64 = 6000;
+/// Periods behind a flip while the drive is on.
+const AFTER: u64 = 300;
 /// Periods behind a flip of any word of the interrupt: what acts without an order acts at once.
 const SHORT: u64 = 60;
+/// Memory of the trace, which lies behind all data of the main loop.
+const TRACE: &str = "induction_drive::task::bring_up::start_control::TRACE_MEMORY";
 
 /// A drive that has run with the injection and rests: off, and in the fault that ended it.
 fn situations() -> Result<[(&'static str, Pair, Snapshot); 2]> {
@@ -30,11 +37,25 @@ fn situations() -> Result<[(&'static str, Pair, Snapshot); 2]> {
     Ok([("off", off, a), ("fault", fault, b)])
 }
 
-/// Flips a bit, and goes on; an error if a gate is on at any time.
-fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Result<()> {
+/// Goes back, and flips a bit.
+fn flipped(board: &mut Board, to: &Snapshot, at: u32, bit: u32) -> Result<()> {
     board.go_back(to)?;
     let byte = board.cpu.byte(at + bit / 8).unwrap_or(0);
     board.cpu.write(at + bit / 8, &[byte ^ 1 << (bit % 8)]);
+    Ok(())
+}
+
+/// The words that decide whether the drive is on: that of the phase, then the number of the fault; that of the mailbox, then the tag of
+/// its command.
+fn deciding(board: &Board) -> [u32; 5] {
+    let Addresses { orders, order_waits, phase, .. } = board.addresses();
+    let mailbox = board.cpu.word(orders).unwrap_or(0);
+    [phase, phase + 4, mailbox + order_waits, mailbox, mailbox + 4]
+}
+
+/// Flips a bit, and goes on; an error if a gate is on at any time.
+fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Result<()> {
+    flipped(board, to, at, bit)?;
     for _ in 0..periods {
         board.run_periods(1)?;
         while board.next_period().is_some() {}
@@ -49,19 +70,52 @@ fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Re
 fn no_bit_of_what_decides_switches_a_gate_on() -> Result<()> {
     for (name, mut pair, kept) in situations()? {
         let board = &mut pair.board;
-        let addresses = board.addresses();
-        let mailbox = board.cpu.word(addresses.orders).unwrap_or(0);
-        let phase = addresses.phase;
-        let word = board.cpu.word(phase).unwrap_or(0);
+        let words = deciding(board);
+        let word = board.cpu.word(words[0]).unwrap_or(0);
         ensure!(Drive::PHASES.contains(&word), "{name}: {word:#x} is no phase");
-        // The word of the phase, then the number of the fault; the word of the mailbox, then the tag of its command.
-        let words = [phase, phase + 4, mailbox + addresses.order_waits, mailbox, mailbox + 4];
         for at in words {
             for bit in 0..32 {
                 flip(board, &kept, at, bit, LONG)?;
             }
         }
         println!("{name}: {} bits", 32 * words.len());
+    }
+    Ok(())
+}
+
+/// The same bits in each phase that has outputs: the drive goes on as it would have, or is off.
+#[test]
+fn no_bit_of_what_decides_leads_to_another_phase() -> Result<()> {
+    let ways = [
+        ("start torque", State::Precharge),
+        ("start torque", State::Magnetising),
+        ("start torque", State::Torque),
+        ("start learning", State::Learning),
+        ("start vf", State::VoltsPerHertz),
+    ];
+    for (order, state) in ways {
+        let mut pair = common::pair(&Config::default(), 61)?;
+        pair.order(order)?;
+        pair.until_state(state)?;
+        pair.board.forgive();
+        let (kept, board) = (pair.board.keep()?, &mut pair.board);
+        board.run_periods(AFTER)?;
+        let words = deciding(board);
+        let goes_on = board.cpu.word(words[0]);
+        let mut off = 0;
+        for at in words {
+            for bit in 0..32 {
+                flipped(board, &kept, at, bit)?;
+                board.run_periods(AFTER)?;
+                let phase = board.cpu.word(words[0]);
+                // (A word that is no phase ends the program.)
+                let is_on = phase.is_some_and(|phase| Drive::PHASES[2..].contains(&phase));
+                let is_off = !is_on && !board.gates().any_on();
+                ensure!(is_off || phase == goes_on, "{state}: {at:#x}, bit {bit}: {phase:x?}");
+                off += u32::from(is_off);
+            }
+        }
+        println!("{state}: {} bits, {off} of them switched it off", 32 * words.len());
     }
     Ok(())
 }
@@ -98,6 +152,32 @@ fn no_bit_of_the_drive_switches_a_gate_on() -> Result<()> {
             }
         }
         println!("{name}: {} bits", 8 * state.size);
+    }
+    Ok(())
+}
+
+/// Each bit of the main loop: its stack, and all static data but the interrupt's and the trace. Whatever it does with it, the drive stays
+/// as it is; if not, a second passes without a gate.
+#[test]
+#[ignore = "an hour: `cargo xtask prove image`"]
+fn no_bit_of_the_main_loop_switches_a_gate_on() -> Result<()> {
+    let trace = Image::built()?.symbol(TRACE)?.address;
+    for (name, mut pair, kept) in situations()? {
+        let board = &mut pair.board;
+        let phase = board.addresses().phase;
+        let was = board.cpu.word(phase);
+        let words = (board.cpu.get(Register::SP) & !3..trace).step_by(4);
+        let mut others = 0;
+        for at in words.clone() {
+            for bit in 0..32 {
+                flip(board, &kept, at, bit, SHORT)?;
+                if board.cpu.word(phase) != was {
+                    others += 1;
+                    flip(board, &kept, at, bit, LONG)?;
+                }
+            }
+        }
+        println!("{name}: {} bits, {others} of them changed the phase", 32 * words.count());
     }
     Ok(())
 }
