@@ -1,7 +1,7 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
 use drive_commission::{Collector, Commissioning, Next, Record, Refusal, Report, Step};
-use drive_core::{Command, Excited, Mode, Refused, Stop};
+use drive_core::{Command, Mode, Refused, Stop, TestReport};
 use drive_settings::Settings;
 
 use crate::link::ring::Record as Period;
@@ -86,7 +86,7 @@ impl Session {
     /// current loop, which takes long, with the outputs off.
     pub fn poll(
         &mut self,
-        drive: &Excited,
+        drive: &TestReport,
         design: impl FnOnce(&mut Commissioning),
     ) -> Option<Command> {
         if !self.is_running() || self.news.is_some() {
@@ -94,7 +94,7 @@ impl Session {
         }
         match self.commissioning.poll(drive, &mut self.sums) {
             Next::Wait => {}
-            Next::Excite(excitation) => return Some(Command::Excite(excitation)),
+            Next::Excite(excitation) => return Some(Command::Test(excitation)),
             Next::Stop => return Some(Command::Stop(Stop::Coast)),
             Next::Start => return Some(Command::Start(Mode::Torque)),
             Next::Torque(i_q) => return Some(Command::Torque(i_q)),

@@ -76,13 +76,13 @@ pub struct Desk {
     /// Time of the present pass, ms, wrapping.
     now_ms: u32,
     /// Time of the last sign of life of the one that commands; `None` to begin anew.
-    heard_ms: Option<u32>,
+    last_activity_ms: Option<u32>,
     /// A stop after this silence, s, or why the drive did not take it, until that is announced.
     stopped: Option<Result<f32, CommandError>>,
     /// While the wiring is being checked: the periods of the status at its start.
     checking: Option<u32>,
     /// Result of the last learning, if it is not believable.
-    unbelievable: Option<Learned>,
+    rejected_learning: Option<Learned>,
     /// Whether a learning has ended that is not announced yet.
     learned: bool,
     /// A homing, and how the last one has ended, until that is announced.
@@ -119,10 +119,10 @@ impl Desk {
             shaft: Shaft::default(),
             braked: false,
             now_ms: 0,
-            heard_ms: None,
+            last_activity_ms: None,
             stopped: None,
             checking: None,
-            unbelievable: None,
+            rejected_learning: None,
             learned: false,
             homing: None,
             homed: None,
@@ -150,7 +150,7 @@ impl Desk {
     /// The result of the last learning: whether it is in use, and the result itself.
     pub fn learned(&self) -> Option<(bool, &Learned)> {
         let in_use = self.settings.in_force().learned.as_ref().map(|result| (true, result));
-        self.unbelievable.as_ref().map(|result| (false, result)).or(in_use)
+        self.rejected_learning.as_ref().map(|result| (false, result)).or(in_use)
     }
 
     /// Whether a task waits: orders are not taken.
@@ -177,8 +177,8 @@ impl Desk {
     }
 
     /// The stop with which the terminal strip keeps the drive from running, whoever commands.
-    pub fn hold(&self) -> Option<Stop> {
-        self.settings.in_force().strip.hold(self.wires)
+    pub fn interlock(&self) -> Option<Stop> {
+        self.settings.in_force().strip.interlock(self.wires)
     }
 
     /// Latches that the strip's reference was lost, and announces it.
@@ -195,7 +195,7 @@ impl Desk {
     /// Notes a sign of life: silence of the one that commands stops the drive. `now_ms` wraps.
     pub fn note_activity(&mut self, from: Commander, now_ms: u32) {
         if self.commander() == from {
-            self.heard_ms = Some(now_ms);
+            self.last_activity_ms = Some(now_ms);
         }
     }
 
@@ -207,7 +207,7 @@ impl Desk {
     }
 
     /// Follows the drive. Called at the beginning of each pass of the main loop. `now_ms` wraps.
-    pub fn follow(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+    pub fn poll_drive(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         self.now_ms = now_ms;
         if let Some(status) = drive.status() {
             self.stage.watch(&status, now_ms);
@@ -217,7 +217,7 @@ impl Desk {
         drive.learned(&mut |result| {
             self.settings.learned(result);
             self.unsaved |= result.verdict.is_accepted();
-            self.unbelievable = Some(*result).filter(|result| !result.verdict.is_accepted());
+            self.rejected_learning = Some(*result).filter(|result| !result.verdict.is_accepted());
             self.learned = true;
         });
         if let Some(homed) = self.go_on_homing(drive) {
@@ -253,7 +253,7 @@ impl Desk {
     /// meanwhile is heard first. `now_ms` wraps.
     pub fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         let limit_s = self.timeout_s();
-        let silence_ms = now_ms.wrapping_sub(*self.heard_ms.get_or_insert(now_ms));
+        let silence_ms = now_ms.wrapping_sub(*self.last_activity_ms.get_or_insert(now_ms));
         if limit_s > 0.0 && silence_ms as f32 * 1e-3 > limit_s {
             self.stop_after_silence(limit_s, drive, now_ms);
         }
@@ -262,7 +262,7 @@ impl Desk {
     /// Stops the drive: nobody was heard for this time, s.
     pub fn stop_after_silence(&mut self, limit_s: f32, drive: &mut impl DriveHandle, now_ms: u32) {
         if !drive.is_off() {
-            self.heard_ms = Some(now_ms);
+            self.last_activity_ms = Some(now_ms);
             self.announcer.stopped = Some(Commander::Console);
             self.stopped = Some(drive.command(Command::Stop(Stop::Coast)).map(|_| limit_s));
         }
@@ -304,7 +304,7 @@ impl Desk {
             state: status.state,
             turns: status.telemetry.turns,
             i_q: status.telemetry.reference.q,
-            room: status.room.i_q,
+            room: status.torque_limits.i_q,
         };
         let outcome = match homing.poll(&seen) {
             Next::Wait => return None,
@@ -327,7 +327,7 @@ impl Desk {
         let answer = if order.is_for_the_commander(from) && self.commander() != from {
             Err(Refusal::Authority(self.commander()))
         } else {
-            self.carry_out(from, order, drive)
+            self.dispatch(from, order, drive)
         };
         if let (Commander::Bus | Commander::Strip, Err(why)) = (from, &answer) {
             self.note_refusal(from, why.clone());
@@ -335,14 +335,14 @@ impl Desk {
         answer
     }
 
-    fn carry_out(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
+    fn dispatch(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
             Order::Apply if !self.settings.is_staged() => Ok(Reply::NothingStaged),
             Order::Start(_)
             | Order::Learn { .. }
             | Order::Commission(..)
             | Order::Apply
-            | Order::Save => self.begin(from, order, drive),
+            | Order::Save => self.design(from, order, drive),
             Order::Accept => self.accept(from, drive),
             Order::Stop(stop) => {
                 self.cancel_start(from);
@@ -484,7 +484,7 @@ impl Desk {
     }
 
     /// Performs an order that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
-    fn begin(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
+    fn design(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
             // The drive says why it does not start.
             Order::Start(mode) if !drive.is_off() => return self.start(mode, drive),
@@ -510,12 +510,12 @@ impl Desk {
         let staged = self.settings.prepare().is_some();
         self.unsaved |= staged;
         let applied = if staged { self.adopt(drive) } else { Applied::default() };
-        self.finish(&order, applied, drive).1
+        self.complete(&order, applied, drive).1
     }
 
     /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of the front ends
-    pub fn go_on(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+    pub fn run_pending(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         let task = self.task.take();
         let waits = core::mem::take(&mut self.waits) == WAITS;
         let Some(Task { from, order, applied }) = task.filter(|_| waits) else { return };
@@ -527,15 +527,15 @@ impl Desk {
             return self.wait(Task { from, order, applied });
         }
         // The time that it takes is not silence of the user.
-        self.heard_ms = None;
+        self.last_activity_ms = None;
         let done = match applied {
-            Some(applied) => self.finish(&order, applied, drive),
+            Some(applied) => self.complete(&order, applied, drive),
             None => match self.apply(&order, drive) {
                 // In the next pass: a stop that has come meanwhile, and an ENABLE that was opened, are seen first.
                 Ok(applied) if order.starts() => {
                     return self.wait(Task { from, order, applied: Some(applied) });
                 }
-                Ok(applied) => self.finish(&order, applied, drive),
+                Ok(applied) => self.complete(&order, applied, drive),
                 Err(why) => (Applied::default(), Err(why)),
             },
         };
@@ -567,7 +567,7 @@ impl Desk {
     }
 
     /// Finishes an order whose settings are in force, with these remarks, which the answer to [`Order::Apply`] takes.
-    fn finish(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Done {
+    fn complete(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Done {
         let answer = match *order {
             Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
             Order::Start(mode) => self.start(mode, drive),
@@ -640,7 +640,7 @@ impl Desk {
     /// Passes if the terminal strip lets the drive run. A contact that has just opened does not.
     fn not_held(&self) -> Result<(), Refusal> {
         let closed = Wires(self.wires.0 & self.contacts.0);
-        let hold = self.settings.in_force().strip.hold(closed);
+        let hold = self.settings.in_force().strip.interlock(closed);
         hold.map_or(Ok(()), |stop| Err(Refusal::Held(stop)))
     }
 
@@ -662,7 +662,7 @@ impl Desk {
         may_stage(drive)?;
         let found = drive.session().found(&self.settings.latest().drive);
         self.settings.stage(found.ok_or(Refusal::NothingFound)?);
-        self.begin(from, Order::Save, drive)
+        self.design(from, Order::Save, drive)
     }
 
     /// Lets the drive look for a stop of the shaft.

@@ -36,7 +36,7 @@ impl Front {
         now_ms: u32,
     ) {
         let Self { desk, console, bus, strip } = self;
-        desk.follow(drive, now_ms);
+        desk.poll_drive(drive, now_ms);
         let [.., motor] = wires.codes();
         desk.read_motor(motor, drive, now_ms);
         console.poll(port, desk, drive, now_ms);
@@ -44,7 +44,7 @@ impl Front {
         strip.serve(wires, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {
             line.set_busy(true);
-            desk.go_on(drive, now_ms);
+            desk.run_pending(drive, now_ms);
             line.set_busy(false);
         } else {
             desk.watch_silence(drive, now_ms);

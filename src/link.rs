@@ -4,7 +4,9 @@ pub mod mailbox;
 pub mod ring;
 pub mod trace;
 
-use drive_core::{Accepted, Excited, Hardware, Limiting, Refused, Room, Sample, State, Telemetry};
+use drive_core::{
+    Accepted, Hardware, Limiting, Refused, Sample, State, Telemetry, TestReport, TorqueLimits,
+};
 
 /// The drive's answer to a command.
 pub type Answer = Result<Accepted, Refused>;
@@ -34,9 +36,9 @@ pub struct Status {
     /// Why the torque is smaller than asked for.
     pub limiting: Limiting,
     /// Limits of the torque.
-    pub room: Room,
+    pub torque_limits: TorqueLimits,
     /// Tracked stator resistance relative to the settings, less one.
     pub stator_resistance: Option<f32>,
     /// For the commissioning.
-    pub excited: Excited,
+    pub test_report: TestReport,
 }

@@ -77,7 +77,7 @@ impl Strip {
         let settings = desk.settings().in_force();
         let (own, speed) = (settings.strip, self.speed(settings, port, closed));
         let state = status.map_or(State::Off, |status| status.state);
-        let (off, hold) = (drive.is_off(), desk.hold());
+        let (off, hold) = (drive.is_off(), desk.interlock());
         let commands = desk.commander() == Commander::Strip;
         // The desk shows a refusal at the console.
         let mut give = |desk: &mut Desk, order| drop(desk.order(Commander::Strip, order, drive));

@@ -4,7 +4,7 @@
 use crate::common::config;
 use drive_core::AngleSource;
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_core::{Accepted, Command, Dq, Excitation, Mode, Refused, State, Stop};
+use drive_core::{Accepted, Command, Dq, Mode, Refused, State, Stop, TestSignal};
 use hil_sim::rig::Rig;
 
 /// Time behind a command, s: a stop by ramp is over.
@@ -35,7 +35,7 @@ impl Bench {
         config.drive.track_rotor = config.drive.angle_source == AngleSource::Encoder;
         let mut rig = Rig::from_config(&config, 1).unwrap();
         if mode == Mode::Commissioning {
-            rig.command(&Command::Excite(Excitation::Rest)).unwrap();
+            rig.command(&Command::Test(TestSignal::Rest)).unwrap();
             (0..6000).for_each(|_| rig.step());
             assert_eq!(rig.drive.state(), State::Exciting);
         } else {
@@ -52,7 +52,7 @@ impl Bench {
             Command::Start(mode),
             Command::Relock,
             Command::CheckWiring,
-            Command::Excite(Excitation::Rest),
+            Command::Test(TestSignal::Rest),
             Command::Stop(Stop::Coast),
             Command::Stop(Stop::Ramp),
             Command::Stop(Stop::Quick),

@@ -21,7 +21,7 @@ fn rig(changes: &[&str], seed: u64) -> Rig {
 
 /// The report that the firmware gets ten times a second.
 fn seen(rig: &Rig) -> Seen {
-    let (t, room) = (rig.drive.telemetry(), rig.drive.room().i_q);
+    let (t, room) = (rig.drive.telemetry(), rig.drive.torque_limits().i_q);
     let periods = (rig.time() * 6000.0).round() as u32;
     Seen { periods, state: rig.drive.state(), turns: t.turns, i_q: t.reference.q, room }
 }

@@ -63,7 +63,7 @@ fn check_of(wiring: Wiring, config: &Config, seed: u64) -> (State, f64) {
         if drive.state() == State::CheckingWiring {
             peak = plant.phase_currents().iter().fold(peak, |p, i| p.max(i.abs()));
         }
-        if matches!(drive.state(), State::Catching | State::Fault(_)) {
+        if matches!(drive.state(), State::FlyingStart | State::Fault(_)) {
             break;
         }
     }
@@ -91,7 +91,7 @@ fn the_right_wiring_of_every_motor_is_accepted() {
             let range = config.measurement.range_a;
             for seed in 0..12 {
                 let (state, peak) = check_of(Wiring::Right, &config, seed);
-                assert_eq!(state, State::Catching, "{} {khz} kHz, seed {seed}", motor.name);
+                assert_eq!(state, State::FlyingStart, "{} {khz} kHz, seed {seed}", motor.name);
                 assert!(peak < 0.4 * range, "{} {khz} kHz, seed {seed}: {peak} A", motor.name);
             }
         }
@@ -120,7 +120,7 @@ fn the_right_wiring_is_accepted_over_motors_and_seeds() {
                 ];
                 let motor: Vec<&str> = motor.iter().map(String::as_str).collect();
                 let (state, peak) = check(Wiring::Right, &motor, seed);
-                assert_eq!(state, State::Catching, "{motor:?}, seed {seed}");
+                assert_eq!(state, State::FlyingStart, "{motor:?}, seed {seed}");
                 largest = largest.max(peak);
             }
         }

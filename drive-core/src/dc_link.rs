@@ -144,7 +144,7 @@ pub struct DcLinkLimits {
 
 impl DcLinkLimits {
     /// The torque current, A, within the limits, and why it was changed.
-    pub fn hold(&self, i_q: f32) -> (f32, Limiting) {
+    pub fn clamp(&self, i_q: f32) -> (f32, Limiting) {
         if i_q < self.i_q.0 {
             (self.i_q.0, self.why.0)
         } else if i_q > self.i_q.1 {

@@ -3,24 +3,24 @@
 mod allowed;
 mod axes;
 mod brake;
-mod catching;
 mod coefficients;
 mod command;
 mod commands;
-mod excitation;
-mod excite;
 mod field;
+mod flying_start;
 mod fundamental;
-mod in_turn;
 mod learn;
 mod limits;
 mod power;
 mod prepare;
 mod protect;
 mod scalar;
+mod slow_tasks;
+mod standstill_test;
 mod state;
 mod stopping;
 mod telemetry;
+mod test_signal;
 #[cfg(test)]
 mod tests;
 mod trust;
@@ -56,18 +56,18 @@ use crate::protect::travel_watch::TravelWatchState;
 use crate::supply::RelayState;
 
 use axes::Axes;
-use catching::Residual;
-pub use coefficients::{Catching, Coefficients, DcLimit, PowerLimit, Protection, SequenceSteps};
+pub use coefficients::{Coefficients, DcLimit, FlyingStart, PowerLimit, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
-pub use excitation::{Excitation, Excited, Regulator};
-use excite::Excite;
-use in_turn::COMMANDS_BEHIND;
+use flying_start::Residual;
 use limits::Limits;
 use prepare::Prepare;
 use scalar::Scalar;
+use slow_tasks::COMMANDS_BEHIND;
+use standstill_test::StandstillTest;
 pub use state::{Mode, Stage, State};
 pub use stopping::COAST_S;
-pub use telemetry::{Room, Telemetry};
+pub use telemetry::{Telemetry, TorqueLimits};
+pub use test_signal::{Regulator, TestReport, TestSignal};
 
 /// The drive: coefficients, the phase that it is in, and that which outlives a phase.
 ///
@@ -93,14 +93,14 @@ pub struct Drive {
     c: Coefficients,
     /// Changes of `c`, counted, wrapping.
     changes: u32,
-    kept: Kept,
+    kept: Common,
     phase: Phase,
 }
 
 /// State that every phase uses, or that outlives a run.
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
-struct Kept {
+struct Common {
     /// Control periods spent in this state.
     elapsed: u32,
     /// Offsets of the current sensors a, b and c that the last start has measured, A.
@@ -142,12 +142,12 @@ struct References {
 #[derive(Clone, Debug)]
 #[repr(u32)] // a word of its own: a state is not copied around a byte of it
 enum Phase {
-    Off(Left) = Drive::PHASES[0],
-    Fault(Fault, Left) = Drive::PHASES[1],
+    Off(CarryOver) = Drive::PHASES[0],
+    Fault(Fault, CarryOver) = Drive::PHASES[1],
     /// On the way to one of the next three.
     Prepare(Prepare) = Drive::PHASES[2],
-    /// Excitation of the motor at rest.
-    Excite(Excite) = Drive::PHASES[3],
+    /// TestSignal of the motor at rest.
+    Test(StandstillTest) = Drive::PHASES[3],
     /// Turning by voltage and frequency.
     Scalar(Scalar) = Drive::PHASES[4],
     /// Current in a frame of the flux.
@@ -156,16 +156,16 @@ enum Phase {
 
 /// The work that a drive was started for.
 #[derive(Clone, Copy, Debug)]
-enum Job {
+enum Start {
     Field(Goal),
     Scalar {
         /// Reference of the speed, mechanical turns/s.
         speed: f32,
     },
-    Excite(Excitation),
+    Test(TestSignal),
 }
 
-impl Job {
+impl Start {
     pub fn of_mode(mode: Mode) -> Self {
         match mode {
             Mode::Torque => Self::Field(Goal::Torque),
@@ -173,7 +173,7 @@ impl Job {
             Mode::Position => Self::Field(Goal::POSITION),
             Mode::Learning => Self::Field(Goal::Learn),
             Mode::VoltsPerHertz => Self::Scalar { speed: 0.0 },
-            Mode::Commissioning => Self::Excite(Excitation::Rest),
+            Mode::Commissioning => Self::Test(TestSignal::Rest),
         }
     }
 
@@ -181,13 +181,13 @@ impl Job {
         match self {
             Self::Field(goal) => goal.mode(),
             Self::Scalar { .. } => Mode::VoltsPerHertz,
-            Self::Excite(_) => Mode::Commissioning,
+            Self::Test(_) => Mode::Commissioning,
         }
     }
 
     /// Whether its start looks for a turning shaft. A drive that learns has a locked one.
     pub fn catches(&self, c: &Coefficients) -> bool {
-        c.catching.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
+        c.flying_start.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
     }
 }
 
@@ -222,7 +222,7 @@ struct Field {
     pub lead_axis: UnitVector,
     pub goal: Goal,
     /// Results of the run before; the residual flux until the speed of the shaft is found.
-    pub given: Left,
+    pub carried: CarryOver,
     /// Large: it holds the state of the alternative demodulations.
     pub estimator: EstimatorState,
     /// Large while a turning shaft is looked for.
@@ -237,7 +237,7 @@ enum Frame {
     /// The counted angle of the rotor and the slip.
     #[default]
     Encoder,
-    /// The slip alone: a drive that learns has a locked shaft.
+    /// The slip injection_only: a drive that learns has a locked shaft.
     LockedShaft,
     /// Injection and observer.
     Tracked,
@@ -368,7 +368,7 @@ impl From<Fault> for End {
 
 /// Measured in a run, for the next one that does not measure it again.
 #[derive(Clone, Copy, Debug, Default)]
-struct Left {
+struct CarryOver {
     /// Stator resistance.
     resistance: Resistance,
     /// Voltage per phase that the inverter drops beyond its dead time, V.
@@ -400,9 +400,9 @@ impl Drive {
 
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
-        let phase = Phase::Off(Left::default());
-        let limits = Limits { motor_fault: coefficients.motor_unread(), ..Limits::default() };
-        let kept = Kept { seen: Telemetry::still(), limits, ..Kept::default() };
+        let phase = Phase::Off(CarryOver::default());
+        let limits = Limits { motor_fault: coefficients.no_motor_reading(), ..Limits::default() };
+        let kept = Common { seen: Telemetry::still(), limits, ..Common::default() };
         Self { c: coefficients, changes: 0, kept, phase }
     }
 
@@ -412,7 +412,7 @@ impl Drive {
             Phase::Off(_) => State::Off,
             Phase::Fault(fault, _) => State::Fault(*fault),
             Phase::Prepare(prepare) => prepare.state(),
-            Phase::Excite(excite) => excite.state(),
+            Phase::Test(test) => test.state(),
             Phase::Scalar(scalar) => scalar.state(),
             Phase::Field(field) => field.state(),
         }
@@ -433,17 +433,14 @@ impl Drive {
 
     /// Whether the outputs are off, and stay off until the next command.
     pub fn is_off(&self) -> bool {
-        match self.phase {
-            Phase::Off(_) | Phase::Fault(..) => true,
-            Phase::Prepare(_) | Phase::Excite(_) | Phase::Scalar(_) | Phase::Field(_) => false,
-        }
+        matches!(self.phase, Phase::Off(_) | Phase::Fault(..))
     }
 
     /// Whether the outputs drive a current, for whatever purpose; the pulses of a wiring check do not count.
     fn is_energised(&self) -> bool {
         match &self.phase {
             Phase::Off(_) | Phase::Fault(..) | Phase::Prepare(_) => false,
-            Phase::Excite(excite) => excite.state() == State::Exciting,
+            Phase::Test(test) => test.state() == State::Exciting,
             Phase::Scalar(_) | Phase::Field(_) => true,
         }
     }
@@ -532,7 +529,7 @@ impl Drive {
         checked?;
         match &mut self.phase {
             Phase::Prepare(_) => Ok(self.prepare(measured)?),
-            Phase::Excite(excite) => Ok(Some(excite.step(c, k, measured)?)),
+            Phase::Test(test) => Ok(Some(test.step(c, k, measured)?)),
             Phase::Scalar(scalar) => scalar.step(c, k, measured).map(Some),
             Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(None),
         }
@@ -557,7 +554,7 @@ impl Drive {
             (End::Fault(fault), Phase::Field(field)) => Some(field.as_catch_failure(fault)),
             (End::Fault(fault), _) => Some(fault),
         };
-        let left = self.left();
+        let left = self.carry_over();
         match fault {
             None => self.enter(Phase::Off(left)),
             Some(fault) => self.enter(Phase::Fault(fault, left)),
@@ -566,17 +563,18 @@ impl Drive {
 
     /// That which a run leaves to the next one.
     #[cold]
-    fn left(&self) -> Left {
+    fn carry_over(&self) -> CarryOver {
         match &self.phase {
-            Phase::Off(left) | Phase::Fault(_, left) => *left,
-            Phase::Prepare(Prepare { left, .. }) | Phase::Excite(Excite { left, .. }) => {
-                Left { residual: left.residual.or(Some(Residual::of(0.0))), ..*left }
+            Phase::Off(carried) | Phase::Fault(_, carried) => *carried,
+            Phase::Prepare(Prepare { carried, .. })
+            | Phase::Test(StandstillTest { carried, .. }) => {
+                CarryOver { residual: carried.residual.or(Some(Residual::of(0.0))), ..*carried }
             }
             Phase::Scalar(scalar) => {
                 let volts = self.kept.seen.voltage.q.abs();
-                Left { residual: Some(Residual::of(volts)), ..scalar.left }
+                CarryOver { residual: Some(Residual::of(volts)), ..scalar.carried }
             }
-            Phase::Field(field) => field.left(),
+            Phase::Field(field) => field.carry_over(),
         }
     }
 }

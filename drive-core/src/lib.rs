@@ -67,8 +67,8 @@ pub mod table;
 
 pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, COAST_S, Catching, Coefficients, Command, Drive, Excitation, Excited, Mode,
-    Protection, Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
+    Accepted, COAST_S, Coefficients, Command, Drive, FlyingStart, Mode, Protection, Refused,
+    Regulator, SequenceSteps, Stage, State, Stop, Telemetry, TestReport, TestSignal, TorqueLimits,
 };
 pub use drive::{DcLimit, PowerLimit};
 pub use fault::Fault;

@@ -99,16 +99,15 @@ pub struct Motion {
     bend: f32,
     /// Largest current, A.
     i_q_limit: f32,
-    /// Control periods in a step of the loops, and whether the speed is estimated, else counted.
+    /// Control periods in a step of the loops. With one of an injection period the speed is estimated, otherwise counted.
     divider: u8,
-    estimates: bool,
     /// Steps in 0.1 s.
     rest_steps: u8,
 }
 
 /// Reference of the loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Goal {
+pub enum Target {
     /// Speed, mechanical turns/s.
     Speed(f32),
     /// Position, mechanical turns from the start.
@@ -146,7 +145,7 @@ impl Motion {
     /// Control periods per step of the loops with an encoder, and with the PII tracking: 100 Hz.
     pub const DIVIDER: u8 = 60;
     /// Control periods per step of the loops with the estimated speed: one period of the injection.
-    pub const ESTIMATED_DIVIDER: u8 = 10;
+    pub const ESTIMATED: u8 = 10;
     /// Counts of a rotor position that no encoder counts, per electrical turn.
     pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
@@ -161,7 +160,6 @@ impl Motion {
         i_q_limit: f32,
     ) -> Self {
         let rate = (1.0 / design.period_s) as f32;
-        let divider = (design.period_s / f64::from(PERIOD_S) + 0.5) as u8;
         let (k_c, forward) = (design.k_c as f32, rate / design.acceleration as f32);
         Self {
             pi: Pi { k_c, z_c: design.z_c as f32 },
@@ -178,8 +176,7 @@ impl Motion {
             twice_braking: 2.0 * ramps.usual,
             bend: ramps.usual / design.k_x as f32,
             i_q_limit,
-            divider,
-            estimates: divider == Self::ESTIMATED_DIVIDER,
+            divider: (design.period_s / f64::from(PERIOD_S) + 0.5) as u8,
             rest_steps: (0.1 * rate + 0.5) as u8,
         }
     }
@@ -239,7 +236,7 @@ impl Motion {
     pub fn step(
         &self,
         state: &mut MotionState,
-        goal: Goal,
+        goal: Target,
         count: u32,
         estimated: f32,
         range: (f32, f32),
@@ -249,22 +246,22 @@ impl Motion {
                 let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
                 state.last = Some(count);
                 let counted = moved * self.turns_per_count * self.rate;
-                let speed = if self.estimates { estimated } else { counted };
+                let speed = if self.divider == Self::ESTIMATED { estimated } else { counted };
                 state.speed += self.smoothing * (speed - state.speed);
             }
             1 => {
                 state.wanted = match goal {
-                    Goal::Speed(speed) => speed,
-                    Goal::Rest { .. } => 0.0,
-                    Goal::Position(turns) => self.braking_curve(turns - self.turns(state, count)),
+                    Target::Speed(speed) => speed,
+                    Target::Rest { .. } => 0.0,
+                    Target::Position(turns) => self.braking_curve(turns - self.turns(state, count)),
                 };
             }
             2 => {
                 let (ramp, waits) = match goal {
-                    Goal::Speed(_) => (&self.ramp, false),
-                    Goal::Position(_) => (&self.straight_ramp, false),
-                    Goal::Rest { quick: false } => (&self.ramp, true),
-                    Goal::Rest { quick: true } => (&self.quick_ramp, true),
+                    Target::Speed(_) => (&self.ramp, false),
+                    Target::Position(_) => (&self.straight_ramp, false),
+                    Target::Rest { quick: false } => (&self.ramp, true),
+                    Target::Rest { quick: true } => (&self.quick_ramp, true),
                 };
                 let mut step = ramp.step(&mut state.ramp, limited(state.wanted, self.speed_limit));
                 let error = state.ramp.reference - state.speed;

@@ -17,8 +17,6 @@ const REGISTERS: [u16; 12] = [
     0x2000, 0x2001, 0x2002, 0x6040, 0x4fff, 0x0100, 0x2100, 0x3000, 0x5000, 0x5100, 0x603f, 0x4000,
 ];
 const LINES: &str = "stop|start|clear|set bus.commands bus|set bus.commands console|set bus.commands strip|apply|revert|defaults|status";
-/// A run ends after so many passes.
-const MOST_PASSES: usize = 400;
 
 fn sum(bytes: &[u8]) -> [u8; 2] {
     Crc::<u16>::new(&CRC_16_MODBUS).checksum(bytes).to_le_bytes()
@@ -37,7 +35,8 @@ fuzz_target!(|bytes: &[u8]| {
     let (mut bus, mut strip) = (Some(FakeBus::default()), FakeStrip::default());
     let mut port = FakePort { room: usize::MAX, ..FakePort::default() };
     let (mut now_ms, mut at) = (0_u32, bytes.iter().copied());
-    for _ in 0..MOST_PASSES {
+    // 400 passes at most.
+    for _ in 0..400 {
         let Some(what) = at.next() else { break };
         let mut next = || at.next().unwrap_or(0);
         let register = |n: u8| REGISTERS[usize::from(n) % REGISTERS.len()];

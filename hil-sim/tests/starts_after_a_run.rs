@@ -66,7 +66,7 @@ fn a_start_that_was_stopped_in_its_search_is_repeated() {
             rig.wait(0.02);
         }
         rig.settle(&Command::Stop(Stop::Coast), 0.02).expect("a stop");
-        start(&mut rig, State::Catching);
+        start(&mut rig, State::FlyingStart);
         rig.wait(0.015);
         rig.settle(&Command::Stop(Stop::Coast), 0.005).expect("a stop");
         let flux = rig.plant.rotor_flux().norm();

@@ -27,7 +27,7 @@ fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bo
     let mut told = Vec::new();
     for n in 0..LONGEST {
         rig.step();
-        let seen = rig.drive.excites() || rig.drive.state().regulates();
+        let seen = rig.drive.is_testing() || rig.drive.state().regulates();
         if seen && !lost(n, session) {
             let telemetry = *rig.drive.telemetry();
             session.take(&Period { period: n as u32, telemetry, ..Period::default() });
@@ -35,7 +35,7 @@ fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bo
         if !n.is_multiple_of(PASS) {
             continue;
         }
-        let command = session.poll(&rig.drive.excited(), |commissioning| {
+        let command = session.poll(&rig.drive.test_report(), |commissioning| {
             assert_eq!(rig.drive.state(), State::Off, "it takes a second");
             commissioning.design();
         });
@@ -109,7 +109,7 @@ fn a_command_that_is_not_taken_ends_it() {
     drive.command(&Command::Start(Mode::Learning)).unwrap();
     let report = loop {
         // As far as the session knows, it is still off.
-        let stale = Excited::default();
+        let stale = TestReport::default();
         if let Some(command) = session.poll(&stale, |_| panic!("too early")) {
             let why = drive.command(&command).unwrap_err();
             session.refused(Some(why));

@@ -41,7 +41,7 @@ impl Console {
             if desk.wires != Wires::default() {
                 write!(f, "; closed:{}", desk.wires)?;
             }
-            desk.hold().map_or(Ok(()), |stop| write!(f, "; {}", Refusal::Held(stop)))?;
+            desk.interlock().map_or(Ok(()), |stop| write!(f, "; {}", Refusal::Held(stop)))?;
             desk.lost.map_or(Ok(()), |lost| write!(f, "; the reference is lost, {lost}"))?;
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
             let settings = &desk.settings().in_force().drive;
@@ -126,9 +126,9 @@ fn torque_range(f: &mut fmt::Formatter<'_>, s: &Status, settings: &Settings) -> 
     let (i_d, largest) = (settings.i_d(), settings.current_limit_a());
     let limit = VoltageLimit::new(&settings.motor, i_d, largest);
     let (least, most, voltage) = if s.state.regulates() {
-        (s.room.i_q.0, s.room.i_q.1, s.room.voltage)
+        (s.torque_limits.i_q.0, s.torque_limits.i_q.1, s.torque_limits.voltage)
     } else {
-        let most = limit.start().most.q.min(largest - s.room.too_hot_for);
+        let most = limit.start().most.q.min(largest - s.torque_limits.thermal_reduction_a);
         (-most, most, 0.0)
     };
     let torque = |i_q: f32| {

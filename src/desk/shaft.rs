@@ -61,7 +61,7 @@ impl Shaft {
             }
             // The shaft is looked for, or nothing measures it.
             State::Calibrating | State::Precharge | State::CheckingWiring => return,
-            State::Catching | State::Exciting | State::Learning => return,
+            State::FlyingStart | State::Exciting | State::Learning => return,
         }
         (self.freq, self.measured_ms) = (status.telemetry.rotor_freq, now_ms);
         // Should the drive go off now.

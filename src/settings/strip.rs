@@ -109,7 +109,7 @@ const NO_LIVE_ZERO: &str =
 
 impl Settings {
     /// The stop that keeps the drive from running with these wires closed; `None` lets it run.
-    pub fn hold(&self, closed: Wires) -> Option<Stop> {
+    pub fn interlock(&self, closed: Wires) -> Option<Stop> {
         match self.enable {
             Enable::Yes if !closed.has(Wires::ENABLE) => return Some(Stop::Coast),
             Enable::Now if !closed.has(Wires::ENABLE) => return Some(Stop::Now),

@@ -120,7 +120,7 @@ fn the_table_of_what_holds_the_drive() {
                 (Enable::Now, true) => Some(Stop::Now),
                 _ => buttons.then_some(Stop::Ramp),
             };
-            assert_eq!(own.hold(closed), expected, "{closed} {own:?}");
+            assert_eq!(own.interlock(closed), expected, "{closed} {own:?}");
         }
     }
 }

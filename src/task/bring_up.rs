@@ -306,7 +306,7 @@ fn start_control(
         return Err("the control interrupt does not come at its rate");
     }
     let sources = Sources::new(source)?;
-    control::TOLD.store(control::WATCHED, Ordering::Relaxed);
+    control::FAULTS_FROM_MAIN.store(control::WINDOW_ON, Ordering::Relaxed);
     asm::delay(1000 * board::CYCLES_PER_US);
     Window::close();
     let (streamed, observed) = (reported.clone(), reported.clone());

@@ -66,14 +66,14 @@ pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 /// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
 /// Whether the commissioning is to see what the drive does while it regulates.
-pub static OBSERVED: AtomicBool = AtomicBool::new(false);
+pub static RECORD_FOR_MAIN: AtomicBool = AtomicBool::new(false);
 /// Control periods from one record of the stream to the next; 0: none.
-pub static STREAMED: AtomicU32 = AtomicU32::new(0);
-/// From the main loop: [`WATCHED`], and what it has found wrong, as bits of [`Hardware`].
-pub static TOLD: AtomicU8 = AtomicU8::new(0);
+pub static STREAM_DIVIDER: AtomicU32 = AtomicU32::new(0);
+/// From the main loop: [`WINDOW_ON`], and what it has found wrong, as bits of [`Hardware`].
+pub static FAULTS_FROM_MAIN: AtomicU8 = AtomicU8::new(0);
 /// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
-pub const WATCHED: u8 = 1 << 7;
-const _: () = assert!(Hardware::all().bits() & WATCHED == 0);
+pub const WINDOW_ON: u8 = 1 << 7;
+const _: () = assert!(Hardware::all().bits() & WINDOW_ON == 0);
 /// Word of the phase of a drive whose state has a flipped bit; 0: none. The outputs are off, and the main loop ends the run.
 pub static BROKEN: AtomicU32 = AtomicU32::new(0);
 /// Whether a deadline was ever missed.
@@ -211,8 +211,8 @@ impl Running {
         }
 
         // At the beginning, where it comes in equal steps; an interrupt that does not end is not fed again.
-        let told = TOLD.load(Ordering::Relaxed);
-        if told & WATCHED != 0 {
+        let told = FAULTS_FROM_MAIN.load(Ordering::Relaxed);
+        if told & WINDOW_ON != 0 {
             window.feed();
         }
 
@@ -288,7 +288,7 @@ impl Running {
                 |command| has_time || matches!(command, Command::Stop(Stop::Now)),
                 |command| {
                     // A start that is refused leaves the drive off, which disarms again.
-                    if matches!(command, Command::Start(_) | Command::Excite(_)) {
+                    if matches!(command, Command::Start(_) | Command::Test(_)) {
                         pwm.arm();
                     }
                     answers.send_with(|answer| *answer = drive.command(command));
@@ -320,7 +320,7 @@ impl Running {
             self.report_left = 2;
         }
         // A sample of the stream waits as well, as long as it differs from the next one.
-        let every = STREAMED.load(Ordering::Relaxed);
+        let every = STREAM_DIVIDER.load(Ordering::Relaxed);
         let since = self.periods.checked_rem(every);
         self.stream_due |= since == Some(0);
         let hurries = every < 3 || since == Some(2);
@@ -331,8 +331,8 @@ impl Running {
         self.report_late = if waits { self.report_late.saturating_add(1) } else { 0 };
         let part = if waits { 0 } else { self.report_left };
         self.report_left -= u8::from(part > 0);
-        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
-        let observed = drive.tracks_rotor() || drive.excites() || commissioned;
+        let commissioned = RECORD_FOR_MAIN.load(Ordering::Relaxed) && state.regulates();
+        let observed = drive.tracks_rotor() || drive.is_testing() || commissioned;
         if observed || streamed || part == 2 {
             signals.write(|record| {
                 (record.period, record.sampled) = (self.periods, sampled);
@@ -370,11 +370,11 @@ impl Running {
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
             report.limiting = drive.limiting();
-            report.room = drive.room();
+            report.torque_limits = drive.torque_limits();
             report.stator_resistance = drive.stator_resistance();
             // The commissioning's part: while the drive regulates nothing of it changes.
             if !(state.regulates() && self.reported == Some(state)) {
-                report.excited = drive.excited();
+                report.test_report = drive.test_report();
             }
         });
         if sent {

@@ -7,7 +7,7 @@ use drive_core::{Fault, Hardware};
 
 use crate::chip::clocks::Source;
 use crate::chip::{StartError, adc, time};
-use crate::task::control::{TOLD, WATCHED};
+use crate::task::control::{FAULTS_FROM_MAIN, WINDOW_ON};
 use induction_drive::board;
 
 /// Time between two measurements, ms, and to one that repeats a suspicion.
@@ -45,7 +45,7 @@ impl Sources {
     pub fn watch(&mut self, now_ms: u32) {
         if now_ms.wrapping_sub(self.measured_ms) >= self.pause_ms {
             self.measured_ms = now_ms;
-            TOLD.store(WATCHED | self.measure().bits(), Ordering::Relaxed);
+            FAULTS_FROM_MAIN.store(WINDOW_ON | self.measure().bits(), Ordering::Relaxed);
         }
     }
 

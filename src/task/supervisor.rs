@@ -211,12 +211,12 @@ impl Supervisor {
     /// Goes on with the commissioning.
     #[inline(never)] // a command takes much stack
     fn commission(&mut self) {
-        let Some(Status { excited, .. }) = self.status else { return };
-        control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
+        let Some(Status { test_report, .. }) = self.status else { return };
+        control::RECORD_FOR_MAIN.store(self.commissioning.is_running(), Ordering::Relaxed);
         // A search takes most of the time of the watchdog, and so may the console before it, with the periods that came meanwhile. The
         // drive answers a command within a period.
         self.feed_watchdog();
-        let command = self.commissioning.poll(&excited, |commissioning| {
+        let command = self.commissioning.poll(&test_report, |commissioning| {
             extended(&mut self.guard, || commissioning.design());
         });
         self.feed_watchdog();
@@ -285,7 +285,7 @@ impl DriveHandle for Supervisor {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         let not_started = self.no_control();
         let dc_link = self.status.map_or(0, |status| status.sample.dc_link);
-        let starts = matches!(command, Command::Start(_) | Command::Excite(_)) && self.is_off();
+        let starts = matches!(command, Command::Start(_) | Command::Test(_)) && self.is_off();
         let link = self.link.as_mut().ok_or(not_started)?;
         if starts && !over_voltage::prove(dc_link) {
             return Err(CommandError::NotStarted(over_voltage::UNPROVED));
@@ -391,7 +391,7 @@ impl Firmware for Supervisor {
     }
 
     fn stream(&mut self, divider: u16) {
-        control::STREAMED.store(divider.into(), Ordering::Relaxed);
+        control::STREAM_DIVIDER.store(divider.into(), Ordering::Relaxed);
         self.link.iter_mut().for_each(|link| link.streamed.by_ref().for_each(drop));
     }
 

@@ -73,8 +73,8 @@ impl Hashes {
             t.saliency_loss,
             t.inverter_drop,
         ]);
-        let room = drive.room();
-        b.numbers(&[room.i_q.0, room.i_q.1, room.too_hot_for, room.voltage]);
+        let room = drive.torque_limits();
+        b.numbers(&[room.i_q.0, room.i_q.1, room.thermal_reduction_a, room.voltage]);
         b.push(drive.limiting().to_string().as_bytes());
         b.numbers(&[drive.stator_resistance().unwrap_or(f32::NAN)]);
     }
@@ -143,7 +143,7 @@ impl Player {
     /// The rest of a control period, after the outputs are set.
     pub fn end_period(&mut self, drive: &mut Drive) {
         let seen = drive.telemetry();
-        if drive.excites() {
+        if drive.is_testing() {
             self.sums.push(seen.measured, seen.realised, seen.dc_link);
         }
         if drive.state().regulates() {
@@ -154,8 +154,8 @@ impl Player {
             return;
         }
         let Some(commissioning) = &mut self.commissioning else { return };
-        let command = match commissioning.poll(&drive.excited(), &mut self.sums) {
-            Next::Excite(excitation) => Command::Excite(excitation),
+        let command = match commissioning.poll(&drive.test_report(), &mut self.sums) {
+            Next::Excite(excitation) => Command::Test(excitation),
             Next::Stop => Command::Stop(Stop::Coast),
             Next::Start => Command::Start(Mode::Torque),
             Next::Torque(i_q) => Command::Torque(i_q),

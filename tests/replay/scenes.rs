@@ -181,7 +181,7 @@ pub const SCENES: &[Scene] = &[
             // In the search, then while the flux builds up, each time with flux left.
             for seconds in [0.015, 0.4] {
                 bench.run(0.02);
-                bench.start("start torque", State::Catching);
+                bench.start("start torque", State::FlyingStart);
                 bench.run(seconds);
                 bench.order("stop");
                 bench.until_state(State::Off);

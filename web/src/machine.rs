@@ -118,9 +118,9 @@ impl Machine {
         let sampled = Sampled::new(&self.sample, state, self.drive.limiting());
         self.trace.0.step(&sampled, self.drive.telemetry());
         let streamed = self.periods.checked_rem(self.streamed.0) == Some(0);
-        let commissions = self.session.is_running();
+        let (drive, commissions) = (&self.drive, self.session.is_running());
         let observed =
-            self.drive.tracks_rotor() || self.drive.excites() || commissions && state.regulates();
+            drive.tracks_rotor() || drive.is_testing() || commissions && state.regulates();
         if streamed || observed {
             let (period, telemetry) = (self.periods, *self.drive.telemetry());
             let record = Record { period, telemetry, sampled, observed, streamed };
@@ -134,8 +134,8 @@ impl Machine {
             }
         }
         if commissions
-            && let Some(command) = self.session.poll(&self.drive.excited(), Commissioning::design)
-            && let Err(why) = self.drive.command(&command)
+            && let Some(next) = self.session.poll(&self.drive.test_report(), Commissioning::design)
+            && let Err(why) = self.drive.command(&next)
         {
             self.session.refused(Some(why));
         }
@@ -168,9 +168,9 @@ impl DriveHandle for Machine {
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
             limiting: self.drive.limiting(),
-            room: self.drive.room(),
+            torque_limits: self.drive.torque_limits(),
             stator_resistance: self.drive.stator_resistance(),
-            excited: self.drive.excited(),
+            test_report: self.drive.test_report(),
             ..Status::default()
         })
     }

@@ -1,6 +1,6 @@
 //! The modules of a crate and the paths in their code, read from the source files.
 //!
-//! Tests (`#[cfg(test)]`), documentation and `#[cfg(doc)]` are left out.
+//! Tests (`#[cfg(test)]`, and files of tests that another crate shares by `#[path]`), documentation and `#[cfg(doc)]` are left out.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -152,7 +152,7 @@ fn has_left_out(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| is_left_out(&attribute.meta.to_token_stream().to_string()))
 }
 
-/// Whether an attribute leaves out its item.
-fn is_left_out(attribute: &str) -> bool {
-    ["cfg(test)", "cfg(doc)"].contains(&attribute.replace(' ', "").as_str())
+/// Whether an attribute leaves out its item. A module with a path of its own is a file of tests elsewhere.
+fn is_left_out(text: &str) -> bool {
+    text.starts_with("path") || ["cfg(test)", "cfg(doc)"].contains(&&*text.replace(' ', ""))
 }

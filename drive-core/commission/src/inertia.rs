@@ -12,7 +12,7 @@
 
 use super::motion::Slope;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
-use drive_core::{Excited, State, periods};
+use drive_core::{State, TestReport, periods};
 
 /// Duration of a quarter, s, and the quarters of the measurement: three times + - - +.
 const QUARTER_S: f32 = 0.8;
@@ -28,7 +28,7 @@ const PEAK_RAD_PER_S: f32 = 12.566;
 const EXPLAINED: f32 = 0.9;
 impl Commissioning {
     /// Part 0 starts the drive; every further part is a quarter.
-    pub(super) fn inertia(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+    pub(super) fn inertia(&mut self, drive: &TestReport, sums: &mut Collector) -> Answer {
         let (rated, limit) = (self.plate.rated, self.plate.i_q_limit);
         match self.state.part {
             0 => {

@@ -19,7 +19,7 @@ use super::{
     Step,
 };
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
+use drive_core::{AlphaBeta, PERIOD_S, SQRT_3, TestSignal};
 use drive_settings::rules::CARRIER_HZ;
 use num_complex::Complex32;
 
@@ -113,7 +113,7 @@ impl Commissioning {
         }
         let (record, seconds, carrier) = parts[part];
         let amperes = share * self.plate.amperes;
-        let excitation = Excitation::Current { amperes, regulator, carrier, binary: false };
+        let excitation = TestSignal::Current { amperes, regulator, carrier, binary: false };
         self.begin(sums, (record, seconds, excitation))
     }
 

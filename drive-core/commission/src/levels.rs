@@ -5,7 +5,7 @@ use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
     Record, Refusal, SIZE, Step, TIME,
 };
-use drive_core::{Excitation, PERIOD_S, SQRT_3};
+use drive_core::{PERIOD_S, SQRT_3, TestSignal};
 
 /// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
 /// depends on the current.
@@ -70,7 +70,7 @@ impl Commissioning {
         let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(LEVEL_S - WAIT_T * tau_r));
         let [high, low, third, fourth] = LEVELS.map(|share| self.along(share, regulator));
         let parts = [
-            (Record::Nothing, QUIET_S, Excitation::Rest),
+            (Record::Nothing, QUIET_S, TestSignal::Rest),
             (Record::bins(0, LEVEL_S), LEVEL_S, high),
             (Record::bins(1, LEVEL_S), LEVEL_S, low),
             (Record::Nothing, wait, third),

@@ -1,7 +1,7 @@
 //! Commissioning: from the nameplate to the parameters of the motor, at standstill, without a sensor on the shaft.
 //!
 //! [`Commissioning`] is a state machine for the main loop. It never touches the hardware: it asks for an
-//! [`Excitation`], the drive applies it in its interrupt, a [`Collector`] keeps sums of what the drive saw, and the
+//! [`TestSignal`], the drive applies it in its interrupt, a [`Collector`] keeps sums of what the drive saw, and the
 //! commissioning evaluates them, step by step.
 //!
 //! ```no_run
@@ -17,13 +17,13 @@
 //! commissioning.start(Step::Nameplate, Step::Leakage);
 //! loop {
 //!     one_period(&mut drive); // in the interrupt: `Drive::step`
-//!     if drive.excites() {
+//!     if drive.is_testing() {
 //!         let seen = drive.telemetry();
 //!         collector.push(seen.measured, seen.realised, seen.dc_link);
 //!     }
-//!     match commissioning.poll(&drive.excited(), &mut collector) {
+//!     match commissioning.poll(&drive.test_report(), &mut collector) {
 //!         Next::Wait => {}
-//!         Next::Excite(excitation) => drop(drive.command(&Command::Excite(excitation))?),
+//!         Next::Excite(excitation) => drop(drive.command(&Command::Test(excitation))?),
 //!         Next::Stop => drop(drive.command(&Command::Stop(Stop::Coast))?),
 //!         Next::Start => drop(drive.command(&Command::Start(Mode::Torque))?),
 //!         Next::Torque(i_q) => drop(drive.command(&Command::Torque(i_q))?),
@@ -61,7 +61,9 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-use drive_core::{AlphaBeta, Excitation, Excited, FirstOrder, PERIOD_S, Regulator, State, periods};
+use drive_core::{
+    AlphaBeta, FirstOrder, PERIOD_S, Regulator, State, TestReport, TestSignal, periods,
+};
 use drive_settings::Settings;
 use drive_settings::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
 use drive_settings::value::Words as _;
@@ -91,8 +93,8 @@ const ZERO_RAD_PER_S: f32 = 167.0;
 pub enum Next {
     /// Nothing: poll again, after a millisecond or so.
     Wait,
-    /// Give the drive [`Command::Excite`](drive_core::Command::Excite).
-    Excite(Excitation),
+    /// Give the drive [`Command::Test`](drive_core::Command::Test).
+    Excite(TestSignal),
     /// Give the drive [`Command::Stop`](drive_core::Command::Stop).
     Stop,
     /// Give the drive [`Command::Start`](drive_core::Command::Start) in torque mode: the shaft is going to turn.
@@ -111,7 +113,7 @@ pub enum Next {
 type Answer = Result<Next, Refusal>;
 
 /// A part of a step: what is recorded, for how many seconds, and the excitation.
-type Part = (Record, f32, Excitation);
+type Part = (Record, f32, TestSignal);
 
 /// The commissioning: what it does, and what it has found.
 #[derive(Clone, Debug)]
@@ -222,7 +224,7 @@ impl Commissioning {
 
     /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](drive_core::Drive::excited).
     #[inline(never)] // in `main` it would lie in the bank of the interrupt's code
-    pub fn poll(&mut self, drive: &Excited, sums: &mut Collector) -> Next {
+    pub fn poll(&mut self, drive: &TestReport, sums: &mut Collector) -> Next {
         let (progress, next) = match (self.progress, drive.state) {
             (Progress::Ended, _)
             | (Progress::Stop | Progress::Stopping, State::Off | State::Fault(_)) => {
@@ -265,7 +267,7 @@ impl Commissioning {
     }
 
     /// The next action of the present step, once the samples of its part are there.
-    fn go_on(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+    fn go_on(&mut self, drive: &TestReport, sums: &mut Collector) -> Answer {
         let before = *self.starts.get_or_insert(drive.starts);
         self.on |= drive.state != State::Off || drive.starts != before;
         let turns = self.step == Step::Inertia;
@@ -273,7 +275,7 @@ impl Commissioning {
             State::Off => !self.on,
             State::Calibrating | State::Precharge | State::CheckingWiring => true,
             State::Exciting => !turns,
-            State::Catching | State::Magnetising | State::Verifying | State::Torque => turns,
+            State::FlyingStart | State::Magnetising | State::Verifying | State::Torque => turns,
             _ => false,
         };
         match self.step {
@@ -349,8 +351,8 @@ impl Commissioning {
     }
 
     /// A share of the test current along phase a.
-    fn along(&self, share: f32, regulator: Regulator) -> Excitation {
+    fn along(&self, share: f32, regulator: Regulator) -> TestSignal {
         let (amperes, carrier) = (share * self.plate.amperes, AlphaBeta::ZERO);
-        Excitation::Current { amperes, regulator, carrier, binary: false }
+        TestSignal::Current { amperes, regulator, carrier, binary: false }
     }
 }

@@ -14,7 +14,7 @@
 
 use super::plant_fit::SETTLING;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
-use drive_core::{AlphaBeta, Excitation, FirstOrder, PERIOD_S};
+use drive_core::{AlphaBeta, FirstOrder, PERIOD_S, TestSignal};
 use drive_settings::tuning::motor_plant;
 
 /// Bias along phase a, and current that a sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A, which
@@ -49,7 +49,7 @@ impl Commissioning {
             }
             let (amperes, bias) = (BIAS * self.plate.amperes, self.along(BIAS, regulator));
             let axis = |across, carrier| {
-                let excitation = Excitation::Current { amperes, regulator, carrier, binary: true };
+                let excitation = TestSignal::Current { amperes, regulator, carrier, binary: true };
                 (Record::Plant { across, bases: (volts, i) }, FITTED_S, excitation)
             };
             let parts = [

@@ -2,7 +2,7 @@
 
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, SIZE};
 use drive_core::protect::{WiringCheck, WiringSettings};
-use drive_core::{Excitation, Excited, PERIOD_S};
+use drive_core::{PERIOD_S, TestReport, TestSignal};
 
 /// Time of the sums without current, and of the pause before the pulses and before the levels, s.
 pub(super) const QUIET_S: f32 = 0.1;
@@ -28,10 +28,10 @@ const UNANSWERED: f32 = 0.25;
 const ROUGH: (f32, f32) = (0.5, 1.7);
 
 impl Commissioning {
-    pub(super) fn sensors(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+    pub(super) fn sensors(&mut self, drive: &TestReport, sums: &mut Collector) -> Answer {
         if self.state.part == 0 {
             self.found.noise = None;
-            return self.begin(sums, (Record::Noise, QUIET_S, Excitation::Rest));
+            return self.begin(sums, (Record::Noise, QUIET_S, TestSignal::Rest));
         }
         let ([noise_a, noise_b], dc_link) = sums.quiet();
         let ([offset_a, offset_b], i) = (drive.offsets, self.plate.amperes);
@@ -57,18 +57,18 @@ impl Commissioning {
         WiringSettings { sigma_ls, expected_a, noise_a, highest_v: self.plate.pulse_v }
     }
 
-    pub(super) fn wiring(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+    pub(super) fn wiring(&mut self, drive: &TestReport, sums: &mut Collector) -> Answer {
         let (i, (least, most)) = (self.plate.amperes, self.plate.leakage);
         match self.state.part {
             0 => {
                 self.found.rough = None;
                 self.state.volt_seconds = SILENT * i * least;
-                return self.begin(sums, (Record::Nothing, QUIET_S, Excitation::Rest));
+                return self.begin(sums, (Record::Nothing, QUIET_S, TestSignal::Rest));
             }
             1 => {
                 self.state.trains = drive.trains;
                 self.state.part = 2;
-                return Ok(Next::Excite(Excitation::Pulses(self.pulses())));
+                return Ok(Next::Excite(TestSignal::Pulses(self.pulses())));
             }
             _ if drive.trains == self.state.trains => return Ok(Next::Wait),
             _ => {}

@@ -132,7 +132,7 @@ impl DqPi {
     }
 
     /// Takes back what the last error adds by integration: before each step of proportional controllers.
-    pub fn hold(&self, state: &mut DqPiState) {
+    pub fn freeze_integrator(&self, state: &mut DqPiState) {
         let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;
         let last = Dq { d: integral(&self.d, &state.d), q: integral(&self.q, &state.q) };
         state.back_calculate(-last);

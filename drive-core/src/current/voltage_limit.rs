@@ -118,7 +118,7 @@ impl VoltageLimit {
 
     /// Whether the direct current is that of the least loss where there is no carrier.
     #[inline]
-    pub fn is_economical(&self) -> bool {
+    pub fn minimises_loss(&self) -> bool {
         self.economy != 0.0
     }
 

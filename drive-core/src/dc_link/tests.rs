@@ -73,7 +73,7 @@ impl Bench {
                 self.limits.step(&mut self.state, self.v as f32, freq, (I_Q, Limiting::None));
             assert!(limits.i_q.0 <= limits.i_q.1 && (0.0..=1.0).contains(&limits.chopper));
             let asked = (0.1 * (reference(self.t) - self.rpm)) as f32;
-            let (taken, why) = limits.hold(asked.clamp(-I_Q, I_Q));
+            let (taken, why) = limits.clamp(asked.clamp(-I_Q, I_Q));
             self.why = why;
             self.advance(taken.into(), limits.flux_a.into(), limits.chopper.into());
         }
@@ -248,15 +248,15 @@ fn nothing_is_limited_where_nothing_has_to_be() {
     {
         let free = step(v, rpm);
         assert_eq!((free.i_q, free.flux_a), ((-I_Q, I_Q), 0.0), "{v} V, {rpm} rpm");
-        assert_eq!(free.hold(-2.9), (-2.9, Limiting::None));
+        assert_eq!(free.clamp(-2.9), (-2.9, Limiting::None));
     }
     // The nearer to the trip, the less; only the direction that the link does not bear.
-    assert_eq!(step(390.0, 1000.0).hold(-1.0), (0.0, Limiting::DcLinkHigh));
-    assert_eq!(step(390.0, -1000.0).hold(1.0), (0.0, Limiting::DcLinkHigh));
-    assert_eq!(step(390.0, 1000.0).hold(1.0), (1.0, Limiting::None));
-    assert_eq!(step(260.0, 1000.0).hold(1.0), (0.0, Limiting::DcLinkLow));
-    assert_eq!(step(215.0, 1000.0).hold(1.0), (-I_Q, Limiting::RideThrough));
-    assert_eq!(step(215.0, -1000.0).hold(0.0), (I_Q, Limiting::RideThrough));
+    assert_eq!(step(390.0, 1000.0).clamp(-1.0), (0.0, Limiting::DcLinkHigh));
+    assert_eq!(step(390.0, -1000.0).clamp(1.0), (0.0, Limiting::DcLinkHigh));
+    assert_eq!(step(390.0, 1000.0).clamp(1.0), (1.0, Limiting::None));
+    assert_eq!(step(260.0, 1000.0).clamp(1.0), (0.0, Limiting::DcLinkLow));
+    assert_eq!(step(215.0, 1000.0).clamp(1.0), (-I_Q, Limiting::RideThrough));
+    assert_eq!(step(215.0, -1000.0).clamp(0.0), (I_Q, Limiting::RideThrough));
     // Halfway up the band; the flux only above 1200 rpm.
     let half = step(365.0, 1300.0);
     assert!((half.i_q.0 + 1.5).abs() < 1e-5 && (half.flux_a - 1.0).abs() < 1e-5, "{half:?}");
@@ -278,7 +278,7 @@ fn nothing_is_limited_where_nothing_has_to_be() {
     }
     // A reference at its limit is not limited.
     let (least, largest) = (half.i_q.0, step(365.0, -1300.0).i_q.1);
-    assert_eq!(half.hold(least), (least, Limiting::None));
-    assert_eq!(step(365.0, -1300.0).hold(largest), (largest, Limiting::None));
+    assert_eq!(half.clamp(least), (least, Limiting::None));
+    assert_eq!(step(365.0, -1300.0).clamp(largest), (largest, Limiting::None));
     assert!(step(f32::NAN, 1000.0).i_q.0.is_nan());
 }

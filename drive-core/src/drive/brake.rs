@@ -3,7 +3,7 @@
 //!
 //! Whoever drives the brake opens it while the drive regulates, and closes it when the drive stops; see `src/strip.rs` of the firmware.
 
-use super::{Field, FluxPhase, Goal, Kept};
+use super::{Common, Field, FluxPhase, Goal};
 use crate::{Coefficients, Dq, Fault};
 
 /// Longest time that a brake may need to close, s.
@@ -17,12 +17,12 @@ const PROOF_ERROR: f32 = 0.3;
 
 impl Field {
     /// The phase behind a flux that was built up and verified.
-    pub(super) fn behind_the_flux(k: &Kept) -> FluxPhase {
+    pub(super) fn behind_the_flux(k: &Common) -> FluxPhase {
         if k.brake > 0 { FluxPhase::Prove } else { FluxPhase::ready() }
     }
 
     /// The goal of a shaft that has come to rest.
-    pub(super) fn at_rest(k: &Kept) -> Goal {
+    pub(super) fn at_rest(k: &Common) -> Goal {
         if k.brake > 0 { Goal::Hold { left: k.brake } } else { Goal::Release }
     }
 
@@ -31,7 +31,7 @@ impl Field {
     /// # Errors
     /// [`Fault::TorqueNotProven`].
     #[cold]
-    pub(super) fn prove(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+    pub(super) fn prove(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let wanted = PROOF_SHARE * c.protection.i_q;
         if k.elapsed >= PROOF {
             let missing = (wanted - k.seen.current.q).abs();

@@ -61,7 +61,7 @@ pub struct Coefficients {
     /// The watch on the lock, if it is wanted.
     pub lock_monitor: Option<LockMonitor>,
     /// The start on a turning shaft, if it is wanted.
-    pub catching: Option<Catching>,
+    pub flying_start: Option<FlyingStart>,
     /// Limit of the torque current by the voltage.
     pub voltage_limit: VoltageLimit,
     /// Limits of the torque current by the dc link, and chopper.
@@ -104,7 +104,7 @@ pub struct Coefficients {
 
 impl Coefficients {
     /// The fault of a motor sensor of which no reading has come.
-    pub(crate) fn motor_unread(&self) -> Option<Fault> {
+    pub(crate) fn no_motor_reading(&self) -> Option<Fault> {
         self.motor_c.map(|_| Fault::MotorSensorUnread)
     }
 
@@ -195,24 +195,24 @@ pub struct SequenceSteps {
 
 /// Coefficients of a start on a turning shaft, control periods and A.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Catching {
+pub struct FlyingStart {
     /// Direct current that the rotor is looked for with, A.
     pub current: f32,
     /// Periods in which the injection alone corrects the angle.
-    pub alone: u32,
+    pub injection_only: u32,
     /// Periods in which the flux builds up.
-    pub built: u32,
+    pub build_up: u32,
     /// Periods after which no flux is left in a motor that was switched off.
-    pub flux_gone: u32,
+    pub flux_decay: u32,
     /// Model that the search subtracts from the voltage.
     pub path: Path,
     /// Largest voltage of flux that was left, V.
-    pub left_v: f32,
+    pub residual_v: f32,
     /// Decay of that flux per period.
     pub decay: f32,
 }
 
-impl Catching {
+impl FlyingStart {
     /// Share of `current` that is enough where flux was left: the flux drives a current of its own.
     pub const WITH_FLUX: f32 = 0.4;
 }

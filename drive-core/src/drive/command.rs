@@ -1,7 +1,7 @@
 //! The commands to the drive, and its answers.
 
-use crate::drive::excitation::Excitation;
 use crate::drive::state::{Mode, State};
+use crate::drive::test_signal::TestSignal;
 use crate::{Coefficients, Dq, Fault};
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
@@ -23,10 +23,10 @@ pub enum Command {
     /// From off: the motor has a brake, which needs this time to close, s; 0: none, as at the beginning. A start then proves the torque,
     /// and a stop keeps it for that time; see `drive/brake.rs`.
     Brake(f32),
-    /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
+    /// From off, or while a motor at rest is tested: this test signal. From off the drive calibrates the
     /// offsets and charges the bootstraps first. See `crate::commission`.
     #[cfg_attr(feature = "serde", serde(skip))]
-    Excite(Excitation),
+    Test(TestSignal),
     /// Stop in this way. A drive that neither regulates torque, speed or position nor turns by voltage and frequency does it by
     /// [`Stop::Coast`].
     Stop(Stop),
@@ -75,7 +75,7 @@ pub enum Command {
 pub enum Stop {
     /// Take the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. Whatever is set, the outputs are off
     /// [`COAST_S`](crate::COAST_S) after the command, and later by the time of the [brake](Command::Brake) if there is one. While the motor
-    /// at rest is excited, switch off at once.
+    /// at rest is tested, switch off at once.
     #[default]
     Coast,
     /// Take the speed to zero by `speed.ramp_rpm_per_s`, then as [`Coast`](Self::Coast).

@@ -1,6 +1,6 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
+use super::{Drive, Field, FluxPhase, Frame, Goal, Phase, Start};
 use super::{allowed::allowed, brake::BRAKE_MAX_S, prepare::Prepare, scalar::Scalar};
 
 use crate::drive::command::{Accepted, Command, Refused};
@@ -26,14 +26,14 @@ impl Drive {
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
         match *command {
-            Command::Start(mode) => return self.start(Job::of_mode(mode)),
+            Command::Start(mode) => return self.start(Start::of_mode(mode)),
             Command::Relock => self.relock()?,
             Command::CheckWiring => self.kept.wiring_unchecked = true,
             Command::Brake(seconds) => {
                 in_range(seconds, 0.0, BRAKE_MAX_S)?;
                 self.kept.brake = (seconds / PERIOD_S) as u32;
             }
-            Command::Excite(excitation) => return self.take_excitation(excitation),
+            Command::Test(wanted) => return self.take_test(wanted),
             Command::Stop(stop) => self.stop(stop),
             Command::Clear => {
                 if let Phase::Fault(_, left) = self.phase {
@@ -47,8 +47,8 @@ impl Drive {
                 current.q = limited(limited(i_q, largest), self.c.protection.i_q);
                 return Ok(accepted(i_q, current.q));
             }
-            Command::Speed(rpm) => return self.turn_at(rpm, 0),
-            Command::Jog(rpm) => return self.turn_at(rpm, JOG),
+            Command::Speed(rpm) => return self.set_speed(rpm, 0),
+            Command::Jog(rpm) => return self.set_speed(rpm, JOG),
             Command::Position(to) => {
                 finite(to)?;
                 let taken = limited(to, self.c.motion.position_limit);
@@ -127,7 +127,7 @@ impl Drive {
             Command::Configure(ref coefficients) => {
                 self.c = *coefficients;
                 let limits = &mut self.kept.limits;
-                (limits.motor_hot, limits.motor_fault) = (0, self.c.motor_unread());
+                (limits.motor_hot, limits.motor_fault) = (0, self.c.no_motor_reading());
                 self.kept.home = None;
                 self.changes = self.changes.wrapping_add(1);
             }
@@ -140,7 +140,7 @@ impl Drive {
         match &self.phase {
             Phase::Off(_) | Phase::Fault(..) => Mode::Torque,
             Phase::Prepare(prepare) => prepare.job.mode(),
-            Phase::Excite(_) => Mode::Commissioning,
+            Phase::Test(_) => Mode::Commissioning,
             Phase::Scalar(_) => Mode::VoltsPerHertz,
             Phase::Field(field) => field.goal.mode(),
         }
@@ -149,19 +149,19 @@ impl Drive {
     /// The goal of the current, with its reference.
     fn goal(&mut self) -> Option<&mut Goal> {
         match &mut self.phase {
-            Phase::Prepare(Prepare { job: Job::Field(goal), .. })
+            Phase::Prepare(Prepare { job: Start::Field(goal), .. })
             | Phase::Field(Field { goal, .. }) => Some(goal),
-            Phase::Off(_) | Phase::Fault(..) | Phase::Excite(_) => None,
+            Phase::Off(_) | Phase::Fault(..) | Phase::Test(_) => None,
             Phase::Prepare(_) | Phase::Scalar(_) => None,
         }
     }
 
     /// Takes the speed, for so many periods where it is a jog.
-    fn turn_at(&mut self, rpm: f32, periods: u32) -> Result<Accepted, Refused> {
+    fn set_speed(&mut self, rpm: f32, periods: u32) -> Result<Accepted, Refused> {
         finite(rpm)?;
         let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
         match &mut self.phase {
-            Phase::Prepare(Prepare { job: Job::Scalar { speed }, .. })
+            Phase::Prepare(Prepare { job: Start::Scalar { speed }, .. })
             | Phase::Scalar(Scalar { speed, .. }) => *speed = taken / 60.0,
             _ => {
                 if let Some(Goal::Speed { speed, jog }) = self.goal() {
@@ -183,16 +183,16 @@ impl Drive {
         }
     }
 
-    pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
+    pub(super) fn start(&mut self, job: Start) -> Result<Accepted, Refused> {
         if let Some(fault) = self.kept.limits.motor_fault {
             return Err(Refused::Stands(fault));
         }
         match &job {
             _ if !self.is_charged() => Err(Refused::NotCharged),
-            Job::Field(Goal::Learn) if !self.can_learn() => Err(Refused::NeedsInjection),
-            Job::Scalar { .. } if self.c.volts_per_hertz.is_none() => Err(Refused::Nameplate),
-            Job::Field(goal) if goal.regulates() && self.c.unlearned => Err(Refused::NotLearned),
-            Job::Field(_) | Job::Scalar { .. } | Job::Excite(_) => Ok(()),
+            Start::Field(Goal::Learn) if !self.can_learn() => Err(Refused::NeedsInjection),
+            Start::Scalar { .. } if self.c.volts_per_hertz.is_none() => Err(Refused::Nameplate),
+            Start::Field(goal) if goal.regulates() && self.c.unlearned => Err(Refused::NotLearned),
+            Start::Field(_) | Start::Scalar { .. } | Start::Test(_) => Ok(()),
         }?;
         self.prepare_for(job);
         Ok(Accepted::AsGiven)
@@ -205,7 +205,7 @@ impl Drive {
         if field.frame != Frame::Tracked {
             return Err(Refused::NeedsInjection);
         }
-        if !k.stands(c) {
+        if !k.is_at_standstill(c) {
             return Err(Refused::Turning);
         }
         k.no_torque(k.references.current.d, c.injection_axis);

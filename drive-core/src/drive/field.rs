@@ -1,10 +1,10 @@
 //! Current in a frame of the flux: the control law, top to bottom, and the phases in which the flux is found, built up and
 //! verified.
 
-use super::catching::Residual;
-use super::in_turn::StepResults;
+use super::flying_start::Residual;
+use super::slow_tasks::StepResults;
 use super::stopping::COAST;
-use super::{End, Field, FluxPhase, Frame, Goal, Kept, Left};
+use super::{CarryOver, Common, End, Field, FluxPhase, Frame, Goal};
 use crate::carrier::at_start::{AtStart, AtStartState};
 use crate::carrier::{CarrierPeriod, CarrierSample};
 use crate::current::{DIRECT_SHARE, DIRECT_SHARE_WITHOUT_CARRIER, inverter_drop::DropSample};
@@ -13,13 +13,14 @@ use crate::filter::LPF;
 use crate::identify::learning::LearningState;
 use crate::learned::LARGEST_ASYMMETRY;
 use crate::math::limited;
+use crate::motion::Target;
 use crate::protect::SaliencyCheck;
 use crate::protect::saliency_check::SaliencyCheckAction;
-use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured, motion};
+use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured};
 
 impl Field {
     /// Without a current yet, for this goal.
-    pub fn begin(&mut self, c: &Coefficients, goal: Goal, left: &Left) {
+    pub fn begin(&mut self, c: &Coefficients, goal: Goal, carried: &CarryOver) {
         self.frame = match (c.source, goal) {
             (_, Goal::Learn) => Frame::LockedShaft,
             (AngleSource::Encoder, _) => Frame::Encoder,
@@ -27,14 +28,14 @@ impl Field {
         };
         self.goal = goal;
         // A start on a turning shaft measures none of them.
-        self.given = *left;
-        self.inverter_drop.volts = left.inverter_drop;
-        self.observer.resistance = left.resistance;
+        self.carried = *carried;
+        self.inverter_drop.volts = carried.inverter_drop;
+        self.observer.resistance = carried.resistance;
         c.turn(&mut self.axes, 0.0, c.injection_axis, false);
         c.estimator.start(&mut self.estimator);
         // A learning begins anew.
         if self.frame != Frame::LockedShaft {
-            self.estimator.changed = left.asymmetry;
+            self.estimator.changed = carried.asymmetry;
         }
         self.observer.start(c.observer.as_ref());
     }
@@ -43,7 +44,7 @@ impl Field {
         match (&self.flux, &self.goal) {
             (_, Goal::Brake { .. }) => State::Braking,
             (_, Goal::Hold { .. } | Goal::Release) => State::Stopping,
-            (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::Catching,
+            (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::FlyingStart,
             (FluxPhase::Asymmetry(_) | FluxPhase::Hold, _) => State::Magnetising,
             (FluxPhase::Verify | FluxPhase::Prove, _) => State::Verifying,
             (FluxPhase::Ready(_) | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
@@ -61,15 +62,15 @@ impl Field {
     }
 
     /// What this run leaves to the next one.
-    pub fn left(&self) -> Left {
+    pub fn carry_over(&self) -> CarryOver {
         // Until a speed is found nothing is known but what it was given.
         let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
-        let residual = Some(self.given.residual.unwrap_or_else(turning));
+        let residual = Some(self.carried.residual.unwrap_or_else(turning));
         // Until the flux is verified the shaft may turn, and what was measured may be its voltage.
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
-            return Left { residual, ..self.given };
+            return CarryOver { residual, ..self.carried };
         }
-        Left {
+        CarryOver {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,
             asymmetry: self.estimator.changed,
@@ -84,7 +85,7 @@ impl Field {
     pub fn step(
         &mut self,
         c: &Coefficients,
-        k: &mut Kept,
+        k: &mut Common,
         measured: &Measured,
         put_out: &mut dyn FnMut(Compare),
     ) -> Result<[f32; 3], End> {
@@ -93,7 +94,7 @@ impl Field {
             k.seen.turns = c.motion.turns(&self.motion, k.rotor_count);
         }
         let measured_current = measured.current();
-        let wanted = self.wanted(c, k)?;
+        let wanted = self.advance(c, k)?;
         let counted = self.frame.is_counted();
         let s = self;
         let index = s.carrier.advance();
@@ -149,7 +150,7 @@ impl Field {
             let slip_freq = s.indirect.slip_freq;
             let turning = c.observe_fundamental(s, index, rest, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+            if trust.rotates && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
             }
             (reference, s.estimator.rotor_freq)
@@ -187,7 +188,7 @@ impl Field {
             s.observer.put_out(modulated.realised - carrier_voltage);
         }
 
-        if trust.drop {
+        if trust.measures_drop {
             let sample = DropSample {
                 current,
                 voltage,
@@ -218,7 +219,7 @@ impl Field {
             rotor_freq,
             trust,
         };
-        c.in_turn(s, k, index, &results)?;
+        c.run_slot(s, k, index, &results)?;
         Ok(modulated.duties)
     }
 
@@ -232,7 +233,7 @@ impl Field {
     }
 
     /// Shows the state of the demodulation, the checks and the position.
-    pub fn show(&self, c: &Coefficients, k: &mut Kept) {
+    pub fn show(&self, c: &Coefficients, k: &mut Common) {
         let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
         seen.saliency = saliency.q;
         seen.carrier_squared = saliency.carrier_squared;
@@ -246,7 +247,7 @@ impl Field {
     ///
     /// # Errors
     /// Why the outputs go off.
-    fn wanted(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
+    fn advance(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             return self.find_flux(c, k);
         }
@@ -268,16 +269,16 @@ impl Field {
         };
         let (i_d, most) = (k.references.current.d, k.limits.voltage.most.d);
         let d = if i_d < most { i_d } else { most } + k.limits.now.flux_a;
-        Ok(Dq { d, q: k.limits.hold(i_q) })
+        Ok(Dq { d, q: k.limits.clamp_torque(i_q) })
     }
 
     /// The current while the flux is found, built up and verified, A.
     #[cold]
-    fn find_flux(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
+    fn find_flux(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
         Ok(match self.flux {
             FluxPhase::Search(_) => self.search(c, k)?,
             FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k)?,
-            FluxPhase::Build { from } => self.build(c, k, from)?,
+            FluxPhase::Build { from } => self.build(c, k, k.elapsed.wrapping_sub(from))?,
             FluxPhase::Hold => self.magnetise(c, k)?,
             FluxPhase::Verify => self.verify(c, k)?,
             FluxPhase::Prove => self.prove(c, k)?,
@@ -286,7 +287,7 @@ impl Field {
     }
 
     /// The torque current of the speed or the position loop, A.
-    fn follow(&mut self, c: &Coefficients, k: &mut Kept) -> f32 {
+    fn follow(&mut self, c: &Coefficients, k: &mut Common) -> f32 {
         let mut range = k.limits.now.i_q;
         let goal = match &mut self.goal {
             Goal::Speed { speed, jog } => {
@@ -297,17 +298,17 @@ impl Field {
                         *speed = 0.0;
                     }
                 }
-                motion::Goal::Speed(*speed)
+                Target::Speed(*speed)
             }
             Goal::Position { press: Some((speed, most)), .. } => {
                 range = (limited(range.0, *most), limited(range.1, *most));
-                motion::Goal::Speed(*speed)
+                Target::Speed(*speed)
             }
-            Goal::Position { turns, press: None } => motion::Goal::Position(turns.unwrap_or(0.0)),
-            Goal::Brake { quick } => motion::Goal::Rest { quick: *quick },
+            Goal::Position { turns, press: None } => Target::Position(turns.unwrap_or(0.0)),
+            Goal::Brake { quick } => Target::Rest { quick: *quick },
             Goal::Hold { left } => {
                 *left = left.saturating_sub(1);
-                motion::Goal::Rest { quick: true }
+                Target::Rest { quick: true }
             }
             Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
         };
@@ -326,19 +327,19 @@ impl Field {
 
     /// Goes on in this phase of the flux.
     #[inline(always)] // a small phase is written, not the memory that it shares
-    pub fn enter(&mut self, k: &mut Kept, flux: FluxPhase) {
+    pub fn enter(&mut self, k: &mut Common, flux: FluxPhase) {
         (self.flux, k.elapsed) = (flux, 0);
     }
 
     /// Goes on with a shaft that stands: measures the asymmetry where that is of use, then lets the flux build up.
     #[cold]
-    pub fn stand(&mut self, c: &Coefficients, k: &mut Kept, encoder: u32) {
+    pub fn continue_at_standstill(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
         let learns = self.frame == Frame::LockedShaft;
         if c.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
             self.carrier.set(AtStart::CARRIER_SHARE);
             self.enter(k, FluxPhase::Asymmetry(AtStartState::new(learns)));
         } else {
-            self.hold(c, k, encoder);
+            self.enter_hold(c, k, encoder);
         }
     }
 
@@ -347,7 +348,7 @@ impl Field {
     /// # Errors
     /// [`Fault::NothingLearned`] for more asymmetry than a learning accepts.
     #[cold]
-    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let (Some(at_start), FluxPhase::Asymmetry(state)) = (&c.at_start, &mut self.flux) else {
             return Ok(Dq::ZERO);
         };
@@ -366,13 +367,13 @@ impl Field {
             }
         }
         self.observer.start(c.observer.as_ref());
-        self.hold(c, k, 0);
+        self.enter_hold(c, k, 0);
         Ok(Dq::ZERO)
     }
 
     /// Holds the frame along phase a, and lets the flux build up there.
     #[cold]
-    pub fn hold(&mut self, c: &Coefficients, k: &mut Kept, encoder: u32) {
+    pub fn enter_hold(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
         (self.lock, self.inverter_drop) = Default::default();
         k.rotor_count = match c.source {
             AngleSource::Encoder => encoder,
@@ -391,7 +392,7 @@ impl Field {
 
     /// The current while the flux is built up, and while the saliency is checked, A.
     #[cold]
-    fn magnetise(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+    fn magnetise(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let level = c.inverter_drop.level(k.elapsed);
         let magnetising = Dq { d: level * k.references.current.d, q: 0.0 };
         let learns = self.frame == Frame::LockedShaft;
@@ -429,7 +430,7 @@ impl Field {
 
     /// The current while the lock is verified, A: the axis is tracked for a while without torque.
     #[cold]
-    fn verify(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+    fn verify(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         if k.elapsed >= c.sequence.verify {
             if k.seen.rotor_freq.abs() > c.sequence.pushed_freq {
                 return Err(Fault::LostLock);
@@ -448,7 +449,7 @@ impl Field {
 
     /// The fault when a result is not finite: settings, references or state, whichever is not.
     #[cold]
-    fn not_finite(&self, c: &Coefficients, k: &Kept) -> Option<Fault> {
+    fn not_finite(&self, c: &Coefficients, k: &Common) -> Option<Fault> {
         let state = (!self.estimator.is_finite()).then_some(Fault::NonFiniteState);
         k.not_finite(c, self.goal.is_finite()).or(state)
     }

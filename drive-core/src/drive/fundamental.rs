@@ -3,7 +3,7 @@
 use core::f32::consts::TAU;
 
 use super::Field;
-use super::in_turn::StepResults;
+use super::slow_tasks::StepResults;
 use crate::flux::hand_over::{Source, Turning};
 use crate::{AlphaBeta, Coefficients, UnitVector};
 
@@ -32,8 +32,8 @@ impl Coefficients {
 
     /// Whether the filter has the angle.
     #[inline(never)] // in the flash; inlined at both calls, 232 bytes more of control code
-    fn filters(&self, s: &Field, step: &StepResults) -> bool {
-        step.trust.turns
+    fn filter_tracks(&self, s: &Field, step: &StepResults) -> bool {
+        step.trust.rotates
             && self.injects(s)
             && !s.hand_over.leads
             // Flux that builds up shows no angle.
@@ -54,10 +54,11 @@ impl Coefficients {
 
     /// Corrects the tracked angle, speed and resistance by what carrier and observer show.
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
-        let (filters, known) = (self.filters(s, step), self.freq_per_speed * s.motion.acceleration);
+        let filters = self.filter_tracks(s, step);
         if !filters {
             s.estimator.filter.start(s.observer.resistance.decay > 0.0);
         }
+        let known = self.freq_per_speed * s.motion.acceleration;
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);
         if self.observer.is_some() && filters && step.trust.resistance {
             s.observer.resistance.correct(resistance);

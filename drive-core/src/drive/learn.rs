@@ -1,6 +1,6 @@
 //! Learning with the shaft locked, as a state of the drive.
 
-use super::{Drive, End, Field, FluxPhase, Kept, Phase};
+use super::{Common, Drive, End, Field, FluxPhase, Phase};
 use crate::identify::learning::{Learned, LearningSample, Start, Verdict};
 use crate::math::limited;
 use crate::{Angle, AngleSource, Coefficients, Fault};
@@ -56,7 +56,7 @@ impl Field {
     /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
     /// result replaces the settings, and the drive stops.
     #[cold]
-    pub(super) fn learn(&mut self, c: &Coefficients, k: &mut Kept) -> Result<f32, End> {
+    pub(super) fn learn(&mut self, c: &Coefficients, k: &mut Common) -> Result<f32, End> {
         let FluxPhase::Learn(learning) = &mut self.flux else { return Ok(0.0) };
         let saliency = *self.estimator.saliency();
         let signal = if c.learning.normalised { saliency.q } else { self.estimator.delta_i };

@@ -1,6 +1,6 @@
 //! The chain of limits of the torque current, with the reason of the one that acts.
 
-use super::{Drive, Kept, Phase, PowerLimit};
+use super::{Common, Drive, Phase, PowerLimit};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::drive::coefficients::Coefficients;
@@ -19,8 +19,8 @@ pub(super) struct Limits {
     /// Why the torque current is smaller than asked for.
     pub why: Limiting,
     /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
-    pub too_hot_for: f32,
-    pub too_hot: Limiting,
+    pub thermal_reduction_a: f32,
+    pub thermal_reason: Limiting,
     /// Share of the squared current that the motor does not bear by its sensor, of 255.
     pub motor_hot: u8,
     /// What stands against a start by that sensor.
@@ -41,8 +41,8 @@ impl Limits {
     }
 
     /// The torque current within the limits, A.
-    pub fn hold(&mut self, i_q: f32) -> f32 {
-        let (held, why) = self.now.hold(i_q);
+    pub fn clamp_torque(&mut self, i_q: f32) -> f32 {
+        let (held, why) = self.now.clamp(i_q);
         self.why = why;
         held
     }
@@ -56,13 +56,13 @@ impl Limits {
         rotor_freq: f32,
         (by_voltage, why): (f32, Limiting),
     ) {
-        let by_heat = c.protection.i_q - self.too_hot_for;
-        let most = if by_heat < by_voltage { (by_heat, self.too_hot) } else { (by_voltage, why) };
+        let hot = c.protection.i_q - self.thermal_reduction_a;
+        let most = if hot < by_voltage { (hot, self.thermal_reason) } else { (by_voltage, why) };
         self.now = c.dc_link.step(&mut self.dc_link, dc_link, rotor_freq, most);
     }
 }
 
-impl Kept {
+impl Common {
     /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
     #[inline(never)] // inlined, 32 bytes more of control code
     pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
@@ -103,7 +103,7 @@ impl Kept {
         let sensor = (1.0 - f32::from(limits.motor_hot) * (1.0 / 255.0), Limiting::Motor);
         let loads = if sensor.0 < loads.0 { sensor } else { loads };
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
-        (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
+        (limits.thermal_reduction_a, limits.thermal_reason) = if share < 1.0 {
             let (largest, i_d) = (c.protection.i_q, references.current.d);
             let square = share * largest * largest - i_d * i_d;
             (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
@@ -140,7 +140,7 @@ impl Drive {
             Phase::Field(field) if field.has_torque() => self.kept.limits.why,
             Phase::Scalar(_) => self.kept.limits.why,
             Phase::Field(_) | Phase::Off(_) | Phase::Fault(..) => Limiting::None,
-            Phase::Prepare(_) | Phase::Excite(_) => Limiting::None,
+            Phase::Prepare(_) | Phase::Test(_) => Limiting::None,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! From off to the first current: offsets, bootstraps, wiring.
 
-use super::excite::Excite;
 use super::scalar::Scalar;
-use super::{Drive, Field, FluxPhase, Goal, Job, Kept, Left, Phase, References, Telemetry};
+use super::standstill_test::StandstillTest;
+use super::{
+    CarryOver, Common, Drive, Field, FluxPhase, Goal, Phase, References, Start, Telemetry,
+};
 use crate::drive::state::State;
 use crate::flux::catch::CatchState;
 use crate::io::LOW_SIDES_ON;
@@ -17,8 +19,8 @@ const LOW_SIDES_ON_FROM: u32 = 4;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepare {
     pub step: Preparation,
-    pub job: Job,
-    pub left: Left,
+    pub job: Start,
+    pub carried: CarryOver,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +51,7 @@ impl Drive {
         let Phase::Prepare(prepare) = &mut self.phase else { return Ok(None) };
         match &mut prepare.step {
             Preparation::Offsets(state) => {
-                let residual = prepare.left.residual;
+                let residual = prepare.carried.residual;
                 let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
                 if !waits && let Some(offsets) = c.offsets.step(state, measured)? {
                     k.offsets = offsets;
@@ -70,7 +72,7 @@ impl Drive {
                 }
                 if k.elapsed >= c.sequence.precharge {
                     // The boost of V/f and the pulses of the commissioning check the wiring themselves.
-                    if matches!(prepare.job, Job::Field(_)) && k.wiring_unchecked {
+                    if matches!(prepare.job, Start::Field(_)) && k.wiring_unchecked {
                         prepare.step = Preparation::Wiring(WiringCheckState::default());
                         k.elapsed = 0;
                     } else {
@@ -94,11 +96,11 @@ impl Drive {
     #[cold]
     fn energise(&mut self, encoder: u32) {
         let Phase::Prepare(prepare) = &self.phase else { return };
-        let left = prepare.left;
+        let left = prepare.carried;
         match prepare.job {
-            Job::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
-            Job::Excite(wanted) => self.enter(Phase::Excite(Excite::new(wanted, left))),
-            Job::Field(goal) => {
+            Start::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
+            Start::Test(wanted) => self.enter(Phase::Test(StandstillTest::new(wanted, left))),
+            Start::Field(goal) => {
                 let catches = prepare.job.catches(&self.c);
                 // Built where it stays: it is large.
                 self.enter(Phase::Field(Field::default()));
@@ -110,38 +112,38 @@ impl Drive {
                     field.hand_over.switch_carrier_off();
                     field.flux = FluxPhase::Search(CatchState::default());
                 } else {
-                    field.stand(c, k, encoder);
+                    field.continue_at_standstill(c, k, encoder);
                 }
             }
         }
     }
 
     /// Begins to prepare for this work.
-    pub(super) fn prepare_for(&mut self, job: Job) {
-        let mut left = self.left();
+    pub(super) fn prepare_for(&mut self, job: Start) {
+        let mut carried = self.carry_over();
         let (c, k) = (&self.c, &mut self.kept);
-        left.residual = left.residual.and_then(|residual| {
+        carried.residual = carried.residual.and_then(|residual| {
             let residual = residual.after(k.elapsed);
             (job.catches(c) && residual.is_recent(c)).then_some(residual)
         });
         let boost = c.volts_per_hertz.map(|turning| turning.boost_a);
         let i_d = match job {
-            Job::Scalar { .. } => boost.unwrap_or(c.voltage_limit.i_d),
-            Job::Field(_) | Job::Excite(_) => c.voltage_limit.i_d,
+            Start::Scalar { .. } => boost.unwrap_or(c.voltage_limit.i_d),
+            Start::Field(_) | Start::Test(_) => c.voltage_limit.i_d,
         };
-        k.start(c, i_d, left.inverter_drop);
-        if matches!(job, Job::Field(Goal::Learn)) {
+        k.start(c, i_d, carried.inverter_drop);
+        if matches!(job, Start::Field(Goal::Learn)) {
             k.learned = None;
         }
         self.enter(Phase::Prepare(Prepare {
             step: Preparation::Offsets(OffsetCheckState::default()),
             job,
-            left,
+            carried,
         }));
     }
 }
 
-impl Kept {
+impl Common {
     /// Makes everything fresh that does not outlive a run.
     fn start(&mut self, c: &Coefficients, i_d: f32, inverter_drop: f32) {
         self.starts = self.starts.wrapping_add(1);
@@ -153,7 +155,7 @@ impl Kept {
     }
 
     /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
-    pub fn stands(&self, c: &Coefficients) -> bool {
+    pub fn is_at_standstill(&self, c: &Coefficients) -> bool {
         self.seen.rotor_freq.abs() <= c.sequence.standing_freq
     }
 

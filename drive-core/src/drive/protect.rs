@@ -1,6 +1,6 @@
 //! The checks of every step: the sample before it is used, and the state when a result is not finite.
 
-use super::Kept;
+use super::Common;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Measured};
@@ -59,7 +59,7 @@ impl Coefficients {
     }
 }
 
-impl Kept {
+impl Common {
     /// The fault when a result is not finite and settings, or references, are not; `goal_is_finite` says it of the references of
     /// the goal.
     #[cold]

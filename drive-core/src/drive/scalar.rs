@@ -1,6 +1,6 @@
 //! Running by voltage and frequency, without a model of the motor: see [`volts_per_hertz`](crate::flux::volts_per_hertz).
 
-use super::{End, Kept, Left, Telemetry};
+use super::{CarryOver, Common, End, Telemetry};
 use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
@@ -17,12 +17,12 @@ pub(super) struct Scalar {
     pub speed: f32,
     /// Whether it comes to rest by the ramp of a quick stop, where it stops.
     pub stop: Option<bool>,
-    pub left: Left,
+    pub carried: CarryOver,
 }
 
 impl Scalar {
-    pub fn new(speed: f32, left: Left) -> Self {
-        Self { turning: VoltsPerHertzState::default(), speed, stop: None, left }
+    pub fn new(speed: f32, carried: CarryOver) -> Self {
+        Self { turning: VoltsPerHertzState::default(), speed, stop: None, carried }
     }
 
     pub fn state(&self) -> State {
@@ -37,7 +37,7 @@ impl Scalar {
     pub fn step(
         &mut self,
         c: &Coefficients,
-        k: &mut Kept,
+        k: &mut Common,
         measured: &Measured,
     ) -> Result<[f32; 3], End> {
         let (s, current) = (&mut self.turning, measured.current());
@@ -71,7 +71,7 @@ impl Scalar {
         let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
         let modulated = c.modulator.step(voltage, compensation, measured.dc_link);
 
-        k.limits.hold(turned.current.q);
+        k.limits.clamp_torque(turned.current.q);
         if k.limits.why == Limiting::None && s.by_voltage {
             k.limits.why = Limiting::Voltage;
         }

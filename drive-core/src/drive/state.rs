@@ -23,7 +23,7 @@ pub enum Mode {
     /// Learning of the reference of the angle tracking with the shaft locked (see `crate::identify::learning`), then
     /// stops.
     Learning,
-    /// [Excitation](crate::Excitation) of the motor at rest, for the commissioning.
+    /// [TestSignal](crate::TestSignal) of the motor at rest, for the commissioning.
     Commissioning,
 }
 
@@ -46,7 +46,7 @@ pub enum State {
     /// Exciting the motor at rest, for the commissioning.
     Exciting,
     /// Current along phase a, to find the speed of a turning shaft; then its flux builds up.
-    Catching,
+    FlyingStart,
     /// Current on the direct axis only, until the flux stands.
     Magnetising,
     /// Flux built up, tracking without torque: is it the flux that is tracked?
@@ -91,7 +91,7 @@ impl State {
             Self::Off => Stage::Off,
             Self::Fault(_) => Stage::Fault,
             Self::Calibrating | Self::Precharge | Self::CheckingWiring => Stage::Starting,
-            Self::Catching | Self::Magnetising | Self::Verifying => Stage::Starting,
+            Self::FlyingStart | Self::Magnetising | Self::Verifying => Stage::Starting,
             Self::Torque | Self::Speed | Self::Position | Self::VoltsPerHertz => Stage::Running,
             Self::Learning | Self::Exciting => Stage::Running,
             Self::Braking | Self::BrakingByFrequency | Self::Stopping => Stage::Stopping,
@@ -114,7 +114,7 @@ impl State {
     /// Whether the current is regulated in the frame of the flux, for whatever purpose: with a wiring that was found right.
     pub const fn has_current(self) -> bool {
         match self {
-            Self::Catching | Self::Magnetising | Self::Verifying | Self::Learning => true,
+            Self::FlyingStart | Self::Magnetising | Self::Verifying | Self::Learning => true,
             Self::Torque | Self::Speed | Self::Position | Self::Braking | Self::Stopping => true,
             Self::Off | Self::Fault(_) | Self::Calibrating | Self::Precharge => false,
             Self::CheckingWiring | Self::Exciting => false,
@@ -164,7 +164,7 @@ impl fmt::Display for State {
             Self::Precharge => "precharging",
             Self::CheckingWiring => "checking the wiring",
             Self::Exciting => "exciting the motor at rest",
-            Self::Catching => "looking for a turning shaft",
+            Self::FlyingStart => "looking for a turning shaft",
             Self::Magnetising => "magnetising",
             Self::Verifying => "verifying the lock",
             Self::Torque => "regulating torque",

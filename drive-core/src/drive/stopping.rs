@@ -2,7 +2,7 @@
 
 use crate::io::PERIOD_S;
 
-use super::{Drive, End, Field, FluxPhase, Goal, Kept, Phase};
+use super::{Common, Drive, End, Field, FluxPhase, Goal, Phase};
 use crate::Coefficients;
 use crate::drive::command::Stop;
 
@@ -17,7 +17,7 @@ impl Drive {
         match (&mut self.phase, stop) {
             (Phase::Off(_) | Phase::Fault(..), _) => {}
             (_, Stop::Now)
-            | (Phase::Prepare(_) | Phase::Excite(_), _)
+            | (Phase::Prepare(_) | Phase::Test(_), _)
             | (Phase::Scalar(_), Stop::Coast) => self.end(End::Stopped),
             (Phase::Scalar(scalar), Stop::Ramp | Stop::Quick) => {
                 if scalar.stop.is_none() {
@@ -31,7 +31,7 @@ impl Drive {
 }
 
 impl Field {
-    fn stop(&mut self, c: &Coefficients, k: &mut Kept, stop: Stop) {
+    fn stop(&mut self, c: &Coefficients, k: &mut Common, stop: Stop) {
         match (&mut self.goal, stop) {
             (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
             (Goal::Brake { quick }, Stop::Quick) => {
@@ -47,7 +47,7 @@ impl Field {
         if regulates && (brakes || holds) {
             // The speed loop takes over at the present speed and torque current.
             let speed = k.seen.rotor_freq / c.freq_per_speed;
-            let (i_q, _) = k.limits.now.hold(k.references.current.q);
+            let (i_q, _) = k.limits.now.clamp(k.references.current.q);
             c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
         }
         // A torque that was asked for during the start has not come yet.

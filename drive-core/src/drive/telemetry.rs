@@ -55,11 +55,11 @@ impl Telemetry {
 
 /// Limits of the present torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Room {
+pub struct TorqueLimits {
     /// Least and largest torque current, A, at the present speed, dc link and heat sink; only while the drive regulates.
     pub i_q: (f32, f32),
     /// Torque current that the heat sink does not bear, of the largest current, A.
-    pub too_hot_for: f32,
+    pub thermal_reduction_a: f32,
     /// Voltage that the limit of the direct current reckons with, V peak; 0 where the direct
     /// current is that of the setting.
     pub voltage: f32,
@@ -70,10 +70,10 @@ impl Drive {
     pub const TELEMETRY: usize = offset_of!(Self, kept.seen);
 
     /// Limits of the present torque.
-    pub fn room(&self) -> Room {
+    pub fn torque_limits(&self) -> TorqueLimits {
         let limits = &self.kept.limits;
         let (i_q, voltage) = (limits.now.i_q, limits.voltage.available);
-        Room { i_q, too_hot_for: limits.too_hot_for, voltage }
+        TorqueLimits { i_q, thermal_reduction_a: limits.thermal_reduction_a, voltage }
     }
 
     /// The telemetry of the last step with the outputs on.

@@ -1,10 +1,10 @@
 //! The drive on a resistive-inductive load: sequence, protections, commands. How it drives a motor
 //! is tested with the simulator.
 
-mod excitation;
 mod motor;
 mod protections;
 mod ranges;
+mod standstill_test;
 mod trust;
 
 use super::*;
@@ -146,7 +146,7 @@ fn field(drive: &mut Drive) -> &mut Field {
 /// The reference of the speed of a drive that starts, turns/s.
 fn speed(drive: &Drive) -> Option<f32> {
     match drive.phase {
-        Phase::Prepare(Prepare { job: Job::Field(Goal::Speed { speed, .. }), .. }) => Some(speed),
+        Phase::Prepare(Prepare { job: Start::Field(Goal::Speed { speed, .. }), .. }) => Some(speed),
         _ => None,
     }
 }

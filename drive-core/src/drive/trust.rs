@@ -1,7 +1,7 @@
 //! Quantities that may be used and checks that may act, by the phase of the flux: one table, a row a phase. `docs/control-law.md`
 //! prints it.
 
-use Judged::{No, Strictly, Tolerantly};
+use Check::{Narrow, Wide};
 use Lock::{Baseline, Off, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
@@ -11,11 +11,11 @@ use crate::flux::hand_over::Source;
 
 /// How strictly the measured current is compared with that which voltage and flux explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Judged {
-    No,
+pub(super) enum Check {
+    Off,
     /// Residual flux turns relative to the new one.
-    Tolerantly,
-    Strictly,
+    Wide,
+    Narrow,
 }
 
 /// Task of the lock monitor.
@@ -33,15 +33,15 @@ pub(super) enum Lock {
 pub(super) struct Trust {
     pub source: Source,
     /// Whether the frame turns with the rotor.
-    pub turns: bool,
+    pub rotates: bool,
     pub lock: Lock,
-    pub current: Judged,
+    pub current: Check,
     /// Whether the mean of the unexplained voltage is kept and judged; otherwise it begins anew.
-    pub mean: bool,
+    pub mean_voltage: bool,
     /// Whether flux and injection show the stator resistance.
     pub resistance: bool,
     /// Whether the drop of the inverter is measured, and with it the resistance.
-    pub drop: bool,
+    pub measures_drop: bool,
 }
 
 impl Trust {
@@ -57,17 +57,17 @@ impl Field {
     pub(super) fn trust(&self, c: &Coefficients, elapsed: u32) -> Trust {
         match (&self.flux, self.frame) {
             // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
-            (FluxPhase::Search(_), _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+            (FluxPhase::Search(_), _) => Trust { source: Nothing, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             // There is neither current nor flux.
-            (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
-            (FluxPhase::Build { from }, _) => match &c.catching {
-                Some(c) if elapsed.wrapping_sub(*from) < c.alone => Trust { source: Injection, turns: true, lock: Off, current: No, mean: false, resistance: false, drop: false },
-                _ => Trust { source: Both, turns: true, lock: Baseline, current: Tolerantly, mean: true, resistance: false, drop: false },
+            (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
+            (FluxPhase::Build { from }, _) => match &c.flying_start {
+                Some(c) if elapsed.wrapping_sub(*from) < c.injection_only => Trust { source: Injection, rotates: true, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
+                _ => Trust { source: Both, rotates: true, lock: Baseline, current: Wide, mean_voltage: true, resistance: false, measures_drop: false },
             },
-            (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
-            (FluxPhase::Hold, Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
-            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::LockedShaft) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
-            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
+            (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, rotates: false, lock: Baseline, current: Narrow, mean_voltage: false, resistance: false, measures_drop: true },
+            (FluxPhase::Hold, Frame::Encoder | Frame::Tracked) => Trust { source: Both, rotates: false, lock: Baseline, current: Narrow, mean_voltage: false, resistance: false, measures_drop: true },
+            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::LockedShaft) => Trust { source: Slip, rotates: true, lock: Off, current: Narrow, mean_voltage: true, resistance: false, measures_drop: false },
+            (FluxPhase::Verify | FluxPhase::Prove | FluxPhase::Ready(_) | FluxPhase::Learn(_), Frame::Encoder | Frame::Tracked) => Trust { source: Both, rotates: true, lock: Watch, current: Narrow, mean_voltage: true, resistance: true, measures_drop: false },
         }
     }
 }

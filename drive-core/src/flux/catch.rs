@@ -69,7 +69,7 @@ impl Default for CatchState {
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Caught {
+pub enum SearchResult {
     /// The search goes on.
     Searching,
     /// The shaft stands, or turns so slowly that a start does not mind.
@@ -109,9 +109,9 @@ impl Path {
 impl CatchState {
     /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands. From [`FROM`] on
     /// the controller is proportional.
-    pub fn step(&mut self, elapsed: u32, e: Dq) -> Caught {
+    pub fn step(&mut self, elapsed: u32, e: Dq) -> SearchResult {
         if elapsed < FROM {
-            return Caught::Searching;
+            return SearchResult::Searching;
         }
         self.flux += e;
         self.sum += self.flux;
@@ -120,7 +120,7 @@ impl CatchState {
             self.take();
             (self.sum, self.summed) = (Dq::ZERO, 0);
         }
-        if elapsed < END { Caught::Searching } else { self.result() }
+        if elapsed < END { SearchResult::Searching } else { self.result() }
     }
 
     /// Takes an average.
@@ -132,7 +132,7 @@ impl CatchState {
         self.count += 1;
     }
 
-    fn result(&self) -> Caught {
+    fn result(&self) -> SearchResult {
         let [short, middle, long] = &self.correlations;
         let (by_short, by_middle) = (short.frequency(SHORT), middle.frequency(MIDDLE));
         let freq = match (by_short, by_middle, long.frequency(LONG)) {
@@ -147,7 +147,7 @@ impl CatchState {
             (_, Some(freq), _) | (_, _, Some(freq)) => freq,
             _ => 0.0,
         };
-        if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq) }
+        if freq.abs() < LOWEST { SearchResult::Standing } else { SearchResult::Turning(freq) }
     }
 }
 

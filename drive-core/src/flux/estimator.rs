@@ -130,7 +130,7 @@ impl EstimatorState {
     }
 
     /// Lets the axis turn on with a rotor of this speed, electrical turns per period.
-    pub fn turn_with(&mut self, rotor_freq: f32) {
+    pub fn preset_speed(&mut self, rotor_freq: f32) {
         (self.rotor_freq, self.tracker.freq) = (rotor_freq, rotor_freq);
     }
 

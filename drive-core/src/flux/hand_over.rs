@@ -33,7 +33,7 @@ const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
 /// Sources that may turn the frame of a drive without an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The slip alone: the shaft is locked.
+    /// The slip injection_only: the shaft is locked.
     Slip,
     /// Nothing, and the carrier is off.
     Nothing,

@@ -33,8 +33,8 @@ use crate::math::{limited, within};
 use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
 
 /// Gains `s_0` and `c`. Values of `c` from 0.2 to 0.7 differ by 0.1 degrees.
-const AT_REST: f32 = 1.0;
-const WITH_SPEED: f32 = 0.4;
+const GAIN_AT_STANDSTILL: f32 = 1.0;
+const GAIN_PER_SPEED: f32 = 0.4;
 /// Most that the flux may turn in a period, as a tangent.
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
@@ -42,7 +42,7 @@ const LEAST_FLUX: f32 = 0.01;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Least flux that shows an angle and a speed, as a share of the nominal one.
-const COUNTS_FROM: f32 = 0.6;
+const LEAST_FLUX_SHARE: f32 = 0.6;
 /// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
 /// sample, samples.
 const SEEN_AGE: f32 = 5.5;
@@ -65,7 +65,7 @@ const FROM_INJECTION: f32 = 0.02;
 /// by more at this speed does little.
 const LARGEST_ERROR: f32 = 0.05;
 /// Share of the learned torque limit in the middle of the currents.
-const JUDGED_AT: f32 = 0.5;
+const LEARNED_AT_SHARE: f32 = 0.5;
 /// Voltages that are kept: enough for a current of age 6, two more than its age.
 const VOLTAGES: usize = 8;
 
@@ -252,7 +252,7 @@ impl Observer {
         }
         if learned.current_saliency.accepted {
             let b = learned.current_saliency.value;
-            let middle = b * JUDGED_AT * learned.limit_a;
+            let middle = b * LEARNED_AT_SHARE * learned.limit_a;
             self.current_saliency = b * (1.0 - self.flux_saliency + middle);
         }
     }
@@ -305,7 +305,7 @@ impl Observer {
     /// carrier period.
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
         let (a, w) = (self.rate, rotor_freq * TAU);
-        let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
+        let gain = 2.0 * (GAIN_AT_STANDSTILL * a + GAIN_PER_SPEED * w.abs()) / (a * a + w * w);
         state.gain = Dq { d: gain * a, q: gain * w };
         state.flux_saliency = self.flux_saliency * (state.flux / self.nominal);
     }
@@ -319,7 +319,7 @@ impl Observer {
 
     /// Whether there is flux enough to show an angle and a speed.
     pub fn has_flux(&self, state: &ObserverState) -> bool {
-        state.flux > COUNTS_FROM * self.nominal
+        state.flux > LEAST_FLUX_SHARE * self.nominal
     }
 
     /// The speed of the rotor that it sees, for a mean `turn` of the flux in a carrier period, less the present slip, at a flux of

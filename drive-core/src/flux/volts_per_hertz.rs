@@ -21,7 +21,7 @@
 //! 20 ms is taken for a motor that has pulled out: the frequency goes down until the current does. A motor that stays at its
 //! limits below 4 Hz for two seconds is taken for one that stands.
 //!
-//! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate alone: half the rated speed within 1 % of
+//! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate injection_only: half the rated speed within 1 % of
 //! the rated one without load, within 3 % with 0.3 of the rated torque.
 
 use crate::math::{limited, within};
@@ -41,11 +41,11 @@ const COMPENSATED: f32 = 0.55;
 /// Resistance that limits the current, as a share of the base impedance.
 const LIMITING: f32 = 0.6;
 /// Share of the current limit from which on the torque current makes the frequency give way.
-const NEAR: f32 = 0.83;
+const FOLD_BACK_FROM: f32 = 0.83;
 /// Least time for a change by the rated frequency, s: the flux of most motors follows.
 const STEEPEST_S: f32 = 2.0;
 /// Share of it that must be left for the whole acceleration.
-const ROOM: f32 = 0.25;
+const LEAST_RAMP_SHARE: f32 = 0.25;
 /// A current beyond the limit for these control periods, 20 ms, is that of a motor that has pulled out. The frequency then
 /// goes down, the rated one in this time, s, until the current is below this share of the limit.
 const PULLED_OUT: u32 = 120;
@@ -80,9 +80,9 @@ const JUDGED_AFTER: u32 = 3000;
 const ACROSS: f32 = 0.7;
 const ACROSS_OF_POLARITY: f32 = 0.8;
 /// Share of the circle inside the hexagon that is used.
-const OF_CIRCLE: f32 = 0.97;
+const MODULATION_SHARE: f32 = 0.97;
 /// Periods from the sample to the middle of the period of its voltage.
-const AHEAD: f32 = 1.5;
+const VOLTAGE_DELAY: f32 = 1.5;
 
 /// Nameplate and limits; the voltages are peaks of a phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,7 +215,7 @@ impl VoltsPerHertz {
             damping: DAMPING * s.frequency_hz * PERIOD_S / s.rated_a,
             ramp: ramp(s.ramp_hz_per_s),
             quick_ramp: ramp(s.quick_hz_per_s),
-            per_room: 1.0 / (ROOM * s.limit_a),
+            per_room: 1.0 / (LEAST_RAMP_SHARE * s.limit_a),
             recovery: s.frequency_hz * PERIOD_S * (PERIOD_S / RECOVERY_S),
         }
     }
@@ -249,7 +249,7 @@ impl VoltsPerHertz {
             voltage -= seen * (self.limiting * beyond);
         }
         let angle = state.angle;
-        let applied = (angle + Angle::from_turns(AHEAD * state.freq)).unit_vector();
+        let applied = (angle + Angle::from_turns(VOLTAGE_DELAY * state.freq)).unit_vector();
         state.angle = angle + Angle::from_turns(state.freq);
         Ok(Turned { angle, applied, current: seen, voltage })
     }
@@ -279,7 +279,7 @@ impl VoltsPerHertz {
     /// Brings the frequency to the one that is asked for, as far as the current allows.
     fn follow(&self, state: &mut VoltsPerHertzState, demand: &Demand) -> Result<(), Fault> {
         let (square, limit) = (state.fast.length_squared(), self.limit_a * self.limit_a);
-        let most = NEAR * NEAR * limit - state.slow.d * state.slow.d;
+        let most = FOLD_BACK_FROM * FOLD_BACK_FROM * limit - state.slow.d * state.slow.d;
         let most = if most > 0.0 { fpu_sqrt::sqrtf(most) } else { 0.0 };
         let i_q = state.fast.q;
         let range = (within(-most, demand.i_q), within(most, demand.i_q));
@@ -315,7 +315,7 @@ impl VoltsPerHertz {
         // The drop of the resistance comes first.
         let resistance = state.boost / self.boost_a;
         let drop = COMPENSATED * resistance * state.slow.q;
-        let left = OF_CIRCLE * demand.largest_v - drop.abs() - state.boost;
+        let left = MODULATION_SHARE * demand.largest_v - drop.abs() - state.boost;
         let wanted = state.flux * whole.abs();
         state.by_voltage = wanted > left;
         let flux = if state.by_voltage { state.flux * left / wanted } else { state.flux };

@@ -33,7 +33,7 @@ struct Done {
 
 /// With a load in A of torque current from `load.0` s on, and a motor whose inertia is `heavier`
 /// than the design's.
-fn run(motion: &Motion, goal: Goal, load: (f64, f64), heavier: f64, seconds: f64) -> Done {
+fn run(motion: &Motion, goal: Target, load: (f64, f64), heavier: f64, seconds: f64) -> Done {
     const DT: f64 = 1.0 / 6000.0;
     let mut state = MotionState::default();
     motion.start(&mut state, 77);
@@ -47,7 +47,7 @@ fn run(motion: &Motion, goal: Goal, load: (f64, f64), heavier: f64, seconds: f64
         x += v * DT;
         done.furthest = done.furthest.max(x);
         done.fastest = done.fastest.max(v);
-        if let Goal::Position(turns) = goal
+        if let Target::Position(turns) = goal
             && (x - f64::from(turns)).abs() > 1.0 / 360.0
         {
             done.settled = t;
@@ -61,7 +61,7 @@ fn five_turns_without_overshoot_whatever_the_limits() {
     for (limit, ramp, heavier) in
         [(24.0, 12.0, 1.0), (24.0, 5.0, 1.0), (5.0, 5.0, 1.0), (5.0, 5.0, 1.5), (5.0, 5.0, 0.7)]
     {
-        let done = run(&motion(limit, ramp), Goal::Position(5.0), (9e9, 0.0), heavier, 8.0);
+        let done = run(&motion(limit, ramp), Target::Position(5.0), (9e9, 0.0), heavier, 8.0);
         println!("{limit} turns/s, {ramp} turns/s^2, inertia x{heavier}: {done:?}");
         assert!(done.furthest < 5.0 * 1.01, "{done:?}");
         assert!(done.settled < 3.5, "{done:?}");
@@ -72,7 +72,7 @@ fn five_turns_without_overshoot_whatever_the_limits() {
 fn speed_is_reached_held_under_load_and_limited() {
     for (goal, limit, end) in [(5.0, 24.0, 5.0), (30.0, 24.0, 24.0)] {
         let motion = motion(limit, 10.0);
-        let done = run(&motion, Goal::Speed(goal), (4.0, 1.5), 1.0, 6.0);
+        let done = run(&motion, Target::Speed(goal), (4.0, 1.5), 1.0, 6.0);
         assert!((done.end.1 - end).abs() < 0.01, "{done:?}");
         // The friction it did not know of on the way up.
         assert!(done.fastest < end * 1.04, "{done:?}");
@@ -88,7 +88,7 @@ fn limits_do_not_wind_up() {
     for k in 0..60_000 {
         let t = f64::from(k) / 6000.0;
         let count = (x * f64::from(COUNTS)) as i64 as u32;
-        let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, 0.0, ANY));
+        let i = f64::from(motion.step(&mut state, Target::Speed(5.0), count, 0.0, ANY));
         assert!(i.abs() <= 3.0);
         let i_load = if (2.0..4.0).contains(&t) { 3.4 } else { 0.0 };
         v += ACCELERATION * (i - i_load) / 6000.0;

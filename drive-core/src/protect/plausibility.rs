@@ -95,7 +95,7 @@ pub struct RotorFlux {
 
 /// Knowledge of resistance and flux in a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Known {
+pub struct Uncertainty {
     /// Deviation of the stator resistance from the settings, relative.
     pub deviation: f32,
     /// Whether that is tracked; otherwise it is as of the start.
@@ -195,7 +195,7 @@ impl Prediction {
         &self,
         state: &mut PredictionState,
         current: AlphaBeta,
-        known: Known,
+        known: Uncertainty,
     ) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);

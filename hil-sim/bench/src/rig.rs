@@ -324,7 +324,7 @@ fn words(command: &Command) -> String {
         Command::Relock => "to magnetise and verify the angle again".into(),
         Command::CheckWiring => "to check the wiring".into(),
         Command::Brake(seconds) => format!("to have a brake that closes in {seconds} s"),
-        Command::Excite(_) => "to excite the motor at rest".into(),
+        Command::Test(_) => "to excite the motor at rest".into(),
         Command::Stop(Stop::Coast) => "to stop".into(),
         Command::Stop(Stop::Ramp) => "to stop by the ramp".into(),
         Command::Stop(Stop::Quick) => "to stop quickly".into(),

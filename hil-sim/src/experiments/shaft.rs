@@ -139,7 +139,7 @@ impl Case {
         }
         let before = speed;
         seen.noise_pct[0] = 100.0 * torque.deviation() / rated_nm;
-        let room = rig.drive.room().i_q;
+        let room = rig.drive.torque_limits().i_q;
         let allowed = f64::from((-room.0).min(room.1)) * last.torque_per_ampere;
         seen.load = self.load * (SHARE_OF_ALLOWED_TORQUE * allowed / rated_nm).min(1.0);
         let direction = self.load.signum();

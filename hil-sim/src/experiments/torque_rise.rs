@@ -69,7 +69,7 @@ fn step(config: &Config, rig: &Rig, (rpm, sign): Case) -> Result<Seen, Error> {
         flux: start.flux * start.torque_per_flux_ampere / (1.5 * pole_pairs),
         voltage: config.inverter.dc_link_v / 3f64.sqrt(),
     };
-    let (least, most) = rig.drive.room().i_q;
+    let (least, most) = rig.drive.torque_limits().i_q;
     let allowed = f64::from(if sign > 0.0 { most } else { least });
     let i_q = STEP_SHARE * physical.borne(start.id, allowed);
     let limit_ms = 1e3 * (physical.least_s(start.id, 0.9 * i_q) + DELAY / RATE_HZ);

@@ -121,7 +121,7 @@ impl Shadow {
             Ok(Request::Order(order)) => {
                 let _ = self.desk.order(Commander::Console, order, &mut self.orders);
                 // A start follows its design in the next pass.
-                (0..2).for_each(|_| self.desk.go_on(&mut self.orders, 0));
+                (0..2).for_each(|_| self.desk.run_pending(&mut self.orders, 0));
             }
             Ok(Request::Set(values)) => {
                 drop(self.desk.set(Commander::Console, &values, &self.orders))
@@ -171,7 +171,7 @@ impl Shadow {
         }
         self.compared += 1;
         (self.orders.state, self.orders.periods) = (self.drive.state(), self.compared as u32);
-        self.desk.follow(&mut self.orders, self.compared as u32 / 6);
+        self.desk.poll_drive(&mut self.orders, self.compared as u32 / 6);
         if period.took_order {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);

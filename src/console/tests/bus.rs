@@ -200,7 +200,7 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
     both.bus.asked.push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
     let Talk { front, drive, .. } = &mut both.talk;
-    front.desk.go_on(drive, 0);
+    front.desk.run_pending(drive, 0);
     both.serve();
     assert_eq!(both.talk.say(""), [""; 0]);
     assert!(both.bus.asked.is_empty() && both.bus.answers.is_empty());

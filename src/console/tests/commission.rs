@@ -21,11 +21,11 @@ fn found_on_a_motor(settings: &Settings) -> Session {
     session.begin(Step::Nameplate, Step::Leakage);
     for n in 0.. {
         rig.step();
-        if rig.drive.excites() {
+        if rig.drive.is_testing() {
             let telemetry = *rig.drive.telemetry();
             session.take(&Record { period: n, telemetry, ..Record::default() });
         }
-        if let Some(command) = session.poll(&rig.drive.excited(), |_| ()) {
+        if let Some(command) = session.poll(&rig.drive.test_report(), |_| ()) {
             rig.drive.command(&command).unwrap();
         }
         match session.news() {
@@ -82,7 +82,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
 fn told(talk: &mut Talk) -> Vec<String> {
     let mut told = Vec::new();
     for _ in 0..20 {
-        talk.drive.session.poll(&talk.drive.drive.excited(), |_| ());
+        talk.drive.session.poll(&talk.drive.drive.test_report(), |_| ());
         told.extend(talk.say(""));
     }
     told

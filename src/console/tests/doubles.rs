@@ -114,9 +114,9 @@ impl DriveHandle for FakeDrive {
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
             limiting: self.drive.limiting(),
-            room: self.drive.room(),
+            torque_limits: self.drive.torque_limits(),
             stator_resistance: self.drive.stator_resistance(),
-            excited: self.drive.excited(),
+            test_report: self.drive.test_report(),
         })
     }
     fn is_off(&self) -> bool {

@@ -30,12 +30,12 @@ fn console_of(config: &Config, seed: u64) -> (String, FirmwareSettings) {
     let mut lines = vec!["> commission".to_owned()];
     for n in 0.. {
         rig.step();
-        if rig.drive.excites() {
+        if rig.drive.is_testing() {
             let telemetry = *rig.drive.telemetry();
             session.take(&Record { period: n, telemetry, ..Record::default() });
         }
         if let Some(command) =
-            session.poll(&rig.drive.excited(), |commissioning| commissioning.design())
+            session.poll(&rig.drive.test_report(), |commissioning| commissioning.design())
         {
             rig.drive.command(&command).unwrap();
         }

@@ -1,7 +1,7 @@
 //! The design of the coefficients of the control step.
 
-mod catching;
 mod estimator;
+mod flying_start;
 mod scalar;
 
 use core::f32::consts::TAU;
@@ -158,7 +158,7 @@ impl Settings {
             motor_c: self.motor_sensor.limits(),
             unlearned: tracks && !t.allow_unlearned,
             prediction: Prediction::new(m, motor_plant, allowed_v, allowed_mean_v),
-            catching: self.catching([d.k_c, q.k_c]),
+            flying_start: self.flying_start([d.k_c, q.k_c]),
             voltage_limit: if self.flux.economy { limit.economical(m) } else { limit },
             dc_link: DcLink::new(&self.dc_link_limits()),
             power: self.power_limit(),
@@ -257,7 +257,7 @@ impl Settings {
         let slip = f64::from(1.0 / (m.tau_r() * self.i_d() * turns));
         let leakage = f64::from(m.sigma_l_s() / (m.coupled_inductance() * self.i_d() * turns));
         let source = SpeedSource::Estimate { slip, leakage };
-        let estimated = design(source, Motion::ESTIMATED_DIVIDER)?;
+        let estimated = design(source, Motion::ESTIMATED)?;
         // With little flux and much slip the loop of the counted angle is the faster one.
         Ok(if estimated.gains.k_c > counted.gains.k_c { estimated } else { counted })
     }

@@ -309,14 +309,16 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
         bench.motor.omega = rpm / 60.0 * 2.0 * core::f64::consts::TAU;
         bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
         let mut builds = false;
-        while matches!(bench.drive.state(), State::Calibrating | State::Precharge | State::Catching)
-        {
+        while matches!(
+            bench.drive.state(),
+            State::Calibrating | State::Precharge | State::FlyingStart
+        ) {
             bench.step();
             if let Phase::Field(field) = &mut bench.drive.phase {
                 let now = matches!(field.flux, FluxPhase::Build { .. });
                 if now && !builds {
                     let freq = field.estimator.rotor_freq;
-                    field.estimator.turn_with(freq + wrong_by * PERIOD_S);
+                    field.estimator.preset_speed(freq + wrong_by * PERIOD_S);
                 }
                 builds = now;
             }

@@ -222,7 +222,7 @@ fn the_load_of_the_motor_follows_the_current_in_every_phase() {
     let mut s = settings();
     (s.limits.motor_s, s.limits.motor_a) = (10.0, Some(2.0));
     let c = s.build().unwrap();
-    let excite = excitation::current(1.5, AlphaBeta::ZERO);
+    let excite = standstill_test::current(1.5, AlphaBeta::ZERO);
     // The least square of the current that flows, A^2.
     let cases: [(Option<Command>, State, f32); 5] = [
         (None, State::Off, 0.0),

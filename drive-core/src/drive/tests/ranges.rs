@@ -2,9 +2,9 @@
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use super::*;
-use crate::drive::catching::Residual;
-use crate::drive::excite::next_bit;
-use crate::drive::{Excitation, Regulator};
+use crate::drive::flying_start::Residual;
+use crate::drive::standstill_test::next_bit;
+use crate::drive::{Regulator, TestSignal};
 
 /// A regulated drive in this mode, with the encoder.
 fn in_mode(mode: Mode) -> Drive {
@@ -19,7 +19,7 @@ fn in_mode(mode: Mode) -> Drive {
 }
 
 fn excitation(amperes: f32, regulator: Regulator, carrier: AlphaBeta) -> Command {
-    Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false })
+    Command::Test(TestSignal::Current { amperes, regulator, carrier, binary: false })
 }
 
 /// Each command at the ends of its range, and just beyond.
@@ -104,10 +104,10 @@ fn the_binary_sequence_has_the_largest_length() {
 #[test]
 fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
     let c = sensorless().build().unwrap();
-    let catching = c.catching.unwrap();
+    let flying_start = c.flying_start.unwrap();
     let per_period = 1.0 / (6000.0 * f64::from(settings().motor.tau_r()));
     for volts in [1.01, 2.0, 5.0, 20.0] {
-        let residual = Residual::of(volts * catching.left_v);
+        let residual = Residual::of(volts * flying_start.residual_v);
         let waits = |elapsed| residual.waits(&c, elapsed);
         let decayed = (f64::from(volts).ln() / per_period) as u32;
         let ends = (0..100_000).find(|elapsed| !waits(*elapsed)).unwrap();
@@ -119,10 +119,13 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
         // It makes no difference when the time has passed.
         assert!(!residual.after(ends).waits(&c, 0) && residual.after(ends - 1).waits(&c, 0));
     }
-    assert!(!Residual::of(catching.left_v).waits(&c, 0), "as much as is left is no reason to wait");
+    assert!(
+        !Residual::of(flying_start.residual_v).waits(&c, 0),
+        "as much as is left is no reason to wait"
+    );
     let residual = Residual::of(50.0);
-    assert!(residual.after(catching.flux_gone - 1).is_recent(&c));
-    assert!(!residual.after(catching.flux_gone).is_recent(&c));
+    assert!(residual.after(flying_start.flux_decay - 1).is_recent(&c));
+    assert!(!residual.after(flying_start.flux_decay).is_recent(&c));
     // The voltage of a flux of 0.5 V s at 50 Hz.
     let turning = Residual::turning(-50.0 / 6000.0, 0.5);
     let volts = core::f32::consts::TAU * 50.0 * 0.5;

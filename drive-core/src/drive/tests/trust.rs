@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::carrier::at_start::AtStartState;
-use crate::drive::trust::{Judged, Lock, Trust};
+use crate::drive::trust::{Check, Lock, Trust};
 use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;
 
@@ -14,19 +14,19 @@ fn row(trust: &Trust) -> String {
         Source::Injection => "injection",
         Source::Both => "injection and voltage",
     };
-    let frame = if trust.turns { "turns" } else { "stands" };
+    let frame = if trust.rotates { "turns" } else { "stands" };
     let lock = match trust.lock {
         Lock::Off => "off",
         Lock::Baseline => "baseline",
         Lock::Watch => "watches",
     };
     let current = match trust.current {
-        Judged::No => "no",
-        Judged::Tolerantly => "tolerantly",
-        Judged::Strictly => "strictly",
+        Check::Off => "no",
+        Check::Wide => "tolerantly",
+        Check::Narrow => "strictly",
     };
-    let mean = if trust.mean { "judged" } else { "begins anew" };
-    let resistance = match (trust.resistance, trust.drop) {
+    let mean = if trust.mean_voltage { "judged" } else { "begins anew" };
+    let resistance = match (trust.resistance, trust.measures_drop) {
         (true, false) => "by flux or injection",
         (false, true) => "with the drop of the inverter",
         (false, false) => "kept",
@@ -41,7 +41,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let mut settings = Settings::default();
     (settings.observer.enabled, settings.sequence.catch) = (true, true);
     let c = settings.build().unwrap();
-    let alone = c.catching.unwrap().alone;
+    let alone = c.flying_start.unwrap().injection_only;
     let phases = [
         (FluxPhase::Search(CatchState::default()), 5),
         (FluxPhase::Asymmetry(AtStartState::new(false)), 5),

@@ -98,7 +98,7 @@ fn run(
                 },
             ),
             3 | 8 => {
-                if let Err(fault) = prediction.judge(&mut state, current, Known::default()) {
+                if let Err(fault) = prediction.judge(&mut state, current, Uncertainty::default()) {
                     return (state.unexplained, Some((n, fault)));
                 }
             }
@@ -165,7 +165,7 @@ fn a_back_emf_that_is_missing_is_seen_with_either_sign() {
 fn the_resistance_that_is_tracked_is_reckoned_with() {
     let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
     let current = AlphaBeta::new(2.0, 0.0);
-    let judged = |known: Known| {
+    let judged = |known: Uncertainty| {
         let mut state = PredictionState { last: current, ..PredictionState::default() };
         // The voltage that the model of the cold motor needs, and that of the warm motor.
         let cold = current * ((1.0 - PLANT.p) / PLANT.k) as f32;
@@ -177,9 +177,9 @@ fn the_resistance_that_is_tracked_is_reckoned_with() {
         })
     };
     let fault = Err(Fault::FluxNotAsPredicted);
-    assert_eq!(judged(Known { deviation: 0.0, tracked: false, building: false }), Ok(()));
-    assert_eq!(judged(Known { deviation: 0.0, tracked: true, building: false }), fault);
-    assert_eq!(judged(Known { deviation: 0.3, tracked: true, building: false }), Ok(()));
+    assert_eq!(judged(Uncertainty { deviation: 0.0, tracked: false, building: false }), Ok(()));
+    assert_eq!(judged(Uncertainty { deviation: 0.0, tracked: true, building: false }), fault);
+    assert_eq!(judged(Uncertainty { deviation: 0.3, tracked: true, building: false }), Ok(()));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A commissioning on the bench.
 
 use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{AlphaBeta, Excitation, Motor, Sample};
+use drive_core::{AlphaBeta, Motor, Sample, TestSignal};
 
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
 use crate::prelude::*;
@@ -75,7 +75,7 @@ impl Session {
             let mut sample = rig.plant.sample();
             sensors(&mut sample);
             rig.step_with(&sample);
-            if rig.drive.excites() {
+            if rig.drive.is_testing() {
                 let seen = rig.drive.telemetry();
                 sums.push(seen.measured, seen.realised, seen.dc_link);
             }
@@ -101,13 +101,13 @@ impl Session {
             if !period.is_multiple_of(POLL) {
                 continue;
             }
-            match commissioning.poll(&rig.drive.excited(), &mut sums) {
+            match commissioning.poll(&rig.drive.test_report(), &mut sums) {
                 Next::Wait => {}
                 Next::Excite(excitation) => {
-                    if let Excitation::Current { carrier, .. } = excitation {
+                    if let TestSignal::Current { carrier, .. } = excitation {
                         carrier_on = carrier;
                     }
-                    order(&mut rig, Command::Excite(excitation))?;
+                    order(&mut rig, Command::Test(excitation))?;
                 }
                 Next::Stop => order(&mut rig, Command::Stop(Stop::Coast))?,
                 Next::Start => order(&mut rig, Command::Start(Mode::Torque))?,

@@ -4,7 +4,7 @@ use core::mem::discriminant;
 use std::collections::{BTreeMap, HashSet};
 
 use super::*;
-use crate::drive::excitation::{Excitation, Regulator};
+use crate::drive::test_signal::{Regulator, TestSignal};
 use crate::protect::wiring_check::WiringSettings;
 
 /// The states of a start.
@@ -12,7 +12,7 @@ const STARTING: [State; 6] = [
     State::Calibrating,
     State::Precharge,
     State::CheckingWiring,
-    State::Catching,
+    State::FlyingStart,
     State::Magnetising,
     State::Verifying,
 ];
@@ -22,12 +22,12 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
     use Command::*;
     let regulator = Regulator { k_c: 25.0, z_c: 0.97, direct: 0.0, filtered: false };
     let (amperes, carrier) = (0.5, AlphaBeta::ZERO);
-    let current = Excitation::Current { amperes, regulator, carrier, binary: false };
+    let current = TestSignal::Current { amperes, regulator, carrier, binary: false };
     let settings = motor_settings(AngleSource::Injection).build().unwrap();
     vec![
         ("start, learn", MODES.map(Start).into()),
         ("check of the wiring, brake", vec![CheckWiring, Brake(0.2)]),
-        ("commission", vec![Excite(current), Excite(pulses())]),
+        ("commission", vec![Test(current), Test(pulses())]),
         (
             "stop",
             [super::Stop::Coast, super::Stop::Ramp, super::Stop::Quick, super::Stop::Now]
@@ -54,8 +54,8 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
     ]
 }
 
-fn pulses() -> Excitation {
-    Excitation::Pulses(WiringSettings {
+fn pulses() -> TestSignal {
+    TestSignal::Pulses(WiringSettings {
         sigma_ls: 0.0515,
         expected_a: 0.2,
         noise_a: 0.05,
@@ -78,8 +78,8 @@ fn bench_of(settings: &Settings, state: State, mode: Mode) -> Option<Bench> {
         bench.drive.command(&Command::CheckWiring).unwrap();
     }
     let start = match (mode, state) {
-        (Mode::Commissioning, State::CheckingWiring) => Command::Excite(pulses()),
-        (Mode::Commissioning, _) => Command::Excite(Excitation::Rest),
+        (Mode::Commissioning, State::CheckingWiring) => Command::Test(pulses()),
+        (Mode::Commissioning, _) => Command::Test(TestSignal::Rest),
         _ => Command::Start(mode),
     };
     bench.drive.command(&start).unwrap();

@@ -8,7 +8,7 @@ use super::*;
 /// A torque that was asked for while the drive starts does not come with a stop.
 #[test]
 fn a_stop_before_the_run_puts_out_no_torque() {
-    for state in [State::Catching, State::Magnetising, State::Verifying] {
+    for state in [State::FlyingStart, State::Magnetising, State::Verifying] {
         let mut bench = Bench::new(&motor_settings(AngleSource::Injection));
         bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(bench.run_to(state), "{state}");

@@ -1,14 +1,14 @@
 //! The excitation of a motor at rest: a sequence of its own, and the same protections.
 
 use super::*;
-use crate::drive::{Excitation, Regulator};
+use crate::drive::{Regulator, TestSignal};
 use crate::protect::wiring_check::WiringSettings;
 
 /// A regulated direct current and a carrier on top of it.
 pub(super) fn current(amperes: f32, carrier: AlphaBeta) -> Command {
     let regulator =
         Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
-    Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false })
+    Command::Test(TestSignal::Current { amperes, regulator, carrier, binary: false })
 }
 
 /// A drive that excites, and its load.
@@ -22,7 +22,7 @@ fn exciting(command: &Command) -> (Drive, Load) {
         if states.last() != Some(&drive.state()) {
             states.push(drive.state());
         }
-        if drive.excites() {
+        if drive.is_testing() {
             assert_eq!(states, [State::Calibrating, State::Precharge, State::Exciting]);
             return (drive, load);
         }
@@ -114,10 +114,10 @@ fn a_pulse_train_answers_and_then_rests() {
         WiringSettings { sigma_ls: 0.0515, expected_a: 0.32, noise_a: 0.3, highest_v: 60.0 };
     let mut drive = Drive::new(settings().build().unwrap());
     let mut load = Load::new();
-    drive.command(&Command::Excite(Excitation::Pulses(pulses))).unwrap();
+    drive.command(&Command::Test(TestSignal::Pulses(pulses))).unwrap();
     run(&mut drive, &mut load, 1200, |_| {});
-    assert_eq!((drive.state(), drive.excited().trains), (State::Exciting, 1));
-    let [a, b, c] = drive.excited().answers;
+    assert_eq!((drive.state(), drive.test_report().trains), (State::Exciting, 1));
+    let [a, b, c] = drive.test_report().answers;
     for own in [a[0], b[1], -(c[0] + c[1])] {
         assert!((0.28..0.34).contains(&own), "{own}");
     }

@@ -2,14 +2,14 @@
 
 use core::f32::consts::TAU;
 
-use super::{Field, FluxPhase, Kept};
+use super::{Common, Field, FluxPhase};
 use crate::current::pi::ReferenceState;
-use crate::flux::catch::{self, Caught};
+use crate::flux::catch::{self, SearchResult};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::math::within;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::{Catching, Coefficients, Dq, Fault, PERIOD_S};
+use crate::{Coefficients, Dq, Fault, FlyingStart, PERIOD_S};
 
 /// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
@@ -49,15 +49,15 @@ impl Residual {
 
     /// Whether there may be some of it left.
     pub fn is_recent(&self, c: &Coefficients) -> bool {
-        c.catching.is_some_and(|catching| self.ago < catching.flux_gone)
+        c.flying_start.is_some_and(|start| self.ago < start.flux_decay)
     }
 
     /// Whether it would drive too much current yet, `elapsed` periods later.
     pub fn waits(&self, c: &Coefficients, elapsed: u32) -> bool {
-        let Some(catching) = &c.catching else { return false };
-        let x = self.ago.saturating_add(elapsed) as f32 * catching.decay;
+        let Some(start) = &c.flying_start else { return false };
+        let x = self.ago.saturating_add(elapsed) as f32 * start.decay;
         // It decays by e^x, which is more than this.
-        self.volts > catching.left_v * (1.0 + x * (1.0 + 0.5 * x))
+        self.volts > start.residual_v * (1.0 + x * (1.0 + 0.5 * x))
     }
 }
 
@@ -67,38 +67,38 @@ impl Field {
     /// # Errors
     /// [`Fault::NotCaught`] for a shaft that turns too fast.
     #[cold]
-    pub(super) fn search(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
-        let (Some(catching), FluxPhase::Search(search)) = (&c.catching, &mut self.flux) else {
-            self.stand(c, k, 0);
+    pub(super) fn search(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
+        let (Some(start), FluxPhase::Search(search)) = (&c.flying_start, &mut self.flux) else {
+            self.continue_at_standstill(c, k, 0);
             return Ok(Dq::ZERO);
         };
         // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
         let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
-        let drives = self.given.residual.is_some_and(|residual| residual.volts > NEGLIGIBLE_EMF_V);
+        let drives = self.carried.residual.is_some_and(|flux| flux.volts > NEGLIGIBLE_EMF_V);
         if n == 0 && !drives {
-            self.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * catching.current);
+            self.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * start.current);
         }
-        let d = if drives { Catching::WITH_FLUX * catching.current } else { catching.current };
+        let d = if drives { FlyingStart::WITH_FLUX * start.current } else { start.current };
         if n > catch::FROM {
-            c.current_loop.hold(&mut self.current_loop);
+            c.current_loop.freeze_integrator(&mut self.current_loop);
         }
         match search.step(n, self.observer.change) {
-            Caught::Searching => {}
-            Caught::Standing => {
-                self.given.residual = None;
+            SearchResult::Searching => {}
+            SearchResult::Standing => {
+                self.carried.residual = None;
                 self.hand_over = HandOver::default();
-                self.stand(c, k, 0);
+                self.continue_at_standstill(c, k, 0);
             }
-            Caught::Turning(flux_freq) => {
-                let freq = catching.path.rotor(flux_freq);
+            SearchResult::Turning(flux_freq) => {
+                let freq = start.path.rotor(flux_freq);
                 if freq.abs() > HIGHEST {
                     return Err(Fault::NotCaught);
                 }
-                self.given.residual = None;
+                self.carried.residual = None;
                 self.flux = FluxPhase::Build { from: k.elapsed };
-                self.estimator.turn_with(freq);
+                self.estimator.preset_speed(freq);
                 self.indirect = IndirectState::default();
                 self.observer.start(c.observer.as_ref());
             }
@@ -106,19 +106,18 @@ impl Field {
         Ok(Dq { d, q: 0.0 })
     }
 
-    /// The current while the flux of a turning rotor builds up, from period `from` on: as much flux as the voltage bears,
+    /// The current while the flux of a turning rotor builds up, `n` periods after it began: as much flux as the voltage allows,
     /// and with all current until it has built up.
     ///
     /// # Errors
     /// [`Fault::NotCaught`] where no voltage shows it: in a frame that does not turn with the rotor there is none.
     #[cold]
-    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Kept, from: u32) -> Result<Dq, Fault> {
+    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Common, n: u32) -> Result<Dq, Fault> {
         let most = k.limits.voltage.most.d;
         let missing = most - c.observer.as_ref().map_or(most, |o| o.magnetising(&self.observer));
-        let (current, built) =
-            c.catching.map_or((most, 0), |catching| (catching.current, catching.built));
+        let (current, built) = c.flying_start.map_or((most, 0), |s| (s.current, s.build_up));
         let d = within(most + FORCING_GAIN * missing, (0.0, current));
-        if k.elapsed.wrapping_sub(from) >= built {
+        if n >= built {
             Fault::NotCaught.unless(c.prediction.sees_flux(&self.prediction))?;
             // At speed the carrier current without torque does not tell that under torque: what comes is the baseline.
             if self.hand_over.leads {

@@ -18,13 +18,13 @@
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
 //! averages of sample 9.
 
-use super::trust::{Judged, Lock, Trust};
-use super::{Field, FluxPhase, Kept};
+use super::trust::{Check, Lock, Trust};
+use super::{Common, Field, FluxPhase};
 use crate::carrier::CARRIER_SAMPLES;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
 use crate::protect::Thermal;
-use crate::protect::plausibility::{Known, RotorFlux};
+use crate::protect::plausibility::{RotorFlux, Uncertainty};
 use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
 
 /// Sample behind which a command is taken: its tasks and the command take less than the longest sample.
@@ -57,10 +57,10 @@ impl Coefficients {
     ///
     /// # Errors
     /// The fault that a check finds.
-    pub(super) fn in_turn(
+    pub(super) fn run_slot(
         &self,
         s: &mut Field,
-        k: &mut Kept,
+        k: &mut Common,
         index: usize,
         step: &StepResults,
     ) -> Result<(), Fault> {
@@ -76,8 +76,8 @@ impl Coefficients {
             }
             1 => {
                 self.limit_torque(s, k, step);
-                if self.voltage_limit.is_economical() {
-                    self.economise(s, k, step);
+                if self.voltage_limit.minimises_loss() {
+                    self.minimise_loss(s, k, step);
                 }
                 s.prediction.latch_voltage();
                 self.check_lock(s, step)?;
@@ -172,7 +172,7 @@ impl Coefficients {
     }
 
     /// Limits the currents to those that the voltage of the dc link allows.
-    fn limit_voltage(&self, s: &Field, k: &mut Kept, step: &StepResults) {
+    fn limit_voltage(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
@@ -189,14 +189,14 @@ impl Coefficients {
 
     /// Follows the direct current of the least loss.
     #[cold] // in the flash
-    fn economise(&self, s: &Field, k: &mut Kept, step: &StepResults) {
+    fn minimise_loss(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
         let i_d = &mut k.references.current.d;
         *i_d = self.voltage_limit.least_loss(*i_d, step.reference.q, carrier);
     }
 
     /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
-    fn limit_torque(&self, s: &Field, k: &mut Kept, step: &StepResults) {
+    fn limit_torque(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
         let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
         k.limits.step(self, step.measured.dc_link, step.rotor_freq, (most.q, why));
@@ -211,15 +211,15 @@ impl Coefficients {
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let trust = &step.trust;
-        if !trust.mean {
+        if !trust.mean_voltage {
             // The drop of the inverter may not be known either.
             s.prediction.forget_mean();
         }
         let tracked = self.observer.is_some() && trust.observes();
-        let building = trust.current != Judged::Strictly;
-        let known = Known { deviation: s.observer.resistance.now, tracked, building };
+        let building = trust.current != Check::Narrow;
+        let known = Uncertainty { deviation: s.observer.resistance.now, tracked, building };
         let judged = self.prediction.judge(&mut s.prediction, step.current, known);
-        if trust.current == Judged::No {
+        if trust.current == Check::Off {
             s.prediction.forget();
             return Ok(());
         }

@@ -1,14 +1,14 @@
-//! Excitation of a motor at rest for the [commissioning](crate::commission).
+//! TestSignal of a motor at rest for the [commissioning](crate::commission).
 //!
 //! The current along phase a is regulated by one controller, with an optional carrier; the voltage across it is the
 //! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
 
-use super::{Drive, Job, Kept, Left, Phase};
+use super::{CarryOver, Common, Drive, Phase, Start};
 use crate::carrier::{CARRIER_COS, CARRIER_SAMPLES};
 use crate::current::{Pi, PiState, pi::ReferenceState};
 use crate::drive::command::{Accepted, Refused};
-use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
+use crate::drive::test_signal::{Regulator, TestReport, TestSignal};
 use crate::filter::{LPF, LpfState};
 use crate::io::LOW_SIDES_ON;
 use crate::math::{all_finite, limited};
@@ -19,16 +19,16 @@ use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
 /// Control periods in which the carrier rises to its amplitude: twenty of its own.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
 
-/// A drive that excites.
+/// A motor at rest is tested.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Excite {
-    wanted: Excitation,
+pub(super) struct StandstillTest {
+    wanted: TestSignal,
     low_pass: LpfState,
     control: Control,
     /// Pulse trains that have ended.
     trains: u32,
     pulses: WiringCheckState,
-    pub left: Left,
+    pub carried: CarryOver,
 }
 
 /// State of the current along phase a and its carrier.
@@ -51,43 +51,43 @@ pub(super) fn next_bit(register: &mut u8) -> f32 {
     if r & 1 == 1 { 1.0 } else { -1.0 }
 }
 
-impl Excite {
-    pub fn new(wanted: Excitation, left: Left) -> Self {
-        Self { wanted, left, ..Self::default() }
+impl StandstillTest {
+    pub fn new(wanted: TestSignal, carried: CarryOver) -> Self {
+        Self { wanted, carried, ..Self::default() }
     }
 
     pub fn state(&self) -> State {
         match self.wanted {
-            Excitation::Pulses(_) => State::CheckingWiring,
-            Excitation::Rest | Excitation::Current { .. } => State::Exciting,
+            TestSignal::Pulses(_) => State::CheckingWiring,
+            TestSignal::Rest | TestSignal::Current { .. } => State::Exciting,
         }
     }
 
-    /// A step of the excitation.
+    /// A step of the test.
     #[cold]
     pub fn step(
         &mut self,
         c: &Coefficients,
-        k: &mut Kept,
+        k: &mut Common,
         measured: &Measured,
     ) -> Result<[f32; 3], Fault> {
         let current = measured.current();
         let mut realised = AlphaBeta::ZERO;
         let mut duties = LOW_SIDES_ON;
         match self.wanted {
-            Excitation::Pulses(pulses) => {
+            TestSignal::Pulses(pulses) => {
                 let duties = c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)?;
                 if duties.is_none() {
                     self.trains = self.trains.wrapping_add(1);
-                    (self.control, self.wanted) = (Control::default(), Excitation::Rest);
+                    (self.control, self.wanted) = (Control::default(), TestSignal::Rest);
                     k.elapsed = 0;
                 }
                 return Ok(duties.unwrap_or(LOW_SIDES_ON));
             }
-            Excitation::Rest => {
+            TestSignal::Rest => {
                 LPF.step(&mut self.low_pass, current);
             }
-            Excitation::Current { amperes, regulator, carrier, binary } => {
+            TestSignal::Current { amperes, regulator, carrier, binary } => {
                 let s = &mut self.control;
                 let Regulator { k_c, z_c, direct, filtered } = regulator;
                 let pi = Pi { k_c, z_c };
@@ -124,17 +124,17 @@ impl Excite {
 
 impl Drive {
     /// Whether `Collector` is to be given what the last step saw.
-    pub fn excites(&self) -> bool {
-        matches!(&self.phase, Phase::Excite(excite) if excite.state() == State::Exciting)
+    pub fn is_testing(&self) -> bool {
+        matches!(&self.phase, Phase::Test(test) if test.state() == State::Exciting)
     }
 
     /// What the commissioning needs of this drive.
-    pub fn excited(&self) -> Excited {
+    pub fn test_report(&self) -> TestReport {
         let (trains, answers) = match &self.phase {
-            Phase::Excite(excite) => (excite.trains, excite.pulses.answers()),
+            Phase::Test(test) => (test.trains, test.pulses.answers()),
             _ => Default::default(),
         };
-        Excited {
+        TestReport {
             state: self.state(),
             starts: self.kept.starts,
             offsets: [self.kept.offsets[0], self.kept.offsets[1]],
@@ -143,9 +143,9 @@ impl Drive {
         }
     }
 
-    /// Takes [`Command::Excite`](super::Command::Excite).
-    pub(super) fn take_excitation(&mut self, wanted: Excitation) -> Result<Accepted, Refused> {
-        if let Excitation::Current { amperes, regulator, carrier, .. } = wanted {
+    /// Takes [`Command::Test`](super::Command::Test).
+    pub(super) fn take_test(&mut self, wanted: TestSignal) -> Result<Accepted, Refused> {
+        if let TestSignal::Current { amperes, regulator, carrier, .. } = wanted {
             let max = self.c.protection.trip_a;
             let numbers = [amperes, regulator.k_c, regulator.z_c, regulator.direct];
             if !(all_finite(&numbers) && carrier.is_finite()) {
@@ -155,13 +155,13 @@ impl Drive {
                 return Err(Refused::OutOfRange { min: -max, max });
             }
         }
-        if let Phase::Excite(excite) = &mut self.phase {
-            (excite.wanted, self.kept.elapsed) = (wanted, 0);
-            if let Excitation::Pulses(_) = wanted {
-                excite.pulses = WiringCheckState::default();
+        if let Phase::Test(test) = &mut self.phase {
+            (test.wanted, self.kept.elapsed) = (wanted, 0);
+            if let TestSignal::Pulses(_) = wanted {
+                test.pulses = WiringCheckState::default();
             }
             return Ok(Accepted::AsGiven);
         }
-        self.start(Job::Excite(wanted))
+        self.start(Start::Test(wanted))
     }
 }

@@ -4,10 +4,10 @@ use crate::AlphaBeta;
 use crate::drive::state::State;
 use crate::protect::WiringSettings;
 
-/// Excitation of a motor at rest.
+/// TestSignal of a motor at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub enum Excitation {
+pub enum TestSignal {
     /// No voltage between the phases: the low sides are on.
     #[default]
     Rest,
@@ -43,7 +43,7 @@ pub struct Regulator {
 /// The quantities of a drive that the commissioning needs beside the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct Excited {
+pub struct TestReport {
     /// State of the drive.
     pub state: State,
     /// Starts so far, wrapping: a drive that is off again has been stopped.
