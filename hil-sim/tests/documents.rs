@@ -99,6 +99,8 @@ impl Results {
 
     /// Runs the commands and takes the figures from what they print.
     fn measure(&mut self) {
+        let measured = self.columns.iter().any(|column| !column.from.is_empty());
+        assert!(measured, "no column says what it is from: TABLE=FILE gives the rows");
         let mut ran = BTreeMap::new();
         let mut run = |command: &str| {
             let ran = ran.entry(command.to_owned()).or_insert_with(|| printed_json(command));
