@@ -93,18 +93,6 @@ fn a_turning_shaft_is_there_before_the_start() {
     assert!((2.0..3.5).contains(&peak), "{peak}");
 }
 
-/// A start on a turning shaft measures no resistance. One that is 30 % higher than that of the run before is found from the torque: what was
-/// left is not taken for measured. (Taken for it: 1.9 and 1.7 degrees rms.)
-#[test]
-fn a_turning_start_finds_a_resistance_that_has_changed() {
-    let set = ["plant=r", "after.motor.r_s=7.0", "runs=4"];
-    let outcome = full_range("turning-start", &set);
-    for region in ["0_150", "150_350"] {
-        let rms = get(&outcome, &format!("turning_start_{region}_angle_error_rms_deg"));
-        assert!(rms < 1.5, "{region}: {rms}");
-    }
-}
-
 /// Without an encoder the injection holds up to its range, and a motor without saliency is refused while the drive learns.
 #[test]
 fn without_an_encoder_the_low_regions_are_those_of_the_injection() {

@@ -56,7 +56,7 @@ impl Coefficients {
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let filters = self.filter_tracks(s, step);
         if !filters {
-            s.estimator.filter.start(s.observer.resistance.decay > 0.0);
+            s.estimator.filter.start(s.observer.resistance.certainty);
         }
         let known = self.freq_per_speed * s.motion.acceleration;
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);

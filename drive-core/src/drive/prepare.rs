@@ -10,7 +10,7 @@ use crate::flux::catch::CatchState;
 use crate::io::LOW_SIDES_ON;
 use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
-use crate::{Coefficients, Dq, Fault, Measured, UnitVector};
+use crate::{Coefficients, Dq, Fault, Measured, PERIOD_S, UnitVector};
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
@@ -126,6 +126,7 @@ impl Drive {
             let residual = residual.after(k.elapsed);
             (job.catches(c) && residual.is_recent(c)).then_some(residual)
         });
+        carried.resistance.rest(k.elapsed as f32 * PERIOD_S);
         let boost = c.volts_per_hertz.map(|turning| turning.boost_a);
         let i_d = match job {
             Start::Scalar { .. } => boost.unwrap_or(c.voltage_limit.i_d),

@@ -54,9 +54,7 @@ const SLOW: f32 = 1.5;
 const REMEMBERED: f32 = 0.7;
 /// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
 const FIRST: [f32; N - 1] = [0.1, 5.0, 100.0, SLOW];
-/// Deviation of the resistance at the beginning, and where the drop of the inverter has not been measured: 0.27 of the voltage across
-/// it for model A at 0.7 A.
-const MEASURED: f32 = 0.03;
+/// Standard deviation of the resistance without a measurement: 0.27 of the voltage across it for model A at 0.7 A.
 const UNMEASURED: f32 = 0.3;
 
 /// Variances of the filter.
@@ -107,11 +105,11 @@ pub struct Correction {
 }
 
 impl AngleFilterState {
-    /// Begins anew; whether the drop of the inverter was measured, and with it the resistance.
+    /// Begins anew. A measurement of the resistance has taken this `certainty` from its standard deviation.
     #[cold] // in the flash
-    pub fn start(&mut self, is_measured: bool) {
+    pub fn start(&mut self, certainty: f32) {
         *self = Self { i_q: self.i_q, moved: self.moved, ..Self::default() };
-        let r = if is_measured { MEASURED } else { UNMEASURED };
+        let r = UNMEASURED - certainty;
         let [e, w, a, b] = FIRST.map(|deviation| deviation * deviation);
         self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r * r, 0.0, 0.0, 0.0, 0.0, b];
     }
@@ -277,7 +275,7 @@ mod tests {
 
     fn started() -> AngleFilterState {
         let mut state = AngleFilterState { i_q: 1.5, ..AngleFilterState::default() };
-        state.start(true);
+        state.start(0.27);
         state
     }
 
