@@ -228,7 +228,7 @@ impl Field {
     fn measure_drop(&mut self, c: &Coefficients, elapsed: u32, sample: &DropSample) {
         if let Some(ratio) = c.inverter_drop.step(&mut self.inverter_drop, elapsed, sample) {
             self.observer.resistance.take(ratio - 1.0);
-            self.estimator.filter.start(self.observer.resistance.certainty);
+            self.estimator.filter.start(self.observer.resistance.deviation);
         }
     }
 

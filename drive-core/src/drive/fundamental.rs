@@ -56,7 +56,7 @@ impl Coefficients {
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let filters = self.filter_tracks(s, step);
         if !filters {
-            s.estimator.filter.start(s.observer.resistance.certainty);
+            s.estimator.filter.start(s.observer.resistance.deviation);
         }
         let known = self.freq_per_speed * s.motion.acceleration;
         let resistance = self.estimator.update_correction(&mut s.estimator, filters, known);

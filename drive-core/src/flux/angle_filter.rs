@@ -31,7 +31,7 @@
 
 use core::f32::consts::TAU;
 
-use super::observer::SeenSpeed;
+use super::observer::{SeenSpeed, UNMEASURED};
 use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
 use crate::carrier::injection::CARRIER_S;
@@ -54,8 +54,6 @@ const SLOW: f32 = 1.5;
 const REMEMBERED: f32 = 0.7;
 /// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
 const FIRST: [f32; N - 1] = [0.1, 5.0, 100.0, SLOW];
-/// Standard deviation of the resistance without a measurement: 0.27 of the voltage across it for model A at 0.7 A.
-const UNMEASURED: f32 = 0.3;
 
 /// Variances of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,11 +103,11 @@ pub struct Correction {
 }
 
 impl AngleFilterState {
-    /// Begins anew. A measurement of the resistance has taken this `certainty` from its standard deviation.
+    /// Resets the state. `deviation`: standard deviation of the resistance by its measurement, relative; 0 without one.
     #[cold] // in the flash
-    pub fn start(&mut self, certainty: f32) {
+    pub fn start(&mut self, deviation: f32) {
         *self = Self { i_q: self.i_q, moved: self.moved, ..Self::default() };
-        let r = UNMEASURED - certainty;
+        let r = if deviation > 0.0 { deviation } else { UNMEASURED };
         let [e, w, a, b] = FIRST.map(|deviation| deviation * deviation);
         self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r * r, 0.0, 0.0, 0.0, 0.0, b];
     }
@@ -275,7 +273,7 @@ mod tests {
 
     fn started() -> AngleFilterState {
         let mut state = AngleFilterState { i_q: 1.5, ..AngleFilterState::default() };
-        state.start(0.27);
+        state.start(0.03);
         state
     }
 
