@@ -1,10 +1,11 @@
-//! Takes causes and cure of every fault from the page of the faults, so that console and page say the same.
+//! Takes the causes and the cure of every fault from the documentation page of the faults, so that the console says the same as the
+//! page.
 
 use std::path::Path;
 use std::{env, fs};
 
-/// The page of the faults: in the repository, and in a package of this crate, where the link `faults.txt` becomes the page itself. A
-/// clone may hold a text in place of the link, so the repository's own page comes first.
+/// Places of the page of the faults: in the repository, and in a package of this crate, where the link `faults.txt` becomes the page
+/// itself. The repository's own page comes first, because a clone may hold a text file in place of the link.
 const PAGES: [&str; 2] = ["../docs/faults.md", "faults.txt"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -12,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = PAGES.into_iter().find(|path| Path::new(path).is_file());
     let path = path.ok_or("the page of the faults is missing: docs/faults.md")?;
     println!("cargo::rerun-if-changed={path}");
-    // The console prints the names of settings without the marks of the page.
+    // The console prints the names of settings without the backquotes of the page.
     let page = fs::read_to_string(path)?.replace('`', "");
     let mut arms = String::new();
     for section in page.split("\n## ") {

@@ -1,9 +1,9 @@
 //! The drive on another chip.
 //!
-//! A port brings four things: a board (what the timer, the converters and the encoder do), settings with the scales of
-//! its sensors, an interrupt that calls [`Drive::period`] 6000 times a second, and a task that gives
-//! commands. Here the board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
-//! one producer and one consumer, such as `heapless::spsc::Queue`.
+//! A port consists of four things: a board (access to the timer, the ADCs and the encoder), settings with the scales of its sensors, an
+//! interrupt that calls [`Drive::period`] 6000 times a second, and a task that gives commands. Here the board is a host that reads zero
+//! currents. On a chip, its functions access registers, and the channel is a queue for one producer and one consumer, such as
+//! `heapless::spsc::Queue`.
 //!
 //! `cargo run -p induction-drive-core --example port`
 
@@ -23,33 +23,33 @@ struct Board {
 }
 
 impl Board {
-    /// The readings of this period, without a third shunt, encoder and flags of the chip. The currents were sampled in the middle of the
-    /// low sides' on-time.
+    /// Returns the readings of this period, without a third shunt, an encoder and flags of the chip. The currents were sampled in the
+    /// middle of the on-time of the low sides.
     fn sample(&mut self) -> Sample {
         let (current_a, current_b) = (2048, 2048);
         Sample { current_a, current_b, dc_link: 1820, heat_sink: 1309, ..Sample::default() }
     }
 
-    /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.
+    /// Loads the compare registers for the next period, and switches the outputs off at once if `enabled` is false.
     fn output(&mut self, _: &Compare) {}
 
     /// Sets the switches of the dc link: the duty of the brake chopper, and whether the precharge relay is closed. A board
-    /// that has neither leaves it empty.
+    /// that has neither leaves this function empty.
     fn dc_link(&mut self, _chopper: f32, relay: bool) {
         self.relay = relay;
     }
 }
 
-/// Converter codes: 12 bits.
+/// ADC counts: 12 bits.
 const CODES: u16 = 4096;
-/// Reference of the converters, V.
+/// Reference of the ADCs, V.
 const REFERENCE_V: f32 = 3.3;
 
-/// The settings: motor, nameplate and sensors of one's own. All else follows from them by rules; a design that cannot be
-/// made is an error that names its reason.
+/// Returns the settings: your own motor, nameplate and sensors. All other settings follow from them by rules. If a
+/// design cannot be made, the error names the reason.
 fn settings() -> Settings {
     let mut settings = Settings::default();
-    // A motor with a winding for 48 V, from its data sheet: T-equivalent circuit per phase, star.
+    // This is a motor with a winding for 48 V, from its data sheet: T-equivalent circuit per phase, star.
     let motor = &mut settings.motor;
     (motor.r_s, motor.r_r) = (0.22, 0.13);
     (motor.l_ls, motor.l_lr, motor.l_m) = (0.8e-3, 0.8e-3, 9.0e-3);
@@ -57,14 +57,14 @@ fn settings() -> Settings {
     (nameplate.power_w, nameplate.voltage_v, nameplate.current_a) = (250.0, 32.0, 8.0);
     (nameplate.frequency_hz, nameplate.speed_rpm) = (50.0, 1400.0);
     settings.inverter.dc_link_v = 48.0;
-    // Counts up and down once a period: clock / 12 kHz.
+    // The timer counts up and down once a period: clock / 12 kHz.
     settings.inverter.top = 14_167;
-    // Shunts of 5 mohm, amplified 20 times around half of the reference.
+    // The shunts have 5 mohm and are amplified 20 times around half of the reference.
     let current = Line::of_sensor(0.005 * 20.0, 0.5 * REFERENCE_V, REFERENCE_V, CODES);
     settings.scales = Scales {
         current_a: current,
         current_b: current,
-        // 22 kohm over 680 ohm.
+        // The divider is 22 kohm over 680 ohm.
         dc_link: Line::of_sensor(0.68 / 22.68, 0.0, REFERENCE_V, CODES),
         ntc: Ntc { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm: 4700.0, to_ground: false },
         current_delay_s: 2e-6,
@@ -73,8 +73,8 @@ fn settings() -> Settings {
     settings
 }
 
-/// The control interrupt owns the drive. The task reaches it through two queues only, so that a command is never taken
-/// while a step runs.
+/// The control interrupt, which owns the drive. The task reaches the drive through two queues only, so that a command
+/// is never taken while a step runs.
 struct Interrupt {
     board: Board,
     drive: Drive,
@@ -84,13 +84,13 @@ struct Interrupt {
 }
 
 impl Interrupt {
-    /// Called once a PWM period, at the highest priority.
+    /// Runs one control period; called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
         let sample = self.board.sample();
         let put_out = &mut |compare| self.board.output(&compare);
         let (_, output) = self.drive.period(&mut self.front_end, &sample, put_out);
         self.board.dc_link(output.chopper, output.relay);
-        // The rest of the period belongs to commands.
+        // Commands are taken in the rest of the period.
         if let Ok(command) = self.commands.try_recv() {
             let _ = self.answers.try_send(self.drive.command(&command));
         }
@@ -99,9 +99,9 @@ impl Interrupt {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = settings();
-    // Takes a second on a chip: with the outputs off.
+    // The design takes a second on a chip, so the outputs are off.
     let coefficients = settings.build()?;
-    // Here `coefficients.take` the result of the last learning with these settings, from the flash.
+    // If the flash holds the result of a self-commissioning with these settings, `coefficients.take` it here.
 
     let (order, commands) = sync_channel(1);
     let (answers, answer) = sync_channel(1);
@@ -109,18 +109,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let front_end = FrontEndState::default();
     let mut interrupt = Interrupt { board: Board::default(), drive, front_end, commands, answers };
 
-    // The task: one command, one answer.
+    // The task sends one command and receives one answer.
     order.send(Command::Start(Mode::Torque))?;
     interrupt.on_period();
     println!("start: {:?}", answer.recv()?);
 
-    // A second of the interrupt. Without a motor the drive finds that no current flows.
+    // The interrupt runs for a second. Without a motor the drive finds that no current flows.
     for _ in 0..6000 {
         interrupt.on_period();
     }
     println!("the drive is {}", interrupt.drive.state());
 
-    // Whenever a learning has ended: to the flash, beside the settings it belongs to.
+    // Whenever a self-commissioning has ended, write its result to the flash, beside the settings to which it belongs.
     if let Some(learned) = interrupt.drive.learned().filter(|found| found.verdict.is_accepted()) {
         println!("learned {} points", learned.points);
     }
@@ -131,7 +131,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 mod tests {
     use super::*;
 
-    /// The dc link of the board is steady from the beginning: the relay closes once it has been so for its time.
+    /// The dc link of the board is steady from the beginning, so the relay closes after its delay.
     #[test]
     fn the_precharge_relay_closes() {
         let mut settings = settings();

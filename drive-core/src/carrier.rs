@@ -1,4 +1,4 @@
-//! The injected carrier: generation of its voltage and demodulation of its current.
+//! The high-frequency injection: generation of its voltage and demodulation of its current.
 
 pub(crate) mod asymmetry;
 pub(crate) mod at_start;

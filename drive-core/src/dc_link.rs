@@ -1,117 +1,118 @@
-//! Limits of the torque current by the voltage of the dc link, brake chopper, and braking by flux: once a carrier period.
+//! Limits of the q-axis current by the voltage of the dc link, brake chopper, and flux braking, computed once an injection period.
 //!
-//! A rectifier lets no energy back into the mains, so torque that generates charges the capacitor; torque that motors
-//! discharges it when the mains fail. With `v` the measured link, half of it new at each step, `w` the speed, `I` the
-//! largest torque current and `r = max(1, |w|/w_power)`:
+//! A rectifier returns no energy to the mains, so generating torque charges the capacitor; motoring torque discharges
+//! it when the mains fail. With `v` the voltage of the link (a low-pass that takes half of each new value), `w` the
+//! speed, `I` the largest q-axis current and `r = max(1, |w|/w_power)`:
 //!
 //! ```text
 //! generating <= I clamp((high - v)/(r (high - from)))
-//! motoring   <= I clamp((v - held)/(r rise))             held: `low`, gives way towards `floor` while this limits
-//! motoring   <= -I clamp((held - v)/(r depth))           ride-through: the shaft feeds the link
+//! motoring   <= I clamp((v - held)/(r rise))             held: `low`, lowered towards `floor` while this limits
+//! motoring   <= -I clamp((held - v)/(r depth))           kinetic buffering: the shaft feeds the link
 //! chopper     = clamp((v - on)/(full - on)) clamp(10 (1 - heat))
 //! ```
 //!
-//! Power is torque times speed, so `r` keeps the gain of these loops what it is at `w_power`, 60 Hz electrical (with
-//! generating torque, up to 1.4 times that speed). Near standstill the copper losses take all that the shaft gives: below
-//! 9 Hz nothing is limited. With a resistor that can still take energy, generating torque is limited above the middle of
-//! the chopper's band alone. Above 40 Hz a limited generating torque asks for more flux, whose current burns power; below,
-//! the flux must be back when the carrier comes on.
+//! Power is torque times speed, so above `w_power`, 60 Hz electrical, `r` keeps the gain of these loops constant (for
+//! generating torque, up to 1.4 times that speed). Near standstill the copper losses absorb the whole power of the shaft,
+//! so nothing is limited below 9 Hz. If a resistor can still absorb energy, generating torque is limited only above the
+//! middle of the chopper's band. Above 40 Hz a limited generating torque adds flux, whose current dissipates power. Below
+//! 40 Hz it adds none, because the flux must have its setting when the injection is switched on.
 //!
-//! A sagging mains and one that is gone look alike at first: motoring torque is taken away. Without load the link of a
-//! sagging mains stays where it is, and `held` gives way below it, so that the torque comes back; in an outage the shaft
+//! A sag of the mains and an outage look alike at first, and motoring torque is removed in both. In a sag, the link
+//! stays at its voltage without load and `held` is lowered below it, so that the torque returns. In an outage the shaft
 //! holds the link at `held`.
 
 use core::fmt;
 
 use crate::PERIOD_S;
 
-/// Control periods per step: those of a carrier period.
+/// Control periods per step, as many as in an injection period.
 pub const DIVIDER: u8 = 10;
 /// Seconds per step.
 const STEP_S: f32 = DIVIDER as f32 * PERIOD_S;
 
-/// Band of the voltage in which motoring torque comes, in relation to how far the held voltage gives way: a mains that sags
-/// to `floor + 11 V` carries all torque up to twice `w_power`.
+/// Band of the voltage in which motoring torque rises, relative to the range by which the held voltage can be lowered. If
+/// the mains sag to `floor + 11 V`, all torque is available up to twice `w_power`.
 const RISE: f32 = 1.0 / 9.0;
-/// The same in relation to the band in which the shaft feeds the link. That loop has no mains that damps it.
+/// The same band relative to the band of kinetic buffering, whose loop is not damped by the mains.
 const RISE_OF_DEPTH: f32 = 1.0 / 6.0;
-/// Most that the band of generating torque is widened: it stays clear of the nominal voltage.
+/// Largest factor by which the band of generating torque is widened, so that it stays above the nominal voltage.
 const WIDEST: f32 = 1.4;
-/// Time in which the held voltage gives way to the floor, s.
+/// Time in which the held voltage is lowered to the floor, s.
 const YIELD_S: f32 = 0.45;
-/// Electrical speeds, turns per control period: where the limits begin, over which band they come on, from which on flux
-/// brakes, and from which on gains go down with the speed. 270, 68, 1200 and 1800 rpm of four poles.
+/// Electrical speeds, turns per control period: the speed at which the limits begin, the band over which they become
+/// full, the speed above which flux braking works, and the speed above which gains fall. They are 270, 68, 1200 and 1800
+/// rpm for four poles.
 const SLOW: f32 = 9.0 * PERIOD_S;
 const FADES: f32 = 0.25 * SLOW;
 const FLUX: f32 = 40.0 * PERIOD_S;
 const POWER: f32 = 60.0 * PERIOD_S;
-/// Braking by flux begins where this share of the generating torque is left, and is whole where half of it is.
+/// Share of the generating torque that is left when flux braking begins. It is full when half of the generating torque is left.
 const FLUX_FROM: f32 = 0.75;
 const FLUX_GAIN: f32 = 4.0;
-/// The duty goes down over the last tenth of the energy that the resistor takes.
+/// Gain with which the duty falls over the last tenth of the energy that the resistor can absorb.
 const COOL_GAIN: f32 = 10.0;
 
-/// A brake resistor behind a chopper. `under_v` and `over_v` are the voltages at which the drive trips.
+/// A brake resistor with its chopper. `under_v` and `over_v` are the voltages at which the drive trips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChopperSettings {
-    /// Voltage at which it begins to conduct, V; half of `full_v` to 0.999 times it.
+    /// Voltage at which the chopper begins to conduct, V; half of `full_v` to 0.999 times `full_v`.
     pub on_v: f32,
-    /// Voltage from which on it conducts throughout, V; `from_v` to `over_v`.
+    /// Voltage above which the chopper conducts all the time, V; `from_v` to `over_v`.
     pub full_v: f32,
     /// Resistance, ohm; 0.1 to 1e5.
     pub resistance: f32,
-    /// Energy that it takes from cold, J; 1 to 1e7.
+    /// Energy that the cold resistor can absorb, J; 1 to 1e7.
     pub energy_j: f32,
-    /// Power that it takes for ever, W; 0.1 to 1e5.
+    /// Continuous power of the resistor, W; 0.1 to 1e5.
     pub power_w: f32,
 }
 
-/// Settings of the limits, with their ranges, within which [`DcLink::new`] expects them.
+/// Settings of the limits. [`DcLink::new`] expects them within the stated ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DcLinkSettings {
-    /// Voltage from which on generating torque is limited, V; half of `high_v` to 0.99 times it.
+    /// Voltage above which generating torque is limited, V; half of `high_v` to 0.99 times `high_v`.
     pub from_v: f32,
-    /// Voltage without generating torque, V; `under_v` to `over_v`.
+    /// Braking limit: voltage at which generating torque ends, V; `under_v` to `over_v`.
     pub high_v: f32,
-    /// Voltage without motoring torque, V, below which the shaft feeds the link; `under_v` to `from_v`.
+    /// Voltage at which motoring torque ends and below which kinetic buffering begins, V; `under_v` to `from_v`.
     pub low_v: f32,
-    /// Voltage down to which the latter gives way when the link stays low, V; `under_v` to 0.99 of `low_v`.
+    /// Voltage to which `low_v` is lowered while the link stays low, V; `under_v` to 0.99 of `low_v`.
     pub floor_v: f32,
-    /// Direct current that is added while generating torque is limited, A; 0 for none.
+    /// D-axis current that is added while generating torque is limited, A; 0 for none.
     pub flux_a: f32,
     /// The brake resistor, if there is one.
     pub chopper: Option<ChopperSettings>,
 }
 
-/// Why torque is limited.
+/// Reason why torque is limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Limiting {
-    /// It is not.
+    /// Torque is not limited.
     #[default]
     None,
     /// The dc link has no more voltage at this speed; see `voltage_limit`.
     Voltage,
     /// The heat sink is hot.
     HeatSink,
-    /// The motor carries no more for any time.
+    /// The motor is at its continuous load.
     Motor,
-    /// The inverter carries no more for any time.
+    /// The inverter is at its continuous load.
     Inverter,
-    /// Generating torque: the link is high.
+    /// The link is high, so generating torque is limited.
     DcLinkHigh,
-    /// Generating torque: the link is high, and the brake resistor has taken all that it can.
+    /// The link is high and the brake resistor can absorb no more energy, so generating torque is limited.
     ResistorHot,
-    /// Motoring torque: the link is low.
+    /// The link is low, so motoring torque is limited.
     DcLinkLow,
-    /// The shaft feeds the link, which has no supply.
+    /// Kinetic buffering: the link has no supply and the shaft feeds it.
     RideThrough,
     /// Dc current or power is at its limit.
     Power,
 }
 
-/// Reason of the limit, in words.
+/// Shows the reason of the limit in words.
 impl fmt::Display for Limiting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -123,7 +124,7 @@ impl fmt::Display for Limiting {
             Self::DcLinkHigh => "the dc link is high",
             Self::ResistorHot => "the dc link is high and the brake resistor hot",
             Self::DcLinkLow => "the dc link is low",
-            Self::RideThrough => "the dc link has no supply: the shaft feeds it",
+            Self::RideThrough => "the dc link has no supply: kinetic buffering",
             Self::Power => "dc current or power is at its limit",
         })
     }
@@ -132,18 +133,18 @@ impl fmt::Display for Limiting {
 /// Result of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DcLinkLimits {
-    /// Least and largest torque current, A. Both have one sign while the shaft feeds the link.
+    /// Least and largest q-axis current, A. Both have the same sign during kinetic buffering.
     pub i_q: (f32, f32),
-    /// Why the torque current is not less and not more than this.
+    /// Reasons of the lower and of the upper limit of the q-axis current.
     pub why: (Limiting, Limiting),
-    /// Direct current to be added, A.
+    /// D-axis current to be added, A.
     pub flux_a: f32,
     /// Duty of the chopper, 0 to 1.
     pub chopper: f32,
 }
 
 impl DcLinkLimits {
-    /// The torque current, A, within the limits, and why it was changed.
+    /// Returns the q-axis current within the limits, A, and the reason if it was changed.
     pub fn clamp(&self, i_q: f32) -> (f32, Limiting) {
         if i_q < self.i_q.0 {
             (self.i_q.0, self.why.0)
@@ -160,11 +161,11 @@ impl DcLinkLimits {
 struct Chopper {
     on: f32,
     per_band: f32,
-    /// Band of the voltage in which generating torque is limited while the resistor takes energy.
+    /// Band of the voltage in which generating torque is limited while the resistor can absorb energy.
     band: (f32, f32),
-    /// Heat per step and squared volt at full duty; 1 is all that the resistor can take.
+    /// Heat per step and squared volt at full duty; 1 is all that the resistor can absorb.
     per_square: f32,
-    /// Share of the heat that goes in a step.
+    /// Share of the heat that is dissipated in a step.
     cooling: f32,
 }
 
@@ -183,19 +184,19 @@ pub struct DcLink {
     chopper: Option<Chopper>,
 }
 
-/// State of the limits. It is kept over stops and starts: the resistor stays hot.
+/// State of the limits. It is kept over stops and starts, since the resistor stays hot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DcLinkState {
     /// Smoothed voltage, V; none before the first step.
     v: Option<f32>,
-    /// By how much the held voltage is lowered, V.
+    /// Voltage by which the held voltage is lowered, V.
     lowered: f32,
-    /// Heat of the brake resistor; 1 is all that it can take.
+    /// Heat of the brake resistor; 1 is all that it can absorb.
     pub heat: f32,
 }
 
 impl DcLink {
-    /// Limits with these settings, which are within the ranges that [`DcLinkSettings`] states.
+    /// Creates the limits with these settings, which must be within the ranges that [`DcLinkSettings`] states.
     pub fn new(s: &DcLinkSettings) -> Self {
         Self {
             band: (s.from_v, s.high_v),
@@ -222,8 +223,8 @@ impl DcLink {
         self.chopper.is_some()
     }
 
-    /// One step with the measured dc link `dc_link`, V, at the speed `freq` of the rotor, electrical turns per control
-    /// period, for torque currents within `i_q_limit`, A, which is less than the usual for this reason.
+    /// Runs one step with the measured dc link `dc_link`, V, at the rotor speed `freq`, electrical turns per control
+    /// period, for q-axis currents within `i_q_limit`, A. `reason` is the reason of that limit.
     pub fn step(
         &self,
         state: &mut DcLinkState,
@@ -249,7 +250,7 @@ impl DcLink {
         let flux = (FLUX_GAIN * (FLUX_FROM - generating)).clamp(0.0, 1.0);
         let flux_a = if speed > FLUX { flux * self.flux_a } else { 0.0 };
 
-        // 1 at the upper end of the band of motoring torque.
+        // This is 1 at the upper end of the band of motoring torque.
         let above = gain * (v - self.low + state.lowered) * self.per_rise;
         self.adapt_held_voltage(state, above);
         let slope = if above < 0.0 { RISE_OF_DEPTH } else { 1.0 };
@@ -286,7 +287,7 @@ impl DcLink {
         }
     }
 
-    /// Duty of the chopper, and how much of it the heat of the resistor leaves.
+    /// Returns the duty of the chopper, and the share of it that the heat of the resistor allows.
     fn brake(&self, state: &mut DcLinkState, v: f32) -> (f32, f32) {
         let Some(c) = &self.chopper else { return (0.0, 0.0) };
         let cold = (COOL_GAIN * (1.0 - state.heat)).clamp(0.0, 1.0);
@@ -295,8 +296,8 @@ impl DcLink {
         (duty, cold)
     }
 
-    /// Lowers the held voltage while motoring torque is limited, and raises it again with room to spare; `above` is
-    /// how far up its band the link is.
+    /// Lowers the held voltage while motoring torque is limited, and raises it again when there is a margin;
+    /// `above` is the position of the link in the band of motoring torque.
     fn adapt_held_voltage(&self, state: &mut DcLinkState, above: f32) {
         if above < 1.0 {
             state.lowered += self.lowering;

@@ -69,18 +69,18 @@ pub use stopping::COAST_S;
 pub use telemetry::{Telemetry, TorqueLimits};
 pub use test_signal::{Regulator, TestReport, TestSignal};
 
-/// The drive: coefficients, the phase that it is in, and that which outlives a phase.
+/// The drive: coefficients, state of the present phase, and state that outlives a phase.
 ///
 /// ```
 /// use induction_drive_core::{AngleSource, Command, Drive, FrontEndState, Mode, Sample, State};
 /// use induction_drive_settings::Settings;
 ///
-/// // Without an encoder it would have to learn its motor first.
+/// // Without an encoder the drive would have to learn its motor first.
 /// let settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
 /// let mut drive = Drive::new(settings.build()?);
 /// let mut front_end = FrontEndState::default();
 /// drive.command(&Command::Start(Mode::Torque))?;
-/// // One period, with codes of zero current, 311 V and 25 °C.
+/// // One period, with the ADC counts of zero current, 311 V and 25 °C.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };
 /// let (compare, _) = drive.period(&mut front_end, &sample, &mut |_| {});
 /// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
@@ -91,66 +91,67 @@ pub use test_signal::{Regulator, TestReport, TestSignal};
 #[repr(C)]
 pub struct Drive {
     c: Coefficients,
-    /// Changes of `c`, counted, wrapping.
+    /// Number of changes of `c`, wrapping.
     changes: u32,
     kept: Common,
     phase: Phase,
 }
 
-/// State that every phase uses, or that outlives a run.
+/// State that every phase uses or that outlives a run.
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
 struct Common {
-    /// Control periods spent in this state.
+    /// Control periods spent in the present state.
     elapsed: u32,
     /// Offsets of the current sensors a, b and c that the last start has measured, A.
     offsets: [f32; 3],
-    /// Of the last step with the outputs on.
+    /// Telemetry of the last step with the outputs on.
     seen: Telemetry,
     rotor_count: u32,
     references: References,
     limits: Limits,
     /// Whether the next start checks the wiring.
     wiring_unchecked: bool,
-    /// Starts so far, wrapping.
+    /// Number of starts so far, wrapping.
     starts: u32,
-    /// Count of the encoder at position 0, where that was set.
+    /// Count of the encoder at position 0, if that was set.
     home: Option<u32>,
     thermal: ThermalLoads,
     relay: RelayState,
     learned: Option<Learned>,
-    /// Periods that the motor's brake needs to close; 0: there is none.
+    /// Control periods that the motor's brake needs to close; 0 if there is no brake.
     brake: u32,
 }
 
-/// References that every goal has; fresh at every start.
+/// References that every goal has; reset at every start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct References {
-    /// A. The quadrature component is that of the goal, or was asked for.
+    /// Current, A. Its q component is that of the goal, or was commanded.
     current: Dq,
-    /// Added to the voltage of the current loop, V.
+    /// Voltage that is added to the output of the current loop, V.
     test_voltage: Dq,
-    /// Injection axis seen from the frame.
+    /// Injection axis in the flux frame.
     injection_axis: UnitVector,
 }
 
 /// The phase of a drive. A phase owns the state that only it uses.
 ///
-/// Its word ([`Drive::PHASES`]) differs from each other one, and from 0, in 16 bits: flipped bits make no phase of another one.
-// The large one is the one that matters; the others share its memory.
+/// The words of the phases ([`Drive::PHASES`]) differ from each other, and from 0, in 16 bits, so that flipped bits do not turn one
+/// phase into another.
+// The large variant is the important one, and the others share its memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
-#[repr(u32)] // a word of its own: a state is not copied around a byte of it
+#[repr(u32)] // a separate word, so that a state is not copied around a single byte
 enum Phase {
     Off(CarryOver) = Drive::PHASES[0],
     Fault(Fault, CarryOver) = Drive::PHASES[1],
-    /// On the way to one of the next three.
+    /// Preparation of one of the next three phases.
     Prepare(Prepare) = Drive::PHASES[2],
-    /// TestSignal of the motor at rest.
+    /// A test signal to the motor at rest.
     Test(StandstillTest) = Drive::PHASES[3],
-    /// Turning by voltage and frequency.
+    /// V/f control.
     Scalar(Scalar) = Drive::PHASES[4],
-    /// Current in a frame of the flux.
+    /// Current control in the flux frame.
     Field(Field) = Drive::PHASES[5],
 }
 
@@ -159,7 +160,7 @@ enum Phase {
 enum Start {
     Field(Goal),
     Scalar {
-        /// Reference of the speed, mechanical turns/s.
+        /// Speed reference, mechanical turns/s.
         speed: f32,
     },
     Test(TestSignal),
@@ -185,15 +186,16 @@ impl Start {
         }
     }
 
-    /// Whether its start looks for a turning shaft. A drive that learns has a locked one.
+    /// Whether the start begins with a flying start. A drive that learns has a locked shaft.
     pub fn catches(&self, c: &Coefficients) -> bool {
         c.flying_start.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
     }
 }
 
-/// A drive that regulates the current in a frame of the flux.
-// In this order: the fields of every step lie within the 1020 bytes that a floating-point load of the core
-// reaches from one base address; otherwise every sixth instruction of a step computes an address.
+/// A drive that regulates the current in the flux frame.
+// The order matters: the fields that every step uses lie within the 1020 bytes that a floating-point load
+// of the core reaches from one base address. Otherwise every sixth instruction of a step would compute an
+// address.
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
 struct Field {
@@ -217,17 +219,17 @@ struct Field {
     pub lock: LockMonitorState,
     pub noise: NoiseWatchState,
     pub inverter_drop: InverterDropState,
-    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
+    /// Angle by which the flux leads the frame, also as a unit vector: 0 except during self-commissioning.
     pub lead: Angle,
     pub lead_axis: UnitVector,
     pub goal: Goal,
-    /// Results of the run before; the residual flux until the speed of the shaft is found.
+    /// Results of the run before. The residual flux is kept until the speed of the shaft is found.
     pub carried: CarryOver,
-    /// Large: it holds the state of the alternative demodulations.
+    /// Large, since it contains the state of the alternative demodulators.
     pub estimator: EstimatorState,
-    /// Large while a turning shaft is looked for.
+    /// Large during the search of a flying start.
     pub flux: FluxPhase,
-    /// Asymmetry that was seen before there was current or flux, beyond the known one.
+    /// Asymmetry that was measured before there was current or flux, beyond the known asymmetry.
     pub at_start: Option<Asymmetry>,
 }
 
@@ -237,9 +239,9 @@ enum Frame {
     /// The counted angle of the rotor and the slip.
     #[default]
     Encoder,
-    /// The slip injection_only: a drive that learns has a locked shaft.
+    /// The slip alone, since a drive that learns has a locked shaft.
     LockedShaft,
-    /// Injection and observer.
+    /// Injection and back-EMF observer.
     Tracked,
 }
 
@@ -253,27 +255,27 @@ impl Frame {
     }
 }
 
-/// A phase of the flux.
+/// Phase of the flux.
 // See `Phase`.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, Default)]
 enum FluxPhase {
-    /// The frame stands, and nothing is judged: a turning shaft is looked for.
+    /// Search of a flying start. The frame is fixed, and no check is active.
     Search(CatchState),
-    /// The shaft stands; flux that is left decays, then the asymmetry of sensors and stator is measured.
+    /// The shaft is at rest. A residual flux decays, then the asymmetry of sensors and stator is measured.
     Asymmetry(AtStartState),
-    /// The flux of a turning rotor builds up from this period on.
+    /// The flux of a rotating rotor builds up from this period on.
     Build { from: u32 },
-    /// The frame is held along phase a until the flux stands; then the saliency is checked.
+    /// The frame is fixed along phase a until the flux is established; then the saliency is checked.
     #[default]
     Hold,
-    /// Tracking without torque: is it the flux that is tracked?
+    /// Tracking without torque, to verify that the flux is tracked.
     Verify,
-    /// Torque against the closed brake.
+    /// Proof of the torque against the closed brake.
     Prove,
-    /// The sensors are watched while the carrier is off.
+    /// Ready. The sensors are watched while the injection is off.
     Ready(TravelWatchState),
-    /// Ready, and a learning measures.
+    /// Ready, and the self-commissioning measures.
     Learn(LearningState),
 }
 
@@ -284,38 +286,38 @@ impl FluxPhase {
     }
 }
 
-/// The work of the current, with its reference. That of the torque is the torque current itself.
+/// Goal of the current control, with its reference. The reference of the torque is the q-axis current itself.
 #[derive(Clone, Copy, Debug, Default)]
 enum Goal {
     #[default]
     Torque,
     Speed {
-        /// Mechanical turns/s.
+        /// Speed, mechanical turns/s.
         speed: f32,
-        /// Periods for which the speed holds where it is a jog; 0 where it is none.
+        /// Periods for which the speed of a jog is still valid; 0 if there is no jog.
         jog: u32,
     },
     Position {
-        /// Mechanical turns; `None`: where the drive was started.
+        /// Position, mechanical turns; `None` for the position at the start.
         turns: Option<f32>,
-        /// Instead, to press on at this speed, mechanical turns/s, with at most this torque current, A.
+        /// Instead of the position: a speed, mechanical turns/s, to press against a stop with at most this q-axis current, A.
         press: Option<(f32, f32)>,
     },
     Learn,
-    /// To rest.
+    /// Brakes to rest.
     Brake {
         quick: bool,
     },
-    /// At rest, until the brake has closed, for so many periods.
+    /// Stays at rest for so many periods, until the brake has closed.
     Hold {
         left: u32,
     },
-    /// To no torque, and off.
+    /// Reduces the torque to zero and switches off.
     Release,
 }
 
 impl Goal {
-    /// Whether torque, speed or position is regulated as asked for.
+    /// Whether torque, speed or position is regulated as commanded.
     pub fn regulates(&self) -> bool {
         match self {
             Self::Torque | Self::Speed { .. } | Self::Position { .. } => true,
@@ -323,7 +325,7 @@ impl Goal {
         }
     }
 
-    /// The mode that has this goal; of a drive that stops none is asked for.
+    /// Returns the mode that has this goal. The mode of a drive that stops is never used.
     pub fn mode(&self) -> Mode {
         match self {
             Self::Torque | Self::Brake { .. } | Self::Hold { .. } | Self::Release => Mode::Torque,
@@ -333,12 +335,12 @@ impl Goal {
         }
     }
 
-    /// Speed 0.
+    /// Speed mode with speed 0.
     pub const SPEED: Self = Self::Speed { speed: 0.0, jog: 0 };
-    /// The position where the drive is started.
+    /// Position mode at the position where the drive is started.
     pub const POSITION: Self = Self::Position { turns: None, press: None };
 
-    /// Whether its references are finite numbers.
+    /// Whether the references of the goal are finite numbers.
     pub fn is_finite(&self) -> bool {
         match self {
             Self::Speed { speed, .. } => speed.is_finite(),
@@ -351,11 +353,11 @@ impl Goal {
     }
 }
 
-/// Why the outputs go off.
+/// Reason why the outputs are switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     Stopped,
-    /// A learning has measured all its points.
+    /// The self-commissioning has measured all its points.
     Measured,
     Fault(Fault),
 }
@@ -366,30 +368,31 @@ impl From<Fault> for End {
     }
 }
 
-/// Measured in a run, for the next one that does not measure it again.
+/// Quantities that a run has measured and the next run may not measure again.
 #[derive(Clone, Copy, Debug, Default)]
 struct CarryOver {
     /// Stator resistance.
     resistance: Resistance,
-    /// Voltage per phase that the inverter drops beyond its dead time, V.
+    /// Inverter voltage error per phase beyond the dead time, V.
     inverter_drop: f32,
     /// Asymmetry of sensors and stator beyond the learned one.
     asymmetry: Asymmetry,
-    /// Flux in the motor; `None` before the first run.
+    /// Residual flux in the motor; `None` before the first run.
     residual: Option<Residual>,
 }
 
 impl Drive {
-    /// Where in a drive its coefficients are, bytes: for a check of its memory from outside. They change
-    /// only when the count [`Self::CHANGES`] does.
+    /// Position of the coefficients in a drive, bytes, for a check of its memory from outside. They
+    /// change only when the count at [`Self::CHANGES`] changes.
     pub const COEFFICIENTS: Range<usize> =
         offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients>();
-    /// Where in a drive that count is, a `u32`.
+    /// Position in a drive of the count of these changes, a `u32`.
     pub const CHANGES: usize = offset_of!(Self, changes);
 
-    /// Where in a drive the word of its phase is, bytes, and the words that it can have: for a check from outside before each step.
+    /// Position of the word of the phase in a drive, bytes, for a check from outside before each step.
     pub const PHASE: usize = offset_of!(Self, phase);
-    /// See [`PHASE`](Self::PHASE). Rows of a Hadamard matrix that the core compares with in one instruction.
+    /// Values that the word at [`PHASE`](Self::PHASE) can have: rows of a Hadamard matrix that the core can compare in one
+    /// instruction.
     pub const PHASES: [u32; 6] =
         [0x5555_5555, 0x3333_3333, 0x6666_6666, 0x0f0f_0f0f, 0x00ff_00ff, 0xff00_ff00];
 
@@ -398,7 +401,7 @@ impl Drive {
         phase == Self::PHASES[0] || phase == Self::PHASES[1]
     }
 
-    /// A drive that is off.
+    /// Creates a drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
         let phase = Phase::Off(CarryOver::default());
         let limits = Limits { motor_fault: coefficients.no_motor_reading(), ..Limits::default() };
@@ -406,7 +409,7 @@ impl Drive {
         Self { c: coefficients, changes: 0, kept, phase }
     }
 
-    /// The present state.
+    /// Returns the present state.
     pub fn state(&self) -> State {
         match &self.phase {
             Phase::Off(_) => State::Off,
@@ -418,7 +421,8 @@ impl Drive {
         }
     }
 
-    /// Whether the last period leaves time for a command: of a carrier period one does, so that the longest interrupt has none.
+    /// Whether the last period leaves time for a command. One period of an injection period does, so that the longest interrupt has
+    /// no command.
     pub fn has_time(&self) -> bool {
         match &self.phase {
             Phase::Field(field) => field.carrier.is_behind(COMMANDS_BEHIND),
@@ -426,17 +430,17 @@ impl Drive {
         }
     }
 
-    /// Whether `online` is to be given what the last step saw.
+    /// Whether the measurements of the last step are to be passed to `online`.
     pub fn tracks_rotor(&self) -> bool {
         self.c.track_rotor && matches!(&self.phase, Phase::Field(field) if field.regulates())
     }
 
-    /// Whether the outputs are off, and stay off until the next command.
+    /// Whether the outputs are off and stay off until the next command.
     pub fn is_off(&self) -> bool {
         matches!(self.phase, Phase::Off(_) | Phase::Fault(..))
     }
 
-    /// Whether the outputs drive a current, for whatever purpose; the pulses of a wiring check do not count.
+    /// Whether the outputs drive a current for any purpose; the pulses of a wiring check do not count.
     fn is_energised(&self) -> bool {
         match &self.phase {
             Phase::Off(_) | Phase::Fault(..) | Phase::Prepare(_) => false,
@@ -445,21 +449,21 @@ impl Drive {
         }
     }
 
-    /// Coefficients of the front end.
+    /// Returns the coefficients of the front end.
     pub fn front_end(&self) -> &FrontEnd {
         &self.c.front_end
     }
 
-    /// Offsets of the current sensors a, b and c, A, which the present or the last start has measured: 0 until then.
+    /// Returns the offsets of the current sensors a, b and c, A, which the present or the last start has measured; 0 before.
     pub fn offsets(&self) -> [f32; 3] {
         self.kept.offsets
     }
 
-    /// One PWM period between converters and timer: front end, [`step`](Self::step), front end.
+    /// Runs one PWM period from the ADCs to the timer: front end, [`step`](Self::step), front end.
     ///
-    /// `put_out` gets the compare values as soon as they are known. Checks and slow tasks follow, and it is called again where one of
-    /// them switches the outputs off: before the next period, so that the first values never act.
-    #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
+    /// `put_out` gets the compare values as soon as they are known. Checks and slow tasks follow. If one of them switches the outputs
+    /// off, `put_out` is called again before the next period, so that the first values never act.
+    #[inline(never)] // inlined into the firmware's crate, it would be compiled for size: 350 cycles more in the median
     pub fn period(
         &mut self,
         front_end: &mut FrontEndState,
@@ -476,21 +480,21 @@ impl Drive {
         (compare, output)
     }
 
-    /// One PWM period: from that which was measured at instant `k T` to the duties of the period that begins at `(k + 1) T`.
+    /// Runs one PWM period, from the measurement at the instant `k T` to the duties of the period that begins at `(k + 1) T`.
     ///
-    /// Never panics. Whatever is wrong with the input or with the state becomes a latched fault,
-    /// with the outputs off in the same step.
+    /// It never panics. Any error of the input or of the state becomes a latched fault, with the
+    /// outputs off in the same step.
     pub fn step(&mut self, measured: &Measured) -> Output {
         self.step_with(measured, &mut |_| {})
     }
 
-    /// The same, with the compare values that result early where they do.
+    /// Runs one step and passes the compare values to `put_out` early, if the phase computes them early.
     fn step_with(&mut self, measured: &Measured, put_out: &mut dyn FnMut(Compare)) -> Output {
         let checked = self.c.protect(measured);
         let result = match &mut self.phase {
             Phase::Field(field) => {
-                // The drive is a static. With its address known the compiler computes the address of each field, instead of
-                // taking it from one of three bases within reach.
+                // The drive is a static. If the compiler knew its address, it would compute the address of each field
+                // instead of using one of three base addresses within reach.
                 let (field, c, kept) = black_box((field, &self.c, &mut self.kept));
                 match checked {
                     Ok(()) => field.step(c, kept, measured, put_out).map(Some),
@@ -511,7 +515,7 @@ impl Drive {
         Output { duties, chopper, relay: self.kept.relay.closed }
     }
 
-    /// A step without current control in a frame of the flux.
+    /// Runs a step of a phase without current control in the flux frame.
     #[cold]
     fn step_without_flux(
         &mut self,
@@ -535,14 +539,14 @@ impl Drive {
         }
     }
 
-    /// Goes on in this phase.
-    #[inline(always)] // a small phase is written, not the memory that it shares
+    /// Continues in this phase.
+    #[inline(always)] // writes the small phase only, not the memory that it shares
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
         self.kept.elapsed = 0;
     }
 
-    /// Switches off.
+    /// Switches the outputs off.
     #[cold]
     fn end(&mut self, end: End) {
         if let Phase::Field(field) = &self.phase {
@@ -561,7 +565,7 @@ impl Drive {
         }
     }
 
-    /// That which a run leaves to the next one.
+    /// Returns the quantities that a run passes on to the next run.
     #[cold]
     fn carry_over(&self) -> CarryOver {
         match &self.phase {

@@ -1,4 +1,4 @@
-//! Angle of the rotor flux: from encoder and slip, or from the saliency measured with the carrier.
+//! Angle of the rotor flux: from encoder and slip, or from the saliency measured by injection.
 
 pub(crate) mod angle_filter;
 pub(crate) mod catch;
@@ -19,11 +19,11 @@ pub use schedule::GainSchedule;
 pub use tracker::{Tracker, TrackerState};
 pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
 
-/// The source of the flux angle.
+/// Source of the flux angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleSource {
     /// Encoder and slip, Eq. 2.10.
     Encoder,
-    /// The injected carrier: no sensor on the shaft.
+    /// The injection, without a sensor on the shaft.
     Injection,
 }

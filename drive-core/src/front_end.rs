@@ -1,11 +1,12 @@
-//! Front end of the drive: converter codes to SI units (section 3.2, Eq. 3.5), and duties to timer counts.
+//! Front end of the drive: converts ADC counts to SI units (section 3.2, Eq. 3.5), and duties to timer counts.
 //!
 //! ```text
 //! Sample -> FrontEnd::measure -> Measured -> Drive::step -> Output -> FrontEnd::put_out -> Compare
 //! ```
 //!
-//! [`Drive::period`](crate::Drive::period) is the three together. The coefficients of the front end are part of those of the drive
-//! ([`Drive::front_end`](crate::Drive::front_end)), which also knows the offsets; its state lies beside the drive.
+//! [`Drive::period`](crate::Drive::period) runs all three. The coefficients of the front end are part of the coefficients of the
+//! drive ([`Drive::front_end`](crate::Drive::front_end)), which also has the offsets. The state of the front end is kept beside
+//! the drive.
 
 pub(crate) mod shunts;
 
@@ -19,7 +20,7 @@ use shunts::{ShuntState, Shunts};
 /// Coefficients of the front end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontEnd {
-    /// Calibration of current a, A, by the code of a [`Sample`].
+    /// Calibration of current a, A, from the ADC counts of a [`Sample`].
     pub current_a: Line,
     /// Calibration of current b, A.
     pub current_b: Line,
@@ -27,17 +28,17 @@ pub struct FrontEnd {
     pub shunts: Option<Shunts>,
     /// Calibration of the dc-link voltage, V.
     pub dc_link: Line,
-    /// Whether the code of a current is the sum of two conversions, one in each zero vector, rather than one.
+    /// Whether the ADC counts of a current are the sum of two conversions, one in each zero vector.
     pub both_zero_vectors: bool,
-    /// Largest code of a current. At this code, or at 0, its channel is saturated.
+    /// Largest ADC counts of a current. At this value, or at 0, its channel is saturated.
     pub full_scale: u16,
-    /// Compare value at which a high side is on throughout.
+    /// Compare value at which a high side is on all the time.
     pub top: f32,
     /// Checks of the heat sink.
     pub heat_sink: HeatSink,
 }
 
-/// State of the front end. The default is that with the outputs off.
+/// State of the front end. The default is the state with the outputs off.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrontEndState {
     shunts: ShuntState,
@@ -50,8 +51,8 @@ impl FrontEnd {
         self.current_b = self.current_b.scaled(1.0 + 0.5 * mismatch);
     }
 
-    /// Converts codes to SI units, subtracts the `offsets` of the current sensors a, b and c, A, and checks the codes against their limits and, with three shunts, the
-    /// sum of the currents.
+    /// Converts ADC counts to SI units and subtracts the `offsets` of the current sensors a, b and c, A. It also checks the counts against
+    /// their limits and, with three shunts, the sum of the currents.
     pub fn measure(
         &self,
         state: &mut FrontEndState,
@@ -90,14 +91,15 @@ impl FrontEnd {
         self.compare(duties)
     }
 
-    /// Timer counts of duties.
+    /// Returns the timer counts of duties.
     pub(crate) fn compare(&self, duties: [f32; 3]) -> Compare {
-        // To the nearest integer; 0 for NaN. The cast to u32 is one instruction of the core, the saturating one to u16 twelve.
+        // The result is rounded to the nearest integer, 0 for NaN. The cast to u32 is one instruction of the core; a saturating
+        // cast to u16 would be twelve.
         let [a, b, c] = duties.map(|duty| (duty * self.top + 0.5) as u32 as u16);
         Compare { a, b, c, enabled: true }
     }
 
-    /// The sensor that cannot be believed.
+    /// Returns the fault of a sensor that cannot be trusted.
     fn check(&self, state: &FrontEndState, sample: &Sample) -> Option<Fault> {
         let saturated = |code: u16| code == 0 || code >= self.full_scale;
         let (least, most) = self.heat_sink.window;
@@ -138,7 +140,7 @@ mod tests {
 
     #[test]
     fn table_4_gives_the_currents_that_were_set() {
-        // Codes of Table 4; Eq. 3.5 leaves residuals up to 8.7 mA (A) and 10.2 mA (B).
+        // These are ADC counts of Table 4; Eq. 3.5 leaves residuals up to 8.7 mA (A) and 10.2 mA (B).
         let table = [
             (-3.0, 666, 671),
             (-2.0, 1117, 1118),
@@ -200,7 +202,7 @@ mod tests {
             heat_sink: 1309,
             ..Sample::default()
         };
-        // The fault after so many samples.
+        // This returns the fault after so many samples.
         let after = |current_c, samples| {
             let mut state = FrontEndState::default();
             (0..samples)
@@ -213,7 +215,7 @@ mod tests {
             (0, 1, Some(Fault::SensorSaturatedC)),
             (4095, 1, Some(Fault::SensorSaturatedC)),
             (1, 1, Some(Fault::CurrentSum)),
-            // 0.6 A too much, above the limit of the mean after two time constants.
+            // 0.6 A too much are above the limit of the mean after two time constants.
             (2060, 1, None),
             (2060, 100, Some(Fault::CurrentSum)),
             (1940, 100, Some(Fault::CurrentSum)),
@@ -222,7 +224,7 @@ mod tests {
         for (current_c, samples, fault) in cases {
             assert_eq!(after(current_c, samples), fault, "{current_c}, {samples} samples");
         }
-        // Without shunts the third code means nothing.
+        // Without shunts the third reading has no meaning.
         assert_eq!(measured(&sample(0), [0.0; 3]).fault, None);
     }
 }

@@ -1,45 +1,47 @@
-//! Homing: finds a stop of the shaft in position mode; for the main loop.
+//! Homing: finds a mechanical stop of the shaft in position mode. It runs in the main loop.
 //!
-//! The drive presses towards the stop by [`Command::Press`]: slowly, with little torque. A shaft that stands for a second
-//! against that torque is at the stop, or friction holds it, or it turns slowly about where it bounced to. So it turns back
-//! by a tenth of a turn and comes again, until it stands at the same place twice: there is position 0, by
-//! [`Command::Home`]. A shaft that does not turn back was not at a stop.
+//! The drive presses towards the stop by [`Command::Press`], slowly and with little torque. A shaft that stands still for a
+//! second against that torque is at the stop, or it is held by friction, or it still moves slowly after a bounce. Therefore
+//! the shaft turns back by a tenth of a turn and approaches again, until it has stopped at the same position twice. This
+//! becomes position 0, by [`Command::Home`]. A shaft that does not turn back was not at a stop.
 //!
-//! Measured on the simulated motor against a stop of 100 N m/rad (`tests/homing.rs`), both ways, 10 to 60 rpm, 0.4 to 1.5 A:
-//! position 0 lies within 0.002 turns of where the stop yields to that torque with the encoder, within 0.01 turns
-//! without, and within 0.01 turns where an inertia of 0.06 kg m² swings at the stop. From 100 rpm on, the impact can turn
-//! the flux away from an angle that is tracked without an encoder: hence the limit of the speed.
+//! The accuracy was measured on the simulated motor against a stop of 100 N m/rad (`tests/homing.rs`), in both directions,
+//! with 10 to 60 rpm and 0.4 to 1.5 A. Compared with the position to which that torque deflects the stop, position 0 is
+//! within 0.002 turns with the encoder, within 0.01 turns without, and within 0.01 turns if an inertia of 0.06 kg m² swings
+//! at the stop. At 100 rpm or more, the impact can turn the flux away from an angle that is tracked without an encoder,
+//! hence the limit of the speed.
 
 use core::ops::RangeInclusive;
 
 use crate::motion::LARGEST_POSITION;
 use crate::{Command, State};
 
-/// Speeds, mechanical rpm.
+/// Allowed speeds, mechanical rpm.
 const RPM: RangeInclusive<f32> = 5.0..=60.0;
-/// Ways, mechanical turns.
+/// Allowed distances, mechanical turns.
 const TURNS: RangeInclusive<f32> = 0.1..=LARGEST_POSITION;
-/// Control periods for which a shaft at the stop stands: 1 s.
+/// Control periods for which a shaft at the stop must stand still: 1 s.
 const STANDS: u32 = 6000;
-/// Way from where it began to stand within which it does, turns.
+/// Distance within which the shaft counts as standing still, turns.
 const STILL: f32 = 0.02;
-/// Share of the torque current against which it stands, on average; the rest is the noise of a speed without an encoder.
+/// Least mean share of the q-axis current against which the shaft stands still. The rest is for the noise of a speed without an
+/// encoder.
 const PRESSES: f32 = 0.5;
-/// Way back from the stop, turns.
+/// Distance by which the shaft turns back from the stop, turns.
 const BACK: f32 = 0.1;
-/// Distance of two stands at the same place, turns. Without an encoder the position drifts under torque.
+/// Largest distance of two positions that count as the same, turns. Without an encoder the position drifts under torque.
 const SAME: f32 = 0.02;
-/// Most stands.
+/// Largest number of approaches.
 const TRIES: u8 = 5;
 
-/// How to look for the stop.
+/// Plan of the search for the stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Speed, mechanical rpm, 5 to 60; its sign is the direction.
     pub rpm: f32,
-    /// Largest torque current, A peak.
+    /// Largest q-axis current, A peak.
     pub i_q: f32,
-    /// Longest way to the stop, mechanical turns, 0.1 to 1000.
+    /// Largest distance to the stop, mechanical turns, 0.1 to 1000.
     pub turns: f32,
 }
 
@@ -59,55 +61,55 @@ pub struct OutOfRange {
 pub struct Seen {
     /// Control periods, wrapping. A report with the same number is the same.
     pub periods: u32,
-    /// State.
+    /// State of the drive.
     pub state: State,
     /// Position, mechanical turns.
     pub turns: f32,
-    /// Reference of the torque current, A.
+    /// Q-axis current reference, A.
     pub i_q: f32,
-    /// Least and largest torque current that is possible, A.
+    /// Least and largest possible q-axis current, A.
     pub room: (f32, f32),
 }
 
 /// The next action.
 ///
-/// Exhaustive on purpose: every action has to be carried out.
-#[allow(clippy::large_enum_variant)] // taken at once
+/// Exhaustive on purpose, since every action has to be carried out.
+#[allow(clippy::large_enum_variant)] // the value is used at once
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
-    /// Nothing yet.
+    /// Nothing to be done yet.
     Wait,
     /// Give the drive this command.
     Command(Command),
-    /// It has ended: position 0 is at the stop and the shaft stays there, or the shaft stays where it is.
+    /// The homing has ended: position 0 is at the stop and the shaft stays there, or the shaft stays at its present position.
     Ended(Result<(), Failure>),
 }
 
-/// Why there is no position 0.
+/// Reason why there is no position 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failure {
-    /// The drive does not regulate the position any more.
+    /// The drive no longer regulates the position.
     #[error("ended, the drive is {0}")]
     Left(State),
-    /// No stop within this way, turns.
+    /// There is no stop within this distance, turns.
     #[error("no stop within {0} turns")]
     NoStop(f32),
-    /// The shaft does not turn back from where it stood.
+    /// The shaft does not turn back from the position at which it stood still.
     #[error("the shaft does not turn with this current")]
     Held,
-    /// It does not stand at the same place twice.
-    #[error("the shaft never stood at the same place twice")]
+    /// The shaft did not stop at the same position twice.
+    #[error("the shaft never stopped at the same position twice")]
     Unsteady,
 }
 
-/// A shaft that stands.
+/// A shaft that stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stand {
-    /// Where, turns, and since when, periods.
+    /// Its position, turns, and its beginning, control periods.
     at: f32,
     since: u32,
-    /// Sums in the second half of the way from there and of the share of the torque current, and their number.
+    /// Sums over the second half of the time: distance from that position, and share of the q-axis current; and their number.
     way: f32,
     share: f32,
     count: f32,
@@ -116,39 +118,39 @@ struct Stand {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Towards,
-    /// Back from here, turns.
+    /// Turning back from this position, turns.
     Back(f32),
     Ending(Result<(), Failure>),
 }
 
-/// A homing.
+/// A homing procedure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Homing {
     plan: Plan,
     phase: Phase,
     periods: Option<u32>,
-    /// Where it began, turns.
+    /// Position at the beginning, turns.
     began: Option<f32>,
     stands: Option<Stand>,
-    /// Where it stood last, turns, and how often it did.
+    /// Position of the last stop, turns, and number of stops.
     stood: Option<f32>,
     tries: u8,
 }
 
 impl Homing {
-    /// A homing by this plan, with at most `largest` of torque current, A.
+    /// Creates a homing by this plan, with a q-axis current of at most `largest`, A.
     ///
     /// # Errors
     /// [`OutOfRange`].
     pub fn new(plan: Plan, largest: f32) -> Result<Self, OutOfRange> {
         check("the speed", plan.rpm.abs(), RPM, "rpm")?;
         check("the current", plan.i_q, 0.0..=largest, "A")?;
-        check("the way", plan.turns, TURNS, "turns")?;
+        check("the distance", plan.turns, TURNS, "turns")?;
         let phase = Phase::Towards;
         Ok(Self { plan, phase, periods: None, began: None, stands: None, stood: None, tries: 0 })
     }
 
-    /// The first command.
+    /// Returns the first command.
     pub fn begin(&self) -> Command {
         self.press(1.0)
     }
@@ -157,7 +159,7 @@ impl Homing {
         Command::Press(direction * self.plan.rpm, self.plan.i_q)
     }
 
-    /// Goes on; called with each report of the drive since the first command.
+    /// Continues the homing; called with each report of the drive since the first command.
     pub fn poll(&mut self, seen: &Seen) -> Next {
         if let Phase::Ending(outcome) = self.phase {
             return Next::Ended(outcome);
@@ -182,7 +184,7 @@ impl Homing {
         }
     }
 
-    /// Where the shaft has been standing against the torque, turns.
+    /// Returns the position at which the shaft has stood still against the torque, turns.
     fn standing(&mut self, seen: &Seen) -> Option<f32> {
         let forward = (self.plan.rpm > 0.0) == (self.phase == Phase::Towards);
         let (i_q, room) = if forward { (seen.i_q, seen.room.1) } else { (-seen.i_q, -seen.room.0) };
@@ -249,15 +251,15 @@ mod tests {
 
     /// A rigid shaft.
     struct Shaft<'a> {
-        /// Distance of the stop, turns, the n-th time that it comes there.
+        /// Distance of the stop, turns, at the n-th approach.
         stop: &'a dyn Fn(usize) -> f32,
-        /// Torque current against it, A, and what is possible, backwards and forward.
+        /// Q-axis current against the stop, A, and the possible current, backwards and forward.
         presses: [f32; 2],
         room: [f32; 2],
         held: bool,
     }
 
-    /// The outcome within a minute, and all commands, each with its time, s, and where the shaft was, turns.
+    /// The outcome within a minute, and all commands, each with its time, s, and the position of the shaft, turns.
     type Homed = (Option<Result<(), Failure>>, Vec<(Command, f32, f32)>);
 
     fn home(plan: Plan, shaft: &Shaft) -> Homed {
@@ -271,7 +273,7 @@ mod tests {
             let presses =
                 if shaft.held || turns * towards == end { shaft.presses } else { [0.0; 2] };
             let seen = Seen {
-                // Wraps on the way.
+                // The number wraps during the homing.
                 periods: (n * EVERY).wrapping_sub(10_000),
                 state: State::Position,
                 turns,
@@ -305,12 +307,12 @@ mod tests {
                 [towards.0, back.0, again.0],
                 [rpm, -rpm, rpm].map(|rpm| Command::Press(rpm, 0.5))
             );
-            // It takes 2.58 s to the stop and stands for a second, turns back by a tenth of a turn, and comes again.
+            // The shaft takes 2.58 s to the stop, stands still for a second, turns back by a tenth of a turn, and approaches again.
             assert!((zero - 1.29 * rpm.signum()).abs() < 1e-5, "{zero}");
             assert!((3.52..3.6).contains(&back.1), "{back:?}");
             assert!((0.099..0.106).contains(&(back.2 - again.2).abs()), "{again:?}");
         }
-        // Half of the current has to press, or of that which is possible in this direction.
+        // At least half of the current, or of the possible current in this direction, has to press.
         for (rpm, presses, room, found) in [
             (30.0, [0.0, 0.24], [3.0; 2], false),
             (-30.0, [0.24, 0.0], [3.0; 2], false),
@@ -357,7 +359,7 @@ mod tests {
             ((61.0, 1.0, 1.0), "the speed = 61: outside 5 to 60 rpm"),
             ((30.0, -0.1, 1.0), "the current = -0.1: outside 0 to 3 A"),
             ((30.0, f32::NAN, 1.0), "the current = NaN: outside 0 to 3 A"),
-            ((30.0, 1.0, 0.09), "the way = 0.09: outside 0.1 to 1000 turns"),
+            ((30.0, 1.0, 0.09), "the distance = 0.09: outside 0.1 to 1000 turns"),
         ] {
             assert_eq!(text(plan.0, plan.1, plan.2).unwrap_err(), expected);
         }

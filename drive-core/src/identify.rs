@@ -1,3 +1,3 @@
-//! Identification in the control step: learning with locked shaft.
+//! Identification in the control step: saliency self-commissioning with a locked shaft.
 
 pub(crate) mod learning;

@@ -1,27 +1,27 @@
-//! The result of a learning: what it found, and whether the motor can be tracked with it.
+//! Result of a saliency self-commissioning, and whether the motor can be tracked with it.
 
 use core::fmt;
 
 use crate::carrier::Asymmetry;
 use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
-/// Largest accepted spread of the even part of the reference. Noise gives 0.001.
+/// Largest accepted spread of the even part of the saliency offset. Noise causes 0.001.
 pub(crate) const SPREAD: f32 = 0.005;
 /// Largest accepted gain mismatch.
 pub(crate) const LARGEST_MISMATCH: f32 = 0.1;
 /// Largest accepted asymmetry: a gain mismatch of 10 % has 0.083.
 pub(crate) const LARGEST_ASYMMETRY: f32 = 0.1;
-/// Largest accepted current-dependent saliency at a current of one step of the table, and rms misfit of its law
-/// relative to the rms of the reference.
+/// Largest accepted current-dependent saliency at a current of one step of the table, and largest rms misfit of
+/// its law relative to the rms of the saliency offset.
 pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
-/// Least magnitude of the slope without torque current, 1/rad, with negative and with positive sign: at 5 mA of sensor noise
-/// 5° rms.
+/// Least magnitude of the saliency sensitivity without q-axis current, 1/rad, with negative and with positive sign. With it,
+/// 5 mA of sensor noise cause 5° rms.
 pub(crate) const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
-/// Up to this multiple of it the tracking is weak.
+/// Multiple of the least sensitivity up to which the tracking is weak.
 const WEAK: f32 = 1.5;
-/// Largest accepted part of the signal that repeats four times in a turn, relative to the slope without torque current: 8.6°.
+/// Largest accepted part of the signal that repeats four times in a turn, relative to the sensitivity without q-axis current: 8.6°.
 pub(crate) const RIPPLE: f32 = 0.15;
-/// From this share on it is told: 2.9°.
+/// Share above which that part is reported: 2.9°.
 const CURVED: f32 = 0.05;
 /// Least torque limit, in steps of the table: 1 A of 3.5 A.
 pub(crate) const LEAST_LIMIT: usize = 4;
@@ -31,39 +31,39 @@ pub(crate) const LEAST_LIMIT: usize = 4;
 pub struct Fitted {
     /// The value.
     pub value: f32,
-    /// Unexplained part of the measurement; defined with each value.
+    /// Unexplained part of the measurement, as defined with each value.
     pub misfit: f32,
-    /// Whether value and misfit are within their bounds. Otherwise the previous value stays in use.
+    /// Whether value and misfit are within their bounds. If not, the previous value stays in use.
     pub accepted: bool,
 }
 
 impl Fitted {
-    /// This value where it was accepted, or else `other`.
+    /// Returns this value if it was accepted, otherwise `other`.
     fn or(self, other: Self) -> Self {
         if self.accepted { self } else { other }
     }
 
-    /// `asymmetry` and that of this gain mismatch.
+    /// Returns the sum of `asymmetry` and the asymmetry of this gain mismatch.
     pub(crate) fn with(self, asymmetry: &Asymmetry) -> Asymmetry {
         asymmetry.plus(&Asymmetry::of_gain_mismatch(self.or(Self::default()).value), 1.0)
     }
 }
 
-/// Whether, and how well, the motor can be tracked.
+/// Verdict whether, and how well, the motor can be tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Verdict {
     /// Accepted.
     Sound,
-    /// Accepted, but the slope is less than 1.5 times the least one: expect errors above 5° rms and false stops.
+    /// Accepted, but the sensitivity is less than 1.5 times the least one: expect errors above 5° rms and false stops.
     Weak,
-    /// Refused: the slope without torque current is too small.
+    /// Refused: the sensitivity without q-axis current is too small.
     SlopeTooSmall,
-    /// Refused: the slope falls off below the least torque limit.
+    /// Refused: the sensitivity vanishes below the least torque limit.
     LimitTooLow,
-    /// Refused: the even part of the reference spreads; shaft not quite locked, or a load that pulses.
+    /// Refused: the even part of the saliency offset spreads, because the shaft is not quite locked or the load pulses.
     Uneven,
-    /// Refused: the signal repeats four times in a turn; a current sensor is not linear.
+    /// Refused: the signal repeats four times in a turn, because a current sensor is not linear.
     Bent,
     /// Refused: a value is not finite or out of its range.
     OutOfRange,
@@ -75,13 +75,13 @@ impl Verdict {
         matches!(self, Self::Sound | Self::Weak)
     }
 
-    /// Least magnitude of a slope of this sign, 1/rad.
+    /// Returns the least magnitude of a sensitivity of this sign, 1/rad.
     fn least(at_rest: f32) -> f32 {
         let [negative, positive] = LEAST_SLOPE;
         if at_rest < 0.0 { negative } else { positive }
     }
 
-    /// The verdict on a slope without torque current, 1/rad.
+    /// Returns the verdict on a sensitivity without q-axis current, 1/rad.
     pub fn of_slope(at_rest: f32) -> Self {
         match at_rest.abs() / Self::least(at_rest) {
             WEAK.. => Self::Sound,
@@ -91,50 +91,50 @@ impl Verdict {
     }
 }
 
-/// Result of a learning.
+/// Result of a saliency self-commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learned {
-    /// Reference over the torque current: of the saliency, or of the current difference in A.
+    /// Saliency offset over the q-axis current, or reference of the current difference, A.
     pub reference: ReferenceTable,
-    /// Slope of the saliency over the torque current; none of a current difference.
+    /// Saliency sensitivity over the q-axis current; none for a current difference.
     pub slope: Option<SlopeTable>,
-    /// Slope without torque current, 1/rad, also where it is refused; 0 for a current difference.
+    /// Saliency sensitivity without q-axis current, 1/rad, also if it is refused; 0 for a current difference.
     pub slope_at_rest: f32,
-    /// Largest torque current, A, that the slope allows: up to it the slope on both sides is at least 0.3 of that without
-    /// torque current, and 0.016 /rad.
+    /// Largest q-axis current, A, that the sensitivity allows: up to it, the sensitivity on both sides is at least 0.3 of
+    /// its value without q-axis current, and 0.016 /rad.
     pub limit_a: f32,
-    /// Carrier current over the torque current, if plausible.
+    /// Injection current over the q-axis current, if plausible.
     pub carrier: Option<CarrierTable>,
     /// Number of measured points, without zero; the tables are constant beyond.
     pub points: usize,
-    /// Largest deviation of the even part of the reference from its mean. Beyond 0.005 the whole result is refused.
+    /// Largest deviation of the even part of the saliency offset from its mean. Beyond 0.005 the whole result is refused.
     pub spread: f32,
-    /// Largest part of the signal that repeats four times in an electrical turn, of all points; 0 where the result was read from
-    /// the flash. A third-order error of a current sensor of 1 % at the end of its range makes 0.0042 at 2.9 A of 4.47 A.
+    /// Largest part of the signal that repeats four times in an electrical turn, of all points; 0 if the result was read from
+    /// the flash. A third-order error of a current sensor of 1 % at the end of its range causes 0.0042 at 2.9 A of 4.47 A.
     pub ripple: f32,
     /// (gain of current sensor a) / (gain of b) - 1, within ±0.1. Misfit: the asymmetry that a gain mismatch does
     /// not explain. Synchronous demodulation only.
     pub gain_mismatch: Fitted,
-    /// Asymmetry that is taken out of the demodulated signals: what the gain mismatch, where it is accepted, leaves.
+    /// Asymmetry that is subtracted from the demodulated signals: the rest beyond the gain mismatch, if that is accepted.
     pub asymmetry: Asymmetry,
-    /// Asymmetry that the start saw before there was current or flux, beyond gain mismatch and `asymmetry`: a later start expects it.
-    /// None with an encoder, or of an earlier firmware.
+    /// Asymmetry that the start has measured before there was current or flux, beyond gain mismatch and `asymmetry`. A later start
+    /// expects it. None with an encoder, or in a result of an earlier firmware.
     pub at_start: Option<Asymmetry>,
-    /// Number of rotor positions, 1 or more, whose mean gain mismatch and asymmetry are. The slots of the rotor have an
-    /// asymmetry that changes with its position, sensors and stator have not.
+    /// Number of rotor positions, 1 or more, over which gain mismatch and asymmetry are averaged. The slots of the
+    /// rotor have an asymmetry that changes with its position; sensors and stator have a constant one.
     pub positions: u8,
-    /// Saliency per ampere of stator current, 1/A, within ±0.075 at one step of the table: least squares of the reference on
-    /// 2 i_d i_q/|i|. Misfit: rms of the residual relative to that of the reference, at most 0.35.
+    /// Saliency per ampere of stator current, 1/A, within ±0.075 at one step of the table: least squares of the saliency
+    /// offset on 2 i_d i_q/|i|. Misfit: rms of the residual relative to the rms of the offset, at most 0.35.
     pub current_saliency: Fitted,
-    /// Flux-fixed saliency at nominal flux measured by the check at the start (±5 % by noise); 0 without
-    /// the check. A later start expects it.
+    /// Flux-fixed saliency at nominal flux, measured by the check at the start (±5 % by noise); 0
+    /// without the check. A later start expects it.
     pub flux_saliency: f32,
-    /// Whether the result is used, and why not.
+    /// Verdict: whether the result is used, and if not, why.
     pub verdict: Verdict,
 }
 
 impl fmt::Display for Learned {
-    /// The verdict in words, with the numbers that it rests on.
+    /// Writes the verdict in words, with its numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { slope_at_rest: slope, limit_a, spread, ripple, .. } = *self;
         let (least, least_limit_a) = (Verdict::least(slope), self.least_limit_a());
@@ -151,10 +151,10 @@ impl fmt::Display for Learned {
             }
             Verdict::LimitTooLow => write!(
                 f,
-                "slope {slope:.4} /rad is lost above {limit_a:.2} A of torque current, less than {least_limit_a:.2} A"
+                "slope {slope:.4} /rad is lost above {limit_a:.2} A of q-axis current, less than {least_limit_a:.2} A"
             ),
             Verdict::Uneven => {
-                write!(f, "even part of the reference spreads by {spread:.5}, more than {SPREAD}")
+                write!(f, "even part of the saliency offset spreads by {spread:.5}, over {SPREAD}")
             }
             Verdict::Bent => write!(
                 f,
@@ -172,13 +172,13 @@ impl fmt::Display for Learned {
 }
 
 impl Learned {
-    /// Least accepted torque limit, A.
+    /// Returns the least accepted torque limit, A.
     fn least_limit_a(&self) -> f32 {
         self.reference.grid().current(LEAST_LIMIT)
     }
 
-    /// Whether a stored result is plausible, i.e. could come from an accepted learning. The tables check
-    /// their own values.
+    /// Whether a stored result is plausible, i.e. could come from an accepted self-commissioning. The
+    /// tables check their own values.
     pub fn is_believable(&self) -> bool {
         let within = |fitted: &Fitted, largest: f32| {
             fitted.misfit.is_finite() && (!fitted.accepted || fitted.value.abs() <= largest)
@@ -199,11 +199,12 @@ impl Learned {
             && self.flux_saliency.abs() < 1.0
     }
 
-    /// This result, found at another rotor position with the coefficients of `before`, on top of it: gain mismatch and
-    /// asymmetry are the means of all positions, so what was found now, a difference, counts as one of them. The other values
-    /// are those of this result; where it did not accept one, that of `before`.
+    /// Returns the combination of `before` and this result, which was found at another rotor position with the coefficients
+    /// of `before`. Gain mismatch and asymmetry are the means over all positions; this result contains a difference, which
+    /// counts as one position. The other values come from this result, or from `before` if this result did not accept them.
     ///
-    /// The drive itself [takes](crate::Coefficients::take) a result as if it were the first: build the coefficients anew.
+    /// The drive itself [takes](crate::Coefficients::take) a result as if it were the first, so the coefficients must be built
+    /// again.
     pub fn on_top_of(&self, before: &Self) -> Self {
         let positions = before.positions.saturating_add(1);
         let share = 1.0 / f32::from(positions);
@@ -212,7 +213,8 @@ impl Learned {
             let corrected = before.gain_mismatch.or(Fitted::default()).value;
             gains.value = corrected + share * gains.value;
         }
-        // The mean over the positions differs from the asymmetry of this one by `1 - share` of it, which a start there measures.
+        // The mean over the positions differs from the asymmetry of this position by `1 - share` of it, which a start at this
+        // position measures.
         let rest = self.gain_mismatch.with(&self.asymmetry);
         Self {
             gain_mismatch: gains,

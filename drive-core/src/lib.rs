@@ -1,40 +1,37 @@
 //! Field-oriented control of a three-phase induction motor without a position sensor, down to zero
-//! speed, by a 600 Hz voltage injected on the quadrature axis.
+//! speed, by a 600 Hz voltage injected on the q axis.
 //!
-//! The whole drive is one type, [`Drive`], and the whole control one function, [`Drive::step`]:
-//! currents and voltages go in as [`Measured`], duties come out as an [`Output`]. A [`FrontEnd`] around it converts codes of
-//! converters and counts of a timer. The same code runs
-//! in the control interrupt of the firmware and against the simulated motor on a host, and gives the
-//! same bits on both: angles are integers, sine and cosine come from one integer table, the step calls no
-//! transcendental function (its square roots are those of libm, in software on both), and no
-//! multiplication is fused with an addition.
+//! The whole drive is one type, [`Drive`], and the whole control is one function, [`Drive::step`]: currents and voltages go
+//! in as [`Measured`], duties come out as an [`Output`]. A [`FrontEnd`] around it converts ADC counts and timer counts. The
+//! same code runs in the control interrupt of the firmware and against the simulated motor on a host, and gives the same
+//! bits on both: angles are integers, sine and cosine come from one integer table, the step calls no transcendental function
+//! (its square roots are those of libm, in software on both), and no multiplication is fused with an addition.
 //!
-//! Inside, one direction only:
+//! Signals flow in one direction only:
 //!
 //! ```text
 //! front end -> frames -> filters -> flux angle -> current loop -> injection -> dead time -> modulation -> front end
 //! ```
 //!
-//! | room | contents |
+//! | module | contents |
 //! |---|---|
 //! | the root | [`Drive`], its [`Coefficients`], states and commands; front end, faults, motor, scales; speed loop, dc link, relay |
 //! | [`io`] | input and output of a step and of the front end |
 //! | [`math`], [`filter`] | vectors and frames; second-order sections |
-//! | [`current`] | PI, modulation, dead time and drop of the inverter |
+//! | [`current`] | PI, modulation, dead time and inverter voltage error |
 //! | [`carrier`] | the injected voltage and the demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
-//! | [`learned`], [`table`] | the result of a learning with locked shaft, and its tables |
+//! | [`learned`], [`table`] | the result of a saliency self-commissioning with locked shaft, and its tables |
 //! | [`homing`] | finding a stop of the shaft |
 //!
 //! The coefficients come from outside: the crate `induction-drive-settings` designs them from settings in SI units.
 //! `induction-drive-commission` finds the parameters of the motor, `induction-drive-rotor-id` its rotor time constant while it
 //! runs.
 //!
-//! Each block is a small pair of coefficients, which are public, and state, which the drive alone has, with one step function.
-//! Equation, table, figure and section numbers are
-//! those of R. A. N. Barroso, "Controle de torque sensorless de um motor de indução com injeção de
-//! sinal de alta frequência no eixo de quadratura", UFC, 2017.
+//! Each block is a small pair of coefficients, which are public, and state, which only the drive has, with one step function.
+//! Equation, table, figure and section numbers refer to R. A. N. Barroso, "Controle de torque sensorless de um motor de
+//! indução com injeção de sinal de alta frequência no eixo de quadratura", UFC, 2017.
 //!
 //! # Conventions
 //!
@@ -84,7 +81,8 @@ pub use motion::{Motion, MotionGains, Ramps};
 pub use motor::{FirstOrder, Motor};
 pub use supply::Relay;
 
-/// The settings and the design, compiled into the unit tests: as a dependency they would bring a second instance of this crate.
+/// The settings and the design, compiled into the unit tests, because as a dependency they would bring a second instance of this
+/// crate.
 #[cfg(test)]
 #[path = "../settings/src/settings/mod.rs"]
 pub mod settings;
@@ -97,7 +95,7 @@ extern crate self as drive_core;
 #[path = "../../tests/common/generated.rs"]
 mod generated;
 
-/// The examples of the documents.
+/// Examples in the documents, compiled as tests.
 #[cfg(doctest)]
 mod documents {
     #[doc = include_str!("../README.md")]

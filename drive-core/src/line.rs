@@ -1,11 +1,11 @@
-//! Scales of the converters.
+//! Scales of the ADCs.
 
 /// Calibration line of one channel: `value = gain * code + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Units per code.
+    /// Units per ADC count.
     pub gain: f32,
-    /// Value at code 0.
+    /// Value at 0 ADC counts.
     pub offset: f32,
 }
 
@@ -16,8 +16,8 @@ impl Line {
     #[allow(clippy::excessive_precision)]
     pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
 
-    /// The line of a sensor that gives `zero_v` at zero and `v_per_unit` more per ampere or volt, behind a converter with
-    /// the reference `reference_v` and `codes` codes (4096 with 12 bits).
+    /// Returns the line of a sensor with an output of `zero_v` at zero and `v_per_unit` per ampere or volt, on an ADC
+    /// with the reference `reference_v` and `codes` counts (4096 with 12 bits).
     ///
     /// ```
     /// use induction_drive_core::Line;
@@ -31,17 +31,17 @@ impl Line {
         Self { gain: per_volt * reference_v / codes as f32, offset: -per_volt * zero_v }
     }
 
-    /// The line multiplied by a factor.
+    /// Returns the line multiplied by a factor.
     pub fn scaled(self, factor: f32) -> Self {
         Self { gain: factor * self.gain, offset: factor * self.offset }
     }
 
-    /// Value at a code.
+    /// Returns the value at these ADC counts.
     pub fn at(self, code: u16) -> f32 {
         self.without(0.0, code)
     }
 
-    /// Value at a code, less the `offset` of the sensor.
+    /// Returns the value at these ADC counts, less the `offset` of the sensor.
     pub fn without(self, offset: f32, code: u16) -> f32 {
         self.gain * f32::from(code) + (self.offset - offset)
     }

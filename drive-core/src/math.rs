@@ -1,7 +1,7 @@
 //! Angles, vectors with their reference frames, and decimal output.
 
-/// Sum, difference and negative of a type, field by field. It stands in for a crate of derive macros: that one and its parser were
-/// compiled before the control, which everything else waits for.
+/// Implements sum, difference and negative of a type, field by field. It replaces a crate of derive macros, which with its parser
+/// would be compiled before the control, for which everything else waits.
 macro_rules! field_by_field {
     ($name:ident { $($field:tt),+ }) => {
         impl core::ops::Add for $name {
@@ -53,7 +53,7 @@ pub fn all_finite(values: &[f32]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// `value` clamped to a range; NaN stays NaN.
+/// Returns `value` clamped to a range; NaN stays NaN.
 pub fn within(value: f32, (least, most): (f32, f32)) -> f32 {
     if value > most {
         most
@@ -64,7 +64,7 @@ pub fn within(value: f32, (least, most): (f32, f32)) -> f32 {
     }
 }
 
-/// `value` clamped to ±`largest`; NaN stays NaN.
+/// Returns `value` clamped to ±`largest`; NaN stays NaN.
 pub fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {
         largest

@@ -11,16 +11,16 @@
 //! speed inside a P on the position has the same terms.)
 //!
 //! The loops run at 100 Hz with an encoder and with the PII tracking of the dissertation, whose speed is the difference of two
-//! counted angles. Where angle filter and observer estimate the speed, they take the estimate, once in a period of the injection.
+//! counted angles. If angle filter and observer estimate the speed, the loops use that estimate, once an injection period.
 //!
 //! # Without the encoder
 //! The rotor angle is the flux angle minus the slip integrated since the start:
 //! `theta_r = phi - (1/tau_r) ∫ i_q/i_d dt`, Eq. 2.10 solved for the rotor angle. The injection observes
 //! the flux but not the rotor, since a cage is rotationally symmetric. A slip error is therefore a speed
 //! error, and its integral a position error that nothing corrects. Measured on the simulated motor
-//! (experiment `sensorless-position`), mechanical: a step of five turns ends within 8° (ten runs); a
-//! position held for a minute drifts by some 10° without load, and under load by 130° per ampere and
-//! percent of error of the rotor resistance. Learning the reference of the saliency with the shaft locked
+//! (experiment `sensorless-position`), mechanical: a step of five turns ends within 8° (ten runs). A
+//! position held for a minute drifts by about 10° without load, and under load by 130° per ampere and
+//! percent of error of the rotor resistance. The saliency self-commissioning with the shaft locked
 //! removes that error until the rotor temperature changes.
 //!
 //! The acceleration reference is also fed forward to the tracking loop, which would otherwise lag by the
@@ -38,11 +38,11 @@ use ramp::{Ramp, RampState};
 
 /// Largest position reference, mechanical turns: f32 resolves 0.02° there.
 pub const LARGEST_POSITION: f32 = 1000.0;
-/// Speed below which the shaft counts as at rest, mechanical turns/s (12 rpm: clear of the noise without an encoder), for
-/// 0.1 s.
+/// Speed below which the shaft counts as at rest, if it lasts 0.1 s, mechanical turns/s: 12 rpm, which is above the noise
+/// without an encoder.
 const REST: f32 = 0.2;
 
-/// The controllers of speed and position.
+/// Controllers of speed and position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionGains {
     /// Gain of the PI controller of the speed, A per turn/s.
@@ -51,7 +51,7 @@ pub struct MotionGains {
     pub z_c: f64,
     /// Gain of the P controller of the position, turns/s per turn.
     pub k_x: f64,
-    /// Acceleration per ampere of torque current, mechanical turns/s^2.
+    /// Acceleration per ampere of q-axis current, mechanical turns/s^2.
     pub acceleration: f64,
     /// Share of the newest value in the first-order low-pass of the speed; 1 for none.
     pub smoothing: f64,
@@ -59,18 +59,18 @@ pub struct MotionGains {
     pub period_s: f64,
 }
 
-/// Limits of the speed reference's change.
+/// Limits of the change of the speed reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramps {
     /// Acceleration, mechanical turns/s^2.
     pub usual: f32,
-    /// Deceleration of a quick stop, at least as large.
+    /// Deceleration of a quick stop, at least as large as the usual one, mechanical turns/s^2.
     pub quick: f32,
-    /// Time in which the usual acceleration comes and goes, s, but in position mode, where the braking curve shapes it.
+    /// Time in which the usual acceleration rises and falls, s, except in position mode, in which the braking curve determines it.
     pub rise_s: f32,
 }
 
-/// Coefficients of the loops. Speeds in mechanical turns/s, positions in mechanical turns.
+/// Coefficients of the loops. Speeds are in mechanical turns/s, positions in mechanical turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Speed controller, A per turn/s.
@@ -86,12 +86,12 @@ pub struct Motion {
     pub speed_limit: f32,
     /// Largest position reference, turns.
     pub position_limit: f32,
-    /// Change of the current with that of the speed reference in the same step, turns/s per A.
+    /// Change of the speed reference per change of the current in the same step, turns/s per A.
     per_change: f32,
-    /// Ramp of the speed reference, turns/s in steps of the loops, with its acceleration rising, and without.
+    /// Ramps of the speed reference, turns/s per step of the loops, with limited jerk and without.
     ramp: Ramp,
     straight_ramp: Ramp,
-    /// That of a quick stop.
+    /// Ramp of a quick stop.
     quick_ramp: Ramp,
     /// Twice the deceleration of the braking curve, turns/s^2.
     twice_braking: f32,
@@ -99,9 +99,9 @@ pub struct Motion {
     bend: f32,
     /// Largest current, A.
     i_q_limit: f32,
-    /// Control periods in a step of the loops. With one of an injection period the speed is estimated, otherwise counted.
+    /// Control periods per step of the loops. If a step is an injection period, the speed is estimated, otherwise counted.
     divider: u8,
-    /// Steps in 0.1 s.
+    /// Number of steps in 0.1 s.
     rest_steps: u8,
 }
 
@@ -112,10 +112,9 @@ pub enum Target {
     Speed(f32),
     /// Position, mechanical turns from the start.
     Position(f32),
-    /// Rest, and whether by the ramp of a quick stop. The reference waits for a rotor that the current cannot brake as
-    /// fast.
+    /// Braking to rest. The reference waits if the current cannot brake the rotor as fast.
     Rest {
-        /// By that ramp.
+        /// Whether by the ramp of a quick stop.
         quick: bool,
     },
 }
@@ -136,22 +135,22 @@ pub struct MotionState {
     pub(crate) origin: u32,
     last: Option<u32>,
     phase: u8,
-    /// Steps of the loops for which the rotor was at rest, up to those of 0.1 s.
+    /// Steps of the loops for which the rotor was at rest, up to the steps of 0.1 s.
     rest: u8,
     output: f32,
 }
 
 impl Motion {
-    /// Control periods per step of the loops with an encoder, and with the PII tracking: 100 Hz.
+    /// Control periods per step of the loops with an encoder and with the PII tracking: 100 Hz.
     pub const DIVIDER: u8 = 60;
-    /// Control periods per step of the loops with the estimated speed: one period of the injection.
+    /// Control periods per step of the loops with the estimated speed: one injection period.
     pub const ESTIMATED: u8 = 10;
-    /// Counts of a rotor position that no encoder counts, per electrical turn.
+    /// Counts of an estimated rotor position per electrical turn.
     pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
-    /// Loops with the controllers `design` and `counts` of the position per mechanical turn.
+    /// Creates the loops with the controllers `design` and `counts` of the position per mechanical turn.
     ///
-    /// Limits of the references: `speed_limit`, mechanical turns/s; `ramps`; `i_q_limit`, A.
+    /// `speed_limit`, mechanical turns/s, `ramps` and `i_q_limit`, A, are the limits of the references.
     pub fn new(
         design: &MotionGains,
         counts: u32,
@@ -181,7 +180,7 @@ impl Motion {
         }
     }
 
-    /// Lowers the largest current to `limit`, A, where it is larger.
+    /// Lowers the largest current to `limit`, A, if it is larger.
     pub fn limit_current(&mut self, limit: f32) {
         self.i_q_limit = limited(self.i_q_limit, limit);
     }
@@ -191,8 +190,8 @@ impl Motion {
         *state = MotionState { origin: count, ..MotionState::default() };
     }
 
-    /// Takes over from whatever gave the torque current `i_q`, A, with the rotor at `count` and `speed`, turns/s: the speed
-    /// loop goes on from both, with the acceleration that it had.
+    /// Takes over from any source of the q-axis current `i_q`, A, with the rotor at `count` and `speed`, turns/s. The speed
+    /// loop continues from these values, with its present acceleration.
     pub fn take_over(&self, state: &mut MotionState, count: u32, speed: f32, i_q: f32) {
         let step = state.acceleration * f32::from(self.divider);
         *state = MotionState {
@@ -200,7 +199,7 @@ impl Motion {
             ramp: RampState { reference: speed, change: step },
             speed,
             wanted: speed,
-            // The speed is known to the last period.
+            // The speed is known up to the last period.
             last: Some(count),
             phase: 1,
             rest: 0,
@@ -209,7 +208,7 @@ impl Motion {
         };
     }
 
-    /// Makes the position `turns` position 0; returns its count.
+    /// Makes the position `turns` position 0 and returns its count.
     pub fn shift_origin(&self, state: &mut MotionState, turns: f32) -> u32 {
         let counts = (turns / self.turns_per_count) as i32;
         state.origin = state.origin.wrapping_add_signed(counts);
@@ -221,7 +220,7 @@ impl Motion {
         state.rest >= self.rest_steps
     }
 
-    /// Position in mechanical turns from the start.
+    /// Returns the position in mechanical turns from the start.
     pub fn turns(&self, state: &MotionState, count: u32) -> f32 {
         count.wrapping_sub(state.origin) as i32 as f32 * self.turns_per_count
     }
@@ -231,8 +230,8 @@ impl Motion {
     ///
     /// The computation is spread over three periods: speed, speed reference, current.
     ///
-    /// `estimated` is the speed that the drive estimates, turns/s, which the loops take without an encoder. `range` is the least and the
-    /// largest current, A, that is possible now.
+    /// `estimated` is the estimated speed, turns/s, which the loops use without an encoder. `range` is the least and the largest
+    /// current, A, that is possible now.
     pub fn step(
         &self,
         state: &mut MotionState,
@@ -268,9 +267,9 @@ impl Motion {
                 let mut wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
                 state.output = within(limited(wanted, self.i_q_limit), range);
                 if state.output != wanted {
-                    // The rotor does not accelerate as wanted.
+                    // The rotor does not accelerate as fast as the reference.
                     if waits {
-                        // Back to where it was at most.
+                        // The reference goes back to its previous value at most.
                         let room = if step < 0.0 { (0.0, -step) } else { (-step, 0.0) };
                         let more = within(self.per_change * (state.output - wanted), room);
                         state.ramp.shift(more);
@@ -292,24 +291,25 @@ impl Motion {
         state.output
     }
 
-    /// Speed, turns/s, from which the rotor comes to rest over a position `error` in turns: `k_x e` for
-    /// small errors, the square root of `2 a e` for large ones, so that the deceleration stays below `a`.
+    /// Returns the speed, turns/s, from which the rotor comes to rest over a position `error` in turns:
+    /// `k_x e` for small errors, the square root of `2 a e` for large ones, so that the deceleration
+    /// stays below `a`.
     fn braking_curve(&self, error: f32) -> f32 {
-        // sqrt(bend^2 + 2 a |e|) - bend with the sign of e, written without cancellation.
+        // This is sqrt(bend^2 + 2 a |e|) - bend with the sign of e, written without cancellation.
         let square = self.bend * self.bend + self.twice_braking * error.abs();
         self.twice_braking * error / (fpu_sqrt::sqrtf(square) + self.bend)
     }
 }
 
-/// Counter of the estimated rotor angle in place of an encoder: [`Motion::COUNTS_PER_TURN`] per electrical turn,
-/// wrapping.
+/// Counter of the estimated rotor angle, which replaces an encoder: [`Motion::COUNTS_PER_TURN`] per electrical
+/// turn, wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RotorCount {
     count: u32,
 }
 
 impl RotorCount {
-    /// Follows the rotor to its present electrical angle, less than half a turn away; returns the count.
+    /// Follows the rotor to its present electrical angle, which is less than half a turn away, and returns the count.
     pub fn follow(&mut self, rotor: Angle) -> u32 {
         let now = (rotor.to_bits() >> 16) as u16;
         let moved = now.wrapping_sub(self.count as u16) as i16;

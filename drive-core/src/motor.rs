@@ -1,4 +1,4 @@
-//! The motor as the blocks of the control see it.
+//! Model of the motor for the blocks of the control.
 
 use num_complex::Complex64;
 
@@ -15,7 +15,7 @@ pub struct Motor {
     pub l_lr: f32,
     /// Magnetising inductance, H.
     pub l_m: f32,
-    /// Pairs of poles.
+    /// Pole pairs.
     pub pole_pairs: u8,
     /// Inertia of rotor and load, kg m^2; for the speed loop.
     pub inertia: f32,
@@ -33,28 +33,28 @@ impl Motor {
         inertia: 0.012,
     };
 
-    /// Rotor inductance, H.
+    /// Returns the rotor inductance, H.
     pub fn l_r(&self) -> f32 {
         self.l_m + self.l_lr
     }
 
-    /// Transient inductance sigma L_s, H.
+    /// Returns the transient inductance sigma L_s, H.
     pub fn sigma_l_s(&self) -> f32 {
         self.l_ls + self.l_m * (self.l_lr / self.l_r())
     }
 
-    /// Coupling of the rotor flux to the stator, (L_m / L_r) L_m, H.
+    /// Returns the coupling of the rotor flux to the stator, (L_m / L_r) L_m, H.
     pub fn coupled_inductance(&self) -> f32 {
         self.l_m / self.l_r() * self.l_m
     }
 
-    /// Rotor time constant L_r / r_r, s.
+    /// Returns the rotor time constant L_r / r_r, s.
     pub fn tau_r(&self) -> f32 {
         self.l_r() / self.r_r
     }
 
-    /// Torque per quadrature current, Nm/A, at a constant direct current `i_d`, A peak:
-    /// 3/2 P L_m^2 / L_r i_d (Eq. 2.7 prints L_m for L_m^2 / L_r).
+    /// Returns the torque per q-axis current, Nm/A, at a constant d-axis current `i_d`, A peak: 3/2
+    /// P L_m^2 / L_r i_d (Eq. 2.7 prints L_m for L_m^2 / L_r).
     pub fn torque_per_ampere(&self, i_d: f32) -> f32 {
         1.5 * f32::from(self.pole_pairs) * self.l_m * self.l_m / self.l_r() * i_d
     }
@@ -76,7 +76,7 @@ pub struct FirstOrder {
 }
 
 impl FirstOrder {
-    /// G(e^(j omega_t)).
+    /// Returns the frequency response G(e^(j omega_t)).
     #[cold]
     pub fn response(&self, omega_t: f64) -> Complex64 {
         Complex64::new(self.k, 0.0) / (Complex64::cis(omega_t) - Complex64::new(self.p, 0.0))
@@ -91,7 +91,7 @@ mod tests {
         assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
     }
 
-    /// Table 5, worked out by hand.
+    /// The expected values were computed by hand from Table 5.
     #[test]
     fn derived_parameters_of_the_motor() {
         let motor = Motor::default();

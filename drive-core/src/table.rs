@@ -1,11 +1,11 @@
-//! Tables over the torque current: reference of the saliency, its slope over the angle, and carrier current.
+//! Tables over the q-axis current: saliency offset, saliency sensitivity, and injection current.
 
 /// Number of points of a table, from i_q = 0 on.
 pub const POINTS: usize = 16;
-/// The largest current of a table lies at this multiple of the distance of the points.
+/// Largest current of a table, as a multiple of the distance of the points.
 const STEPS: f32 = 14.0;
 
-/// The torque currents of the points: 0, a step, two steps, and so on.
+/// The q-axis currents of the points: 0, a step, two steps, and so on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     step_a: f32,
@@ -16,39 +16,39 @@ impl Grid {
     /// The points of the dissertation's motor.
     pub const REFERENCE: Self = Self { step_a: 0.25, per_step: 4.0 };
 
-    /// Points `step_a` apart, A; `None` unless that is a positive number.
+    /// Returns points `step_a` apart, A; `None` unless that is a positive number.
     pub fn of_step(step_a: f32) -> Option<Self> {
         let per_step = 1.0 / step_a;
         let usable = step_a > 0.0 && per_step > 0.0 && per_step.is_finite();
         usable.then_some(Self { step_a, per_step })
     }
 
-    /// Points for currents up to `largest_a`, A peak, a positive number.
+    /// Returns points for currents up to `largest_a`, A peak, a positive number.
     pub fn for_current(largest_a: f32) -> Self {
         Self { step_a: largest_a / STEPS, per_step: STEPS / largest_a }
     }
 
-    /// Distance of the points, A.
+    /// Returns the distance of the points, A.
     pub fn step_a(self) -> f32 {
         self.step_a
     }
 
-    /// Torque current at point `n`, A.
+    /// Returns the q-axis current at point `n`, A.
     pub fn current(self, n: usize) -> f32 {
         n as f32 * self.step_a
     }
 
-    /// Interval that contains |i_q|, A, and the position in it, 0 to 1. The last value is held beyond the end.
+    /// Returns the interval that contains |i_q|, A, and the position in it, 0 to 1. Beyond the end the last value is used.
     pub(crate) fn place(self, i_q: f32) -> (usize, f32) {
         let x = i_q.abs() * self.per_step;
-        // Saturating cast.
+        // The cast saturates.
         let n = (x as usize).min(POINTS - 2);
         let past = x - n as f32;
         (n, if past < 1.0 { past } else { 1.0 })
     }
 }
 
-/// Values over the torque current at the points of a grid, of one of three kinds: [`ReferenceTable`], [`CarrierTable`] or
+/// Values over the q-axis current at the points of a grid, of one of three kinds: [`ReferenceTable`], [`CarrierTable`] or
 /// [`SlopeTable`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<const KIND: u8> {
@@ -60,8 +60,8 @@ const REFERENCE: u8 = 0;
 const CARRIER: u8 = 1;
 const SLOPE: u8 = 2;
 
-/// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last. The first value is 0, and
-/// all are within ±0.3.
+/// Offset of the saliency `q` over i_q: odd, linear between the points, constant beyond the last. The first value is 0, and
+/// all values are within ±0.3.
 ///
 /// ```
 /// use induction_drive_core::table::{Grid, POINTS, ReferenceTable};
@@ -72,17 +72,19 @@ const SLOPE: u8 = 2;
 /// assert_eq!(table.at(4.5), values[POINTS - 1]);
 /// ```
 pub type ReferenceTable = Table<REFERENCE>;
-/// Carrier current over i_q as a ratio to that at i_q = 0; even. The first value is 1, and all are within 0.5 to 2.
+/// Injection current over i_q relative to its value at i_q = 0; even. The first value is 1, and all values are within 0.5 to 2.
 pub type CarrierTable = Table<CARRIER>;
-/// Slope dq/de of the saliency over the angle error over i_q, 1/rad: even, of one sign. All values are within ±(0.001 to 0.6).
+/// Saliency sensitivity dq/de, the change of the saliency per angle error, over i_q, 1/rad: even, of one sign. All values are
+/// within ±(0.001 to 0.6).
 ///
-/// The error e is the angle of the flux less that of the estimated frame, and the slope the slow one: current and flux have
-/// settled at every e. A saliency `a` that is fixed to the flux and to nothing else has the slope 2a; it is negative where
-/// the inductance along the flux is the larger one.
+/// The error e is the angle of the flux less the angle of the estimated frame. The sensitivity is the steady one: current
+/// and flux have settled at every e. A saliency `a` that is fixed to the flux alone has the sensitivity 2a, which is
+/// negative if the inductance along the flux is the larger one.
 pub type SlopeTable = Table<SLOPE>;
 
 impl<const KIND: u8> Table<KIND> {
-    /// Table from its values at the points of `grid`; `None` when the first or any is not what the type states.
+    /// Returns a table from its values at the points of `grid`; `None` if the first value or any other violates the limits of the
+    /// type.
     pub fn from_points(grid: Grid, values: [f32; POINTS]) -> Option<Self> {
         let first = values[0];
         let believable = |value: &f32| match KIND {
@@ -93,17 +95,17 @@ impl<const KIND: u8> Table<KIND> {
         values.iter().all(believable).then_some(Self { grid, values })
     }
 
-    /// The torque currents of the points.
+    /// Returns the q-axis currents of the points.
     pub fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// The values at the points.
+    /// Returns the values at the points.
     pub fn points(&self) -> &[f32; POINTS] {
         &self.values
     }
 
-    /// The default at these currents: a beginning until the motor's own is learned.
+    /// Returns the default table at these currents, which is used until the table of the motor is learned.
     pub fn guessed(grid: Grid) -> Self
     where
         Self: Default,
@@ -113,8 +115,8 @@ impl<const KIND: u8> Table<KIND> {
 }
 
 impl Default for ReferenceTable {
-    /// Learned on the simulated motor of Table 5 with a flux-fixed saliency of -3.5 % (experiment
-    /// `learn-reference`): it belongs to that motor.
+    /// Returns the table that was learned on the simulated motor of Table 5 with a flux-fixed
+    /// saliency of -3.5 % (experiment `learn-reference`). It belongs to that motor.
     fn default() -> Self {
         let values = [
             0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
@@ -125,8 +127,8 @@ impl Default for ReferenceTable {
 }
 
 impl Default for CarrierTable {
-    /// Learned on the simulated motor of Table 5 together with the default
-    /// [`ReferenceTable`]: it belongs to that motor.
+    /// Returns the table that was learned on the simulated motor of Table 5 together with the
+    /// default [`ReferenceTable`]. It belongs to that motor.
     fn default() -> Self {
         let values = [
             1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,
@@ -137,34 +139,34 @@ impl Default for CarrierTable {
 }
 
 impl ReferenceTable {
-    /// Reference at a quadrature current `i_q`, A.
+    /// Returns the saliency offset at a q-axis current `i_q`, A.
     pub fn at(&self, i_q: f32) -> f32 {
         odd(i_q, between(&self.values, self.grid.place(i_q)))
     }
 }
 
-/// Linear interpolation of a table at a [`place`](Grid::place).
+/// Interpolates a table linearly at a [`place`](Grid::place).
 pub(crate) fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
     table[n] + (table[n + 1] - table[n]) * past
 }
 
-/// Odd continuation: the sign of `i_q` on the value `q` at |i_q|.
+/// Returns the odd continuation: the value `q` at |i_q| with the sign of `i_q`.
 pub(crate) fn odd(i_q: f32, q: f32) -> f32 {
     if i_q < 0.0 { -q } else { q }
 }
 
 impl SlopeTable {
-    /// The slope of a saliency `a` that is fixed to the flux.
+    /// Returns the sensitivity of a saliency `a` that is fixed to the flux.
     pub fn of_flux_saliency(grid: Grid, a: f32) -> Self {
         Self { grid, values: [2.0 * a; POINTS] }
     }
 
-    /// The slope without torque current, 1/rad.
+    /// Returns the sensitivity without q-axis current, 1/rad.
     pub fn at_rest(&self) -> f32 {
         self.values[0]
     }
 
-    /// The inverses, rad, at most `most` times that without torque current.
+    /// Returns the inverses, rad, at most `most` times the inverse without q-axis current.
     #[cold]
     pub(crate) fn inverses(&self, most: f32) -> [f32; POINTS] {
         let first = self.at_rest();
@@ -206,7 +208,7 @@ mod tests {
         }
     }
 
-    /// The defaults are of 3.5 A; for twice that they are the same at twice the current.
+    /// The defaults are for 3.5 A; for twice that current they have the same values at twice the currents.
     #[test]
     fn a_guess_is_in_proportion_to_the_largest_current() {
         let grid = Grid::for_current(7.0);

@@ -24,7 +24,7 @@ use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;
 use doubles::{FakeBus, FakePort, FakeStrip};
-/// For the tests of desk and store.
+/// Shared with the tests of command arbiter and store.
 pub(crate) use doubles::{FakeDrive, found};
 use drive_core::io::PERIOD_S;
 use drive_core::learned::{Learned, Verdict};
@@ -73,10 +73,10 @@ impl Talk {
         front.pass(port, &mut no_line, strip, drive, *now_ms);
     }
 
-    /// Sends bytes and gives the replies, until the console has nothing more to say.
+    /// Sends bytes and returns the replies, until the console has nothing more to say.
     fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
         self.port.sent.extend(bytes.as_ref());
-        // What happens at the end of a pass is told in the next.
+        // An event at the end of a pass is told in the next pass.
         let mut silent = 0;
         while !self.port.sent.is_empty() || silent < 2 {
             let said = self.port.received.len();
@@ -87,7 +87,7 @@ impl Talk {
         text.split_terminator("\r\n").map(str::to_owned).collect()
     }
 
-    /// Sends a line that has one reply, beside what comes unasked.
+    /// Sends a line that has one reply beside unrequested lines.
     fn ask(&mut self, line: &str) -> String {
         let mut replies = self.say(format!("{line}\n"));
         replies.retain(|reply| !reply.starts_with(line::UNASKED));
@@ -158,9 +158,9 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
     assert_eq!(talk.drive.commands, [Command::CheckWiring, Command::Start(Mode::Torque)]);
     assert_eq!(talk.ask("stop"), "ok");
-    // It was not got past: it is checked again.
+    // The check was not passed, so the wiring is checked again.
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    // No current in it: a motor that is not there.
+    // No current in the sample, as if no motor were connected.
     let sample = Sample {
         current_a: 1838,
         current_b: 1832,
@@ -174,7 +174,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
     }
     assert_eq!(talk.drive.drive.state(), State::Fault(Fault::WiringNoCurrent));
     assert!(talk.ask("get wiring_checked").starts_with("wiring_checked = no (one of: no yes)"));
-    // Without the check, past it.
+    // Without the check, the start goes past it.
     assert_eq!(talk.ask("clear"), "ok");
     assert_eq!(talk.ask("set wiring_checked yes"), "ok: staged");
     assert_eq!(talk.ask("start"), "ok");
@@ -184,7 +184,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
 fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.injection.synchronous.allow_unlearned = true;
-    // The simulated converter is calibrated for its own reference.
+    // The simulated ADC is calibrated for its own reference.
     settings.drive.scales = drive_settings::Scales::default();
     settings.confirm_board();
     let mut talk = Talk::new();
@@ -217,7 +217,7 @@ fn silence_stops_a_running_drive_once_and_only_if_asked_for() {
     talk.ask("start");
     talk.now_ms += 1900;
     assert!(talk.say("").is_empty());
-    // What is not understood does not count.
+    // A line that is not understood does not count.
     talk.ask("rubbish");
     talk.now_ms += 200;
     assert_eq!(talk.say(""), ["* stopped: no command for 2 s"]);
@@ -240,7 +240,7 @@ fn half_lines_are_dropped_in_time() {
 fn a_line_has_its_own_time_whatever_came_before() {
     let mut talk = Talk::new();
     assert!(talk.say("rubbish").is_empty());
-    // Late, but whole, and the next line begins in the same breath.
+    // The line is late but whole, and the next line begins at once.
     talk.now_ms += LINE_MS + 1;
     talk.port.sent.extend(b"\nst");
     talk.poll();
@@ -276,11 +276,11 @@ fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved()
     assert_eq!(talk.ask("confirm board"), "ok: with the boot pin in use, see `board`");
     let saved = talk.drive.saved.unwrap();
     assert!(saved.board_is_confirmed());
-    // It outlasts the defaults: it belongs to the hardware.
+    // The confirmation outlasts the defaults: it belongs to the hardware.
     assert_eq!(talk.ask("defaults"), "ok: staged");
     assert_eq!(talk.ask("apply"), "ok");
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    // The number does not count for another board.
+    // The number is not valid for another board.
     assert!(!FirmwareSettings { board: boards::ALL[1], ..saved }.board_is_confirmed());
 }
 
@@ -320,14 +320,14 @@ fn status_tells_what_is_known_of_the_rotor_time_constant() {
         status.split_once("; tau_r ").map(|(_, rest)| rest.to_owned())
     };
     assert_eq!(of_the_rotor(&mut talk), None, "not while it is off");
-    // One that regulates.
+    // A drive that regulates.
     let mut config = hil_sim::Config::default();
     config.drive.angle_source = drive_core::AngleSource::Encoder;
     let mut rig = hil_sim::rig::Rig::from_config(&config, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
     talk.drive.drive = rig.drive;
     assert_eq!(of_the_rotor(&mut talk).unwrap(), "not found: settling; used 186.1 ms");
-    // The longest is not cut off.
+    // The longest line is not cut off.
     let tracking = talk.drive.tracking.as_ref().unwrap().report();
     for doubt in [NoEstimate::Transient, NoEstimate::PoorExcitation, NoEstimate::OutOfRange] {
         let report = Report { estimate: Err(doubt), ..tracking };
@@ -358,7 +358,7 @@ fn what_is_not_believable_is_shown_and_not_used() {
     for (result, why) in [
         (
             Learned { verdict: Verdict::Uneven, spread, ..refused },
-            "even part of the reference spreads by 0.02000, more than 0.005",
+            "even part of the saliency offset spreads by 0.02000, over 0.005",
         ),
         (
             Learned { verdict: Verdict::SlopeTooSmall, slope_at_rest: -0.0123, ..refused },
@@ -375,7 +375,7 @@ fn what_is_not_believable_is_shown_and_not_used() {
                 limit_a: 0.75,
                 ..refused
             },
-            "slope -0.0300 /rad is lost above 0.75 A of torque current, less than 1.00 A",
+            "slope -0.0300 /rad is lost above 0.75 A of q-axis current, less than 1.00 A",
         ),
         (Learned { verdict: Verdict::OutOfRange, ..refused }, "a value is out of its range"),
     ] {
@@ -429,7 +429,7 @@ fn the_motor_sensor_is_read_and_shown() {
     settings.drive.angle_source = drive_core::AngleSource::Encoder;
     settings.drive.motor_sensor.sensor = drive_settings::SensorKind::Pt1000;
     let mut talk = Talk::with(settings);
-    assert!(talk.ask("start").contains("fault 57 stands"));
+    assert!(talk.ask("start").contains("fault 57 is present"));
     // 1385 ohm of 1385 + 4700.
     talk.strip.codes[2] = Some(932);
     talk.now_ms = 100;
@@ -440,13 +440,11 @@ fn the_motor_sensor_is_read_and_shown() {
         talk.poll();
     }
     assert_eq!(talk.drive.commands.len(), 2 + 9);
-    for (code, fault) in
-        [(Some(4095), "fault 54 stands"), (Some(0), "fault 55 stands"), (None, "fault 57 stands")]
-    {
+    for (code, fault) in [(Some(4095), "fault 54"), (Some(0), "fault 55"), (None, "fault 57")] {
         talk.strip.codes[2] = code;
         talk.now_ms += 100;
         talk.poll();
         let refused = talk.ask("start");
-        assert!(refused.contains(fault), "{refused}");
+        assert!(refused.contains(&format!("{fault} is present")), "{refused}");
     }
 }

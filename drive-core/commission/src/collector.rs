@@ -1,7 +1,7 @@
-//! Sums over the samples of an excitation: small, of fixed size, so that memory can be lent for them.
+//! Sums over the samples of a test signal. They are small and of fixed size, so that memory can be lent for them.
 //!
-//! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: that of step `k-1` acts
-//! from `k` on, that of `k-2` ended at `k`.
+//! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: the voltage of step
+//! `k-1` acts from `k` on, and the voltage of step `k-2` ends at `k`.
 
 use super::motion::Motion;
 use super::plant_fit::PlantFit;
@@ -13,39 +13,39 @@ use num_complex::Complex32;
 pub const BINS: usize = 57;
 /// Every bin is longer than the one before by this factor.
 const GROWTH: f32 = 1.09;
-/// The ends of all bins, in lengths of the first: (1.09^57 - 1) / 0.09.
+/// Total length of all bins, in lengths of the first: (1.09^57 - 1) / 0.09.
 pub(super) const FIRST_BINS: f32 = 1501.0;
 
 /// Kind of record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Record {
-    /// Nothing; the bins stay.
+    /// Nothing is recorded; the bins keep their contents.
     #[default]
     Nothing,
-    /// Means in bins that grow by 9 %, in one half of the memory.
+    /// Means in bins of which each is 9 % longer than the one before, in one half of the memory.
     Bins {
         /// The half, 0 or 1.
         half: usize,
         /// Length of the first bin, control periods.
         first: f32,
     },
-    /// Products of voltage and current with the carrier.
+    /// Products of voltage and current with the cosine and sine of the injection.
     Carrier,
     /// Means and squares of the phase currents and of the dc link.
     Noise,
-    /// Fit of the plant of the current loop.
+    /// Least-squares fit of the plant of the current loop.
     Plant {
-        /// Whether across phase a, or along it.
+        /// Whether the voltage lies across phase a, or along it.
         across: bool,
         /// Amplitude of the voltage, V, and of the current that a sample of it makes, A: the bases of the fit.
         bases: (f32, f32),
     },
-    /// Torque current and speed, by [`push_motion`](Collector::push_motion).
+    /// Q-axis current and speed, by [`push_motion`](Collector::push_motion).
     Motion,
 }
 
 impl Record {
-    /// Bins that last so many seconds.
+    /// Returns a record in bins that last so many seconds in all.
     pub(super) fn bins(half: usize, seconds: f32) -> Self {
         Self::Bins { half, first: seconds / PERIOD_S / FIRST_BINS }
     }
@@ -63,23 +63,23 @@ pub struct Bin {
 }
 
 impl Bin {
-    /// The means of sums over as many periods.
+    /// Returns the means, if `self` holds sums over `periods`.
     fn mean(&self) -> Self {
         let share = 1.0 / self.periods;
         Self { voltage: self.voltage * share, current: self.current * share, ..*self }
     }
 }
 
-/// The sums.
+/// Collects the sums.
 ///
 /// Call [`begin`](Self::begin) before the command that changes the excitation, and [`push`](Self::push) for every step of
-/// the drive while it [excites](drive_core::Drive::excites). 2 KiB.
+/// the drive while it [applies a test signal](drive_core::Drive::is_testing). The size is 2 KiB.
 #[derive(Clone, Debug)]
 pub struct Collector {
     pub(super) recorded: Recorded,
     /// Voltages of the last two steps.
     voltages: [AlphaBeta; 2],
-    /// Sums of length, voltage, current of each bin; they stay until a record takes their half.
+    /// Sums of length, voltage and current of each bin; they stay until another record takes their half of the memory.
     bins: [[Bin; BINS]; 2],
 }
 
@@ -90,13 +90,14 @@ pub(super) struct Recorded {
     pub samples: u32,
     /// Whether samples are missing.
     pub incomplete: bool,
-    /// Bin that is filled, its length, and the sample at which it ends.
+    /// Index of the bin that is being filled, its length, and the sample at which it ends.
     bin: usize,
     length: f32,
     end: f32,
-    /// Products of the cosine and the sine of the carrier with voltage along phase a and across it, and with the current likewise.
+    /// Products of the cosine and the sine of the injection with the voltage along phase a and across it, and with the current
+    /// along and across it.
     carrier: [[f32; 2]; 4],
-    /// Phase currents a and b, their squares, dc link less its first value.
+    /// Sums of the phase currents a and b, of their squares, and of the dc link less its first value.
     noise: [f32; 5],
     first_dc_link: f32,
     pub motion: Motion,
@@ -122,13 +123,13 @@ impl Collector {
         }
     }
 
-    /// Notes that steps of the drive are missing between the last and the next: a record that has begun is incomplete.
+    /// Notes that steps of the drive are missing between the last and the next, so that a record that has begun is incomplete.
     pub fn gap(&mut self) {
         let sums = &mut self.recorded;
         sums.incomplete |= sums.samples > 0 && sums.record != Record::Nothing;
     }
 
-    /// Takes a step of the drive while it regulates torque: reference of the torque current, A, and `rotor_freq` of its
+    /// Takes a step of the drive while it regulates torque: the q-axis current reference, A, and `rotor_freq` of its
     /// [telemetry](drive_core::Telemetry).
     pub fn push_motion(&mut self, i_q: f32, rotor_freq: f32) {
         let sums = &mut self.recorded;
@@ -138,14 +139,15 @@ impl Collector {
         }
     }
 
-    /// Takes a step of the drive while it excites: `measured`, `realised` and `dc_link` of its [telemetry](drive_core::Telemetry).
+    /// Takes a step of the drive while it applies the test signal: `measured`, `realised` and `dc_link` of its
+    /// [telemetry](drive_core::Telemetry).
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta, dc_link: f32) {
         let ([last, before], sums) = (self.voltages, &mut self.recorded);
         match sums.record {
             Record::Motion => return,
             Record::Nothing => {}
             Record::Bins { half, .. } => {
-                // The last bin lasts until the next record.
+                // The last bin goes on until the next record.
                 while sums.samples as f32 >= sums.end && sums.bin + 1 < BINS {
                     sums.bin += 1;
                     sums.length *= GROWTH;
@@ -183,13 +185,13 @@ impl Collector {
         sums.samples = sums.samples.wrapping_add(1);
     }
 
-    /// The bins of a half that have samples, in their order.
+    /// Returns the bins of a half of the memory that have samples, in their order.
     pub fn bins(&self, half: usize) -> impl Iterator<Item = Bin> + Clone + '_ {
         let filled = self.bins.get(half).into_iter().flatten().filter(|bin| bin.periods > 0.0);
         filled.map(Bin::mean)
     }
 
-    /// Mean over the bins of a half from the given one on.
+    /// Returns the mean over the bins of a half from the given one on.
     pub(super) fn mean(&self, half: usize, from: usize) -> Bin {
         let mut sum = Bin::default();
         for bin in self.bins(half).skip(from) {
@@ -200,13 +202,14 @@ impl Collector {
         sum.mean()
     }
 
-    /// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.
+    /// Returns the phasors at the injection frequency (cosine and sine part): voltage along phase a and across it, V peak, then
+    /// current along and across, A peak.
     pub(super) fn phasors(&self) -> [Complex32; 4] {
         let share = 2.0 / self.recorded.samples as f32;
         self.recorded.carrier.map(|[cos, sin]| share * Complex32::new(cos, -sin))
     }
 
-    /// Noise of the sensors a and b, A rms, and the dc link, V, without current.
+    /// Returns the noise of the sensors a and b without current, A rms, and the dc link, V.
     pub(super) fn quiet(&self) -> ([f32; 2], f32) {
         let share = 1.0 / self.recorded.samples as f32;
         let [a, b, aa, bb, dc_link] = self.recorded.noise.map(|sum| share * sum);

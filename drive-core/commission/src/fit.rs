@@ -1,53 +1,58 @@
-//! Step 4: the fit of a transient between two current levels along phase a, with the shaft at rest.
+//! Step 4: fit of the motor's parameters to the transient between two levels of a dc current along phase a, with the shaft at rest.
 //!
-//! Inverse-Gamma circuit, with a voltage `e` of the inverter that is constant as long as all phases carry current:
+//! The model is the inverse-Gamma circuit, with a voltage error `e` of the inverter that is constant as long as all phases carry
+//! current:
 //!
 //! ```text
 //! v = r_s i + e + R_R (i - i_m) + L di/dt        d i_m/dt = (i - i_m) / tau_r
 //! ```
 //!
-//! For a given rotor time constant `i_m` follows from the measured current, exactly over bins of constant current, and the
-//! rest is linear in the four unknowns. The time constant with the least misfit is searched for.
+//! For a given rotor time constant, `i_m` follows from the measured current (exactly, if the current is constant over a
+//! bin), and the equation is linear in the four unknowns r_s, e, R_R and L. [`Search`] finds the time constant with the
+//! least misfit.
 //!
-//! Across phase a no voltage is put out. What flows there, `i'`, with `i_m'` of its own, is linear in four unknowns again:
+//! No voltage is applied across phase a. The current that flows there, `i'`, and its magnetising current `i_m'` obey an equation
+//! with four other unknowns, which is linear too:
 //!
 //! ```text
 //! r_s i' + R_R (i' - i_m') = c i + v' + g (i - i_m) - w L_M di_w/dt        di_w/dt = i_m - i_w / tau_r
 //! ```
 //!
-//! `c` is of sensors and resistances that differ between the phases b and c, `v'` of legs, `g` of sensors alone, and a shaft
-//! that turns with `w` brings the flux across: that changes and decays, but leaves no steady current.
+//! `c` is due to sensors and resistances that differ between the phases b and c, `v'` to inverter legs that differ, and `g`
+//! to sensors alone. A shaft that rotates at `w` turns the flux out of phase a, which makes a current that changes and
+//! decays, but no steady current.
 
 use super::GAIN_RAD_PER_S;
 use super::collector::{Bin, Collector};
 use super::report::Refusal;
 use drive_core::{AlphaBeta, PERIOD_S, SQRT_3};
 
-/// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the inductance
-/// meanwhile: a share of the rotor time constant, from a least time to 60 ms. The least time is 12 ms for levels of a linear motor, and
-/// twice the time constant of the current loop for small changes on iron, whose rotor time constant may be 10 ms.
+/// Bins that begin earlier than this share of the rotor time constant are left out, because the current still changes fast there and a
+/// saliency changes the inductance with it. The time is limited to 60 ms above and to a least time below: 12 ms for the levels of a
+/// linear motor, and twice the time constant of the current loop for small changes of a motor that saturates, whose small-signal rotor
+/// time constant may be 10 ms.
 const FROM_OF_TAU_R: f32 = 0.08;
 const LATEST_S: f32 = 0.060;
 const LINEAR_S: f32 = 0.012;
 const SMALL_S: f32 = 2.0 / GAIN_RAD_PER_S;
-/// Range of the search, s, and its points: first over the range, then around the best of the last.
+/// Range of the search, s, and number of its points: first over the range, then around the best point of the round before.
 const TAU_R: (f32, f32) = (0.003, 4.0);
 const POINTS: u8 = 40;
 const CLOSER_POINTS: u8 = 9;
-/// Rounds of the search: the spacing shrinks from 15 % to 0.06 %.
+/// Rounds of the search. The spacing of the points shrinks from 15 % to 0.06 %.
 const ROUNDS: u8 = 5;
 
 /// Unknowns of the linear fit: r_s, e, R_R, L.
 const N: usize = 4;
 
-/// The values of the best fit.
+/// Values of the best fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Fitted {
     /// ohm.
     pub r_s: f32,
-    /// Voltage of the inverter along phase a, V.
+    /// Voltage error of the inverter along phase a, V.
     pub e: f32,
-    /// Voltage times current that e lacks at a small current, V A; see [`levels`](super::levels).
+    /// Voltage by which e is smaller at a small current, times that current, V A; see [`levels`](super::levels).
     pub bend: f32,
     /// ohm.
     pub r_r: f32,
@@ -59,15 +64,16 @@ pub(super) struct Fitted {
     pub difference: f32,
     /// Rms of the residual, V.
     pub misfit: f32,
-    /// Standard deviations of r_s, e, R_R, L by what the fit leaves.
+    /// Standard deviations of r_s, e, R_R and L that follow from the residual of the fit.
     pub deviations: [f32; N],
-    /// That of tau_r, s.
+    /// Standard deviation of tau_r, s.
     pub tau_deviation: f32,
 }
 
 impl Fitted {
-    /// The fit across phase a, to bins that began without flux; none where nothing can be fitted: relative difference of the
-    /// currents of phases b and c, voltage, V, electrical speed of the shaft, rad/s, and rms of the residual, V.
+    /// Fits the equation across phase a to bins that began without flux. Returns the relative difference of the currents of
+    /// phases b and c, the voltage, V, the electrical speed of the shaft, rad/s, and the rms of the residual, V; none if the
+    /// equations have no solution.
     pub fn across(&self, sums: &Collector) -> Option<[f32; 4]> {
         let resistances = Some([self.r_s, self.r_r]);
         let best = fit(sums, 0.0, self.tau_r, begins(self.tau_r, LINEAR_S), resistances)?;
@@ -76,7 +82,7 @@ impl Fitted {
     }
 }
 
-/// Bins from here on count with this time constant and this least time, s: control periods.
+/// Returns the time from which on bins count with this time constant and this least time, s, in control periods.
 fn begins(tau_r: f32, least: f32) -> f32 {
     (FROM_OF_TAU_R * tau_r).clamp(least, LATEST_S) / PERIOD_S
 }
@@ -84,39 +90,40 @@ fn begins(tau_r: f32, least: f32) -> f32 {
 /// A fit for one time constant.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Sum of the squares that are left, weighted by the periods, V^2.
+    /// Sum of the squares of the residual, weighted by the periods, V^2.
     left: f64,
     values: [f64; N],
     variances: [f64; N],
     /// Magnetising current at the end, A.
     magnetising: f32,
-    /// Periods, and bins.
+    /// Number of periods, and of bins.
     weight: f64,
     bins: f64,
 }
 
-/// The search for the time constant: one fit a call, so that the main loop goes on meanwhile.
+/// Search for the time constant: one fit a call, so that the main loop continues meanwhile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Search {
     /// Magnetising current at the beginning, A.
     steady: f32,
     round: u8,
     point: u8,
-    /// Bins from here on count, control periods, and the least, s.
+    /// Time from which on bins count, control periods, and its least value, s.
     begins: f32,
     least: f32,
-    /// Logarithm of the first time constant of this round, and spacing.
+    /// Logarithm of the first time constant of this round, and spacing of the points.
     from: f32,
     step: f32,
     best: Option<(f32, Candidate)>,
-    /// What the neighbours of the best left.
+    /// Sums of squares of the last point and of the neighbours of the best point.
     last_left: f64,
     neighbours: f64,
     after_best: bool,
 }
 
 impl Search {
-    /// With the flux of the current `steady`, A, at the beginning; of small changes on iron, or of levels of a linear motor.
+    /// Creates a search for a transient that begins with the flux of the current `steady`, A. `small`: small changes of a motor
+    /// that saturates, not the levels of a linear motor.
     pub fn new(steady: f32, small: bool) -> Self {
         let (from, to) = (libm::logf(TAU_R.0), libm::logf(TAU_R.1));
         let step = (to - from) / f32::from(POINTS - 1);
@@ -124,8 +131,8 @@ impl Search {
         Self { steady, begins: least / PERIOD_S, least, from, step, ..Self::default() }
     }
 
-    /// One fit; the result in the call after the last one, which leaves time for another fit to the same bins. Refused where nothing
-    /// can be fitted.
+    /// Makes one fit. The call after the last fit returns the result, which leaves time for another fit to the same bins. Refused if
+    /// the equations have no solution.
     pub fn step(&mut self, sums: &Collector) -> Result<Option<Fitted>, Refusal> {
         if self.round == ROUNDS {
             return Ok(self.best.map(|(x, best)| self.fitted(x, &best)));
@@ -173,8 +180,8 @@ impl Search {
     }
 }
 
-/// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level: along
-/// phase a, or across it with these resistances r_s and R_R, ohm.
+/// Makes the linear fit for this time constant, s, over the bins that begin so many periods after a change of the level.
+/// It is along phase a, or across it if the resistances r_s and R_R, ohm, are given.
 fn fit(
     sums: &Collector,
     mut magnetising: f32,
@@ -191,7 +198,8 @@ fn fit(
         let (mut start, mut before) = (0.0_f32, None::<Bin>);
         while let Some(bin) = bins.next() {
             let AlphaBeta { alpha: i, beta: j } = bin.current;
-            // Exact for a constant current: ends of all three over the bin, and means of i_m and i' - i_m'.
+            // These are exact for a constant current: the values of all three at the end of the bin, and the means of i_m and i' -
+            // i_m'.
             let turned = bin.periods * PERIOD_S / tau_r;
             let decayed = -libm::expm1f(-turned);
             let mean = i + (magnetising - i) * (decayed / turned);
@@ -229,12 +237,12 @@ fn fit(
     Some(Candidate { left, values, variances, magnetising, weight: products[1][1], bins: count })
 }
 
-/// Sums of the products of the regressors and the voltage: the upper half, as [`solved`] takes it.
+/// Sums of the products of the regressors and the voltage: the upper half of the matrix, as [`solved`] expects it.
 type Products = [[f64; N + 1]; N + 1];
 
-/// Adds an equation of this weight.
+/// Adds an equation with this weight.
 fn add(products: &mut Products, x: [f64; N + 1], weight: f64) {
-    // Few operations: in software they take some 60 cycles each, and the main loop must be back within 4 ms.
+    // There are few operations: in software each takes about 60 cycles, and the main loop must continue within 4 ms.
     for n in 0..=N {
         let weighted = weight * x[n];
         for m in n..=N {
@@ -243,11 +251,11 @@ fn add(products: &mut Products, x: [f64; N + 1], weight: f64) {
     }
 }
 
-/// Resistance r_s, ohm, e, V, and d, V A, of steady voltages r_s i + e - d/i at these currents, by least squares: those of an
-/// inverter whose current has to swing the capacitance of the nodes.
+/// Returns the resistance r_s, ohm, e, V, and d, V A, of steady voltages r_s i + e - d/i at these currents, by least squares.
+/// The term d/i is that of an inverter whose current has to charge the capacitance of its output nodes.
 pub(super) fn bent(points: &[(f32, f32)]) -> Result<[f32; 3], Refusal> {
     let mut products = Products::default();
-    // There is no fourth.
+    // There is no fourth unknown.
     products[N - 1][N - 1] = 1.0;
     for &(i, v) in points {
         add(&mut products, [i, 1.0, -1.0 / i, 0.0, v].map(f64::from), 1.0);
@@ -257,10 +265,10 @@ pub(super) fn bent(points: &[(f32, f32)]) -> Result<[f32; 3], Refusal> {
     Ok([r_s, e, d])
 }
 
-/// The inverse of the matrix of the regressors, by Gauss and Jordan, and the unknowns by it; none where the matrix is not
-/// positive definite.
+/// Returns the inverse of the matrix of the regressors, by Gauss-Jordan elimination, and the unknowns; none if the matrix
+/// is not positive definite.
 fn solved(products: &Products) -> Option<([[f64; N]; N], [f64; N])> {
-    // A and the identity beside it become the identity and the inverse.
+    // The matrix A with the identity beside it becomes the identity with the inverse beside it.
     let mut rows = [[0.0; 2 * N]; N];
     for n in 0..N {
         for m in 0..N {

@@ -1,31 +1,32 @@
-//! What the steps have found, and the settings that follow from it.
+//! Results of the steps, and the settings that follow from them.
 
 use super::fit::Fitted;
 use drive_core::{FirstOrder, Motor};
 use drive_settings::{CurrentPlant, Flux, IdentifiedPlant, PlantSource, Settings};
 
-/// What the steps have found; `None` for a step that has not been done or was refused.
+/// Results of the steps; `None` for a step that has not been done or was refused.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Found {
-    /// Noise of the current sensors, A rms: the larger of both.
+    /// Noise of the noisier current sensor, A rms.
     pub noise: Option<f32>,
     /// Dc link, V.
     pub dc_link: Option<f32>,
-    /// Transient inductance by the pulses, H: up to 60 % too large.
+    /// Transient inductance from the pulses, H: up to 60 % too large.
     pub rough: Option<f32>,
     /// Resistances and rotor.
     pub levels: Option<Levels>,
     /// Transient inductance and saliency.
     pub leakage: Option<Leakage>,
-    /// The motor whose main flux saturates, by the staircase: `l_m` is the chord of the magnetising curve at the direct current.
+    /// Motor whose main flux saturates, from the magnetising-curve test: `l_m` is the chord of the magnetising curve at the
+    /// magnetising current.
     pub iron: Option<Motor>,
-    /// Plants of the current loop along the direct and the quadrature axis, A/V, from the pseudo-random voltage.
+    /// Plants of the current loop along the d axis and the q axis, A/V, from the pseudo-random voltage.
     pub plants: Option<[FirstOrder; 2]>,
     /// Inertia of rotor and load, kg m^2.
     pub inertia: Option<f32>,
 }
 
-/// Result of the current levels: parameters of the inverse-Gamma circuit, inverter, sensors.
+/// Result of the dc current levels: parameters of the inverse-Gamma circuit, of the inverter and of the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Levels {
     /// Stator resistance, ohm.
@@ -34,29 +35,29 @@ pub struct Levels {
     pub r_r: f32,
     /// Rotor time constant, s.
     pub tau_r: f32,
-    /// Voltage that a phase of the inverter loses, V: dead time and drop.
+    /// Voltage error of a phase of the inverter, V: dead time and forward voltages.
     pub inverter_v: f32,
-    /// Relative difference of the currents of phases b and c at dc, (-i_a)/(2 i_b) - 1: by sensors and resistances.
+    /// Relative difference of the currents of phases b and c at dc, (-i_a)/(2 i_b) - 1, due to sensors and resistances.
     pub difference: f32,
-    /// (gain of sensor a)/(gain of b) - 1; the carrier finds it, until then 0.
+    /// (gain of sensor a)/(gain of b) - 1; 0 until the injection has shown it.
     pub mismatch: f32,
-    /// Whether the main flux saturates: `r_r` and `tau_r` are then those of no circuit.
+    /// Whether the main flux saturates. Then `r_r` and `tau_r` belong to no circuit.
     pub saturates: bool,
 }
 
-/// Result of the carrier.
+/// Result of the injection.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leakage {
     /// Transient inductance sigma L_s, H.
     pub inductance: f32,
     /// Leakage inductance of the fundamental wave at no current, H.
     pub fundamental: f32,
-    /// Its change per ampere, peak, H/A.
+    /// Change of that inductance per peak ampere, H/A.
     pub slope: f32,
 }
 
 impl Levels {
-    /// Coupled magnetising inductance L_M = (L_m/L_r) L_m, H.
+    /// Returns the coupled magnetising inductance L_M = (L_m/L_r) L_m, H.
     pub fn coupled(&self) -> f32 {
         self.tau_r * self.r_r
     }
@@ -66,7 +67,7 @@ impl Levels {
         Self { r_s, r_r, tau_r, inverter_v: 0.75 * e, difference, ..Self::default() }
     }
 
-    /// With this gain mismatch: impedances were divided by the current of sensor a.
+    /// Returns the result corrected for this gain mismatch, as all impedances were divided by the current of sensor a.
     pub(super) fn with_mismatch(self, mismatch: f32) -> Self {
         let gain = (1.0 + 0.5 * mismatch) / (1.0 + 0.5 * self.mismatch);
         Self { r_s: self.r_s * gain, r_r: self.r_r * gain, mismatch, ..self }
@@ -74,8 +75,8 @@ impl Levels {
 }
 
 impl Found {
-    /// The motor, as a T with equal leakages; inertia and pole pairs are the default ones. `None` until levels and leakage, and
-    /// with a main flux that saturates the staircase too, have found theirs.
+    /// Returns the motor as a T circuit with equal leakages; inertia and pole pairs are the default ones. `None` until the
+    /// levels and the leakage are found and, if the main flux saturates, the magnetising curve.
     pub fn motor(&self) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
         if levels.saturates {
@@ -88,7 +89,7 @@ impl Found {
         Some(Motor { r_s, r_r, l_m, l_ls, l_lr: l_ls, ..Motor::default() })
     }
 
-    /// These settings with what has been found.
+    /// Returns these settings with the results in them.
     pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
         let mut new = *settings;
         let inertia = self.inertia.unwrap_or(settings.motor.inertia);
@@ -109,7 +110,7 @@ impl Found {
         let per = 1.0 / new.motor.sigma_l_s();
         new.observer.leakage_share = leakage.fundamental * per;
         new.observer.leakage_slope = leakage.slope * per;
-        // The direct current of the rule for this motor.
+        // The magnetising current follows from the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
         let of_dead_time = settings.inverter.dead_time_s / settings.inverter.carrier_s()
             * self.dc_link.unwrap_or(0.0);

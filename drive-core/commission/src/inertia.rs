@@ -1,26 +1,26 @@
-//! Step 8: the inertia, with a free shaft, from what a torque does to the speed.
+//! Step 8: the inertia, from the speed that a torque gives to a free shaft.
 //!
-//! The drive regulates torque: i_q = +i, -i, -i, +i for 0.8 s each. The speed rises, returns, falls, and returns. With x the
-//! integral of i_q and f that of the direction of the speed w,
+//! The drive regulates torque: i_q = +i, -i, -i, +i for 0.8 s each. The speed rises, returns, falls, and returns. Let x be
+//! the integral of i_q and f the integral of the sign of the speed w; then
 //!
 //! ```text
 //! w = K_t/J x - T_f/J f + c        K_t = 3/2 P (L_m^2/L_r) i_d
 //! ```
 //!
-//! The inertia J and the friction T_f follow from the slopes of least squares. The tracked speed rings after a change of the
-//! current, and is right while the acceleration is constant: only the second half of every quarter counts.
+//! The inertia J and the friction T_f follow from the slopes, by least squares. The tracked speed rings after a change of
+//! the current and is right while the acceleration is constant, so only the second half of every quarter counts.
 
 use super::motion::Slope;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
 use drive_core::{State, TestReport, periods};
 
-/// Duration of a quarter, s, and the quarters of the measurement: three times + - - +.
+/// Duration of a quarter, s, and number of the quarters of the measurement: three times + - - +.
 const QUARTER_S: f32 = 0.8;
 const QUARTERS: usize = 12;
-/// First current and least one, as shares of the rated peak: 0.15 and 0.1 A of 3.62 A.
+/// First current and smallest accepted current, as shares of the rated peak current: 0.15 A and 0.1 A of 3.62 A.
 const FIRST: f32 = 0.0414;
 const LEAST: f32 = 0.0276;
-/// Largest current, as a share of the limit.
+/// Largest current, as a share of the current limit.
 const MOST: f32 = 0.8;
 /// Peak of the speed that is aimed at, electrical rad/s: 60 rpm of four poles.
 const PEAK_RAD_PER_S: f32 = 12.566;
@@ -49,8 +49,8 @@ impl Commissioning {
             if self.state.measures {
                 return self.report_inertia(slope);
             }
-            // Twice where it is too little to overcome the friction or to be seen; else as much as friction and the peak
-            // of the speed ask for.
+            // The current is doubled if it is too small to overcome the friction or to move the shaft visibly. Otherwise
+            // it is as large as the friction and the wanted peak of the speed require.
             let follows = slope.explained >= EXPLAINED && slope.value > 0.0;
             let most = MOST * limit;
             let needed = (PEAK_RAD_PER_S / QUARTER_S + slope.friction.abs()) / slope.value;
@@ -60,7 +60,7 @@ impl Commissioning {
             self.state.part = 1;
             sums.begin(Record::Motion);
         }
-        // + - - +, one after the other.
+        // The quarters follow each other as + - - +.
         let ahead = matches!(self.state.part % 4, 0 | 1);
         self.state.until = periods(QUARTER_S) * self.state.part as u32;
         self.state.part += 1;
@@ -72,13 +72,13 @@ impl Commissioning {
         let (explained, free) = (slope.explained, [Meaning::NotFree; 2]);
         let explained = Quantity::new("explained share of the speed", "", explained)
             .checked((EXPLAINED, 1.0), free)?;
-        // Mechanical: the slopes are electrical.
+        // The inertia is mechanical, the slopes are electrical.
         let inertia = self.plate.torque_per_ampere * self.plate.pole_pairs_in_force / slope.value;
         let friction = inertia * slope.friction / self.plate.pole_pairs_in_force;
         let values = [
             Quantity::new("inertia", "kg m2", inertia).checked((0.0, f32::INFINITY), free)?,
             Quantity::new("friction", "Nm", friction),
-            Quantity::new("torque current", "A", self.state.amperes),
+            Quantity::new("q-axis current", "A", self.state.amperes),
             explained,
         ];
         self.found.inertia = Some(inertia);

@@ -1,16 +1,16 @@
-//! Step 5: the transient inductance from the response to the carrier.
+//! Step 5: the transient inductance from the response to the injected voltage.
 //!
-//! The response of the commanded voltage to the sampled current, at `z = e^(j omega T)`:
+//! The response from the commanded voltage to the sampled current, at `z = e^(j omega T)`, is
 //!
 //! ```text
 //! |h| = |(1 - p) / R' / (z - p)| |(1 - b) + b/z|        p = exp(-T R' / L)        b = tau_f/T (1 - e^(-T/tau_f))
 //! ```
 //!
-//! with the analog filter `tau_f` of the sensors, whose input is straight between two samples.
+//! with the analog filter `tau_f` of the sensors, whose input is taken as a straight line between two samples.
 //!
-//! The mean of along and across is `sigma L_s`. The inductance across the bias is that of the fundamental wave: from
-//! `psi = L(|i|) i` follows `dpsi/di = L(|i|)` across `i`. Along the bias it is smaller where iron saturates, the main flux
-//! included. Two biases give its change with the current.
+//! The mean of the inductances along and across the bias is `sigma L_s`. The inductance across the bias is the one that the
+//! fundamental wave sees: `psi = L(|i|) i` gives `dpsi/di = L(|i|)` across `i`. Along the bias the inductance is smaller if
+//! leakage paths or the main flux saturate. Two biases give its change with the current.
 
 use core::f32::consts::TAU;
 
@@ -26,37 +26,38 @@ use num_complex::Complex32;
 /// Bisections of the inductance.
 const BISECTIONS: u32 = 30;
 
-/// Bias of the carrier and carrier current, as shares of the test current. The first also gives the gain mismatch.
+/// Bias and amplitude of the injected current, as shares of the test current. The first pair also gives the gain mismatch.
 const BIASES: [(f32, f32); 2] = [(0.5, 0.14), (0.25, 0.07)];
-/// Parts of each.
+/// Parts of the measurement at each bias.
 const PARTS: usize = 7;
-/// Largest carrier as a share of the dc link.
+/// Largest injected voltage, as a share of the dc link.
 const CARRIER_OF_BUS: f32 = 0.4;
-/// Longest time until the flux of a bias counts as standing, s: it moves the saliency, not the mean inductance.
+/// Longest time after which the flux of a bias counts as established, s: a flux that still changes alters the saliency, not the
+/// mean inductance.
 const SETTLED_S: f32 = 2.1;
-/// Samples of a record, and time of the rise of the carrier, and of its fall, s.
+/// Samples of a record, and time of the rise and of the fall of the injected voltage, s.
 const RECORDED: f32 = 3000.0;
 const RISE_S: f32 = 0.05;
-/// Largest gain mismatch, and difference of the resistances of phases b and c.
+/// Largest gain mismatch, and largest difference of the resistances of phases b and c.
 const MISMATCH: f32 = 0.05;
 const RESISTANCES: f32 = 0.06;
-/// rad/s.
+/// Angular frequency of the injection, rad/s.
 const CARRIER_RAD_PER_S: f32 = TAU * CARRIER_HZ;
 
-/// 1 - (gain of b)/(gain of a), from the carrier along phase a and across it. A motor, however salient, makes as much current
-/// across by a voltage along as the other way round.
+/// Returns 1 - (gain of b)/(gain of a), from the injection along phase a and across it. In every motor, however salient, a
+/// voltage along phase a makes as much current across as a voltage across makes along.
 fn gains(along: &[Complex32; 4], across: &[Complex32; 4]) -> Complex32 {
     let [v, _, i, i_across] = along;
     let [v_along, v_across, i_along, _] = across;
     SQRT_3 * (i_across / i - (i_along * v / i - v_along) / v_across)
 }
 
-/// Share of the sample before in what the analog filter, periods, passes.
+/// Returns the share of the previous sample in the output of the analog filter, whose time constant is given in periods.
 fn held(filter: f32) -> f32 {
     if filter > 0.0 { filter * -libm::expm1f(-1.0 / filter) } else { 0.0 }
 }
 
-/// The inductance, H, that gives this admittance, A/V, with the resistance R', ohm, and the analog filter, periods.
+/// Returns the inductance, H, that gives this admittance, A/V, with the resistance R', ohm, and the analog filter, periods.
 fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) -> f32 {
     let (sin, cos) = libm::sincosf(TAU / CARRIER_SAMPLES as f32);
     let b = held(filter);
@@ -84,7 +85,7 @@ impl Commissioning {
         let volts = volts.min(CARRIER_OF_BUS * self.plate.dc_link);
         let none = AlphaBeta::ZERO;
         let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
-        // The parts of a bias.
+        // These are the parts at one bias.
         let parts: [_; PARTS] = [
             (Record::Nothing, (3.0 * levels.tau_r).min(SETTLED_S), none),
             (Record::Nothing, RISE_S, along),
@@ -95,7 +96,7 @@ impl Commissioning {
             (Record::Nothing, RISE_S, none),
         ];
         let part = self.state.part % PARTS;
-        // A record has ended: along the bias, or across it.
+        // A record has ended, along the bias or across it.
         if let 3 | 6 = part {
             let axis = usize::from(part == 6);
             let seen = sums.phasors();
@@ -118,7 +119,7 @@ impl Commissioning {
     }
 
     fn report_leakage(&mut self, levels: Levels) -> Answer {
-        // A lag of b mixes in a share of the sample before, whatever the current does between the two.
+        // A lag of sensor b mixes in a share of its previous sample, however the current changes between the two.
         let (sin, cos) = libm::sincosf(TAU / CARRIER_SAMPLES as f32);
         let (z, b) = (Complex32::new(cos, -sin), held(self.plate.filter));
         let lag = (1.0 - z) / (1.0 - b + b * z);
@@ -127,7 +128,7 @@ impl Commissioning {
         let mismatch = 1.0 / b_over_a - 1.0;
         let by_gain = |[a, b]: [f32; 2]| [a * (1.0 + 0.5 * mismatch), b * (1.0 - 0.5 * mismatch)];
         self.inductances = self.inductances.map(by_gain);
-        // With the bias along phase a.
+        // The bias lies along phase a.
         let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
         let [high, low] = self.inductances;
         let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);

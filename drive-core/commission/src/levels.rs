@@ -1,4 +1,5 @@
-//! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
+//! Step 4, the dc resistance test: two current levels along phase a with the [fit](super::fit) of the motor's parameters, and a
+//! third level that confirms them.
 
 use super::fit::bent;
 use super::{
@@ -7,32 +8,33 @@ use super::{
 };
 use drive_core::{PERIOD_S, SQRT_3, TestSignal};
 
-/// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
-/// depends on the current.
+/// Current levels, as shares of the test current, and time of the first two, s. The last level is for an inverter whose
+/// voltage error depends on the current.
 const LEVELS: [f32; 4] = [0.8, 0.2, 0.45, 0.3];
 const LEVEL_S: f32 = 1.5;
-/// Largest deviation of the rotor resistance of a linear motor.
+/// Largest relative deviation of the rotor resistance of a linear motor.
 const LINEAR: f32 = 0.017;
-/// Fastest shaft that counts as at rest, electrical rad/s. A free one turns by degrees.
+/// Fastest shaft that counts as at rest, electrical rad/s. A free shaft turns by a few degrees.
 const AT_REST: f32 = 1.0;
-/// Largest difference of the delays of two legs, s.
+/// Largest difference of the switching delays of two legs, s.
 const LEGS_S: f32 = 0.3e-6;
 /// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
 const MISFIT_PER_NOISE: f32 = 105.0;
 const MISFIT_OF_BUS: f32 = 8e-5;
-/// A misfit up to this multiple of it is that of a main flux that saturates.
+/// A misfit up to this multiple of the largest one means that the main flux saturates.
 const SATURATED: f32 = 30.0;
-/// Bins at the end of a level that give its resistance then.
+/// First bin of the end of a level, which gives the resistance if the main flux saturates.
 const ENDS: usize = BINS - 2;
-/// Largest error of the third level: share of the resistive voltage, and of the dc link.
+/// Largest voltage error of the third level: share of the resistive voltage, and of the dc link.
 const THIRD: (f32, f32) = (0.01, 6.5e-5);
-/// Share of it from which on a further level has to confirm that the inverter's voltage depends on the current.
+/// Share of that error from which on a fourth level has to confirm that the inverter voltage error depends on the current.
 const BENT: f32 = 0.3;
-/// Least voltage of the inverter, as a share of that of the dead time: with less, nodes of much capacitance make it grow with the
-/// current up to the test current, like a resistance. (Transistors may turn off later than they turn on.)
+/// Least voltage error of the inverter, as a share of the voltage of the dead time. If it is less, a large capacitance of the
+/// output nodes makes it grow with the current up to the test current, like a resistance. (Transistors may turn off later than
+/// they turn on.)
 const DEAD_TIME: f32 = 0.7;
-/// Wait before the third level is measured, and least time of its mean, in rotor time constants. It is as long as the first two
-/// at least.
+/// Wait before the third level is measured, and least time of its mean, in rotor time constants. Both together last at least as
+/// long as each of the first two levels.
 const WAIT_T: f32 = 3.0;
 const MEAN_T: f32 = 1.0;
 
@@ -45,11 +47,11 @@ impl Commissioning {
         let part = self.state.part;
         match part {
             0 => self.found.levels = None,
-            // The first two levels have ended; or the third, or the fourth.
+            // The first two levels have ended. (5 and 7: the third, the fourth.)
             3 => {
                 let Some(fit) = self.search(sums, 0.0)? else { return Ok(Next::Wait) };
                 let difference = self.across(sums, &fit, limit)?;
-                // The low level has lasted as long as the search.
+                // The low level has gone on as long as the search has taken.
                 let low = LEVELS[1] * self.plate.amperes;
                 let since = sums.recorded.samples as f32 * PERIOD_S / fit.tau_r;
                 let magnetising = low + (fit.magnetising - low) * libm::expf(-since);
@@ -81,8 +83,8 @@ impl Commissioning {
         self.begin(sums, parts[part % parts.len()])
     }
 
-    /// Relative difference of the currents of phases b and c. A shaft that turns makes a current across phase a that changes, legs that
-    /// differ a constant one.
+    /// Returns the relative difference of the currents of phases b and c. A rotating shaft makes a current across phase a that changes,
+    /// and inverter legs that differ make a constant one.
     fn across(&self, sums: &Collector, fit: &Fitted, limit: f32) -> Result<f32, Refusal> {
         let [difference, volts, speed, misfit] = fit.across(sums).ok_or(Refusal::SamplesLost)?;
         let legs = LEGS_S / PERIOD_S * self.plate.dc_link * (1.0 / SQRT_3);
@@ -94,20 +96,20 @@ impl Commissioning {
         Ok(difference)
     }
 
-    /// Whether the third level or the fourth confirms what the first two have shown. The third also gives what the voltage of
-    /// the inverter lacks at a small current; where that is much, the fourth has to confirm it.
+    /// Whether the third level or the fourth confirms the result of the first two. The third level also shows by how much the
+    /// inverter voltage error is smaller at a small current; if the difference is large, the fourth level has to confirm it.
     fn is_confirmed(&mut self, sums: &Collector) -> Result<bool, Refusal> {
         let (fit, seen) = (self.state.fitted, sums.mean(0, 0));
         let resistive = fit.r_s * seen.current.alpha;
         let allowed = THIRD.0 * resistive + THIRD.1 * self.plate.dc_link;
-        // What is left of the transient from the level before.
+        // The rest of the transient from the level before is taken off.
         let (i, turned) = (seen.current.alpha, seen.periods * PERIOD_S / fit.tau_r);
         let behind = (i - fit.magnetising) * libm::expf(-WAIT_T);
         let rest = behind * -libm::expm1f(-turned) / turned;
         self.state.fitted.magnetising = i - behind * libm::expf(-turned);
         let is_third = self.state.part == 5;
         let error = seen.voltage - (fit.e - fit.bend / i) - resistive - fit.r_r * rest;
-        // A capacitance is not negative.
+        // A capacitance is not negative, so the voltage error can only be smaller at the small current.
         if is_third && error > 0.0 {
             let third = (i, seen.voltage - fit.r_r * rest);
             let [high, low, ..] = LEVELS.map(|share| share * self.plate.amperes);
@@ -122,7 +124,8 @@ impl Commissioning {
         Ok(true)
     }
 
-    /// The main flux saturates: the ends of the levels give the resistance, the staircase is to give the rest.
+    /// Reports that the main flux saturates: the ends of the levels give the resistance, and the magnetising-curve test is to give
+    /// the rest.
     fn report_saturated(&mut self, sums: &Collector, limit: f32) -> Answer {
         let fit = self.state.fitted;
         Quantity::new("misfit", "V", fit.misfit)
@@ -163,7 +166,7 @@ impl Commissioning {
     }
 }
 
-/// The misfit, beside that of a linear motor.
+/// Returns the misfit, with the largest one of a linear motor as its limit.
 fn misfit(fit: &Fitted, limit: f32) -> Quantity {
     Quantity::new("misfit", "V", fit.misfit).allowing((0.0, limit))
 }

@@ -1,8 +1,8 @@
 //! Commissioning: from the nameplate to the parameters of the motor, at standstill, without a sensor on the shaft.
 //!
-//! [`Commissioning`] is a state machine for the main loop. It never touches the hardware: it asks for an
-//! [`TestSignal`], the drive applies it in its interrupt, a [`Collector`] keeps sums of what the drive saw, and the
-//! commissioning evaluates them, step by step.
+//! [`Commissioning`] is a state machine for the main loop. It never touches the hardware. It asks for a
+//! [`TestSignal`], which the drive applies in its interrupt; a [`Collector`] sums the measurements of the drive,
+//! and the commissioning evaluates the sums, step by step.
 //!
 //! ```no_run
 //! use induction_drive_commission::{Collector, Commissioning, Next, Step};
@@ -36,8 +36,9 @@
 //! # Ok(()) }
 //! ```
 //!
-//! The sensors' common gain error and that of the dc link cannot be seen: resistances and inductances carry them. Nor can
-//! two phases that are exchanged between sensors and motor: such a motor turns the other way.
+//! The common gain error of the current sensors and the gain error of the dc link cannot be seen: resistances and
+//! inductances are off by them. Two phases that are exchanged between sensors and motor cannot be seen either: such a
+//! motor turns the other way.
 #![cfg_attr(not(test), no_std)]
 
 extern crate induction_drive_core as drive_core;
@@ -79,19 +80,20 @@ use report::{SIZE, TIME};
 use staircase::Staircase;
 use steps::QUIET_S;
 
-/// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
+/// Share of the rough inductance for which the current controller is designed, the gain per inductance of the controller, and its
+/// zero, rad/s.
 const CAUTION: f32 = 0.75;
 const GAIN_RAD_PER_S: f32 = 500.0;
 const ZERO_RAD_PER_S: f32 = 167.0;
 
 /// The next action that the commissioning asks for.
 ///
-/// Exhaustive on purpose: every action has to be carried out.
-// A report is passed once a step.
+/// Exhaustive on purpose, since every action has to be carried out.
+// The size does not matter, since a report is passed once a step.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
-    /// Nothing: poll again, after a millisecond or so.
+    /// Do nothing and poll again, after about a millisecond.
     Wait,
     /// Give the drive [`Command::Test`](drive_core::Command::Test).
     Excite(TestSignal),
@@ -112,49 +114,49 @@ pub enum Next {
 /// The next request of a step.
 type Answer = Result<Next, Refusal>;
 
-/// A part of a step: what is recorded, for how many seconds, and the excitation.
+/// A part of a step: the kind of record, its time, s, and the test signal.
 type Part = (Record, f32, TestSignal);
 
-/// The commissioning: what it does, and what it has found.
+/// The commissioning: the present step with its state, and the results.
 #[derive(Clone, Debug)]
 pub struct Commissioning {
     plate: Plate,
     found: Found,
-    /// Inductances along and across at each bias of the leakage, H: the staircase needs them too.
+    /// Inductances along and across phase a at each bias of the step `leakage`, H, which the magnetising-curve test also needs.
     inductances: [[f32; 2]; 2],
-    /// The present step, and the last.
+    /// Present step, and last step to be done.
     step: Step,
     last: Step,
     state: StepState,
     progress: Progress,
-    /// Whether the drive has left the state off, and its starts before that.
+    /// Whether the drive has left the state off, and the number of its starts before that.
     on: bool,
     starts: Option<u32>,
-    /// Whether a step was refused since the last start of steps.
+    /// Whether a step was refused since the last [`Commissioning::start`].
     refused: bool,
 }
 
-/// State of the present step; a step begins with the default.
+/// State of the present step. Every step begins with the default.
 #[derive(Clone, Debug, Default)]
 struct StepState {
-    /// The next part, and the samples that it waits for.
+    /// Next part of the step, and the number of samples that it waits for.
     part: usize,
     until: u32,
     search: Option<Search>,
-    /// The current loop along and across, once it is designed.
+    /// Current loop along and across phase a, once it is designed.
     design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
-    /// Wiring: volt-seconds of the present train of pulses, V s, and trains before it.
+    /// Wiring: volt-seconds of the present train of pulses, V s, and number of the trains before it.
     volt_seconds: f32,
     trains: u32,
-    /// Levels: the fit to the first two.
+    /// Levels: fit to the first two levels.
     fitted: Fitted,
-    /// Leakage: the carrier along the present bias, and the relative difference of the sensors' gains.
+    /// Leakage: phasors of the injection along the present bias, and relative difference of the sensors' gains.
     along: [Complex32; 4],
     gains: Complex32,
     stairs: Staircase,
-    /// The plants along and across that the current loop is to be designed for.
+    /// Plants along and across phase a for which the current loop is to be designed.
     plants: [Option<FirstOrder>; 2],
-    /// Inertia: torque current, A, and whether it is that of the measurement.
+    /// Inertia: q-axis current, A, and whether the measurement is made with it.
     amperes: f32,
     measures: bool,
 }
@@ -162,7 +164,7 @@ struct StepState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
     Steps,
-    /// Stop the drive, then design the current loop.
+    /// The drive is to be stopped, then the current loop designed.
     StopToDesign,
     StoppingToDesign,
     /// Stop the drive.
@@ -172,7 +174,8 @@ enum Progress {
 }
 
 impl Commissioning {
-    /// A commissioning of the motor with the nameplate, on the board, of these settings. Nothing is begun.
+    /// Creates the commissioning for the motor with the nameplate in these settings, on the board that they describe. No step is
+    /// begun.
     pub fn new(settings: &Settings) -> Self {
         Self {
             plate: Plate::new(settings),
@@ -188,8 +191,8 @@ impl Commissioning {
         }
     }
 
-    /// Begins the steps from `first` to `last`; the drive must be off. What earlier steps have found is kept until
-    /// they are repeated.
+    /// Begins the steps from `first` to `last`; the drive must be off. The results of earlier steps are kept until
+    /// the steps are repeated.
     pub fn start(&mut self, first: Step, last: Step) {
         (self.step, self.last, self.state) = (first, last, StepState::default());
         (self.progress, self.on, self.starts) = (Progress::Steps, false, None);
@@ -201,29 +204,29 @@ impl Commissioning {
         self.progress != Progress::Ended
     }
 
-    /// Whether no step was refused since the last [`start`](Self::start).
+    /// Whether all steps since the last [`start`](Self::start) have passed.
     pub fn is_sound(&self) -> bool {
         !self.refused
     }
 
-    /// The present step, or the last that was done.
+    /// Returns the present step, or the last step that was done.
     pub fn step(&self) -> Step {
         self.step
     }
 
-    /// The results so far.
+    /// Returns the results so far.
     pub fn found(&self) -> &Found {
         &self.found
     }
 
-    /// The settings with what has been found in them; equal to `settings` where nothing has, or where the last steps ended
-    /// with a refusal.
+    /// Returns the settings with the results in them. They are equal to `settings` if there are no results, or if the last
+    /// steps ended with a refusal.
     pub fn settings(&self, settings: &Settings) -> Settings {
         if self.refused { *settings } else { self.found.settings(settings, self.plate.pole_pairs) }
     }
 
-    /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](drive_core::Drive::excited).
-    #[inline(never)] // in `main` it would lie in the bank of the interrupt's code
+    /// Continues the commissioning and returns its next request. `drive` is [`Drive::test_report`](drive_core::Drive::test_report).
+    #[inline(never)] // inlined into `main`, it would lie in the flash bank of the interrupt's code
     pub fn poll(&mut self, drive: &TestReport, sums: &mut Collector) -> Next {
         let (progress, next) = match (self.progress, drive.state) {
             (Progress::Ended, _)
@@ -245,8 +248,8 @@ impl Commissioning {
         next
     }
 
-    /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes
-    /// as long as [`Settings::build`]: a second on the target, so the drive must be off.
+    /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. The
+    /// drive must be off, since the design takes as long as [`Settings::build`], a second on the target.
     pub fn design(&mut self) {
         self.state.design = self.found.motor().map(|motor| {
             let period_s = f64::from(PERIOD_S);
@@ -260,13 +263,13 @@ impl Commissioning {
         (self.progress, self.on, self.starts) = (Progress::Steps, false, None);
     }
 
-    /// Ends the present step, which is refused, and stops the drive.
+    /// Ends the present step with a refusal, and stops the drive.
     pub fn refuse(&mut self, refusal: Refusal) -> Report {
         (self.progress, self.refused) = (Progress::Stop, true);
         Report { refusal: Some(refusal), ..Report::new(self.step, &[]) }
     }
 
-    /// The next action of the present step, once the samples of its part are there.
+    /// Returns the next action of the present step, once the samples of its part have been taken.
     fn go_on(&mut self, drive: &TestReport, sums: &mut Collector) -> Answer {
         let before = *self.starts.get_or_insert(drive.starts);
         self.on |= drive.state != State::Off || drive.starts != before;
@@ -303,7 +306,7 @@ impl Commissioning {
         Ok(Next::Excite(excitation))
     }
 
-    /// Ends the present step, which has found these values.
+    /// Ends the present step with these values.
     fn report(&mut self, values: &[Quantity]) -> Answer {
         let report = Report::new(self.step, values);
         if self.step < self.last {
@@ -320,7 +323,8 @@ impl Commissioning {
         Ok(Next::Report(report))
     }
 
-    /// One fit to the recorded bins, which began with the flux of the current `steady`, A; none before the last.
+    /// Makes one fit to the recorded bins, which began with the flux of the current `steady`, A. Returns the result after the last
+    /// fit.
     fn search(&mut self, sums: &mut Collector, steady: f32) -> Result<Option<Fitted>, Refusal> {
         if let Some(search) = &mut self.state.search {
             return search.step(sums);
@@ -331,7 +335,7 @@ impl Commissioning {
         Ok(None)
     }
 
-    /// The current loop along and across; none while the drive is to be stopped for its design.
+    /// Returns the current loop along and across phase a; none while the drive has to stop for the design.
     fn designed(&mut self) -> Result<Option<[CurrentLoopDesign; 2]>, Refusal> {
         if self.state.design.is_none() {
             self.progress = Progress::StopToDesign;
@@ -339,18 +343,18 @@ impl Commissioning {
         self.state.design.transpose().map_err(Refusal::Design)
     }
 
-    /// Transient inductance by the pulses, rather too small, H.
+    /// Returns the transient inductance from the pulses, H, reduced for safety.
     fn rough(&self) -> Result<f32, Refusal> {
         Ok(CAUTION * self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?)
     }
 
-    /// A cautious controller of the current.
+    /// Returns a cautious current controller.
     fn regulator(&self) -> Result<Regulator, Refusal> {
         let (k_c, z_c) = (GAIN_RAD_PER_S * self.rough()?, 1.0 - ZERO_RAD_PER_S * PERIOD_S);
         Ok(Regulator { k_c, z_c, ..Regulator::default() })
     }
 
-    /// A share of the test current along phase a.
+    /// Returns the test signal for a share of the test current along phase a.
     fn along(&self, share: f32, regulator: Regulator) -> TestSignal {
         let (amperes, carrier) = (share * self.plate.amperes, AlphaBeta::ZERO);
         TestSignal::Current { amperes, regulator, carrier, binary: false }

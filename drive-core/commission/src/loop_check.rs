@@ -1,5 +1,5 @@
-//! Step 7: the current loop, designed by the rule of section 3.8 and its limits for the motor that was found, and checked by
-//! a step of the current along phase a.
+//! Step 7: the current loop. It is designed for the motor that was found, by the rule of section 3.8 and its limits, and
+//! checked by a step of the current along phase a.
 
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use drive_core::Regulator;
@@ -7,15 +7,15 @@ use drive_core::current::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
 const STEP: [f32; 2] = [0.4, 0.7];
-/// Current before the drive is stopped, likewise, and its time in rotor time constants.
+/// Current before the drive is stopped, as a share of the test current, and its time in rotor time constants.
 const LOW: f32 = 0.1;
 const LOW_T: f32 = 2.0;
-/// Time before it, after the flux stands, and of the record, s.
+/// Time with an established flux before the step, and time of the record, s.
 const BEFORE_S: f32 = 0.2;
 const RECORD_S: f32 = 0.25;
-/// Bins at whose end the response counts as settled.
+/// Bin from which on the response counts as settled.
 const SETTLED: usize = 45;
-/// Largest overshoot of the design, relative to the step, and what noise adds in a mean of two samples.
+/// Largest overshoot of the design, relative to the step, and allowance for noise in a mean of two samples, in rms of the noise.
 const OVERSHOOT: f32 = 0.05;
 const NOISES: f32 = 4.0;
 
@@ -25,8 +25,8 @@ impl Commissioning {
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
         if self.state.part == 0 {
             self.found.plants = None;
-            // Less flux first: while the next start has the low sides on, what is left drives a current against itself,
-            // which turns a light shaft away.
+            // The flux is reduced first. The next start has the low sides on, and a flux that is left drives a current
+            // against itself, which would turn a light shaft.
             let low = self.along(LOW, self.regulator()?);
             return self.begin(sums, (Record::Nothing, LOW_T * motor.tau_r(), low));
         }

@@ -5,28 +5,28 @@ use core::mem::replace;
 use drive_core::PERIOD_S;
 use drive_core::math::limited;
 
-/// Control periods from one pair of values to the next: 10 ms. The speed is a mean over as long, and smoothed over 5 ms: it
-/// belongs to the integrals one pair before.
+/// Control periods from one pair of values to the next: 10 ms. The speed is a mean over the same time and smoothed over 5
+/// ms, so it belongs to the integrals of the pair before.
 const EVERY: u16 = 60;
-/// Pairs after a change of the current that do not count, 0.35 s: the tracking of the angle settles.
+/// Pairs after a change of the current that do not count, 0.35 s, while the tracking of the angle settles.
 const SETTLING: u16 = 35;
-/// Speed from which on it counts as a direction in full, electrical rad/s: 10 rpm of four poles.
+/// Speed from which on its direction counts in full, electrical rad/s: 10 rpm of four poles.
 const MOVES_RAD_PER_S: f32 = 2.094;
 
 /// Sums over integrals and speed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Motion {
-    /// Integral of i_q, A s, and of the direction, s; now, and at the last values.
+    /// Integral of i_q, A s, and of the direction, s: now, and at the last pair.
     x: f32,
     f: f32,
     earlier: (f32, f32),
-    /// Sum of the speed since the last values.
+    /// Sum of the speed since the last pair.
     speed: f32,
     periods: u16,
-    /// Torque current, A, and values since it changed.
+    /// Q-axis current, A, and number of pairs since it changed.
     i_q: f32,
     settled: u16,
-    /// Sums of 1, w, x, f, w w, x x, f f, x w, f w, x f.
+    /// Sums over the pairs of 1, w, x, f, w w, x x, f f, x w, f w, x f.
     sums: [f32; 10],
 }
 
@@ -35,14 +35,14 @@ pub(super) struct Motion {
 pub(super) struct Slope {
     /// Speed per integral of the current, electrical rad/s per A s.
     pub value: f32,
-    /// Speed that friction takes, electrical rad/s^2.
+    /// Deceleration by friction, electrical rad/s^2.
     pub friction: f32,
     /// Share of the variance of the speed that is explained.
     pub explained: f32,
 }
 
 impl Motion {
-    /// Takes a period: the reference of the torque current, A, and the speed, electrical turns per period.
+    /// Takes a control period: the q-axis current reference, A, and the speed, electrical turns per period.
     pub fn push(&mut self, i_q: f32, rotor_freq: f32) {
         self.x += PERIOD_S * i_q;
         self.speed += rotor_freq;
@@ -62,7 +62,7 @@ impl Motion {
         }
     }
 
-    /// The slopes.
+    /// Returns the slopes by least squares.
     pub fn slope(&self) -> Slope {
         let [count, w, x, f, ww, xx, ff, xw, fw, xf] = self.sums;
         let centred = |sum: f32, one: f32, other: f32| sum - one * other / count;

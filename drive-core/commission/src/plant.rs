@@ -1,32 +1,32 @@
-//! The plants of the current loop from a pseudo-random voltage, as in section 3.7 of the dissertation; on request, with the
-//! shaft locked, since a voltage across the flux turns a free one.
+//! The plants of the current loop from a pseudo-random voltage, as in section 3.7 of the dissertation. The step is done on
+//! request only and needs a locked shaft, since a voltage across the flux turns a free one.
 //!
-//! Voltage and current pass the filter of the current loop, so the same equation holds between them, and the plant is that of
-//! the motor. The analog filter of the currents has a delay of a part of a sample, which takes a second coefficient of the voltage:
+//! Voltage and current both pass the filter of the current loop, so the equation of the motor still holds between them. The analog
+//! filter of the currents delays them by a part of a sample, for which the voltage has a second coefficient:
 //!
 //! ```text
 //! y[k] = p y[k-1] + b1 u[k-2] + b2 u[k-3] + c          plant k/(z - p), k = b1 + b2
 //! ```
 //!
-//! with `c` for the bias and the voltage of the inverter. The unknowns come from the least squares of
-//! [`rls`](rotor_id::rls::ud). On motors of half to twice the parameters of Table 5, k is within 6 % of that by the parameters;
-//! 1 - p is weak.
+//! with `c` for the bias and the inverter voltage error. The unknowns come from the least squares of
+//! [`rls`](rotor_id::rls::ud). On motors with half to twice the parameters of Table 5, k is within 6 % of the value that
+//! follows from the parameters; 1 - p is uncertain.
 
 use super::plant_fit::SETTLING;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use drive_core::{AlphaBeta, FirstOrder, PERIOD_S, TestSignal};
 use drive_settings::tuning::motor_plant;
 
-/// Bias along phase a, and current that a sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A, which
-/// takes 30 V with Table 5.
+/// Bias along phase a, and current that one sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A,
+/// which takes 30 V with Table 5.
 const BIAS: f32 = 0.5;
 const STEP: f32 = 0.027;
-/// Time until the flux stands, in rotor time constants, and between the axes, s.
+/// Time until the flux is established, in rotor time constants, and time between the two axes, s.
 const FLUX_T: f32 = 4.0;
 const BETWEEN_S: f32 = 0.2;
-/// Time of a record, s: with six times the sequence.
+/// Time of a record, s: the settling and six times the sequence.
 const FITTED_S: f32 = (SETTLING + 6 * 255) as f32 * PERIOD_S;
-/// Accepted k relative to that by the parameters, and accepted p.
+/// Accepted range of k relative to its value from the parameters, and accepted range of p.
 const GAIN: (f32, f32) = (0.8, 1.25);
 const POLE: (f32, f32) = (0.7, 0.9999);
 impl Commissioning {
@@ -39,7 +39,7 @@ impl Commissioning {
             let regulator = self.regulator()?;
             match self.state.part {
                 0 => self.found.plants = None,
-                // A record has ended: along the bias, or across it.
+                // A record has ended, along the bias or across it.
                 part @ (2 | 4) => {
                     let found = sums.recorded.plant.found()?;
                     let k = found.k * f64::from(i) / f64::from(volts);

@@ -7,12 +7,12 @@ use drive_core::filter::{LPF, LpfState};
 use drive_core::{AlphaBeta, FirstOrder};
 use rotor_id::rls::ud::Ud;
 
-/// Samples until filters and amplitude have settled.
+/// Number of samples until the filters and the amplitude have settled.
 pub(super) const SETTLING: u32 = 600;
-/// Covariance before the first sample, in the bases.
+/// Covariance before the first sample, in units of the bases.
 const P0: f32 = 1e6;
 
-/// Least squares of one axis, in bases that make voltage and current about one.
+/// Least squares of one axis, in units of bases that make voltage and current about one.
 #[derive(Clone, Debug)]
 pub(super) struct PlantFit {
     ud: Ud,
@@ -32,7 +32,7 @@ impl Default for PlantFit {
 }
 
 impl PlantFit {
-    /// Takes a sample: the voltage realised in its step, and the measured current.
+    /// Takes a sample: the voltage realised in that step, and the measured current.
     pub fn push(&mut self, voltage: f32, current: f32) {
         let filtered = LPF.step(&mut self.low_pass, AlphaBeta::new(voltage, current));
         let ([u1, u2, u3], y1) = (self.u, self.y);
@@ -45,7 +45,7 @@ impl PlantFit {
         }
     }
 
-    /// The plant, in the bases.
+    /// Returns the plant, in units of the bases.
     pub fn found(&self) -> Result<FirstOrder, Refusal> {
         let [p, b1, b2, _] = self.ud.theta.map(|x| f64::from(x.re));
         let is_sound = self.sound && self.samples > SETTLING;

@@ -1,4 +1,4 @@
-//! Step 1: what follows from the nameplate, and whether it is plausible.
+//! Step 1: the plausibility of the nameplate, and the values that follow from it.
 
 use core::f32::consts::{SQRT_2, TAU};
 
@@ -18,10 +18,10 @@ const LEAST_CURRENT: f32 = 0.3;
 /// Expected range of the rotor time constant, rated rad: 0.02 to 1.4 s at 60 Hz.
 const TAU_R: (f32, f32) = (7.5, 528.0);
 
-/// What follows from the nameplate, the board and the settings in force: safe currents and expected ranges.
+/// Values that follow from the nameplate, the board and the settings in force: safe currents and expected ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plate {
-    /// Current of the tests, A peak: the rated one, or less where the sensors do not reach it.
+    /// Test current, A peak: the rated current, or less if the sensors do not reach it.
     pub amperes: f32,
     /// Base impedance, ohm.
     pub z_b: f32,
@@ -31,34 +31,34 @@ pub(super) struct Plate {
     pub r_r: (f32, f32),
     /// Expected range of the rotor time constant, s.
     pub tau_r: (f32, f32),
-    /// Pairs of poles by the nameplate, and in force.
+    /// Pole pairs by the nameplate, and in force.
     pub pole_pairs: u8,
     pub pole_pairs_in_force: f32,
     /// Peak of the rated voltage between lines, V.
     pub peak_v: f32,
-    /// Rated current, and limit of the torque current, A peak.
+    /// Rated current, and limit of the q-axis current, A peak.
     pub rated: f32,
     pub i_q_limit: f32,
     /// Rated flux, Wb peak, and largest magnetising current by the rule of `sequence.i_d`, A.
     pub flux: f32,
     pub largest_i_d: f32,
-    /// Torque per torque current in force, Nm/A.
+    /// Torque per q-axis current in force, Nm/A.
     pub torque_per_ampere: f32,
     /// Time constant of the analog filter of the currents, control periods.
     pub filter: f32,
-    /// Margin for noise of the pulses, A, and their largest voltage, V.
+    /// Margin of the pulses for noise, A, and their largest voltage, V.
     pub pulse_noise: f32,
     pub pulse_v: f32,
     /// Dead time as a share of the control period.
     pub dead_time: f32,
     /// Nominal dc link, V.
     pub dc_link: f32,
-    /// The first entry of the nameplate that cannot belong to the others.
+    /// First entry of the nameplate that does not fit the others.
     pub implausible: Option<Quantity>,
 }
 
 impl Plate {
-    /// That of the settings.
+    /// Computes the values of the settings.
     pub fn new(settings: &Settings) -> Self {
         let plate = &settings.nameplate;
         let pairs = libm::roundf(60.0 * plate.frequency_hz / plate.speed_rpm).max(1.0);
@@ -101,7 +101,7 @@ impl Plate {
         }
     }
 
-    /// The values of the report.
+    /// Returns the values of the report.
     pub fn values(&self) -> [Quantity; 3] {
         [
             Quantity::new("test current", "A", self.amperes),

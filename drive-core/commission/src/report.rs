@@ -1,4 +1,4 @@
-//! What a step of the commissioning reports: values with their units, and the verdict in words.
+//! Report of a step of the commissioning: values with their units, and the verdict in words.
 
 use core::fmt;
 
@@ -8,33 +8,34 @@ use drive_settings::value::Words;
 use drive_settings::words;
 
 words! {
-    /// A step of the commissioning, in their order.
+    /// The steps of the commissioning, in their order.
     pub enum Step {
-        /// The nameplate: is it plausible, and what follows from it.
+        /// The nameplate: its plausibility, and the values that follow from it.
         Nameplate = "nameplate",
         /// Offsets and noise of the current sensors, dc link.
         Sensors = "sensors",
         /// Volt-second pulses: wiring, open phases, rough transient inductance.
         Wiring = "wiring",
-        /// Two current levels along phase a, and a third: resistances, rotor time constant, voltage of the inverter.
+        /// DC resistance test with two current levels along phase a, and a third: resistances, rotor time constant, inverter
+        /// voltage error.
         Levels = "levels",
-        /// The carrier along and across a bias: transient inductance, saliency at standstill, gain mismatch.
+        /// Injection along and across a bias: transient inductance, saliency at standstill, gain mismatch.
         Leakage = "leakage",
-        /// A staircase of currents: the magnetising curve. Only where the levels show that the main flux saturates.
+        /// Magnetising-curve test with currents that rise in steps. Done only if the levels show that the main flux saturates.
         Staircase = "staircase",
         /// The current loop, designed from the values found and checked by a step.
         CurrentLoop = "current-loop",
-        /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
+        /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, with a locked shaft.
         Plant = "plant",
-        /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
+        /// The inertia, with a free shaft, after the saliency self-commissioning. The shaft turns to and fro.
         Inertia = "inertia",
     }
 }
 
 impl Step {
-    /// The last one at standstill.
+    /// Last step at standstill.
     pub const LAST: Self = Self::CurrentLoop;
-    /// The words of all, for messages.
+    /// The words of all steps, for messages.
     pub const ALL: &'static str =
         "nameplate sensors wiring levels leakage staircase current-loop plant inertia";
 }
@@ -48,9 +49,9 @@ pub struct Quantity {
     pub unit: &'static str,
     /// The value.
     pub value: f32,
-    /// Its standard deviation by the noise of the measurement; 0 where there is none to state.
+    /// Its standard deviation due to the noise of the measurement; 0 if none is stated.
     pub deviation: f32,
-    /// What nameplate and noise allow, from and to; infinite where nothing is expected.
+    /// Range that nameplate and noise allow, from and to; infinite if nothing is expected.
     pub allowed: (f32, f32),
 }
 
@@ -62,7 +63,7 @@ pub struct Report {
     pub step: Step,
     /// The values that it has found, in their order.
     pub values: [Option<Quantity>; 8],
-    /// Why it is refused; none where it is sound.
+    /// Reason of its refusal; none if the step has passed.
     pub refusal: Option<Refusal>,
 }
 
@@ -70,7 +71,7 @@ pub struct Report {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// An entry of the nameplate, with what is plausible beside the others.
+    /// An entry of the nameplate is implausible beside the others.
     #[error(
         "{} = {} {}: with the rest of the nameplate {:.4} to {:.4} is plausible",
         .0.name, .0.value, .0.unit, .0.allowed.0, .0.allowed.1
@@ -82,36 +83,36 @@ pub enum Refusal {
         .found.name, .found.value, .found.unit, .found.allowed.0, .found.allowed.1, .meaning.word()
     )]
     Value {
-        /// As measured, with what is allowed.
+        /// Measured value, with its allowed range.
         found: Quantity,
-        /// What that means.
+        /// Meaning of the deviation.
         meaning: Meaning,
     },
-    /// The drive is in a state in which it cannot be commissioned: a fault has stopped it, or somebody has.
+    /// The drive is in a state in which it cannot be commissioned: it was stopped by a fault or by a command.
     #[error("the drive is {0}")]
     Drive(State),
-    /// What the answers to the pulses say.
+    /// Fault that the responses to the pulses show.
     #[error("{0}")]
     Wiring(Fault),
-    /// The pulses on this phase, 0 to 2, are not answered: it is open.
+    /// Pulses on this phase, 0 to 2, make no current: the phase is open.
     #[error("phase {} is open", phase(*.0))]
     PhaseOpen(u8),
     /// A current sensor, 0 or 1, shows no current.
     #[error("current sensor {} shows no current", phase(*.0))]
     SensorOpen(u8),
-    /// No pulse is answered at all.
-    #[error("no motor: no pulse is answered")]
+    /// No pulse makes a current.
+    #[error("no motor: no pulse makes a current")]
     NoMotor,
     /// The current loop cannot be designed for what was found.
     #[error("{0}")]
     Design(TuningError),
-    /// A step that must come before is missing.
+    /// Another step has to be done before.
     #[error("the step {} comes first", .0.word())]
     Needs(Step),
     /// The drive has not taken a command.
     #[error("{0}")]
     Command(Refused),
-    /// Samples were lost on the way to the evaluation.
+    /// Samples were missing in the evaluation.
     #[error("samples were lost; repeat it")]
     SamplesLost,
 }
@@ -122,12 +123,12 @@ fn phase(number: u8) -> char {
 }
 
 words! {
-    /// Meaning of a value out of its range; its word is the advice.
+    /// Meaning of a value outside its range; its word is the advice.
     pub enum Meaning {
         /// Larger motor than the nameplate says.
         TooLarge = "the motor is larger than its nameplate says, or its windings are shorted",
         /// Smaller motor than the nameplate says.
-        TooSmall = "the motor is smaller than its nameplate says, or connected in another way",
+        TooSmall = "the motor is smaller than its nameplate says, or connected differently",
         /// The sensor's offset.
         Offset = "correct the offset in scales.current_*, and let the motor come to rest",
         /// The sensors' noise.
@@ -135,17 +136,17 @@ words! {
         /// The dc link.
         BusTooLow = "raise the dc link, or compare scales.dc_link with a voltmeter",
         /// The model of a linear motor does not fit.
-        Misfit = "the motor is not linear at these currents, or something has moved",
+        Misfit = "the motor is not linear at these currents, or its shaft has moved",
         /// Gains that differ.
         Mismatch = "compare scales.current_a and scales.current_b with an ammeter",
         /// Resistances that differ.
         Resistances = "look for a bad joint, a cable or a winding: the resistances of phases b and c differ",
-        /// Voltages of the legs that differ.
-        Legs = "dead time, drive or switches of the legs b and c differ",
-        /// Current across the axis of the voltage that changes.
+        /// Voltages of the inverter legs that differ.
+        Legs = "dead time, gate drive or switches of legs b and c differ",
+        /// Changing current across the axis of the voltage.
         Turning = "the shaft turns",
-        /// Inverter voltage that depends on the current.
-        Inverter = "the voltage that the inverter loses still grows with the current",
+        /// Inverter voltage error that depends on the current.
+        Inverter = "the inverter voltage error still grows with the current",
         /// Value too uncertain.
         Uncertain = "too much noise for this motor",
         /// The step response of the current loop.
@@ -155,12 +156,12 @@ words! {
     }
 }
 
-/// What a value below its range means, and one above: of a resistance or an inductance, and of a time constant.
+/// Meaning of a value below its range, and of a value above it: for a resistance or an inductance, and for a time constant.
 pub(super) const SIZE: [Meaning; 2] = [Meaning::TooLarge, Meaning::TooSmall];
 pub(super) const TIME: [Meaning; 2] = [Meaning::TooSmall, Meaning::TooLarge];
 
 impl Report {
-    /// A report of a step that is sound.
+    /// Creates the report of a step that has passed.
     pub(super) fn new(step: Step, values: &[Quantity]) -> Self {
         let values = core::array::from_fn(|n| values.get(n).copied());
         Self { step, values, refusal: None }
@@ -168,27 +169,27 @@ impl Report {
 }
 
 impl Quantity {
-    /// A value of which the nameplate expects nothing.
+    /// Creates a value without an expected range.
     pub(super) const fn new(name: &'static str, unit: &'static str, value: f32) -> Self {
         Self { name, unit, value, deviation: 0.0, allowed: (f32::NEG_INFINITY, f32::INFINITY) }
     }
 
-    /// With the deviation that noise gives it.
+    /// Returns the value with the standard deviation that noise gives it.
     pub(super) const fn within(self, deviation: f32) -> Self {
         Self { deviation, ..self }
     }
 
-    /// With the range that is allowed.
+    /// Returns the value with its allowed range.
     pub(super) const fn allowing(self, allowed: (f32, f32)) -> Self {
         Self { allowed, ..self }
     }
 
-    /// Whether it is in that range; not if it is not a number.
+    /// Whether the value is in its allowed range; false for NaN.
     pub(super) fn is_allowed(&self) -> bool {
         self.value >= self.allowed.0 && self.value <= self.allowed.1
     }
 
-    /// Refuses a value outside this range; `below` and `above` say what that means.
+    /// Refuses a value outside this range; `below` and `above` are the meanings.
     pub(super) fn checked(
         self,
         allowed: (f32, f32),
@@ -207,7 +208,7 @@ impl Quantity {
 
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Four digits.
+        // Four digits are shown.
         let size = self.value.abs();
         let places = [1000.0, 100.0, 10.0, 1.0, 0.1].iter().position(|least| size >= *least);
         let places = places.unwrap_or(5);
@@ -227,7 +228,7 @@ impl fmt::Display for Quantity {
 }
 
 impl fmt::Display for Report {
-    /// Step and verdict; the values are shown one by one.
+    /// Writes step and verdict; the values are shown one by one.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.refusal {
             None if self.step == Step::Inertia => f.write_str(

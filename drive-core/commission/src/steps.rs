@@ -1,4 +1,4 @@
-//! Steps 2 and 3: the sensors without current, and the pulses of the wiring check.
+//! Steps 2 and 3: the sensors at zero current, and the pulses of the wiring check.
 
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, SIZE};
 use drive_core::protect::{WiringCheck, WiringSettings};
@@ -12,19 +12,19 @@ const NOISE: f32 = 0.01;
 /// Least dc link as a share of the peak of the rated voltage between lines.
 const BUS: f32 = 0.37;
 
-/// Current of an answered pulse, as a share of the test current, and the share at which the pulses are designed: no
-/// answer reaches twice of it.
+/// Least current of a pulse that counts as a response, as a share of the test current, and the share for which the
+/// pulses are designed. No response reaches twice that share.
 const ANSWERED: f32 = 0.08;
 const EXPECTED: f32 = 0.125;
-/// Current that a pulse may leave to the next one, likewise: resistances make it.
+/// Current that may be left from the pulse before, due to resistances, as a share of the test current.
 const RESIDUAL: f32 = 0.08;
-/// Growth of the pulses.
+/// Factor by which the pulses grow.
 const GROWTH: f32 = 1.6;
-/// Pulses of a motor that is not there are answered by less than this share of the test current.
+/// If the largest response is below this share of the test current, there is no motor.
 const SILENT: f32 = 0.02;
-/// An answer counts as none below this share of the largest.
+/// A response counts as none below this share of the largest.
 const UNANSWERED: f32 = 0.25;
-/// The inductance by pulses may be that much smaller or larger than the true one.
+/// Factors by which the inductance from the pulses may be smaller or larger than the true one.
 const ROUGH: (f32, f32) = (0.5, 1.7);
 
 impl Commissioning {
@@ -49,7 +49,7 @@ impl Commissioning {
         self.report(&values)
     }
 
-    /// The present pulses.
+    /// Returns the settings of the present pulses.
     fn pulses(&self) -> WiringSettings {
         let expected_a = EXPECTED * self.plate.amperes;
         let sigma_ls = self.state.volt_seconds / expected_a;
@@ -75,7 +75,7 @@ impl Commissioning {
         }
         let legs = drive.answers.map(|[a, b]| a.abs().max(b.abs()));
         let largest = legs.into_iter().fold(0.0, f32::max);
-        // Not the volt-seconds, but the duration and the voltage are limited.
+        // Duration and voltage of the pulses are limited, which limits the volt-seconds.
         let longest = self.plate.pulse_v * 60.0 * PERIOD_S;
         if largest < ANSWERED * i && self.state.volt_seconds < longest {
             self.state.volt_seconds *= GROWTH;

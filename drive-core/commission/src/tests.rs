@@ -1,4 +1,4 @@
-//! The fits on a motor whose answer is computed here, in f64.
+//! Tests of the fits on a motor whose response is computed here, in f64.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use super::collector::{Collector, Record};
@@ -14,11 +14,11 @@ struct Motor {
     leakage: f64,
     r_r: f64,
     tau_r: f64,
-    /// Voltage of the inverter, V.
+    /// Voltage error of the inverter, V.
     e: f64,
 }
 
-/// The sums of a current that approaches 2.9 A, then 0.72 A, within some 10 ms each.
+/// Returns the sums of a current that approaches 2.9 A, then 0.72 A, within about 10 ms each.
 fn levels(motor: &Motor) -> Collector {
     let mut sums = Collector::default();
     let (mut i, mut i_m, mut last) = (0.0, 0.0, None);
@@ -26,7 +26,7 @@ fn levels(motor: &Motor) -> Collector {
         sums.begin(Record::bins(half, 1.5));
         for _ in 0..9000 {
             let measured = i;
-            // A period in parts: the current moves on a straight line, the flux as it does.
+            // The period is computed in parts: the current moves on a straight line, and the flux follows it.
             let next = i + (level - i) * T / 0.01;
             let (parts, mut volts) = (20, 0.0);
             for part in 0..parts {
@@ -36,7 +36,7 @@ fn levels(motor: &Motor) -> Collector {
             }
             volts += motor.r_s * 0.5 * (i + next) + motor.e + motor.leakage * (next - i) / T;
             i = next;
-            // What acts from this sample to the next was realised in the step before.
+            // The voltage that acts from this sample to the next was realised in the step before.
             if let Some((measured, _)) = last {
                 sums.push(measured, AlphaBeta::new(volts as f32, 0.0), 311.0);
             }
@@ -57,7 +57,7 @@ fn found(sums: &Collector) -> Fitted {
 
 #[test]
 fn the_levels_give_back_the_motor() {
-    // Table 5; a slow rotor; a fast one with much leakage.
+    // The cases are Table 5, a slow rotor, and a fast rotor with much leakage.
     for (r_s, leakage, r_r, tau_r, e) in [
         (5.4, 0.0515, 0.823, 0.186, 7.0),
         (2.7, 0.028, 0.45, 0.7, 12.0),

@@ -1,7 +1,7 @@
 //! Rotor time constant of an induction motor while it runs: [`online`] estimates it from current and voltage by the recursive
 //! least squares of [`rls`].
 //!
-//! Both run in the main loop, in single precision, on what the control step has seen.
+//! Both run in the main loop, in single precision, on the measurements of the control step.
 #![cfg_attr(not(test), no_std)]
 
 extern crate induction_drive_core as drive_core;

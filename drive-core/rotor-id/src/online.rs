@@ -22,10 +22,10 @@
 //!   ([`Command::Magnetising`](drive_core::Command::Magnetising)). The speed of the tracking loop of the
 //!   injection is no substitute, since it contains the assumed slip.
 //!
-//! Changes of speed or torque do not fit a constant machine and restart the estimation; three seconds of
-//! steady operation give the next estimate. Measured on the simulated motor with the encoder, over torque
-//! steps between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time uncompensated and 0.8 to 1.3
-//! times the rotor resistance of the settings: every published estimate is within 6 %.
+//! Changes of speed or torque do not fit a constant machine, so they restart the estimation. Three
+//! seconds of steady operation give the next estimate. Measured on the simulated motor with the encoder,
+//! over torque steps between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time uncompensated and
+//! 0.8 to 1.3 times the rotor resistance of the settings: every published estimate is within 6 %.
 //!
 //! The cost is an estimated 200 cycles of a Cortex-M4 per control period and 1000 more in every eighth,
 //! 2 MHz in all, and the fit ten times a second.
@@ -51,10 +51,10 @@ use num_complex::Complex32;
 const DECIMATION: u8 = 8;
 /// Sampling period of the least squares, s.
 pub const SAMPLE_S: f32 = DECIMATION as f32 * PERIOD_S;
-/// Corner of the filters before the decimation, Hz: they attenuate the carrier by 27 000.
+/// Corner of the filters before the decimation, Hz: they attenuate the injection by 27 000.
 const BEFORE_HZ: f32 = 20.0;
 /// Corner of the filters of the least squares, Hz. They reject the harmonics of the dead time and pass
-/// enough of the fundamental up to some 20 Hz.
+/// enough of the fundamental up to about 20 Hz.
 const CORNER_HZ: f32 = 10.0;
 /// Memory of 1250 samples, 1.7 s.
 const LAMBDA: f32 = 0.9992;

@@ -7,10 +7,10 @@
 //! D i(t+h) = (f1 - 1) D i(t) + (f1 + f0 - 1) i(t-h) + h1 D v(t) + (h1 + h0) v(t-h)
 //! ```
 //!
-//! The least-squares problem is the same, but the small sums that determine resistance and rotor time
-//! constant are unknowns themselves instead of results of a cancellation. Equation and section numbers in
-//! this module are those of that paper. With f1 the speed is Im f1 / h (Eq. 42); the other parameters
-//! follow outside the interrupt.
+//! The least-squares problem is the same, but the small sums that determine the resistance and the rotor
+//! time constant are unknowns themselves instead of the results of a cancellation. Equation and section
+//! numbers in this module refer to that paper. With f1 the speed is Im f1 / h (Eq. 42); the other
+//! parameters follow outside the interrupt.
 //!
 //! Measured against the same recursion in `f64`, 60 s at 20 kHz, six-step with and without a Schroeder
 //! signal at 375 and 61 rad/s, clean and with the noise of section 5: the speed differs by at most
@@ -45,12 +45,12 @@ pub struct RlsSettings {
     pub corner: f32,
     /// Base of the voltage, V, above 1e-9 and below 1e9.
     pub voltage_base: f32,
-    /// Base of the current, A, likewise.
+    /// Base of the current, A, above 1e-9 and below 1e9.
     pub current_base: f32,
     /// Voltage limit, V, 0.1 to 100 times its base: a sample with a component at or beyond it is not used.
     pub voltage_limit: f32,
-    /// Current limit, A, likewise: a sample with a component at or beyond it is not used. A little below the full
-    /// scale of the converter.
+    /// Current limit, A, 0.1 to 100 times its base: a sample with a component at or beyond it is not used. Choose
+    /// it a little below the full scale of the ADC.
     pub current_limit: f32,
 }
 
@@ -82,7 +82,7 @@ const UNKNOWN: f32 = 0.2;
 /// Threshold of a current along one axis (open phase or constant voltage): determinant of its mean square
 /// relative to the squared trace. A circle has 0.25.
 const ONE_AXIS: f32 = 0.01;
-/// These means forget four times faster than the estimate, so an open phase is detected sooner.
+/// Factor by which the memory of these means is shorter than that of the estimate, so that an open phase is detected sooner.
 const AXES: f32 = 4.0;
 /// Minimum mean square of voltage and current, in units of the bases, for a sample to be used.
 const SILENT: f32 = 1e-4;
@@ -112,7 +112,7 @@ pub struct Rls {
     ud: Ud,
     /// Input filters of voltage and current.
     filters: [Filter; 2],
-    /// Of voltage and current: increment one sample ago, value two samples ago, value one sample ago.
+    /// History of voltage and current: increment one sample ago, value two samples ago, value one sample ago.
     history: [[Complex32; 3]; 2],
     /// Mean square of voltage and current.
     power: [f32; 2],

@@ -1,7 +1,8 @@
 //! Settings of an induction motor drive in SI units, and the design of its controllers.
 //!
-//! [`Settings::build`] makes the [`Coefficients`](drive_core::Coefficients) of the control of them, outside its interrupt: it
-//! checks every value against its range and runs the design rules. [`Settings::default`] is the drive of the dissertation.
+//! [`Settings::build`] computes the [`Coefficients`](drive_core::Coefficients) of the control from them, outside its
+//! interrupt: it checks every value against its range and runs the design rules. [`Settings::default`] is the drive of the
+//! dissertation.
 //!
 //! | module | contents |
 //! |---|---|

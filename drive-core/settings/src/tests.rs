@@ -36,11 +36,11 @@ fn what_a_learning_depends_on_is_compared_and_nothing_else() {
         |s| s.injection.synchronous.current_saliency = Some(0.02),
     ];
     assert!(!other.into_iter().any(changed));
-    // Not-a-number is never the same.
+    // NaN is never the same.
     assert!(!changed(|s| s.motor.r_s = f32::NAN));
 }
 
-/// Another value of a setting, inside its range.
+/// Returns another value of a setting, inside its range.
 fn another(entry: &Entry<Settings>, settings: &Settings) -> Value {
     match (entry.get(settings), entry.range(settings)) {
         (Value::Word(word), _) => {
@@ -56,7 +56,7 @@ fn another(entry: &Entry<Settings>, settings: &Settings) -> Value {
     }
 }
 
-/// Paths of all numbers and words in the settings, with their values, from the debug text.
+/// Returns the paths of all numbers and words in the settings, with their values, from the debug text.
 fn fields(settings: &Settings) -> Vec<(String, String)> {
     let text = format!("{settings:#?}");
     let (mut path, mut fields): (Vec<&str>, Vec<(String, String)>) = (Vec::new(), Vec::new());
@@ -68,14 +68,14 @@ fn fields(settings: &Settings) -> Vec<(String, String)> {
                 fields.push((full, rest.to_owned()));
             }
             None if line.starts_with('}') => drop(path.pop()),
-            // The value of an `Option`, on lines of its own.
+            // This is the value of an `Option`, on separate lines.
             None => fields.last_mut().unwrap().1.push_str(line),
         }
     }
     fields
 }
 
-/// Every field but the tables is a row, and a row moves its field alone.
+/// Every field except the tables has a row, and a row changes its own field only.
 #[test]
 fn the_table_is_complete() {
     let before = Settings::default();
@@ -112,7 +112,7 @@ fn names_are_unique_and_every_default_is_in_its_range() {
     assert_eq!(find("inverter.dead_time_s").unwrap().change, Change::FromReset);
 }
 
-/// A value outside the range is named with the range and the unit; beyond both ends, and not-a-number.
+/// A value outside the range, beyond either end or NaN, is named with the range and the unit.
 #[test]
 fn values_out_of_range_are_named() {
     for entry in SETTINGS {
@@ -167,7 +167,7 @@ proptest! {
     }
 }
 
-/// The settings that are changed are named, not those whose rules follow from them, with a range that holds a value.
+/// The error names the setting that was changed, not one whose rule follows from it, with a range that is not empty.
 #[test]
 fn the_changed_setting_is_the_one_that_is_named() {
     let refused = |change: fn(&mut Settings)| {
@@ -194,7 +194,7 @@ fn the_changed_setting_is_the_one_that_is_named() {
     assert_eq!(refused(|s| s.limits.dc_over_v = Some(320.0)), "limits.dc_over_v");
     let low_set: fn(&mut Settings) = |s| s.braking.low_v = Some(205.0);
     assert_eq!(refused(low_set), "braking.low_v");
-    // An amplifier whose output falls with the current.
+    // This is an amplifier whose output falls with the current.
     let mut falling = Settings::default();
     falling.scales.current_a = Line { gain: -0.0024, offset: 4.9 };
     assert!(falling.build().is_ok());
@@ -210,8 +210,8 @@ fn a_range_without_a_value_says_so() {
     assert_eq!(text, whole);
 }
 
-/// The code is the sum of two conversions: half the gain, twice the range, a mean that is a quarter of a period older; the same
-/// currents.
+/// The ADC counts are the sum of two conversions: half the gain, twice the range, and a mean that is a quarter of a period
+/// older. The currents are the same.
 #[test]
 fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older() {
     let mut settings = Settings::default();
@@ -231,7 +231,7 @@ fn the_mean_of_both_zero_vectors_is_half_the_sum_and_a_quarter_of_a_period_older
     assert!((two.estimator.lag - one.estimator.lag - 0.25).abs() < 1e-6);
 }
 
-/// Each of the pulses has a dead time and a shortest pulse of its own: their share grows with the rate. With both zero vectors the
+/// Every pulse has a dead time and a least length, so their share grows with the switching frequency. With both zero vectors, the
 /// upper one is that of the last pulse.
 #[test]
 fn the_share_of_the_dead_time_grows_with_the_carrier() {
@@ -254,7 +254,7 @@ fn the_share_of_the_dead_time_grows_with_the_carrier() {
         assert!((older - 0.25 / times).abs() < 1e-6, "{carrier_khz:?}: {older} periods");
         let circle = circle * 1.732_050_8 / 311.0;
         assert!((circle - (1.0 - times * 0.0264)).abs() < 1e-4, "{carrier_khz:?}: {circle}");
-        // 3.2 us is the shortest pulse: a duty of 1.92 % at 6 kHz.
+        // The shortest pulse is 3.2 us, a duty of 1.92 % at 6 kHz.
         let shortest = times * 3.2e-6 * 6000.0;
         for (duty, wanted) in [(0.99 * shortest, shortest), (0.49 * shortest, 0.0)] {
             let along = AlphaBeta::new((1.0 - 2.0 * duty) * 311.0 * 2.0 / 3.0, 0.0);
@@ -264,8 +264,8 @@ fn the_share_of_the_dead_time_grows_with_the_carrier() {
     }
 }
 
-/// The image is built without the demodulations of the feature `printed`; their words are refused there, and stand for the same
-/// places.
+/// An image that is built without the feature `printed` refuses the words of its demodulations, but the words keep their
+/// positions.
 #[test]
 fn a_word_without_code_is_refused_by_name() {
     let mut settings = Settings::default();

@@ -1,4 +1,5 @@
-//! Every nameplate in its range builds, or is refused by a key of the nameplate, or because the leakage's time constant is too short.
+//! Tests that settings with any nameplate in its range build, or are refused because of a key of the nameplate or because the time
+//! constant of the leakage is too short.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use std::f32::consts::{SQRT_2, TAU};
@@ -7,13 +8,13 @@ use induction_drive_core::Motor;
 use induction_drive_settings::{Flux, Nameplate, Settings, SettingsError};
 use proptest::prelude::*;
 
-/// A value between `from` and `to`, at a share `at` of their distance on a logarithmic scale.
+/// Returns a value between `from` and `to`, at the share `at` of their distance on a logarithmic scale.
 fn log(from: f32, to: f32, at: f32) -> f32 {
     from * (to / from).powf(at)
 }
 
-/// A motor with this nameplate. Its parameters, per unit, lie in the usual range of induction motors, each at a share from 0 to 1; a dc link that gives its
-/// rated voltage, and sensors of `range` times its rated peak current.
+/// Returns settings for a motor with this nameplate. Its parameters, per unit, lie in the usual range of induction motors, each at a share
+/// from 0 to 1. The dc link gives its rated voltage, and the sensors have `range` times its rated peak current.
 fn settings(plate: Nameplate, pole_pairs: u8, at: [f32; 4], range: f32) -> Settings {
     let z = plate.voltage_v / (3_f32.sqrt() * plate.current_a);
     let l = z / (TAU * plate.frequency_hz);
@@ -51,7 +52,7 @@ proptest! {
         let current_a = power_w / (3_f32.sqrt() * voltage_v * power_factor);
         let plate = Nameplate { power_w, voltage_v, current_a, frequency_hz, speed_rpm };
         let s = settings(plate, pole_pairs, at, range);
-        // Before the motor is known, with the flux of a board that is to be commissioned.
+        // These are the settings before the motor is known, with the flux of a board that is to be commissioned.
         let mut unknown = Settings { motor: Motor::DEFAULT, ..s };
         unknown.sequence.flux = Flux::High;
         if let Err(error) = unknown.build().map(drop) {

@@ -1,4 +1,4 @@
-//! Stored settings, commands and states come back to the bit; a name or value that is not allowed is refused by its name.
+//! Tests that stored settings, commands and states are restored bit for bit, and that the refusal of a name or value names it.
 
 use drive_core::{Command, Dq, Fault, Mode, State, Stop};
 use induction_drive_core as drive_core;
@@ -10,7 +10,7 @@ fn read(text: &str) -> Result<Settings, String> {
     serde_json::from_str(text).map_err(|why| why.to_string())
 }
 
-/// Every setting at another value than its default, by the kind of the value.
+/// Returns settings that all differ from their defaults, by the kind of the value.
 fn all_changed(factor: f32) -> Settings {
     let mut settings = Settings::default();
     for entry in SETTINGS {
@@ -51,7 +51,7 @@ fn a_map_names_what_is_set_as_the_console_does() {
         (&map["limits.trip_a"], &map["sequence.flux"]),
         (&expected["limits.trip_a"], &expected["sequence.flux"])
     );
-    // A rule is not stored: it follows the other settings of whoever reads.
+    // A rule is not stored, since it follows from the other settings of the reader.
     assert_eq!(map.get("limits.current_a"), None);
     assert_eq!(serde_json::from_value::<Settings>(expected.into()).unwrap(), settings);
 }
@@ -66,7 +66,7 @@ fn what_is_no_setting_is_refused_by_its_name() {
     ] {
         assert_eq!(read(text).unwrap_err().split(" at line").next(), Some(why));
     }
-    // Ranges depend on other settings and are checked as always.
+    // Ranges depend on other settings and are checked later, as always.
     let settings = read(r#"{"motor.r_s": -1}"#).unwrap();
     assert!(matches!(settings.build(), Err(SettingsError::Range { name: "motor.r_s", .. })));
 }
@@ -91,7 +91,7 @@ fn commands_and_states_come_back() {
         let text = serde_json::to_string(&State::Fault(fault)).unwrap();
         assert_eq!(serde_json::from_str::<State>(&text).unwrap(), State::Fault(fault));
     }
-    // Coefficients are made of settings, not stored.
+    // Coefficients are computed from settings and not stored.
     let coefficients = Settings::default().build().unwrap();
     assert!(serde_json::to_string(&Command::Configure(coefficients)).is_err());
 }

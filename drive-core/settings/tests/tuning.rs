@@ -1,4 +1,4 @@
-//! Design of the controllers against section 3.8 and 4.1, with what is wrong in the print.
+//! Tests the design of the controllers against section 3.8 and 4.1, including the errors of the printed text.
 
 use core::f64::consts::{PI, TAU};
 
@@ -19,7 +19,7 @@ const TABLE_5: EquivalentCircuit =
 const EQ_3_34: FirstOrder = FirstOrder { k: 0.004_053_2, p: 0.93916 };
 const EQ_3_41: FirstOrder = FirstOrder { k: 0.002_837, p: 0.9511 };
 const EQ_3_42: FirstOrder = FirstOrder { k: 0.003_721, p: 0.9503 };
-/// k/((z - 1)(z - p)).
+/// Plant k/((z - 1)(z - p)).
 const EQ_4_1: FirstOrder = FirstOrder { k: 0.01716, p: 0.95782 };
 
 fn table_5() -> FirstOrder {
@@ -44,12 +44,12 @@ fn plant_of_the_motor() {
     let plant = table_5();
     assert_close("k", plant.k, 0.003_205_2, 1e-5);
     assert_close("p", plant.p, 0.980_053, 1e-6);
-    // The zero-order hold is exact: same dc gain as 1/R', same decay as T R'/(sigma L_s).
+    // The zero-order hold is exact: its dc gain is 1/R', and its decay is T R'/(sigma L_s).
     let r = 5.4 + 1.1 * (0.1771f64 / 0.2047) * (0.1771 / 0.2047);
     assert_close("dc gain", plant.k / (1.0 - plant.p), 1.0 / r, 1e-12);
     // Eq. 3.20 prints 0.01973 A/V for 1/R'.
     assert_close("1/R'", 1.0 / r, 0.160_685, 1e-5);
-    // With forward differences, as Eq. 3.25 has it: 0.0032376 and 0.97985, not 0.8359 (3.33).
+    // Forward differences, as in Eq. 3.25, give 0.0032376 and 0.97985, not 0.8359 (3.33).
     let sigma_l_s = 0.2047 - 0.1771 * 0.1771 / 0.2047;
     assert_close("T/(sigma L_s)", T / sigma_l_s, 0.003_237_6, 1e-5);
     assert_close("1 - T R'/(sigma L_s)", 1.0 - T * r / sigma_l_s, 0.979_851, 1e-6);
@@ -67,7 +67,7 @@ fn rule_of_section_3_8() {
         assert_close(&format!("{name} z_c"), rule.z_c, z_c, 1e-6);
         assert_close(&format!("{name} v in Hz"), rule.v / TAU, v_hz, 3e-5);
 
-        // It is what the section says: phase of G/(z - 1), zero at a quarter (2.16), unit gain.
+        // The design meets the section: phase of G/(z - 1), zero at a quarter (2.16), unit gain.
         let omega_t = 2.0 * libm::atan(0.5 * T * rule.v);
         let g = plant.response(omega_t) / (Complex64::cis(omega_t) - Complex64::ONE);
         let phase = g.arg().to_degrees();
@@ -76,7 +76,7 @@ fn rule_of_section_3_8() {
         assert_close("w", w, -rule.v / 4.0, 1e-12);
         let l = pi_response(rule.k_c, rule.z_c, omega_t) * plant.response(omega_t);
         assert_close("gain", l.norm(), 1.0, 1e-12);
-        // The zero's atan(vT/2) of Eq. 2.27 is what the rule leaves out: 6.1° for 3.34.
+        // The rule omits the atan(vT/2) of the zero in Eq. 2.27, which is 6.1° for 3.34.
         assert_close(
             "phase with the zero",
             l.arg().to_degrees(),
@@ -84,7 +84,7 @@ fn rule_of_section_3_8() {
             1e-9,
         );
     }
-    // What is printed was read off a graph: within 1 %.
+    // The printed values were read off a graph and agree within 1 %.
     let rule = rule_3_8(EQ_3_34, T).expect("3.34");
     assert_close("printed k_c", rule.k_c, 52.48, 0.01);
     assert_close("printed z_c", rule.z_c, 0.94786, 2e-4);
@@ -127,8 +127,8 @@ fn what_the_rule_leaves_on_the_motor() {
     }
 }
 
-/// The closed loop in time: k_c (z - z_c)/(z - 1), one period of delay, k/(z - p), LPF; whether the
-/// response to a step of the reference dies out.
+/// Simulates the closed loop of k_c (z - z_c)/(z - 1), one period of delay, k/(z - p) and LPF.
+/// Returns whether the response to a step of the reference settles.
 fn settles(k_c: f64, z_c: f64) -> bool {
     let plant = table_5();
     let mut filter = SosState::default();
@@ -164,7 +164,7 @@ fn margins_tell_stable_from_unstable() {
         assert_eq!(settles(rule.k_c * factor, rule.z_c), stable, "x{factor} in time");
         assert_eq!(m.phase_margin_deg > 0.0, stable);
     }
-    // At three times the gain the peak alone (2.19) would have looked good.
+    // At three times the gain the peak alone (2.19) would look good.
     assert!(on_the_motor(3.0 * rule.k_c, rule.z_c, &LPF.sections).ms < MAX_MS);
 }
 
@@ -178,7 +178,7 @@ fn current_loops_of_the_dissertation() {
     assert!((d.margins.phase_margin_deg - 48.13).abs() < 0.02);
     assert!(d.margins.ms <= MAX_MS && d.margins.ms > MAX_MS - 0.005);
 
-    // Nothing to lower on the other axis, nor for 3.34, nor for a rule fed with the motor's plant.
+    // The gain is not lowered on the other axis, nor for 3.34, nor for the rule with the motor's plant.
     let motor = table_5();
     for (name, plant, pm, ms) in [
         ("3.42", EQ_3_42, 50.08, 2.028),
@@ -205,7 +205,7 @@ fn position_loop_as_printed_is_unstable() {
         poles.iter().fold(0.0f64, |m, p| m.max(p.norm()))
     };
     assert_close("|z| of 4.1 with 4.2", largest(6.466, 0.974), 1.0462, 5e-5);
-    // Stable up to 0.926 with that zero.
+    // With that zero, the loop is stable up to a gain of 0.926.
     for (k_c, stable) in [(1e-3, true), (0.1, true), (0.926, true), (0.927, false), (1.0, false)] {
         assert_eq!(largest(k_c, 0.974) < 1.0, stable, "{k_c}");
     }
@@ -221,11 +221,11 @@ fn position_loop_as_printed_is_unstable() {
     }
 }
 
-/// Acceleration that 1 A gives the motor of Table 5 with 0.012 kg m^2, turns/s^2.
+/// Acceleration of the motor of Table 5 with 0.012 kg m^2 by 1 A, turns/s^2.
 const ACCELERATION: f64 = 26.8 / TAU;
 
-/// Open loop of the position mode, opened at the current: the controller sees the speed and k_x times the position, and the
-/// slope of the reference is fed forward.
+/// Returns the open loop of the position mode, opened at the current: the controller sees the speed and k_x times the
+/// position, and the slope of the reference is fed forward.
 fn open_position_loop(design: &MotionDesign, w: f64, period: f64) -> Complex64 {
     let pi = pi_response(design.gains.k_c, design.gains.z_c, w);
     let slope = (1.0 - Complex64::cis(-w)) / period;
@@ -233,7 +233,7 @@ fn open_position_loop(design: &MotionDesign, w: f64, period: f64) -> Complex64 {
         / (1.0 - (1.0 - design.gains.smoothing) * Complex64::cis(-w));
     let rotor = design.open_loop(w) / pi / smoothed;
     if design.source == SpeedSource::Encoder {
-        // A double integrator that is held over a period: T^2 a / 2 (z + 1)/(z - 1)^2
+        // This is a double integrator with a hold of one period: T^2 a / 2 (z + 1)/(z - 1)^2.
         let z = Complex64::cis(w);
         let held = 0.5 * period * period * ACCELERATION * (z + 1.0) / (z - 1.0).powi(2);
         assert!((rotor / held - 1.0).norm() < 1e-9, "{w}");
@@ -242,12 +242,12 @@ fn open_position_loop(design: &MotionDesign, w: f64, period: f64) -> Complex64 {
     rotor * (pi * smoothed + design.gains.k_x * pi + forward)
 }
 
-/// The margins that are asked for are those of the loop, found here by a scan over the frequencies
-/// instead of the closed form; the position loop keeps most of it.
+/// The loop has the margins that are asked for, as a scan over the frequencies instead of the
+/// closed form shows. The position loop keeps most of the margin.
 #[test]
 fn motion_loops_have_the_margins_asked_for() {
     let tracking = [3.0, 4.0, 8.0].map(|hz| (SpeedSource::Tracking { hz }, 0.01));
-    // Without leakage, and with so much that its low-pass decides.
+    // One source has no leakage, the other so much that its low-pass is the limiting factor.
     let estimated =
         [0.0, 0.01, 0.1].map(|leakage| (SpeedSource::Estimate { slip: 0.0, leakage }, 1.0 / 600.0));
     for (source, t) in [&[(SpeedSource::Encoder, 0.01)], &tracking[..], &estimated].concat() {
@@ -265,15 +265,15 @@ fn motion_loops_have_the_margins_asked_for() {
                 c.source.spread() * c.gains.k_x / TAU,
                 1e-6,
             );
-            // The position's share takes atan 1/4 = 14° at an unchanged crossover; the current that
-            // is fed forward moves the crossover up a little.
+            // The share of the position costs atan 1/4 = 14° at an unchanged crossover. The current
+            // that is fed forward raises the crossover a little.
             assert!(position.phase_margin_deg > margin - 16.0);
             if margin >= 60.0 {
                 assert!(speed.ms < 1.6 && position.ms < 1.8 && position.gain_margin > 2.5);
             }
         }
     }
-    // Twice the inertia needs twice the current, and nothing else changes.
+    // Twice the inertia needs twice the current, and all else is equal.
     let [one, other] = [1.0, 0.5].map(|x| {
         design_motion_loops(x * ACCELERATION, SpeedSource::Tracking { hz: 4.0 }, 60.0, 0.01)
             .expect("designed")
@@ -319,9 +319,9 @@ fn errors_name_the_value_and_its_range() {
     ] {
         assert_eq!(message(result), text);
     }
-    // A motor so slow that nothing of it is left after one period.
+    // The response of this motor decays within one period.
     assert!(motor_plant(&EquivalentCircuit { l_ls: 1e-9, l_lr: 1e-9, ..TABLE_5 }, 1.0).is_err());
-    // An identified plant that is not this motor's: a hundred times its gain.
+    // This identified plant, with a hundred times the gain, does not belong to this motor.
     let wrong = FirstOrder { k: 0.28, p: 0.9511 };
     let error = design_current_loop(wrong, table_5(), T).expect_err("refused");
     println!("{error}");
@@ -331,8 +331,7 @@ fn errors_name_the_value_and_its_range() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever plant was identified: the design either keeps its promises on the motor or is
-    /// refused.
+    /// For any identified plant, the design either meets its margins on the motor or is refused.
     #[test]
     fn a_design_keeps_its_promises(k in -4f64..-1.5, p in 0.5f64..0.995) {
         let plant = FirstOrder { k: libm::pow(10.0, k), p };
@@ -342,7 +341,7 @@ proptest! {
             prop_assert!(c.margins.ms <= MAX_MS, "{c:?}");
             prop_assert!(c.k_c <= c.rule_k_c);
             prop_assert!(settles(c.k_c, c.z_c) , "{c:?}");
-            // Lowered only as far as needed: 1 % more would break one of them.
+            // The gain is lowered only as far as needed: 1 % more would violate one of the margins.
             if c.k_c < c.rule_k_c {
                 let more = on_the_motor(1.01 * c.k_c, c.z_c, &LPF.sections);
                 prop_assert!(

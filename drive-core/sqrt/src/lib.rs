@@ -1,8 +1,8 @@
-//! Square root of an `f32`, correctly rounded: by `VSQRT.F32` of a Cortex-M with a floating-point unit, 14 cycles, and by
-//! [`libm`] elsewhere. `libm` has no instruction for this target and takes 93 cycles; `core::f32::math::sqrt` is not stable yet.
+//! Square root of an `f32`, correctly rounded. It uses `VSQRT.F32` on a Cortex-M with a floating-point unit, 14 cycles, and
+//! [`libm`] elsewhere. `libm` does not use this instruction and takes 93 cycles; `core::f32::math::sqrt` is not stable yet.
 #![no_std]
 
-/// The square root of `x`, correctly rounded, so that host and target agree to the bit; NaN of a negative number.
+/// Returns the square root of `x`, correctly rounded, so that host and target agree to the bit; NaN for a negative number.
 ///
 /// ```
 /// assert_eq!(fpu_sqrt::sqrtf(2.0).to_bits(), 0x3fb5_04f3);
@@ -14,8 +14,8 @@ pub fn sqrtf(x: f32) -> f32 {
     #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
     {
         let mut bits = x.to_bits();
-        // The compiler does not count single precision alone as a feature with registers to choose from.
-        // SAFETY: instructions on registers, without memory, stack or flags.
+        // With single precision alone, the compiler has no register class to choose from, so the
+        // registers are named. SAFETY: instructions on registers, without memory, stack or flags.
         unsafe {
             core::arch::asm!(
                 "vmov s0, {0}",

@@ -1,16 +1,16 @@
-//! Asymmetry of sensors and stator: the part of the carrier current that turns against the injection.
+//! Asymmetry of sensors and stator: the part of the injection current that rotates against the injection axis.
 //!
-//! With the voltage injected along `e^(j theta)`, a motor or sensors that are not symmetric in the stator frame add to the
-//! carrier current `n e^(-j theta)`, `n` a complex number: a gain mismatch, cross-talk from one channel to the other, and a
-//! saliency fixed to the stator alike. The first two also turn the whole current by a constant angle. Along and across the
-//! injection axis, relative to the carrier current,
+//! If the voltage is injected along `e^(j theta)`, a motor or sensors that are not symmetric in the stator frame add
+//! `n e^(-j theta)` to the injection current, with a complex number `n`. Its causes are a gain mismatch, cross-talk from
+//! one channel to the other, and a saliency fixed to the stator. The first two also turn the whole current by a constant
+//! angle. Along and across the injection axis, relative to the injection current,
 //!
 //! ```text
 //! q_n = constant + sin sin 2 theta + cos cos 2 theta              |C| = 1 + sin cos 2 theta - cos sin 2 theta
 //! ```
 //!
-//! with `sin = Re n` and `cos = -Im n`. The three numbers are [learned](crate::identify::learning) and taken out. (Products
-//! with the saliency of the flux are of second order and left.)
+//! with `sin = Re n` and `cos = -Im n`. The three numbers are [learned](crate::identify::learning) and subtracted.
+//! (Products with the saliency of the flux are of second order and neglected.)
 
 use crate::carrier::Saliency;
 use crate::{SQRT_3, UnitVector};
@@ -27,18 +27,19 @@ pub struct Asymmetry {
 }
 
 impl Asymmetry {
-    /// Asymmetry caused by a gain of sensor a higher by `mismatch`/2, and of b lower by as much.
+    /// Returns the asymmetry caused by a gain of sensor a that is higher by `mismatch`/2 and a gain of sensor b that is lower by
+    /// the same amount.
     pub const fn of_gain_mismatch(mismatch: f32) -> Self {
         let d = 0.5 * mismatch;
         Self { constant: -d / SQRT_3, sin: d, cos: -d / SQRT_3 }
     }
 
-    /// The gain mismatch that explains most of these numbers, by least squares.
+    /// Returns the gain mismatch that explains most of these numbers, by least squares.
     pub fn gain_mismatch(&self) -> f32 {
         1.2 * (self.sin - (self.cos + self.constant) / SQRT_3)
     }
 
-    /// Sum of this one and a `share` of the other.
+    /// Returns the sum of this asymmetry and a `share` of the other.
     pub fn plus(&self, other: &Self, share: f32) -> Self {
         Self {
             constant: self.constant + share * other.constant,
@@ -47,20 +48,21 @@ impl Asymmetry {
         }
     }
 
-    /// Root of the sum of the squares.
+    /// Returns the root of the sum of the squares.
     pub fn size(&self) -> f32 {
         let Self { constant, sin, cos } = self;
         fpu_sqrt::sqrtf(constant * constant + sin * sin + cos * cos)
     }
 
-    /// Takes the asymmetry out of a saliency that was seen with the injection along `axis`.
+    /// Removes the asymmetry from a saliency that was measured with the injection along `axis`.
     pub fn take_out(&self, saliency: &mut Saliency, axis: UnitVector) {
         let twice = axis.turned_by(axis);
         saliency.q -= self.constant + self.sin * twice.sin + self.cos * twice.cos;
         saliency.carrier_squared *= 1.0 - 2.0 * self.along(twice);
     }
 
-    /// Part of the relative carrier current along the injection axis, whose doubled angle is `twice`.
+    /// Returns the part of the asymmetry in the relative injection current along the injection axis, whose doubled angle is
+    /// `twice`.
     pub(crate) fn along(&self, twice: UnitVector) -> f32 {
         self.sin * twice.cos - self.cos * twice.sin
     }
@@ -72,8 +74,9 @@ mod tests {
     use super::*;
     use crate::Angle;
 
-    /// Carrier current along the axis and saliency across it, relative to the ideal one, for a current `e^(j theta)`
-    /// that both sensors and the stator distort: `i_a` becomes `a i_a + x i_b`, `i_b` becomes `b i_b`.
+    /// Returns the injection current along the axis and the saliency across it, relative to the ideal current, for a
+    /// current `e^(j theta)` that both sensors and the stator distort: `i_a` becomes `a i_a + x i_b`, `i_b` becomes
+    /// `b i_b`.
     fn seen(theta: f64, a: f64, b: f64, x: f64) -> (f64, f64) {
         let (i_a, i_b) = (theta.cos(), (theta - core::f64::consts::TAU / 3.0).cos());
         let (m_a, m_b) = (a * i_a + x * i_b, b * i_b);
@@ -83,7 +86,7 @@ mod tests {
 
     #[test]
     fn sensors_that_differ_are_taken_out_at_every_angle() {
-        // The numbers of each error by the mean over a turn, an independent way.
+        // The numbers of each error are computed independently, by the mean over a turn.
         for (a, b, x) in [(1.01, 0.99, 0.0), (1.0, 1.0, 0.01), (0.997, 1.004, -0.02)] {
             let mut found = [0.0_f64; 3];
             let angles = (0..720).map(|n| f64::from(n) * core::f64::consts::TAU / 720.0);
@@ -99,7 +102,7 @@ mod tests {
                 let rest = asymmetry.plus(&Asymmetry::of_gain_mismatch(0.02), -1.0);
                 assert!(rest.size() < 1e-4, "{rest:?}");
             }
-            // Without asymmetry the carrier is constant; its mean over the angles is common to both sensors.
+            // Without asymmetry the injection current is constant; its mean over the angles is common to both sensors.
             let mean = angles.clone().map(|theta| seen(theta, a, b, x).0).sum::<f64>() / 720.0;
             for theta in angles {
                 let (along, q) = seen(theta, a, b, x);
@@ -110,7 +113,7 @@ mod tests {
                 };
                 let axis = Angle::from_turns((theta / core::f64::consts::TAU) as f32);
                 asymmetry.take_out(&mut saliency, axis.unit_vector());
-                // Left is the second order: the square of 2 %.
+                // The rest is of second order, the square of 2 %.
                 assert!(saliency.q.abs() < 2e-5, "{a} {b} {x} {theta}: {saliency:?}");
                 assert!((saliency.carrier_squared - 1.0).abs() < 2e-3, "{theta}: {saliency:?}");
             }

@@ -1,9 +1,9 @@
-//! Asymmetry of sensors and stator, measured at a start before there is current or flux.
+//! Asymmetry of sensors and stator, measured at a start before there is fundamental current or flux.
 //!
-//! Under torque at zero stator frequency an asymmetry that the drive does not know holds the frame, and nothing tells it from the
-//! saliency of the flux. Without flux and without direct current there is no other saliency: what is seen with the injection along
-//! phase a, 60° and 120° ahead of it is the [asymmetry](super::asymmetry) alone. (Along these axes the inverter's voltage drops lie
-//! along the carrier, too.)
+//! Under torque at zero stator frequency, an unknown asymmetry pulls the estimated angle onto the stator, and cannot be
+//! distinguished from the saliency of the flux. Without flux and without d-axis current there is no other saliency, so an injection
+//! along phase a, then 60° and 120° ahead of it, shows the [asymmetry](super::asymmetry) alone. (Along these axes the inverter
+//! voltage errors also lie along the injected voltage.)
 //!
 //! ```text
 //! q(0°) = constant + cos      q(60°), q(120°) = constant - cos/2 +- sin sqrt3/2
@@ -12,40 +12,41 @@
 use crate::carrier::Asymmetry;
 use crate::{SQRT_3, UnitVector, periods};
 
-/// Injection axes, from phase a.
+/// Injection axes, as angles from phase a.
 const AXES: [UnitVector; 3] = [
     UnitVector { cos: 1.0, sin: 0.0 },
     UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 },
     UnitVector { cos: -0.5, sin: 0.5 * SQRT_3 },
 ];
-/// Time in which the averages of the demodulation settle, and averaging time of a start and of a learning, of each axis, s.
+/// Settling time of the averages of the demodulation, and averaging time of each axis at a start and at a self-commissioning, s.
 const SETTLE_S: f32 = 0.02;
 const AVERAGE_S: f32 = 0.24;
 const LEARNING_S: f32 = 0.96;
-/// The measurement at a start.
+/// Measurement at a start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtStart {
-    /// Control periods in which flux that is left decays first.
+    /// Control periods in which a residual flux decays first.
     pub decay: u32,
-    /// Asymmetry that the start of the learning measured, less the learned one: later starts are compared with it. None where nothing was
-    /// learned.
+    /// Asymmetry that was measured at the start of the self-commissioning, less the learned one. Later starts are compared with it. None
+    /// if nothing was learned.
     pub learned: Option<Asymmetry>,
 }
 
 /// State of the measurement: sums of q.
 #[derive(Clone, Copy, Debug)]
 pub struct AtStartState {
-    /// Averaging time of an axis, control periods.
+    /// Averaging time per axis, control periods.
     average: u32,
     q: [f32; AXES.len()],
 }
 
 impl AtStart {
-    /// Amplitude of the carrier relative to that beside a current: as much as the search for a turning shaft draws.
+    /// Amplitude of the injection relative to the amplitude during operation. The larger current is acceptable, since the search of
+    /// a flying start draws as much.
     pub const CARRIER_SHARE: f32 = 2.0;
 
-    /// Takes the saliency, which known asymmetries were taken out of, `elapsed` control periods after the begin; returns the injection
-    /// axis for the next one, or `None` at the end.
+    /// Processes the saliency without the known asymmetries, `elapsed` control periods after the beginning. Returns the injection axis
+    /// for the next period, or `None` at the end.
     pub fn step(&self, state: &mut AtStartState, elapsed: u32, q: f32) -> Option<UnitVector> {
         let all = periods(SETTLE_S) + state.average;
         let elapsed = elapsed.saturating_sub(self.decay);
@@ -57,20 +58,21 @@ impl AtStart {
         AXES.get(number as usize).copied()
     }
 
-    /// Change of the asymmetry since the learning; none where nothing was learned.
+    /// Returns the change of the asymmetry since the self-commissioning; none if nothing was learned.
     pub fn change(&self, state: &AtStartState) -> Option<Asymmetry> {
         Some(state.found().plus(&self.learned?, -1.0))
     }
 }
 
 impl AtStartState {
-    /// The measurement of a start; that of a learning, which all later ones are compared with, takes longer.
+    /// Begins the measurement of a start. The measurement of a self-commissioning (`learns`), with which all later ones are
+    /// compared, takes longer.
     pub fn new(learns: bool) -> Self {
         let average = periods(if learns { LEARNING_S } else { AVERAGE_S });
         Self { average, q: [0.0; AXES.len()] }
     }
 
-    /// The asymmetry that was seen beyond the known one.
+    /// Returns the measured asymmetry beyond the known one.
     pub fn found(&self) -> Asymmetry {
         let [along_a, ahead, behind] = self.q.map(|sum| sum / self.average as f32);
         let constant = (along_a + ahead + behind) * (1.0 / 3.0);
@@ -85,7 +87,7 @@ mod tests {
 
     const WITHOUT_DECAY: AtStart = AtStart { decay: 0, learned: None };
 
-    /// The saliency that this asymmetry causes with the injection along `axis`.
+    /// Returns the saliency that this asymmetry causes with the injection along `axis`.
     fn seen(of: &Asymmetry, axis: UnitVector) -> Saliency {
         let mut seen = Saliency { q: 0.0, carrier_squared: 0.05, i_q: 0.0 };
         let minus = Asymmetry::default().plus(of, -1.0);
@@ -93,7 +95,7 @@ mod tests {
         seen
     }
 
-    /// The measurement of this asymmetry, with these values instead while the averages settle.
+    /// Measures this asymmetry; while the averages settle, the value is `unsettled`.
     fn measured(of: &Asymmetry, unsettled: f32) -> (AtStartState, u32) {
         let (mut state, mut axis) = (AtStartState::new(false), AXES[2]);
         let at_start = AtStart { decay: 777, learned: None };
@@ -124,8 +126,8 @@ mod tests {
         }
     }
 
-    /// White noise of 0.2 % at twice the carrier, which the demodulation has averaged over four carrier periods, makes a change of 0.024 %
-    /// rms; a change is found with this error.
+    /// White noise of 0.2 % at twice the injection, which the demodulation averages over four injection periods, causes an error of 0.024
+    /// % rms of a change.
     #[test]
     fn noise_makes_a_small_error() {
         let mut x = 1_u32;

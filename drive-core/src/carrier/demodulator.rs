@@ -1,16 +1,16 @@
-//! Demodulators: five ways to extract the saliency from the sampled current.
+//! Five demodulators that extract the saliency from the sampled current.
 //!
 //! All rotate the current into the dm-qm frame, whose axes lie 45° to either side of the injection axis,
 //! and compare its two channels. With a saliency `s` (complex; its angle is twice the angle from the
-//! injection axis to the axis of the lower inductance) the two carrier currents are `I/sqrt2 (1 + Re s -+
-//! Im s)`, so each signal below is a multiple of `Im s`: zero on the axes of the saliency, and steepest
-//! there.
+//! injection axis to the axis of the lower inductance) the two injection currents are
+//! `I/sqrt2 (1 + Re s -+ Im s)`, so each signal below is a multiple of `Im s`: zero on the axes of the
+//! saliency, and steepest there.
 //!
 //! | | output | content |
 //! |---|---|---|
 //! | [`Literal`] | A | leakage of the fundamental, not the saliency |
 //! | [`Rectified`] | A, 0.60 of the amplitude | saliency; leakage through the band-pass as ripple |
-//! | [`RmsImpedance`] | ohm | saliency, with the carrier along the flux (Ha and Sul) |
+//! | [`RmsImpedance`] | ohm | saliency, with the injection along the flux (Ha and Sul) |
 //! | [`Envelope`] | A, 0.945 of the amplitude | saliency, with the least delay behind a band-pass |
 //! | `SynchronousState` | dimensionless | saliency, independent of amplitude and inductance |
 //!
@@ -53,32 +53,32 @@ pub use absent::Demodulator;
 #[cfg(feature = "printed")]
 use crate::{carrier::CarrierSample, filter::BPF, filter::SosState, math::frames::DmQm};
 
-/// A demodulator with its state; at rest after [`Default`] or `new`.
+/// A demodulator with its state, which is at rest after [`Default`] or `new`.
 #[cfg(feature = "printed")]
 pub trait Demodulate {
     /// Demodulates one sample; returns the demodulated signal.
     fn step(&mut self, sample: &CarrierSample) -> f32;
 }
 
-/// In place of the demodulators that are compared.
+/// Replaces the compared demodulators in a build without them.
 #[cfg(not(feature = "printed"))]
 mod absent {
     use crate::carrier::{CarrierSample, DemodulatorKind};
 
-    /// No demodulator beside the synchronous one.
+    /// Placeholder for the compared demodulators, which do not exist in this build.
     #[derive(Clone, Copy, Debug, Default)]
     pub struct Demodulator;
 
     impl Demodulator {
-        /// Starts nothing.
+        /// Does nothing.
         pub fn start(&mut self, _: DemodulatorKind, _: u8) {}
 
-        /// Whether it rotates the output of the band-pass.
+        /// Whether the demodulator rotates the output of the band-pass.
         pub fn rotates_output(&self) -> bool {
             false
         }
 
-        /// No signal.
+        /// Returns no signal.
         pub fn step(&mut self, _: &CarrierSample, _: f32) -> f32 {
             0.0
         }
@@ -89,9 +89,9 @@ mod absent {
 #[cfg(feature = "printed")]
 type RotatedBandPass = SosState<DmQm, 2>;
 
-/// Carrier currents of the dm and qm channels, A, filtered after the rotation as in Figure 9. In
-/// this order the filter delays the saliency but not the angle of the frame, and the speed of the
-/// frame does not appear.
+/// Returns the injection currents of the dm and qm channels, A, filtered after the rotation as in
+/// Figure 9. In this order the filter delays the saliency but not the angle of the frame, and the
+/// speed of the frame does not appear.
 #[cfg(feature = "printed")]
 fn rotated_carrier(state: &mut RotatedBandPass, sample: &CarrierSample) -> DmQm {
     BPF.step(state, sample.current.to_dm_qm(sample.dm_axis()))

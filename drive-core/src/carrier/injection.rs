@@ -2,14 +2,14 @@
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 //!
 //! The fundamental may leave too little voltage for the full amplitude. [`Carrier::fit`] then reduces the
-//! carrier to a `share` of it, and reports when less than half would remain.
+//! injected voltage to a `share` of that amplitude, and reports when less than half would remain.
 
 use crate::{Dq, Fault, FirstOrder, PERIOD_S};
 use num_complex::{Complex32, Complex64};
 
-/// Samples per period of the carrier.
+/// Samples per injection period.
 pub const CARRIER_SAMPLES: usize = 10;
-/// Period of the carrier, s.
+/// Injection period, s.
 pub const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 
 /// `cos(2 pi k / 10)`.
@@ -25,34 +25,35 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
     0.0, -0.587_785_24, -0.951_056_5, -0.951_056_5, -0.587_785_24,
 ];
 
-/// Half of the change of a sine over a PWM period, per mean of the sine a quarter ahead of it: the tangent of 18 degrees.
+/// Half of the change of a sine over a PWM period, relative to the mean of the sine that is a quarter period ahead: the tangent of
+/// 18 degrees.
 const HALF_CHANGE: f32 = 0.324_919_7;
 
-/// Coefficients of the injection: the carrier's voltage and the currents that it makes, as phasors.
+/// Coefficients of the injection: the injected voltage and the currents that it causes, as phasors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
     /// Amplitude of the voltage, V peak.
     pub amplitude: f32,
-    /// Amplitude of the carrier current along the injection axis at full voltage, A peak.
+    /// Amplitude of the injection current along the injection axis at full voltage, A peak.
     pub current_amplitude: f32,
-    /// Mean of the carrier current over a period, and the current in the sample from which the period is computed, A.
+    /// Mean of the injection current over a period, and its value in the sample from which the period is computed, A.
     mean: Complex32,
     sampled: Complex32,
 }
 
 impl Injection {
-    /// The carrier for an amplitude in V peak.
+    /// Creates the injection with an amplitude in V peak.
     ///
-    /// `plant` is the current response of the motor, A/V, at the control rate (ten times the carrier
-    /// frequency); `analog` the time constant of the analog current filter in samples.
+    /// `plant` is the current response of the motor, A/V, at the control rate (ten times the
+    /// injection frequency); `analog` is the time constant of the analog current filter in samples.
     pub fn new(amplitude_v: f32, plant: FirstOrder, analog: f32) -> Self {
-        // Steady-state response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current
-        // at the start of period n is V k / (e^(j w) - p) e^(j w n). Its mean over the period equals
-        // the mean of the samples at both ends to 0.1 %.
+        // The steady-state response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the
+        // current at the start of period n is V k / (e^(j w) - p) e^(j w n). Its mean over the period
+        // equals the mean of the samples at both ends to 0.1 %.
         let turn = Complex64 { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
         let response = Complex64 { re: plant.k, im: 0.0 } / (turn - plant.p);
-        // The voltage computed in step k acts from sample k + 1 on: sample k shows the response to
-        // period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
+        // The voltage computed in step k acts from sample k + 1 on. Sample k shows the response to
+        // period k - 1, H e^(-j w), after the analog filter 1 / (1 + j w tau).
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
         let sampled = response / (turn * Complex64 { re: 1.0, im: w * f64::from(analog) });
         let phasor = |z: Complex64| Complex32::new(z.re as f32, z.im as f32) * amplitude_v;
@@ -65,58 +66,60 @@ impl Injection {
     }
 }
 
-/// State of the carrier: position in its period, and share of the amplitude in use.
+/// State of the injection: position in its period, and share of the amplitude in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carrier {
     index: usize,
-    /// Share of the full amplitude in use; lower where the fundamental leaves too little voltage, above 1 only without a current.
+    /// Share of the full amplitude in use. It is lower if the fundamental leaves too little voltage, and above 1 only without a
+    /// fundamental current.
     pub share: f32,
     /// 1 / `share`^2.
     pub per_share_squared: f32,
-    /// Carrier periods since the share changed.
+    /// Injection periods since the share changed.
     unchanged: u8,
 }
 
 impl Default for Carrier {
-    /// At the beginning of a carrier period, full amplitude.
+    /// Begins an injection period with full amplitude.
     fn default() -> Self {
         Self { index: 0, share: 1.0, per_share_squared: 1.0, unchanged: u8::MAX }
     }
 }
 
-/// Decrease of the share per carrier period. Fast: a voltage outside the hexagon is shortened, which
-/// rotates the carrier.
+/// Decrease of the share per injection period. It is fast, because a voltage outside the hexagon is
+/// shortened, which rotates the injected voltage.
 const SHARE_DOWN: f32 = 1.0 / 16.0;
-/// Increase of the share per carrier period.
+/// Increase of the share per injection period.
 const SHARE_UP: f32 = 1.0 / 64.0;
-/// Headroom required before the share is increased, as a share; it prevents hunting.
+/// Headroom required before the share is increased, as a share of the amplitude; it prevents hunting.
 const SHARE_MARGIN: f32 = 0.125;
-/// Minimum share: noise causes twice the angle error there.
+/// Minimum share, at which noise causes twice the angle error.
 const LEAST_SHARE: f32 = 0.5;
-/// Carrier periods until a change of the share has left the demodulation: 40 samples.
+/// Injection periods until a change of the share has left the demodulation: 40 samples.
 const FORGOTTEN: u8 = 4;
 
-/// The carrier in one PWM period.
+/// The injection in one PWM period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CarrierPeriod {
     /// Voltage along the injection axis, V.
     pub voltage: f32,
-    /// Expected mean of the carrier current along the injection axis over the period, A.
+    /// Expected mean of the injection current along the injection axis over the period, A.
     pub mean_current: f32,
-    /// Half of the expected change of the carrier current from the beginning of the period to its end, A.
+    /// Half of the expected change of the injection current from the beginning of the period to its end, A.
     pub half_change: f32,
-    /// Expected carrier current along the injection axis in the sample from which this period is
+    /// Expected injection current along the injection axis in the sample from which this period is
     /// computed, A.
     pub sampled: f32,
-    /// Cosine of the carrier phase.
+    /// Cosine of the phase of the injection.
     pub cos: f32,
-    /// Sine of the carrier phase.
+    /// Sine of the phase of the injection.
     pub sin: f32,
 }
 
 impl Carrier {
-    /// Adapts the share to the voltage that the `fundamental`, V peak, leaves; called once per carrier
-    /// period. `largest` is the largest vector that the inverter realises in every direction, V peak.
+    /// Adapts the share to the voltage that the `fundamental`, V peak, leaves; called once per
+    /// injection period. `largest` is the largest vector that the inverter realises in every
+    /// direction, V peak.
     ///
     /// # Errors
     /// [`Fault::CarrierNoRoom`] when less than half of the amplitude fits.
@@ -147,7 +150,7 @@ impl Carrier {
         Fault::CarrierNoRoom.unless(share >= LEAST_SHARE)
     }
 
-    /// Sets the share; from above 1 it falls until it fits, and does not rise.
+    /// Sets the share. A share above 1 falls until it fits, and does not rise.
     pub fn set(&mut self, share: f32) {
         (self.share, self.per_share_squared, self.unchanged) = (share, 1.0 / (share * share), 0);
     }
@@ -157,21 +160,21 @@ impl Carrier {
         self.unchanged > FORGOTTEN
     }
 
-    /// Advances to the next PWM period and returns its index in the carrier period, 0 to 9. It counts
-    /// with or without a carrier.
+    /// Advances to the next PWM period and returns its index in the injection period, 0 to 9. It
+    /// counts with or without an injection.
     pub fn advance(&mut self) -> usize {
-        // Always below ten; the test guards against a flipped bit.
+        // The index is always below ten; the comparison guards against a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
         index
     }
 
-    /// Whether PWM period `index` of the carrier period was the last one.
+    /// Whether PWM period `index` of the injection period was the last one.
     pub fn is_behind(&self, index: usize) -> bool {
         self.index == index + 1
     }
 
-    /// The carrier in PWM period `index`.
+    /// Returns the injection in PWM period `index`.
     pub fn at(&self, injection: &Injection, index: usize) -> CarrierPeriod {
         let index = if index < CARRIER_SAMPLES { index } else { 0 };
         let turn = Complex32 { re: CARRIER_COS[index], im: CARRIER_SIN[index] };
@@ -203,7 +206,7 @@ mod tests {
 
     #[test]
     fn expected_current_is_the_simulated_one() {
-        // Motor of Table 5 (R' = 6.22 ohm, sigma L_s = 51.5 mH), 50 V: 0.26 A (notes: 50 / 194).
+        // For the motor of Table 5 (R' = 6.22 ohm, sigma L_s = 51.5 mH), 50 V cause 0.26 A (50 / 194).
         let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
         let injection = Injection::new(50.0, plant, 0.0);
         let mut carrier = Carrier::default();
@@ -223,7 +226,7 @@ mod tests {
             }
             i = next;
         }
-        // Ten samples a period reach the peak to within 5 %.
+        // With ten samples a period, one is within 5 % of the peak.
         let ratio = peak / f64::from(injection.current_amplitude);
         assert!((0.95..=1.0001).contains(&ratio), "{ratio}");
         assert!((injection.current_amplitude - 0.26).abs() < 0.01);
@@ -247,7 +250,8 @@ mod tests {
         }
     }
 
-    /// 50 V beside 100 V: down by sixteenths to what fits, up by a 64th where an eighth more fits.
+    /// 50 V are injected beside 100 V. The share falls by sixteenths to the share that fits, and rises by a 64th if an eighth more
+    /// fits.
     #[test]
     fn the_share_is_what_fits() {
         let injection = Injection::new(50.0, FirstOrder { k: 0.003_205_2, p: 0.980_053 }, 0.0);

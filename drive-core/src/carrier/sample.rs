@@ -10,12 +10,12 @@ pub struct CarrierSample {
     pub current: AlphaBeta,
     /// Injection axis `e^(j theta)` in the stator frame, delayed by the lag of the sampled current.
     pub axis: UnitVector,
-    /// The carrier in this period.
+    /// The injection in this period.
     pub carrier: CarrierPeriod,
 }
 
 impl CarrierSample {
-    /// The dm axis `e^(j (theta - 45°))`.
+    /// Returns the dm axis `e^(j (theta - 45°))`.
     #[cfg(feature = "printed")]
     pub(super) fn dm_axis(&self) -> UnitVector {
         const HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
@@ -26,15 +26,15 @@ impl CarrierSample {
 /// Output of the synchronous demodulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Saliency {
-    /// Saliency component `q` across the injection axis, dimensionless; 0 without a carrier.
+    /// Saliency component `q` across the injection axis, dimensionless; 0 without injection.
     pub q: f32,
-    /// Squared amplitude of the carrier current along the injection axis, A^2.
+    /// Squared amplitude of the injection current along the injection axis, A^2.
     pub carrier_squared: f32,
-    /// Reference of the quadrature current, averaged and delayed like `q`, A.
+    /// Q-axis current reference, averaged and delayed like `q`, A.
     pub i_q: f32,
 }
 
-/// Carrier current of one carrier period as complex amplitudes `(re, im)`, A peak.
+/// Injection current of one injection period as complex amplitudes `(re, im)`, A peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarrierCurrent {
     /// Component along the injection axis.

@@ -1,47 +1,48 @@
 //! Synchronous demodulation: the saliency as a dimensionless number.
 //!
 //! The sampled current is resolved along and across the injection axis. Both components are mixed with
-//! the carrier frequency and averaged twice over two carrier periods:
+//! the injection frequency and averaged twice over two injection periods:
 //!
 //! ```text
 //! X = MA20 MA20 ( 2 i_along e^(-j 2 pi k/10) )       Y likewise from i_across
 //! q = -Re( Y conj(X) ) / |X|^2
 //! ```
 //!
-//! In the channels of the dm-qm frame, A = (X - Y)/sqrt2 and B = (X + Y)/sqrt2, this is
-//! ( |A|^2 - |B|^2 ) / |A + B|^2. Dividing by the component along the injection axis removes the injected
-//! amplitude, the dc link and the leakage inductance; taking magnitudes removes the phase of the carrier.
-//! The averages have zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks
-//! through the printed band-pass, is rejected. They delay `q` by 19 samples (3.2 ms).
+//! In the channels of the dm-qm frame, A = (X - Y)/sqrt2 and B = (X + Y)/sqrt2, this is ( |A|^2 - |B|^2 )
+//! / |A + B|^2. Dividing by the component along the injection axis removes the injected amplitude, the dc
+//! link and the leakage inductance; taking magnitudes removes the phase of the injection. The averages
+//! have zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through the
+//! printed band-pass, is rejected. They delay `q` by 19 samples (3.2 ms).
 //!
-//! The averages are evaluated once per carrier period. Their weights rise by one per sample for twenty
-//! samples and then fall, so over the ten samples of a carrier period they are a constant and a ramp. Two
-//! sums per signal are updated in every sample, `S = sum x` and `D = sum S`; once per carrier period
+//! The averages are evaluated once per injection period. Their weights rise by one per sample for twenty
+//! samples and then fall, so over the ten samples of an injection period they are a constant and a ramp.
+//! Two sums per signal are updated in every sample, `S = sum x` and `D = sum S`; once per injection
+//! period
 //!
 //! ```text
-//! 400 X = D[0] + (10 S + D)[1] + (20 S - D)[2] + (10 S - D)[3]        [n]: n carrier periods ago
+//! 400 X = D[0] + (10 S + D)[1] + (20 S - D)[2] + (10 S - D)[3]        [n]: n injection periods ago
 //! ```
 //!
-//! All sums restart with every carrier period, so that rounding does not accumulate. The
-//! [drive](crate::Drive) calls the functions that run once per carrier period.
+//! All sums restart with every injection period, so that rounding does not accumulate. The
+//! [drive](crate::Drive) calls the functions that run once per injection period.
 
 use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::carrier::{CarrierCurrent, CarrierSample, Saliency};
 
-/// Sample of the carrier period in which [`average_reference`](SynchronousState::average_reference) is to
-/// be called: the reference current then has the same delay as the other signals.
+/// Sample of the injection period in which [`average_reference`](SynchronousState::average_reference) is
+/// to be called: the reference current then has the same delay as the other signals.
 pub const REFERENCE_AT: usize = 5;
 
-/// Lag of the averages where they are evaluated, one sample after the last one that they contain, samples.
+/// Lag of the averages at their evaluation, one sample after the last sample that they contain, samples.
 pub const AVERAGES_LAG: f32 = 20.0;
 
 /// Mixed current: real and imaginary part along the axis, real and imaginary part across it.
 type Mixed = [f32; 4];
 
-/// Contributions of earlier carrier periods to the average of one signal, A: its state in transposed form.
+/// Contributions of earlier injection periods to the average of one signal, A: its state in transposed form.
 type Earlier = [f32; 3];
 
-/// Adds one carrier period and returns the average, times [`WEIGHTS`].
+/// Adds one injection period and returns the average, times [`WEIGHTS`].
 fn average(earlier: &mut Earlier, sum: f32, ramp: f32) -> f32 {
     const N: f32 = CARRIER_SAMPLES as f32;
     let [one, two, three] = *earlier;
@@ -56,10 +57,10 @@ const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    /// The sums `S` and `D` over the present carrier period, A.
+    /// The sums `S` and `D` over the present injection period, A.
     sum: Mixed,
     ramp: Mixed,
-    /// Sum over the previous carrier period, A.
+    /// Sum over the previous injection period, A.
     last: Mixed,
     earlier: [Earlier; 4],
     /// X and Y, times [`WEIGHTS`], A.
@@ -70,7 +71,7 @@ pub struct SynchronousState {
 }
 
 impl SynchronousState {
-    /// Mixes one sample with the carrier and adds it to the sums; called in every control period.
+    /// Mixes one sample with the injection frequency and adds it to the sums; called in every control period.
     pub fn mix(&mut self, sample: &CarrierSample) {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
@@ -81,7 +82,7 @@ impl SynchronousState {
         }
     }
 
-    /// Updates the averages and restarts the sums; called once per carrier period, after its last sample.
+    /// Updates the averages and restarts the sums; called once per injection period, after its last sample.
     pub fn average(&mut self) {
         for n in 0..self.sum.len() {
             self.mean[n] = average(&mut self.earlier[n], self.sum[n], self.ramp[n]);
@@ -90,15 +91,15 @@ impl SynchronousState {
         (self.sum, self.ramp) = ([0.0; 4], [0.0; 4]);
     }
 
-    /// Averages the reference of the quadrature current, `now`, A, over four carrier periods with weights
-    /// 1, 3, 3, 1 eighths; called once per carrier period, in sample [`REFERENCE_AT`].
+    /// Averages the q-axis current reference `now`, A, over four injection periods with weights 1, 3, 3,
+    /// 1 eighths; called once per injection period, in sample [`REFERENCE_AT`].
     pub fn average_reference(&mut self, now: f32) {
         let (i_q, [one, two, three]) = (0.125 * now, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
         self.saliency.i_q = i_q + one;
     }
 
-    /// Computes the saliency from the averages; called once per carrier period, after
+    /// Computes the saliency from the averages; called once per injection period, after
     /// [`average`](Self::average).
     pub fn update_saliency(&mut self) {
         // The mean of the mixed current is half the amplitude.
@@ -111,14 +112,14 @@ impl SynchronousState {
         self.saliency.carrier_squared = squared;
     }
 
-    /// The carrier current of the previous carrier period.
+    /// Returns the injection current of the previous injection period.
     pub fn carrier_current(&self) -> CarrierCurrent {
         let [x_re, x_im, y_re, y_im] = self.last.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
         CarrierCurrent { along: (x_re, x_im), across: (y_re, y_im) }
     }
 }
 
-/// Squared carrier current below which the saliency is reported as 0, A^2.
+/// Squared injection current below which the saliency is reported as 0, A^2.
 const LEAST: f32 = 5e-7;
 
 #[cfg(test)]
@@ -130,7 +131,7 @@ pub(crate) mod tests {
     use crate::{AlphaBeta, Angle};
     use core::f64::consts::TAU;
 
-    /// Sample `k` of a current, injected along `axis`.
+    /// Returns sample `k` of a current, injected along `axis`.
     fn sample(current: AlphaBeta, axis: Angle, k: usize) -> CarrierSample {
         let k = k % CARRIER_SAMPLES;
         let (cos, sin) = (CARRIER_COS[k], CARRIER_SIN[k]);
@@ -138,7 +139,7 @@ pub(crate) mod tests {
         CarrierSample { current, axis: axis.unit_vector(), carrier }
     }
 
-    /// The demodulation with what is done once a carrier period, when the drive does it.
+    /// The demodulation together with its calls once an injection period, in the samples in which the drive makes them.
     #[derive(Default)]
     pub(crate) struct InTurn {
         state: SynchronousState,
@@ -160,8 +161,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
-    /// on top of a fundamental of 3 A.
+    /// Runs an injection current of `amplitude` A in direction `turn` from the injection axis, on
+    /// top of a fundamental of 3 A, until q is steady.
     fn steady(amplitude: f64, turn: f64, phase: f64) -> SynchronousState {
         let theta = 0.7;
         let axis = Angle::from_radians(theta as f32);
@@ -179,8 +180,8 @@ pub(crate) mod tests {
 
     #[test]
     fn q_is_the_turn_of_the_carrier_current_whatever_its_size_and_phase() {
-        // A carrier turned by x from the axis has dm = cos(45° + x), qm = cos(45° - x) parts:
-        // q = -sin(2x) / (2 cos^2 x) = -tan x.
+        // A current turned by x from the axis has dm = cos(45° + x), qm = cos(45° - x) parts: q =
+        // -sin(2x) / (2 cos^2 x) = -tan x.
         for (amplitude, phase) in [(0.26, 0.0), (0.26, 1.0), (0.05, 2.0), (0.5, -0.4)] {
             for x in [-0.1, -0.01, 0.0, 0.03] {
                 let state = steady(amplitude, x, phase);
@@ -203,7 +204,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Against the moving averages of the definition, in f64, on noise.
+    /// Compares with the moving averages of the definition, in f64, on noise.
     #[test]
     fn the_averages_are_two_moving_averages_of_twenty_samples() {
         let (mut demodulation, axis) = (InTurn::default(), Angle::ZERO);
@@ -221,7 +222,7 @@ pub(crate) mod tests {
             mixed[0].push(2.0 * along * c);
             mixed[1].push(2.0 * along * s);
             if k % 10 == 0 && k > 50 {
-                // As of the last sample of the carrier period before.
+                // The values are those of the last sample of the injection period before.
                 let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[k - 1]);
                 let found = f64::from(demodulation.state.saliency.carrier_squared);
                 assert!((found - (re * re + im * im)).abs() < 1e-5 * (1e-2 + found), "{k}");

@@ -1,9 +1,9 @@
 //! Dead-time compensation after Leggate and Kerkman (section 3.9).
 //!
-//! During the dead time the sign of the phase current determines the level of a leg. A leg that switches with a period
-//! `T` and has a positive current loses `V_dc t_d / T` of its mean voltage, one with a negative current gains as much
-//! (4.1 V at 311 V, 2.2 us and 6 kHz, 12.3 V at 18 kHz). The compensation adds the same voltage in advance. Near zero current, where
-//! the sign is uncertain, it passes through zero linearly; so it does where the carrier takes the current through zero within a period.
+//! During the dead time the sign of the phase current determines the level of a leg. A leg that switches with a period `T` loses
+//! `V_dc t_d / T` of its mean voltage if its current is positive, and gains as much if its current is negative (4.1 V at 311 V, 2.2 us
+//! and 6 kHz, 12.3 V at 18 kHz). The compensation adds the same voltage in advance. Near zero current, where the sign is uncertain, and
+//! where the injection takes the current through zero within a period, the compensation passes through zero linearly.
 
 use crate::Abc;
 
@@ -22,9 +22,9 @@ use crate::Abc;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeadTime {
-    /// Lost share of the dc link, dead time / period of the legs.
+    /// Lost share of the dc link: dead time / switching period.
     ratio: f32,
-    /// Sign in units of [`Signs`] per current, 1/A.
+    /// Sign in units of [`Signs`] per ampere.
     per_ampere: f32,
 }
 
@@ -32,20 +32,20 @@ pub struct DeadTime {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signs(Abc);
 
-/// Units of [`Signs`]: the conversion to an integer saturates at ±2^31 in one instruction, where
+/// Units of [`Signs`]. The conversion to an integer saturates at ±2^31 in one instruction, whereas
 /// comparisons take ten.
 const ONE: f32 = 2_147_483_648.0;
 
 impl Signs {
-    /// The signs as numbers from -1 to 1.
+    /// Returns the signs as numbers from -1 to 1.
     pub fn to_abc(self) -> Abc {
         self.0 * (1.0 / ONE)
     }
 }
 
 impl DeadTime {
-    /// Compensates a dead time in s of legs that switch with the period `carrier_s`, s, in full from a phase current of
-    /// `full_at_a`, A, on.
+    /// Creates the compensation of a dead time in s for legs that switch with the period `carrier_s`, s. It is full for
+    /// phase currents of at least `full_at_a`, A.
     pub fn new(dead_time_s: f32, carrier_s: f32, full_at_a: f32) -> Self {
         Self { ratio: dead_time_s / carrier_s, per_ampere: ONE / full_at_a }
     }
@@ -53,8 +53,8 @@ impl DeadTime {
     /// No compensation.
     pub const NONE: Self = Self { ratio: 0.0, per_ampere: 0.0 };
 
-    /// Mean signs over a period of the phase currents `i`, A, which pass from `half` of their change, A, before that mean to as much
-    /// after it: a current that crosses zero on the way has both signs. All zero for [`DeadTime::NONE`].
+    /// Returns the mean signs of the phase currents over a period. The currents change linearly from `i - half` to `i + half`, A,
+    /// and a current that crosses zero has both signs in part. All signs are zero for [`DeadTime::NONE`].
     pub fn signs(&self, i: Abc, half: Abc) -> Signs {
         let sign = |i: f32, half: f32| {
             let crossing = ONE / half.abs();
@@ -63,8 +63,8 @@ impl DeadTime {
         Signs(Abc { a: sign(i.a, half.a), b: sign(i.b, half.b), c: sign(i.c, half.c) })
     }
 
-    /// Voltage to add, V per phase, for a dc link of `v_dc`, V. `drop` is the voltage lost beyond the dead
-    /// time, V (see `crate::current::inverter_drop`).
+    /// Returns the voltage to add, V per phase, for a dc link of `v_dc`, V. `drop` is the inverter voltage
+    /// error beyond the dead time, V (see `crate::current::inverter_drop`).
     pub fn voltage(&self, signs: Signs, v_dc: f32, drop: f32) -> Abc {
         signs.0 * ((self.ratio * v_dc + drop) * (1.0 / ONE))
     }
@@ -87,7 +87,7 @@ mod tests {
         assert!((more.a - 5.105).abs() < 1e-3 && (more.b + 5.105).abs() < 1e-3);
     }
 
-    /// Against the mean of the signs of a thousand moments of the period.
+    /// Compares with the mean of the signs at a thousand instants of the period.
     #[test]
     fn a_current_that_crosses_zero_within_a_period_has_the_mean_of_its_signs() {
         let dt = DeadTime::new(2.2e-6, crate::PERIOD_S, 1e-4);

@@ -1,37 +1,36 @@
-//! Voltage drop per phase of the power stage beyond its dead time, measured at every start.
+//! Inverter voltage error per phase beyond the dead time, measured at every start.
 //!
 //! Switching delays and forward voltages add to the dead time and have the sign of the phase current.
-//! Uncompensated, they act like a saliency where a phase current is near zero: 1.64 V shift the flux angle
-//! by up to 8° there. During magnetisation the current lies on the direct axis, first at 3/2 of its final
-//! value (which builds the flux up faster), then at the final value:
+//! Uncompensated, they act like a saliency if a phase current is near zero: 1.64 V shift the flux angle by
+//! up to 8° there. During magnetisation the current lies on the d axis, first at 3/2 of its final value
+//! (which builds the flux up faster), then at the final value:
 //!
 //! ```text
 //! v_d - r_r (L_m/L_r)^2 (i_d - i_m) = r_s i_d + g v_drop
 //! ```
 //!
-//! with the magnetising current i_m and the direct component g of the signs of the phase currents (4/3
-//! along the axis of a phase). The means at the two levels give r_s and v_drop, independent of the
-//! temperature of the stator. An error of r_r of 30 % causes an error of 0.17 V. With a known drop the lower level
-//! alone gives r_s.
+//! with the magnetising current i_m and the d component g of the signs of the phase currents (4/3 along the axis
+//! of a phase). The means at the two levels give r_s and v_drop, independent of the temperature of the stator. If
+//! r_r is off by 30 %, v_drop is off by 0.17 V. If v_drop is known, the lower level alone gives r_s.
 
 use crate::{Dq, Motor, periods};
 
-/// Forcing current relative to the final direct current.
+/// Forcing current relative to the final d-axis current.
 const FORCING_FACTOR: f32 = 1.5;
 /// Minimum relative forcing current for a measurement.
 const LEAST_FORCING_FACTOR: f32 = 1.2;
 /// Averaging time of the lower level, at the end of the magnetisation, s.
 const AVERAGE_S: f32 = 0.1;
 /// Accepted range of the measured stator resistance relative to the setting. Outside it the model does not
-/// hold and the drop is discarded.
+/// hold and the result is discarded.
 const RESISTANCE: (f32, f32) = (0.5, 2.0);
-/// Largest accepted drop as a share of the dc link.
+/// Largest accepted voltage error, as a share of the dc link.
 const LARGEST: f32 = 0.05;
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverterDrop {
-    /// Relative forcing current; 1 where current limit or time do not allow it.
+    /// Relative forcing current; 1 if the current limit or the time does not allow forcing.
     forced: f32,
     /// Duration of the forcing current, control periods.
     until: u32,
@@ -43,7 +42,7 @@ pub struct InverterDrop {
     pub(crate) rotor: f32,
     /// Stator resistance of the settings, ohm.
     r_s: f32,
-    /// The drop, V, where it need not be measured.
+    /// Voltage error, V, if it need not be measured.
     known: Option<f32>,
 }
 
@@ -59,9 +58,9 @@ struct Level {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InverterDropState {
     levels: [Level; 2],
-    /// The measured drop per phase, V; 0 before the measurement and when its result is implausible.
+    /// Measured voltage error per phase, V; 0 before the measurement and if its result is implausible.
     pub volts: f32,
-    /// Whether this start has measured. A magnetisation while it runs finds a flux whose direction nobody knows.
+    /// Whether this start has measured. A later magnetisation during the run finds a flux of unknown direction.
     done: bool,
 }
 
@@ -81,7 +80,7 @@ pub struct DropSample {
 }
 
 impl InverterDrop {
-    /// Plans the magnetisation of a motor with the direct current `i_d`, A, in `magnetise_s`, s, with currents up to
+    /// Plans the magnetisation of a motor with the d-axis current `i_d`, A, in `magnetise_s`, s, with currents up to
     /// `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, magnetise_s: f32, largest_a: f32) -> Self {
         let room = if FORCING_FACTOR * i_d < largest_a { FORCING_FACTOR } else { largest_a / i_d };
@@ -99,17 +98,17 @@ impl InverterDrop {
         }
     }
 
-    /// The same with a drop that is known, V: it is not measured.
+    /// Returns the coefficients with a known voltage error, V, which is not measured.
     pub fn known(self, volts: Option<f32>) -> Self {
         Self { known: volts, ..self }
     }
 
-    /// Direct current in period `elapsed` of the magnetisation, relative to its final value.
+    /// Returns the d-axis current in period `elapsed` of the magnetisation, relative to its final value.
     pub fn level(&self, elapsed: u32) -> f32 {
         if elapsed < self.until { self.forced } else { 1.0 }
     }
 
-    /// Processes period `elapsed` of the magnetisation, of the first one since the start. The last period computes the drop, and returns
+    /// Processes period `elapsed` of the first magnetisation since the start. The last period computes the voltage error, and returns
     /// the stator resistance relative to the settings if it is plausible.
     #[cold]
     pub fn step(
@@ -143,14 +142,14 @@ impl InverterDrop {
             None => self.solve(&state.levels),
         };
         let (least, most) = RESISTANCE;
-        // NaN, as without a measurement, fails the comparisons.
+        // NaN, the result without a measurement, fails the comparisons.
         let believed = volts.abs() <= LARGEST * sample.dc_link && ratio >= least && ratio <= most;
         state.volts = if believed || self.known.is_some() { volts } else { 0.0 };
         believed.then_some(ratio)
     }
 
-    /// The drop, V, and r_s relative to the settings, from two equations; not finite without a measurement of both
-    /// levels. Sums replace the means: the count is a common factor of a row.
+    /// Returns the voltage error, V, and r_s relative to the settings, from two equations; not finite without a
+    /// measurement of both levels. Sums replace the means, since the count is a common factor of a row.
     fn solve(&self, [high, low]: &[Level; 2]) -> (f32, f32) {
         let per_determinant = 1.0 / (high.current * low.signs - low.current * high.signs);
         let r_s = (high.voltage * low.signs - low.voltage * high.signs) * per_determinant;
@@ -158,7 +157,7 @@ impl InverterDrop {
         (volts, r_s / self.r_s)
     }
 
-    /// r_s relative to the settings behind a drop of `volts`.
+    /// Returns r_s relative to the settings, if the voltage error is `volts`.
     fn resistance(&self, [_, low]: &[Level; 2], volts: f32) -> f32 {
         (low.voltage - volts * low.signs) / (low.current * self.r_s)
     }
@@ -170,17 +169,17 @@ mod tests {
     use super::*;
     use crate::PERIOD_S;
 
-    /// For the motor of Table 5, magnetised with `i_d` A for 0.8 s.
+    /// Returns the coefficients for the motor of Table 5, magnetised with `i_d` A for 0.8 s.
     fn inverter_drop(i_d: f32, largest_a: f32) -> InverterDrop {
         InverterDrop::new(&Motor::default(), i_d, 0.8, largest_a)
     }
 
-    /// The drop found on a motor of `r_s` ohm behind a drop of `volts`.
+    /// Returns the voltage error found on a motor of `r_s` ohm with an error of `volts`.
     fn found(r_s: f32, volts: f32, i_d: f32, largest: f32) -> f32 {
         magnetised(&inverter_drop(i_d, largest), r_s, volts, i_d).0
     }
 
-    /// Drop and relative resistance found on a motor of `r_s` ohm behind a drop of `volts`.
+    /// Returns the voltage error and the relative resistance found on a motor of `r_s` ohm with an error of `volts`.
     fn magnetised(drop: &InverterDrop, r_s: f32, volts: f32, i_d: f32) -> (f32, Option<f32>) {
         let (tau_r, rotor) = (Motor::default().tau_r(), drop.rotor);
         let mut state = InverterDropState::default();
@@ -210,7 +209,7 @@ mod tests {
         for r_s in [4.0, 5.4, 7.0] {
             for volts in [-1.0, 0.0, 1.64, 5.0] {
                 let v = found(r_s, volts, 0.7, 3.5);
-                // Sums of f32 over 700 periods.
+                // The sums of f32 go over 700 periods.
                 assert!((v - volts).abs() < 0.01, "{r_s} ohm, {volts} V: {v}");
             }
         }
@@ -230,14 +229,14 @@ mod tests {
                 assert!(known.is_none() || volts == 1.64);
             }
         }
-        // One level does not tell a drop from a resistance.
+        // One level does not distinguish a voltage error from a resistance.
         assert_eq!(magnetised(&inverter_drop(0.7, 0.75), 5.4, 1.64, 0.7).1, None);
     }
 
     #[test]
     fn what_cannot_be_is_not_used() {
-        // A resistance four times the believed one, a drop beyond 5 % of the dc link, no room for a
-        // second level.
+        // The results are implausible: a resistance four times that of the settings, a voltage
+        // error above 5 % of the dc link, and no current limit left for a second level.
         assert_eq!(found(21.6, 1.64, 0.7, 3.5), 0.0);
         assert_eq!(found(5.4, 16.0, 0.7, 3.5), 0.0);
         assert_eq!(found(5.4, 1.64, 0.7, 0.75), 0.0);
@@ -256,7 +255,7 @@ mod tests {
 
     #[test]
     fn it_is_believed_up_to_its_bounds() {
-        // Half and twice of the believed 5.4 ohm; 5 % of 311 V, 15.55 V, either way.
+        // The limits are half and twice the 5.4 ohm of the settings, and 5 % of 311 V, 15.55 V, in either direction.
         for (r_s, volts, believed) in [
             (2.8, 1.64, true),
             (2.6, 1.64, false),
@@ -281,7 +280,7 @@ mod tests {
             let drop = inverter_drop(0.7, largest_a);
             assert!((drop.level(0) - level).abs() < 1e-3, "{largest_a}");
             let forced = (0..4800).filter(|&k| drop.level(k) > 1.0).count() as f32;
-            // Until 1 - e^(-t/tau_r) = 1/level
+            // The current is forced until 1 - e^(-t/tau_r) = 1/level.
             let expected =
                 if level > 1.0 { 6000.0 * tau_r * (level / (level - 1.0)).ln() } else { 0.0 };
             assert!((forced - expected).abs() < 12.0, "{largest_a}: {forced} {expected}");

@@ -26,9 +26,9 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 pub struct Modulator {
     /// Shortest pulse, share of the period.
     shortest: f32,
-    /// Share of the dc link that the dead-time compensation leaves.
+    /// Share of the dc link that is left beside the dead-time compensation.
     usable: f32,
-    /// With shunts below the low sides.
+    /// Limit with shunts below the low sides.
     readable: Option<Readable>,
 }
 
@@ -55,7 +55,7 @@ pub struct Modulated {
 }
 
 impl Modulator {
-    /// Modulator for a dead time in s of legs that switch with the period `carrier_s`, s.
+    /// Creates a modulator for a dead time in s of legs that switch with the period `carrier_s`, s.
     ///
     /// `compensated`: whether a dead-time compensation is added; it needs twice its amplitude of the dc
     /// link.
@@ -68,29 +68,29 @@ impl Modulator {
         }
     }
 
-    /// The same with shunts below the low sides, which can be read up to the duty `readable`.
+    /// Returns the modulator for shunts below the low sides, which can be read up to the duty `readable`.
     ///
-    /// The second highest leg then stays at or below it, so two of the three currents can always be read. All legs are moved
-    /// down together where needed, which changes no voltage between phases. The circle inside the hexagon, the whole range
-    /// of linear modulation, needs 93.3 % of the period for the second highest leg: nothing is lost from there on. With less
-    /// the corners of the hexagon are cut.
+    /// The duty of the second highest leg then stays at or below `readable`, so two of the three currents can always be
+    /// read. All legs are moved down together if needed, which changes no voltage between phases. The circle inside the
+    /// hexagon, the whole range of linear modulation, needs 93.3 % of the period for the second highest leg, so with
+    /// `readable` of at least 93.3 % no range is lost. With less, the corners of the hexagon are cut.
     pub fn readable(mut self, readable: Option<f32>) -> Self {
         let share = |duty| duty - (1.0 - self.usable);
         self.readable = readable.map(|duty| Readable { duty, share: share(duty) });
         self
     }
 
-    /// Radius of the circle inside the hexagon, V peak: the largest vector available in every direction
-    /// at a dc link of `v_dc`, V.
+    /// Returns the radius of the circle inside the hexagon, V peak: the largest vector available in
+    /// every direction at a dc link of `v_dc`, V.
     pub fn circle(&self, v_dc: f32) -> f32 {
         self.usable * v_dc * (1.0 / SQRT_3)
     }
 
-    /// Duties for a mean voltage `wanted`, V peak, plus the dead-time `compensation`, V per phase,
-    /// at a dc link of `v_dc` > 0, V. The power stage loses the compensation again.
+    /// Returns the duties for a mean voltage `wanted`, V peak, plus the dead-time `compensation`, V
+    /// per phase, at a dc link of `v_dc` > 0, V. The power stage loses the compensation again.
     ///
     /// A voltage outside the hexagon is shortened; its angle is kept.
-    #[inline(always)] // a part of every period, with its values in registers
+    #[inline(always)] // runs in every period, with its values in registers
     pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
@@ -106,7 +106,7 @@ impl Modulator {
                 shortened = true;
             }
         }
-        // Centre the lowest and the highest leg on half the dc link.
+        // The lowest and the highest leg are centred on half the dc link.
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
         let per_volt = 1.0 / v_dc;
@@ -119,7 +119,7 @@ impl Modulator {
         }
         let duty = |volts: f32| centre + volts * per_volt;
         let ideal = [leg.a, leg.b, leg.c].map(duty);
-        // The lowest and the highest leg tell for all three. NaN fails the comparisons.
+        // If the lowest and the highest leg are valid, all three are. NaN fails the comparisons.
         let is_whole = duty(low) >= self.shortest && 1.0 - duty(high) >= self.shortest;
         let duties = if is_whole { ideal } else { ideal.map(|duty| self.drop_or_extend(duty)) };
         // NaN differs from itself and so counts as limited.
@@ -152,19 +152,19 @@ impl Modulator {
     }
 }
 
-/// `part` of `whole`: the compiler would divide in every period, wherever the voltage is.
+/// Returns `part / whole`. The function is cold, because inline the compiler would divide in every period at any voltage.
 #[cold]
 fn ratio(part: f32, whole: f32) -> f32 {
     part / whole
 }
 
-/// The second highest component.
+/// Returns the second highest component.
 fn second(v: Abc) -> f32 {
     let (low, high) = extremes(v);
     v.a + v.b + v.c - low - high
 }
 
-/// The lowest and the highest component.
+/// Returns the lowest and the highest component.
 fn extremes(v: Abc) -> (f32, f32) {
     let (low, high) = if v.a < v.b { (v.a, v.b) } else { (v.b, v.a) };
     (if v.c < low { v.c } else { low }, if v.c > high { v.c } else { high })
@@ -180,7 +180,7 @@ mod tests {
 
     const TOP: u16 = 14_167;
     const V_DC: f32 = 311.0;
-    /// Half a count, as a phase voltage, plus what f32 loses.
+    /// Half a timer count, as a phase voltage, plus the rounding of f32.
     const COUNT_V: f64 = 311.0 / 14_167.0;
 
     fn modulator() -> Modulator {
@@ -191,25 +191,25 @@ mod tests {
         AlphaBeta::new((length * angle.cos()) as f32, (length * angle.sin()) as f32)
     }
 
-    /// Compare values of the timer.
+    /// Returns the compare values of the timer.
     fn counts(modulated: &Modulated) -> [u16; 3] {
         modulated.duties.map(|duty| (duty * f32::from(TOP)).round() as u16)
     }
 
-    /// Mean voltage that the compare values put out, V peak.
+    /// Returns the mean voltage of these compare values, V peak.
     fn mean(compare: [u16; 3]) -> AlphaBeta {
         let [a, b, c] = compare.map(|c| f32::from(c) / f32::from(TOP) * V_DC);
         Abc::new(a, b, c).to_alpha_beta()
     }
 
-    /// On-times of the two neighbouring vectors from Table 2, in f64 and by sectors.
+    /// Returns the on-times of the two neighbouring vectors from Table 2, in f64 and by sectors.
     fn table_2(length: f64, angle: f64) -> [f64; 3] {
         let sector = (angle / (PI / 3.0)).floor();
         let within = angle - sector * PI / 3.0;
         let m = 3f64.sqrt() * length / f64::from(V_DC);
         let (t1, t2) = (m * (PI / 3.0 - within).sin(), m * within.sin());
         let t0 = 1.0 - t1 - t2;
-        // U_0, U_60, … of Table 2 as legs abc
+        // These are U_0, U_60, … of Table 2 as legs abc.
         let vectors = [[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]];
         let (u1, u2) = (vectors[sector as usize % 6], vectors[(sector as usize + 1) % 6]);
         core::array::from_fn(|leg| 0.5 * t0 + t1 * f64::from(u1[leg]) + t2 * f64::from(u2[leg]))
@@ -231,8 +231,8 @@ mod tests {
 
     #[test]
     fn compensation_does_not_cost_the_wanted_voltage() {
-        // With the part for the compensation kept free, the compensated legs never saturate. A leg that does not switch loses
-        // nothing to the dead time.
+        // Since the part for the compensation is kept free, the compensated legs never saturate. A leg that does not switch
+        // has no dead time.
         let m = Modulator::new(2.2e-6, PERIOD_S, true);
         let dt = V_DC * 2.2e-6 / PERIOD_S;
         for degrees in 0..360 {
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    /// 94 % of the period can be read.
+    /// Share of the period in which the shunts can be read.
     const READABLE: f32 = 0.94;
 
     #[test]
@@ -267,7 +267,7 @@ mod tests {
                     let error = mean(counts(&out)) - out.realised;
                     assert!(error.length_squared().sqrt() < 2.0 * COUNT_V as f32);
                     if share < 1.0 {
-                        // A pulse that is too short is dropped or extended with shunts as without.
+                        // A pulse that is too short is dropped or extended in the same way with shunts.
                         let lost = (out.realised - wanted).length_squared().sqrt();
                         let shortest = m.shortest * V_DC;
                         assert!(lost <= 0.7 * shortest, "{share} at {angle}: {lost} V");
@@ -295,19 +295,19 @@ mod tests {
 
         #[test]
         fn inside_the_hexagon_nothing_is_limited(length in 0f64..165.0, angle in 0f64..std::f64::consts::TAU) {
-            // 165 V < 311/sqrt(3) less the shortest pulses
+            // 165 V is below 311/sqrt(3) less the shortest pulses.
             let wanted = polar(length, angle);
             prop_assert_eq!(modulator().step(wanted, Abc::ZERO, V_DC).realised, wanted);
         }
 
         #[test]
         fn limiting_keeps_the_angle(length in 210f64..2000.0, angle in 0f64..std::f64::consts::TAU) {
-            // No shortest pulse here: dropping pulses turns the angle by up to 0.5 degrees.
+            // There is no shortest pulse here, since dropping pulses turns the angle by up to 0.5 degrees.
             let m = Modulator { shortest: 0.0, ..modulator() };
             let out = m.step(polar(length, angle), Abc::ZERO, V_DC).realised;
             let turned = f64::from(out.beta).atan2(f64::from(out.alpha)) - angle;
             prop_assert!(((turned + PI).rem_euclid(2.0 * PI) - PI).abs() < 1e-5);
-            // and the result lies on the hexagon: the span is the dc link
+            // The result lies on the hexagon, so the span is the dc link.
             let (low, high) = extremes(out.to_abc());
             prop_assert!((high - low - V_DC).abs() < 1e-3);
         }
@@ -321,7 +321,7 @@ mod tests {
         }
     }
 
-    /// A pulse of either switch is left out below half the shortest, and lengthened from there.
+    /// A pulse of either switch is dropped if it is below half the shortest, and lengthened otherwise.
     #[test]
     fn short_pulses_are_dropped_or_lengthened() {
         let modulator = Modulator { shortest: 0.04, ..modulator() };

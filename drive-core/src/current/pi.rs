@@ -10,10 +10,10 @@
 //! prints `u[k+1]` on the left (B.1, B.3). Taken literally this is one more delay: the printed example is
 //! then unstable without any limit (|z| = 1.0996), and Figure 40 is not reproduced.
 //!
-//! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference
-//! between realised and wanted output. Without the second call (or with zero) the controller is exactly the
-//! unlimited one. The loops of current and speed take less of it, [`Pi::condition`]: by the whole difference the voltage leaves its limit
-//! before the current is there, and a step of the torque takes twice as long.
+//! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference between realised and wanted
+//! output. Without the second call (or with zero) the controller is exactly the unlimited one. The loops of current and speed use a part
+//! of the difference only, [`Pi::condition`]: with the whole difference the voltage leaves its limit before the current has reached its
+//! reference, and a torque step takes twice as long.
 //!
 //! The state is the output itself, in `f32`: near 180 V it does not change for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
@@ -51,7 +51,7 @@ pub struct PiState {
 }
 
 impl Pi {
-    /// Wanted output for `error` = reference - measured.
+    /// Returns the wanted output for `error` = reference - measured.
     pub fn step(&self, state: &mut PiState, error: f32) -> f32 {
         let output = state.output + self.k_c * (error - self.z_c * state.error);
         *state = PiState { output, error };
@@ -65,8 +65,8 @@ impl Pi {
     /// F(z) = s + (1 - s) (1 - p_f)/(z - p_f)
     /// ```
     ///
-    /// Unit gain at dc. As printed, with s = 0, it is strictly proper: the output depends on the references up to the previous
-    /// step, and the pole cancels the zero of the controller in the response to the reference.
+    /// The gain is 1 at dc. As printed, with s = 0, the filter is strictly proper: the output depends on the references up to
+    /// the previous step, and the pole cancels the zero of the controller in the response to the reference.
     pub fn filter(&self, state: &mut ReferenceState, direct: f32, reference: f32) -> f32 {
         let rest = reference - state.next;
         let output = state.next + direct * rest;
@@ -74,14 +74,14 @@ impl Pi {
         output
     }
 
-    /// Conditions the controller by `correction` = realised - wanted output, where that was limited: as if the last error had been
-    /// smaller by `correction/k_c`, that of a reference that could be realised (Hanus, Kinnaert and Henrotte, Automatica 23(6), 1987).
-    /// The next step takes `z_c` of that error back, so `1 - z_c` of the correction remains.
+    /// Conditions the controller by `correction` = realised - wanted output, if the output was limited. The controller continues as if
+    /// the last error had been smaller by `correction/k_c`, which is the error of a reference that could be realised (Hanus, Kinnaert
+    /// and Henrotte, Automatica 23(6), 1987). The next step takes `z_c` of that error back, so `1 - z_c` of the correction remains.
     pub fn condition(&self, state: &mut PiState, correction: f32) {
         state.back_calculate((1.0 - self.z_c) * correction);
     }
 
-    /// Makes the last step one of an error that was larger by `more`; returns by how much the wanted output is larger then.
+    /// Changes the last step as if its error had been larger by `more`. Returns the increase of the wanted output.
     pub fn revise(&self, state: &mut PiState, more: f32) -> f32 {
         state.error += more;
         state.output += self.k_c * more;
@@ -90,7 +90,7 @@ impl Pi {
 }
 
 impl PiState {
-    /// A controller that has settled at this output.
+    /// Returns a controller that has settled at this output.
     pub fn at_rest(output: f32) -> Self {
         Self { output, error: 0.0 }
     }
@@ -104,18 +104,18 @@ impl PiState {
 /// Coefficients of the current loop in the flux frame: one controller per axis, A peak to V peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DqPi {
-    /// Direct axis.
+    /// The d axis.
     pub d: Pi,
-    /// Quadrature axis.
+    /// The q axis.
     pub q: Pi,
 }
 
 /// State of the current loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DqPiState {
-    /// Direct axis.
+    /// The d axis.
     pub d: PiState,
-    /// Quadrature axis.
+    /// The q axis.
     pub q: PiState,
 }
 
@@ -131,7 +131,7 @@ impl DqPi {
         self.q.condition(&mut state.q, correction.q);
     }
 
-    /// Takes back what the last error adds by integration: before each step of proportional controllers.
+    /// Cancels the integration of the last error. Called before each step, it makes the controllers proportional.
     pub fn freeze_integrator(&self, state: &mut DqPiState) {
         let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;
         let last = Dq { d: integral(&self.d, &state.d), q: integral(&self.q, &state.q) };
@@ -147,11 +147,11 @@ impl DqPiState {
     }
 }
 
-/// Direct share of the current reference, beside the printed filter. Alone the filter takes 7.3 ms to 90 % of a torque step;
-/// without it the zero of the controller makes 25 % of overshoot. A share of 0.8 cancels the slow mode of the loop; 0.6 leaves
-/// a margin for the low-pass filter and for the current of the carrier, which adds to an overshoot.
+/// Direct share of the current reference, beside the printed filter. The filter alone takes 7.3 ms to 90 % of a torque step;
+/// without it the zero of the controller causes 25 % of overshoot. A share of 0.8 cancels the slow mode of the loop; 0.6
+/// leaves a margin for the low-pass filter and for the injection current, which adds to an overshoot.
 pub const DIRECT_SHARE: f32 = 0.6;
-/// Direct share without a carrier, and so without the low-pass filter in the loop.
+/// Direct share without injection, and therefore without the low-pass filter in the loop.
 pub const DIRECT_SHARE_WITHOUT_CARRIER: f32 = 0.8;
 
 /// State of [`Pi::filter`]: its next output.
@@ -161,7 +161,7 @@ pub struct ReferenceState {
 }
 
 impl ReferenceState {
-    /// A filter that has settled at this reference.
+    /// Returns a filter that has settled at this reference.
     pub const fn at_rest(reference: f32) -> Self {
         Self { next: reference }
     }

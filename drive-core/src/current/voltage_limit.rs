@@ -1,27 +1,29 @@
-//! Currents that the voltage of the dc link allows: field weakening, and the limit of the torque current; once a carrier period. And,
-//! where it is asked for, the direct current of the least loss.
+//! Currents that the voltage of the dc link allows: field weakening, and the limit of the q-axis current, computed once an injection
+//! period. If it is enabled, loss minimisation chooses the d-axis current.
 //!
-//! `w = |w_s|` is the angular frequency of the stator. The usable voltage `U` is 0.92 of the largest vector less the amplitude of
-//! the carrier, times a trim:
+//! `w = |w_s|` is the angular frequency of the stator. The usable voltage `U` is 0.92 of the largest vector less the injected
+//! amplitude, times a trim:
 //!
 //! ```text
-//! i_q of the leakage   i_u = 0.6 min(U, U without trim)/(w sigma L_s)
-//! direct current       i_d <= (sqrt(U^2 - (w sigma L_s min(|i_q|, i_u))^2) - r_s s |i_q|)/(w L_s)     s = sign(i_q w_s)
-//! torque current       |i_q| <= min(sqrt(I^2 - i_d^2), i_u)
+//! q-axis: leakage      i_u = 0.6 min(U, U without trim)/(w sigma L_s)
+//! d-axis current       i_d <= (sqrt(U^2 - (w sigma L_s min(|i_q|, i_u))^2) - r_s s |i_q|)/(w L_s)     s = sign(i_q w_s)
+//! q-axis current       |i_q| <= min(sqrt(I^2 - i_d^2), i_u)
 //! trim                 d trim/dt = -5 (|u| - U)/U per second, within 0.6 .. 1.3
 //! ```
 //!
-//! Above 1 the trim rises only where the flux is weakened, and a fifth as fast: it must not take a flux that builds up for one
-//! that is too small. The largest torque would have 0.71 for the leakage; 0.6 costs 4 % of it at most, and keeps parameters that
-//! are 5 % off from the other side, where more torque current gives less torque, until no flux is left to see.
+//! Above 1 the trim rises only if the flux is weakened, and a fifth as fast, because a flux that still builds up must not be
+//! mistaken for one that is too small. The largest torque needs a share of 0.71 for the leakage. The share 0.6 costs at most 4 %
+//! of that torque. With parameters that are 5 % off, it keeps the drive from the range in which more q-axis current gives less
+//! torque until there is no flux left to track.
 //!
-//! The direct current stays within 15 % of its setting and the setting, and comes first: a torque current without flux gives
-//! no torque. The feed-forward does the work; the trim takes 0.2 s for what the parameters miss. (A main flux that saturates
-//! needs less direct current for the same flux.)
+//! The d-axis current stays between 15 % and 100 % of its setting and has priority, since a q-axis current without flux
+//! gives no torque. The feed-forward does most of the work; the trim corrects for errors of the parameters within 0.2 s.
+//! (If the main flux saturates, the motor needs less d-axis current for a weakened flux than its parameters say.)
 //!
-//! With a rotor current of `(L_m/L_r) i_q` stator and rotor lose `1.5 (r_s i_d^2 + (r_s + R_R) i_q^2)` for a torque in proportion to
-//! `i_d i_q`: the least with `i_d = e |i_q|`, `e = sqrt((r_s + R_R)/r_s)`. The direct current follows that upwards at once and downwards
-//! within 0.3 s, from half the setting to the setting. A torque beyond that of the present flux comes with the rotor time constant.
+//! With a rotor current of `(L_m/L_r) i_q`, the loss in stator and rotor is `1.5 (r_s i_d^2 + (r_s + R_R) i_q^2)` for a torque in
+//! proportion to `i_d i_q`. It is smallest with `i_d = e |i_q|`, `e = sqrt((r_s + R_R)/r_s)`. The d-axis current follows this value
+//! upwards at once and downwards within 0.3 s, between half the setting and the setting. A torque for which the present flux is too
+//! small builds up with the rotor time constant.
 
 use core::f32::consts::TAU;
 
@@ -29,21 +31,22 @@ use crate::carrier::CARRIER_SAMPLES;
 use crate::math::within;
 use crate::{Dq, Motor, PERIOD_S};
 
-/// Share of the voltage that is used: the rest is for the current controllers.
+/// Share of the voltage that is used. The rest is for the current controllers.
 const USABLE_SHARE: f32 = 0.92;
 /// Share of the voltage that the leakage may take.
 const FOR_LEAKAGE: f32 = 0.6;
-/// Least direct current, as a share of the setting.
+/// Least d-axis current, as a share of the setting.
 const LEAST_I_D_SHARE: f32 = 0.15;
-/// Least direct current for the least loss, as a share of the setting: when the carrier comes on, less flux would show no angle.
+/// Least d-axis current of the loss minimisation, as a share of the setting. With less flux, the injection would show no angle when
+/// it is switched on.
 const LEAST_ECONOMICAL: f32 = 0.5;
-/// Share of the difference to a smaller one that a carrier period takes: 0.3 s.
+/// Share by which the difference to a smaller d-axis current shrinks in an injection period: 0.3 s.
 const EASED: f32 = CARRIER_SAMPLES as f32 * PERIOD_S / 0.3;
-/// Change of the trim in a carrier period per relative excess of the voltage.
+/// Change of the trim in an injection period per relative excess of the voltage.
 const TRIM: f32 = 5.0 * CARRIER_SAMPLES as f32 * PERIOD_S;
-/// The same from 1 on upwards: slower than a flux that builds up.
+/// The same change above a trim of 1, slower than a flux that builds up.
 const TRIM_UP: f32 = 0.2 * TRIM;
-/// Least and most trim.
+/// Smallest and largest trim.
 const LEAST_TRIM: f32 = 0.6;
 const MOST_TRIM: f32 = 1.3;
 
@@ -53,11 +56,11 @@ pub struct VoltageLimit {
     pub(crate) r_s: f32,
     leakage: f32,
     stator: f32,
-    /// Setting of the direct current, A.
+    /// Setting of the d-axis current, A.
     pub i_d: f32,
     /// Square of the largest current, A^2.
     current_squared: f32,
-    /// Direct current of the least loss per torque current; 0 where that is not asked for.
+    /// D-axis current of the least loss per q-axis current; 0 without loss minimisation.
     economy: f32,
 }
 
@@ -65,38 +68,38 @@ pub struct VoltageLimit {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VoltageLimitState {
     trim: f32,
-    /// Voltage that weakens the flux, V peak; 0 where the flux is kept.
+    /// Voltage that is available in field weakening, V peak; 0 if the flux is kept.
     pub available: f32,
-    /// Most direct and torque current, A.
+    /// Largest d-axis and q-axis current, A.
     pub most: Dq,
-    /// Whether the latter is that of the voltage.
+    /// Whether the voltage limits the q-axis current.
     pub by_voltage: bool,
 }
 
-/// Operating point of a carrier period.
+/// Operating point of an injection period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OperatingPoint {
-    /// Reference of the current, A.
+    /// Current reference, A.
     pub current: Dq,
-    /// Voltage without the carrier, V.
+    /// Voltage without the injection, V.
     pub voltage: Dq,
-    /// Largest voltage vector that the carrier leaves, V.
+    /// Largest voltage vector that the injection leaves, V.
     pub largest: f32,
     /// Frequency of the flux, electrical turns per period.
     pub flux_freq: f32,
-    /// Whether the flux is kept, as with a carrier: what the injection has learned is that of one direct current.
+    /// Whether the flux is kept. With injection it is, because the learned saliency is valid for one d-axis current.
     pub kept: bool,
-    /// Direct current on top of the setting, A.
+    /// D-axis current in addition to the setting, A.
     pub added: f32,
 }
 
-/// Angular frequency that is not zero, rad/s, from electrical turns per period.
+/// Returns the angular frequency, rad/s, from electrical turns per period; it is never zero.
 fn angular(flux_freq: f32) -> f32 {
     flux_freq.abs() * (TAU / PERIOD_S) + 1.0
 }
 
 impl VoltageLimit {
-    /// Limit for a motor at the direct current `i_d`, A, with currents up to `largest_a`, A peak.
+    /// Creates the limit for a motor with the d-axis current `i_d`, A, and currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
         let leakage = motor.sigma_l_s();
         Self {
@@ -109,20 +112,21 @@ impl VoltageLimit {
         }
     }
 
-    /// The limit with the direct current of the least loss of `motor`.
+    /// Returns the limit with loss minimisation for `motor`.
     #[must_use]
     pub fn economical(self, motor: &Motor) -> Self {
         let per_stator = 1.0 + motor.coupled_inductance() / (motor.tau_r() * motor.r_s);
         Self { economy: fpu_sqrt::sqrtf(per_stator), ..self }
     }
 
-    /// Whether the direct current is that of the least loss where there is no carrier.
+    /// Whether the d-axis current minimises the loss while there is no injection.
     #[inline]
     pub fn minimises_loss(&self) -> bool {
         self.economy != 0.0
     }
 
-    /// Direct current of the least loss beside the torque current `i_q`, after `last`, A; the setting with a `carrier`.
+    /// Returns the d-axis current of the least loss for the q-axis current `i_q`, after the value `last`, A; with injection
+    /// (`carrier`), the setting.
     pub fn least_loss(&self, last: f32, i_q: f32, carrier: bool) -> f32 {
         let least = within(self.economy * i_q.abs(), (LEAST_ECONOMICAL * self.i_d, self.i_d));
         if carrier {
@@ -134,19 +138,19 @@ impl VoltageLimit {
         }
     }
 
-    /// State without a limit.
+    /// Returns the state without a limit.
     pub fn start(&self) -> VoltageLimitState {
         let most = Dq { d: self.i_d, q: self.beside(self.i_d) };
         VoltageLimitState { trim: 1.0, available: 0.0, most, by_voltage: false }
     }
 
-    /// Torque current that a direct current leaves, A.
+    /// Returns the q-axis current that a d-axis current leaves, A.
     #[inline]
     pub fn beside(&self, i_d: f32) -> f32 {
         fpu_sqrt::sqrtf(self.current_squared - i_d * i_d)
     }
 
-    /// Voltage of the magnetising current per speed of the rotor, V per A and electrical turn a period.
+    /// Returns the back-EMF of the magnetising current per speed of the rotor, V per A and electrical turn per period.
     pub fn emf(&self) -> f32 {
         (self.stator - self.leakage) * (TAU / PERIOD_S)
     }
@@ -156,7 +160,7 @@ impl VoltageLimit {
         let &OperatingPoint { current, voltage, largest, flux_freq, kept, added } = now;
         let whole = USABLE_SHARE * largest;
         let available = whole * state.trim;
-        // (|u| - U)/U near U, without the root.
+        // This is (|u| - U)/U near U, without the root.
         let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
         let rate = if excess < 0.0 && state.trim >= 1.0 { TRIM_UP } else { TRIM };
         let trim = state.trim - rate * excess;
@@ -174,7 +178,7 @@ impl VoltageLimit {
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }
 
-    /// Most direct current, A, with the torque current `i_q`, A, where `available` V can be used.
+    /// Returns the largest d-axis current, A, with the q-axis current `i_q`, A, if `available` V can be used.
     #[inline]
     pub fn direct(&self, available: f32, flux_freq: f32, i_q: f32) -> f32 {
         let by_leakage = self.by_leakage(available, flux_freq);
@@ -183,11 +187,11 @@ impl VoltageLimit {
         let across = w * self.leakage * if size < by_leakage { size } else { by_leakage };
         let along = fpu_sqrt::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
-        // NaN gives the setting; the step finds it.
+        // NaN gives the setting; the control step detects the NaN.
         if i_d.is_nan() { self.i_d } else { within(i_d, (LEAST_I_D_SHARE * self.i_d, self.i_d)) }
     }
 
-    /// Torque current, A, whose leakage takes its share of the voltage.
+    /// Returns the q-axis current, A, whose leakage takes its share of the voltage.
     #[inline]
     fn by_leakage(&self, available: f32, flux_freq: f32) -> f32 {
         FOR_LEAKAGE * available / (angular(flux_freq) * self.leakage)
@@ -198,8 +202,8 @@ impl VoltageLimit {
 mod tests {
     use super::*;
 
-    /// Runs for 3 s at 120 Hz with a motor whose stator inductance is `share` of the believed one, without torque, its flux following in
-    /// 0.19 s; the state, the voltage relative to the usable one, and the largest of it.
+    /// Runs for 3 s at 120 Hz without torque, with a motor whose stator inductance is `share` of the setting and whose flux follows
+    /// within 0.19 s. Returns the state, the voltage relative to the usable voltage, and its maximum.
     fn weakened(share: f32) -> (VoltageLimitState, f32, f32) {
         let limit = VoltageLimit::new(&Motor::default(), 1.4, 3.5);
         let mut state = limit.start();
@@ -220,8 +224,9 @@ mod tests {
         (state, per_a * flux_current / (USABLE_SHARE * largest), most)
     }
 
-    /// The trim brings the voltage to the usable one, whether the motor takes more or less than the parameters say; a flux that
-    /// builds up does not drive it far beyond; and the torque current never gets more than its share of the untrimmed voltage.
+    /// The trim brings the voltage to the usable voltage, whether the motor needs more or less than its parameters say. A flux
+    /// that builds up does not cause a large overshoot of the trim, and the q-axis current never gets more than its share of
+    /// the untrimmed voltage.
     #[test]
     fn the_voltage_is_used_with_parameters_that_are_off() {
         for share in [0.8, 1.0, 1.2] {
@@ -234,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Where the flux is not weakened the voltage that is left over does not wind the trim up.
+    /// If the flux is not weakened, the unused voltage does not wind the trim up.
     #[test]
     fn the_trim_does_not_wind_up_below_the_limit() {
         let limit = VoltageLimit::new(&Motor::default(), 1.4, 3.5);
@@ -248,7 +253,8 @@ mod tests {
         assert_eq!((state.trim, state.most.d), (1.0, 1.4));
     }
 
-    /// The direct current gives a torque with the least loss; it grows at once, goes down within 0.3 s, and is the setting with a carrier.
+    /// The d-axis current gives the torque with the least loss. It rises at once, falls within 0.3 s, and is the setting with
+    /// injection.
     #[test]
     fn the_loss_is_least_where_that_is_asked_for() {
         let motor = Motor::default();

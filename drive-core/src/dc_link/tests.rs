@@ -1,4 +1,5 @@
-//! The limits on a model of energies: capacitor, shaft, copper, rectifier. The motor is that of Table 5 at 1.4 A, four poles.
+//! Tests of the limits on a model of energies: capacitor, shaft, copper, rectifier. The motor is that of Table 5 at 1.4 A, four
+//! poles.
 
 use super::*;
 
@@ -15,7 +16,7 @@ const CHOPPER: ChopperSettings = ChopperSettings {
     power_w: 50.0,
 };
 
-/// For 311 V, without resistor.
+/// Settings for 311 V, without a resistor.
 const SETTINGS: DcLinkSettings = DcLinkSettings {
     from_v: 340.0,
     high_v: 390.0,
@@ -25,7 +26,7 @@ const SETTINGS: DcLinkSettings = DcLinkSettings {
     chopper: None,
 };
 
-/// Motor, shaft and link as energies.
+/// Model of motor, shaft and link by their energies.
 struct Bench {
     limits: DcLink,
     state: DcLinkState,
@@ -35,7 +36,7 @@ struct Bench {
     inertia: f64,
     load_nm: f64,
     i_q: f64,
-    /// Direct current to which the flux belongs.
+    /// D-axis current of the present flux.
     i_d: f64,
     t: f64,
     highest: f64,
@@ -64,7 +65,7 @@ impl Bench {
         }
     }
 
-    /// Runs for some seconds with a speed reference, rpm, over time since `self.t = 0`; a proportional speed loop.
+    /// Runs for `seconds` with a proportional speed loop and a speed reference, rpm, over time since `self.t = 0`.
     fn run(&mut self, seconds: f64, reference: impl Fn(f64) -> f64) {
         let steps = (seconds * 600.0) as usize;
         for _ in 0..steps {
@@ -79,7 +80,7 @@ impl Bench {
         }
     }
 
-    /// A carrier period in ten parts. Torque follows in 3 ms, the flux with the rotor time constant.
+    /// Advances by an injection period in ten parts. Torque follows within 3 ms, the flux with the rotor time constant.
     fn advance(&mut self, i_q: f64, flux_a: f64, duty: f64) {
         let h = f64::from(STEP_S) / 10.0;
         for _ in 0..10 {
@@ -104,7 +105,7 @@ impl Bench {
         self.lowest = self.lowest.min(self.v);
     }
 
-    /// Time until it stands, s, on a ramp of 1000 rpm/s.
+    /// Returns the time until standstill, s, on a ramp of 1000 rpm/s.
     fn stop(&mut self) -> f64 {
         let from = self.rpm;
         while self.rpm.abs() > 10.0 && self.t < 60.0 {
@@ -114,9 +115,9 @@ impl Bench {
     }
 }
 
-/// A stop from 1800 rpm, either direction. A prototype on the simulated motor, of which this is the energy alone, took 5.6 s
-/// at 386 V, with braking by flux 4.2 s at 384 V, with the resistor 1.9 s at 388 V; without limits it was at 401 V after
-/// 0.11 s.
+/// Tests a stop from 1800 rpm in either direction. This bench models the energies only; a prototype on the simulated motor
+/// took 5.6 s at 386 V, with flux braking 4.2 s at 384 V, with the resistor 1.9 s at 388 V, and reached 401 V after 0.11 s
+/// without limits.
 #[test]
 fn a_stop_keeps_the_link_below_the_trip() {
     let plain = DcLinkSettings { flux_a: 0.0, ..SETTINGS };
@@ -137,7 +138,7 @@ fn a_stop_keeps_the_link_below_the_trip() {
         assert!(faster < 0.85 * s && v < 390.0, "{faster} s, {v} V");
         let (s, v) = stop(resistor, 1800.0, 1.0);
         assert!(s < 2.0 && v < 390.0, "{s} s, {v} V");
-        // Power is torque times speed: from 3600 rpm too, and with five times the inertia.
+        // Power is torque times speed, so the stop is also made from 3600 rpm, and with five times the inertia.
         for settings in [plain, with_flux] {
             for (rpm, inertia) in [(3600.0, 1.0), (1800.0, 5.0), (3600.0, 5.0)] {
                 let (_, v) = stop(settings, rpm, inertia);
@@ -147,8 +148,9 @@ fn a_stop_keeps_the_link_below_the_trip() {
     }
 }
 
-/// The supply gone at 1800 rpm: for 1 s without load, for 0.5 s at 1 Nm, which the shaft alone then carries. The prototype
-/// went down to 1477 and 1248 rpm. From 3600 rpm the shaft holds the link too, and when the supply is back so is the speed.
+/// The supply fails at 1800 rpm: for 1 s without load, or for 0.5 s at 1 Nm, which the shaft alone then supplies. The
+/// prototype slowed down to 1477 and 1248 rpm. From 3600 rpm the shaft also holds the link, and the speed returns with the
+/// supply.
 #[test]
 fn the_shaft_holds_the_link_in_an_outage() {
     for (rpm, load_nm, seconds, least_rpm) in
@@ -170,7 +172,7 @@ fn the_shaft_holds_the_link_in_an_outage() {
     }
 }
 
-/// Without the limits 1 Nm at 1800 rpm takes the link below the trip within 80 ms of an outage.
+/// Without the limits, 1 Nm at 1800 rpm discharges the link below the trip within 80 ms of an outage.
 #[test]
 fn without_limits_the_link_is_lost() {
     let mut bench = Bench::new(SETTINGS, 1800.0);
@@ -182,7 +184,7 @@ fn without_limits_the_link_is_lost() {
     assert!(bench.lowest < 200.0, "{} V", bench.lowest);
 }
 
-/// A mains that sags to 230 V carries 1 Nm again within 0.6 s, and the link never comes near the trip.
+/// After a sag of the mains to 230 V, 1 Nm is available again within 0.6 s, and the link never comes near the trip.
 #[test]
 fn a_sagging_mains_carries_torque_again() {
     for rpm in [900.0, 1800.0, 3000.0] {
@@ -199,8 +201,8 @@ fn a_sagging_mains_carries_torque_again() {
     }
 }
 
-/// Stops from 3600 rpm one after the other: the resistor takes no more energy than it may, the trackers agree on it, and the
-/// link stays below the trip when it takes no more.
+/// Stops from 3600 rpm follow each other. The resistor absorbs no more energy than it may, the energy agrees with the heat
+/// that is tracked, and the link stays below the trip when the resistor absorbs no more.
 #[test]
 fn a_resistor_takes_what_it_may() {
     let chopper = ChopperSettings { energy_j: 500.0, power_w: 10.0, ..CHOPPER };
@@ -218,7 +220,7 @@ fn a_resistor_takes_what_it_may() {
             }
         }
         if n == 0 {
-            // Nearly all that it took is still in it: 10 W cool it.
+            // Nearly all of the energy is still in the resistor, since it cools with 10 W only.
             let in_it = 500.0 * f64::from(bench.state.heat);
             let ratio = in_it / bench.resistor_j;
             assert!((0.93..1.0).contains(&ratio), "{in_it} J of {} J", bench.resistor_j);
@@ -228,7 +230,7 @@ fn a_resistor_takes_what_it_may() {
     assert!(hottest <= 1.0 && hottest > 0.9, "{hottest}");
     assert!(bench.highest < 396.0, "{} V", bench.highest);
     assert!(reasons.contains(&Limiting::ResistorHot));
-    // At rest it cools with 50 s.
+    // At rest it cools with a time constant of 50 s.
     bench.run(15.0, |_| 0.0);
     let hot = bench.state.heat;
     bench.run(50.0, |_| 0.0);
@@ -236,7 +238,7 @@ fn a_resistor_takes_what_it_may() {
     assert!((cooled - 0.368).abs() < 0.01, "{cooled}");
 }
 
-/// At nominal voltage and near standstill nothing is limited, whatever the direction; a number that is none gives none.
+/// At nominal voltage and near standstill nothing is limited in either direction. NaN gives no limit that is a number.
 #[test]
 fn nothing_is_limited_where_nothing_has_to_be() {
     let limits = DcLink::new(&SETTINGS);
@@ -250,18 +252,19 @@ fn nothing_is_limited_where_nothing_has_to_be() {
         assert_eq!((free.i_q, free.flux_a), ((-I_Q, I_Q), 0.0), "{v} V, {rpm} rpm");
         assert_eq!(free.clamp(-2.9), (-2.9, Limiting::None));
     }
-    // The nearer to the trip, the less; only the direction that the link does not bear.
+    // The limit falls towards the trip, and only in the direction that drives the link further.
     assert_eq!(step(390.0, 1000.0).clamp(-1.0), (0.0, Limiting::DcLinkHigh));
     assert_eq!(step(390.0, -1000.0).clamp(1.0), (0.0, Limiting::DcLinkHigh));
     assert_eq!(step(390.0, 1000.0).clamp(1.0), (1.0, Limiting::None));
     assert_eq!(step(260.0, 1000.0).clamp(1.0), (0.0, Limiting::DcLinkLow));
     assert_eq!(step(215.0, 1000.0).clamp(1.0), (-I_Q, Limiting::RideThrough));
     assert_eq!(step(215.0, -1000.0).clamp(0.0), (I_Q, Limiting::RideThrough));
-    // Halfway up the band; the flux only above 1200 rpm.
+    // This is the middle of the band; flux is added above 1200 rpm only.
     let half = step(365.0, 1300.0);
     assert!((half.i_q.0 + 1.5).abs() < 1e-5 && (half.flux_a - 1.0).abs() < 1e-5, "{half:?}");
     assert_eq!(step(365.0, 1100.0).flux_a, 0.0);
-    // At twice the speed of 60 Hz the same power is half the torque: bands are twice as wide, that of generating torque 1.4 times.
+    // At twice the speed of 60 Hz the same power is half the torque, so the bands are twice as wide, and the band of generating
+    // torque is 1.4 times as wide.
     for (v, rpm, generates, motors) in [
         (355.0, 3600.0, 1.5, I_Q),
         (355.0, -3600.0, 1.5, I_Q),
@@ -276,7 +279,7 @@ fn nothing_is_limited_where_nothing_has_to_be() {
         let near = (least + generates).abs() < 1e-4 && (largest - motors).abs() < 1e-4;
         assert!(near, "{v} V, {rpm} rpm: {least} to {largest}");
     }
-    // A reference at its limit is not limited.
+    // A reference exactly at its limit is not limited.
     let (least, largest) = (half.i_q.0, step(365.0, -1300.0).i_q.1);
     assert_eq!(half.clamp(least), (least, Limiting::None));
     assert_eq!(step(365.0, -1300.0).clamp(largest), (largest, Limiting::None));

@@ -1,4 +1,5 @@
-//! Which command is taken in which state, whatever its value. [Control law](../../../docs/control-law.md) has the table.
+//! Rules in which state which command is accepted, independent of its value. [Control law](../../../docs/control-law.md) has the
+//! table.
 
 use crate::drive::command::{Command, Refused};
 use crate::drive::state::{Mode, Stage, State};
@@ -6,11 +7,11 @@ use crate::drive::state::{Mode, Stage, State};
 /// Modes that regulate torque, speed or position.
 const REGULATING: &[Mode] = &[Mode::Torque, Mode::Speed, Mode::Position];
 
-/// States in which a command is taken.
+/// States in which a command is accepted.
 struct Taken {
     off: bool,
     fault: bool,
-    /// In the states before [`State::of_mode`], for these modes.
+    /// Whether it is accepted in the states before [`State::of_mode`], for these modes.
     starting: bool,
     modes: &'static [Mode],
 }
@@ -22,19 +23,19 @@ impl Taken {
         Self { off: false, modes, ..Self::OFF }
     }
 
-    /// From the start command on.
+    /// Accepts the command from the start command on.
     const fn from_start(modes: &'static [Mode]) -> Self {
         Self { starting: true, ..Self::running(modes) }
     }
 }
 
-/// Whether `command` is taken in `state` of a drive that was started in `mode`.
+/// Checks that `command` is accepted in `state` of a drive that was started in `mode`.
 ///
 /// # Errors
-/// The state, or the latched fault, that refuses it.
+/// The state or the latched fault that refuses the command.
 pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(), Refused> {
     let taken = match command {
-        // Off and stopping stay as they are.
+        // In the states off and stopping these commands change nothing.
         Command::Stop(_) | Command::Clear | Command::MotorTemperature(_) => return Ok(()),
         Command::Start(_) | Command::CheckWiring | Command::Brake(_) => Taken::OFF,
         Command::Configure(_) => Taken { fault: true, ..Taken::OFF },

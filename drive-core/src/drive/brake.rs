@@ -1,7 +1,7 @@
-//! A motor with a mechanical brake, as of a hoist: the brake opens only after the torque was proven, and the torque ends only after the
-//! brake has closed.
+//! Control of a motor with a mechanical brake, for example of a hoist. The brake opens only after the torque was proven, and the torque
+//! ends only after the brake has closed.
 //!
-//! Whoever drives the brake opens it while the drive regulates, and closes it when the drive stops; see `src/strip.rs` of the firmware.
+//! The firmware opens the brake while the drive regulates, and closes it when the drive stops; see `src/strip.rs`.
 
 use super::{Common, Field, FluxPhase, Goal};
 use crate::{Coefficients, Dq, Fault};
@@ -10,23 +10,23 @@ use crate::{Coefficients, Dq, Fault};
 pub const BRAKE_MAX_S: f32 = 5.0;
 /// Q-axis current of the proof, as a share of the largest one.
 const PROOF_SHARE: f32 = 0.25;
-/// Periods of the proof: 0.1 s, in which the current settles several times.
+/// Periods of the proof: 0.1 s, several settling times of the current.
 const PROOF: u32 = 600;
-/// Share of that current by which the measured one may be off.
+/// Share of that current by which the measured current may deviate.
 const PROOF_ERROR: f32 = 0.3;
 
 impl Field {
-    /// The phase behind a flux that was built up and verified.
+    /// Returns the phase that follows when the flux was built up and verified.
     pub(super) fn behind_the_flux(k: &Common) -> FluxPhase {
         if k.brake > 0 { FluxPhase::Prove } else { FluxPhase::ready() }
     }
 
-    /// The goal of a shaft that has come to rest.
+    /// Returns the goal for a shaft that has come to rest.
     pub(super) fn at_rest(k: &Common) -> Goal {
         if k.brake > 0 { Goal::Hold { left: k.brake } } else { Goal::Release }
     }
 
-    /// The current while the torque is proven, A: the brake is closed, and the q-axis current must follow its reference.
+    /// Returns the current while the torque is proven, A. The brake is closed, and the q-axis current must follow its reference.
     ///
     /// # Errors
     /// [`Fault::TorqueNotProven`].

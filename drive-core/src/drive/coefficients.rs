@@ -1,4 +1,4 @@
-//! The coefficients of the control step.
+//! Coefficients of the control step.
 
 #[cfg(test)]
 mod tests;
@@ -13,8 +13,8 @@ use crate::protect::{
 };
 use crate::{Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, Relay, UnitVector};
 
-/// The coefficients of the control step, designed outside the interrupt.
-// In this order: the fields of every step come first and lie together; see the state of the drive.
+/// Coefficients of the control step, designed outside the interrupt.
+// The order matters: the fields that every step uses come first and lie together; see the state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Coefficients {
@@ -24,11 +24,11 @@ pub struct Coefficients {
     pub protection: Protection,
     /// Source of the angle of the frame.
     pub source: AngleSource,
-    /// Inject a carrier at all.
+    /// Whether to inject at all.
     pub inject: bool,
-    /// Demodulate and, with the injection as source, track.
+    /// Whether to demodulate and, with the injection as angle source, to track.
     pub demodulate: bool,
-    /// Take a rotor time constant while running.
+    /// Whether to accept a rotor time constant while running.
     pub track_rotor: bool,
     /// Current controllers.
     pub current_loop: DqPi,
@@ -42,37 +42,37 @@ pub struct Coefficients {
     pub indirect: Indirect,
     /// Electrical turns per period for one mechanical turn/s.
     pub freq_per_speed: f32,
-    /// Its inverse.
+    /// Inverse of `freq_per_speed`.
     pub speed_per_freq: f32,
-    /// Delay of the measured current beside the filter, samples.
+    /// Delay of the measured current without the filter, samples.
     pub current_lag: f32,
-    /// 1 where the delays of the current are compensated, 0 where not.
+    /// 1 if the delays of the current are compensated, 0 if not.
     pub lag_share: f32,
     /// Times of a start and a stop.
     pub sequence: SequenceSteps,
-    /// Estimator of the flux angle from the carrier.
+    /// Estimator of the flux angle from the injection.
     pub estimator: Estimator,
-    /// The observer, where the angle is not the injection's alone.
+    /// The back-EMF observer, if the angle does not come from the injection alone.
     pub observer: Option<Observer>,
-    /// The watch on the sensors' noise, where the angle is the injection's.
+    /// The watch on the noise of the sensors, if the angle comes from the injection.
     pub noise_watch: Option<NoiseWatch>,
-    /// The carrier.
+    /// The injection.
     pub injection: Injection,
-    /// The watch on the lock, if it is wanted.
+    /// The lock monitor, if it is enabled.
     pub lock_monitor: Option<LockMonitor>,
-    /// The start on a turning shaft, if it is wanted.
+    /// The flying start, if it is enabled.
     pub flying_start: Option<FlyingStart>,
-    /// Limit of the torque current by the voltage.
+    /// Limit of the q-axis current by the voltage.
     pub voltage_limit: VoltageLimit,
-    /// Limits of the torque current by the dc link, and chopper.
+    /// Limits of the q-axis current by the dc link, and chopper.
     pub dc_link: DcLink,
     /// Speed and position loop.
     pub motion: Motion,
-    /// Injection axis seen from the flux, as an angle and a unit vector.
+    /// Injection axis relative to the flux, as an angle and a unit vector.
     pub injection_turn: Angle,
-    /// See `injection_turn`.
+    /// Unit vector of `injection_turn`.
     pub injection_axis: UnitVector,
-    /// The check of a sensorless start, if it is wanted.
+    /// The saliency check of a sensorless start, if it is enabled.
     pub saliency_check: Option<SaliencyCheck>,
     /// The measurement of the offsets of the current sensors.
     pub offsets: OffsetCheck,
@@ -80,35 +80,35 @@ pub struct Coefficients {
     pub wiring: WiringCheck,
     /// Largest test voltage of an axis, V.
     pub largest_test_v: f32,
-    /// The measurement of the voltage that the inverter drops beyond its dead time.
+    /// The measurement of the inverter voltage error beyond the dead time.
     pub inverter_drop: InverterDrop,
-    /// The learning.
+    /// The saliency self-commissioning.
     pub learning: Learning,
     /// Thermal loads of motor and inverter.
     pub thermal: Thermal,
     /// The precharge relay, if there is one.
     pub relay: Option<Relay>,
-    /// The mode without identification, where the pairs of poles fit the nameplate.
+    /// V/f control, if the pole pairs fit the nameplate.
     pub volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub unlearned: bool,
-    /// Temperatures of the motor, °C, from which on the torque falls and at which there is none, where it has a sensor.
+    /// Temperatures of the motor, °C, at which the torque begins to fall and at which it is zero, if the motor has a sensor.
     pub motor_c: Option<[u8; 2]>,
-    /// The watch on sensors that stand still.
+    /// The watch on sensors whose signal does not change.
     pub travel_watch: TravelWatch,
-    /// The measurement of the asymmetry at a start, where the synchronous demodulation tracks.
+    /// The measurement of the asymmetry at a start, if the synchronous demodulation tracks.
     pub at_start: Option<AtStart>,
     /// Limits of dc current and power.
     pub power: PowerLimit,
 }
 
 impl Coefficients {
-    /// The fault of a motor sensor of which no reading has come.
+    /// Returns the fault of a motor sensor that has given no reading.
     pub(crate) fn no_motor_reading(&self) -> Option<Fault> {
         self.motor_c.map(|_| Fault::MotorSensorUnread)
     }
 
-    /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
+    /// Whether the coefficients are finite numbers, which a flipped bit may have changed.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.front_end, &self.current_loop);
         crate::math::all_finite(&[
@@ -138,26 +138,26 @@ impl Coefficients {
 pub struct DcLimit {
     /// Current from the link, A.
     pub current_a: f32,
-    /// Power from it, W.
+    /// Power from the link, W.
     pub power_w: f32,
 }
 
 impl DcLimit {
-    /// More than any inverter has.
+    /// Limits that are larger than those of any inverter.
     pub const NONE: Self = Self { current_a: 1000.0, power_w: 1e6 };
 }
 
 /// Limits of dc current and power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLimit {
-    /// Of what motor and switches take from the link.
+    /// Limits of current and power from the link into motor and switches.
     pub motoring: DcLimit,
-    /// Of what they give back.
+    /// Limits of current and power back into the link.
     pub generating: DcLimit,
 }
 
 impl PowerLimit {
-    /// None.
+    /// No limits.
     pub const NONE: Self = Self { motoring: DcLimit::NONE, generating: DcLimit::NONE };
 }
 
@@ -168,11 +168,11 @@ pub struct Protection {
     pub trip_a: f32,
     /// Dc link above which the drive trips, V.
     pub dc_over: f32,
-    /// Dc link below which it trips, V.
+    /// Dc link below which the drive trips, V.
     pub dc_under: f32,
     /// Largest speed of the rotor, electrical turns per period.
     pub rotor_freq: f32,
-    /// Largest torque current, A.
+    /// Largest q-axis current, A.
     pub i_q: f32,
 }
 
@@ -181,22 +181,23 @@ pub struct Protection {
 pub struct SequenceSteps {
     /// Time with the low sides on, which charges the bootstraps.
     pub precharge: u32,
-    /// Magnetisation.
+    /// Time of the magnetisation.
     pub magnetise: u32,
-    /// Verification of the lock.
+    /// Time of the verification of the lock.
     pub verify: u32,
-    /// Electrical speed up to which the shaft counts as standing, turns per period.
+    /// Electrical speed up to which the shaft counts as being at rest, turns per period.
     pub standing_freq: f32,
-    /// The same of a free shaft that the small angle error of a healthy drive has pushed while the lock was verified.
+    /// Electrical speed up to which a free shaft counts as being at rest after the verification of the lock, in which the small
+    /// angle error of a healthy drive may push it.
     pub pushed_freq: f32,
-    /// A per period.
+    /// Ramp of the q-axis current at a stop, A per period.
     pub stop_ramp: f32,
 }
 
-/// Coefficients of a start on a turning shaft, control periods and A.
+/// Coefficients of the flying start, in control periods and A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlyingStart {
-    /// Direct current that the rotor is looked for with, A.
+    /// D-axis current of the speed search, A.
     pub current: f32,
     /// Periods in which the injection alone corrects the angle.
     pub injection_only: u32,
@@ -206,13 +207,13 @@ pub struct FlyingStart {
     pub flux_decay: u32,
     /// Model that the search subtracts from the voltage.
     pub path: Path,
-    /// Largest voltage of flux that was left, V.
+    /// Largest voltage of the residual flux, V.
     pub residual_v: f32,
     /// Decay of that flux per period.
     pub decay: f32,
 }
 
 impl FlyingStart {
-    /// Share of `current` that is enough where flux was left: the flux drives a current of its own.
+    /// Share of `current` that is sufficient with a residual flux, since the flux also drives a current.
     pub const WITH_FLUX: f32 = 0.4;
 }

@@ -1,4 +1,4 @@
-//! The commands to the drive, and its answers.
+//! Commands to the drive, and its answers.
 
 use crate::drive::state::{Mode, State};
 use crate::drive::test_signal::TestSignal;
@@ -6,62 +6,62 @@ use crate::{Coefficients, Dq, Fault};
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
 ///
-/// Exhaustive on purpose: who checks or names commands has to handle a new one.
-// The large variant is passed by reference and kept once, in a mailbox.
+/// Exhaustive on purpose, so that code that checks or names the commands has to handle a new one.
+// The large variant is passed by reference and stored only once, in a mailbox.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Command {
-    /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
+    /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock if the
     /// angle comes from the injection, then regulate as `Mode` says.
     Start(Mode),
-    /// While regulating with the injection, at rest: no torque, magnetise again, verify that the flux is
-    /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
+    /// While regulating with the injection, at rest: remove the torque, magnetise again, verify that the
+    /// flux is tracked, then continue at zero torque. After a fault, use `Clear` and `Start` instead.
     Relock,
-    /// From off: the next start checks the wiring first; see `crate::protect::wiring_check`.
+    /// From off: let the next start check the wiring first; see `crate::protect::wiring_check`.
     CheckWiring,
-    /// From off: the motor has a brake, which needs this time to close, s; 0: none, as at the beginning. A start then proves the torque,
-    /// and a stop keeps it for that time; see `drive/brake.rs`.
+    /// From off: declare that the motor has a brake, which needs this time to close, s; 0 for no brake, the initial value. A start then
+    /// proves the torque, and a stop keeps the torque for that time; see `drive/brake.rs`.
     Brake(f32),
-    /// From off, or while a motor at rest is tested: this test signal. From off the drive calibrates the
-    /// offsets and charges the bootstraps first. See `crate::commission`.
+    /// From off, or while a motor at rest is tested: apply this test signal. From off the drive first
+    /// calibrates the offsets and charges the bootstraps. See `crate::commission`.
     #[cfg_attr(feature = "serde", serde(skip))]
     Test(TestSignal),
-    /// Stop in this way. A drive that neither regulates torque, speed or position nor turns by voltage and frequency does it by
+    /// Stop in this way. A drive that neither regulates torque, speed or position nor runs in V/f control stops by
     /// [`Stop::Coast`].
     Stop(Stop),
-    /// Forget the latched fault and be off.
+    /// Clear the latched fault; the drive is off then.
     Clear,
-    /// Reference of the quadrature-axis current, A peak; limited to the machine's limits.
+    /// Q-axis current reference, A peak; limited to the limits of the machine.
     Torque(f32),
-    /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
+    /// Speed reference, mechanical rpm; limited to `speed.limit_rpm`.
     Speed(f32),
-    /// A speed as [`Speed`](Self::Speed), while the drive regulates the speed, that ends by the ramp when it is not given again
-    /// within 0.5 s; a `Speed` ends it as well.
+    /// While the drive regulates the speed: a speed reference as [`Speed`](Self::Speed) that ends by the ramp if the command is
+    /// not repeated within 0.5 s. A `Speed` also ends it.
     Jog(f32),
-    /// Reference of the position, mechanical turns from where the drive was started, or from [`Home`](Self::Home); limited
-    /// to the counted range. It ends [`Press`](Self::Press).
+    /// Position reference, mechanical turns from the position at the start or from [`Home`](Self::Home); limited to the
+    /// counted range. It ends [`Press`](Self::Press).
     Position(f32),
-    /// While the drive regulates the position: turn at this speed, mechanical rpm, with at most this torque current, A peak,
-    /// instead, to find a stop; see [`homing`](crate::homing). The speed is limited to `speed.limit_rpm`.
+    /// While the drive regulates the position: turn at this speed instead, mechanical rpm, with at most this q-axis current,
+    /// A peak, to find a stop; see [`homing`](crate::homing). The speed is limited to `speed.limit_rpm`.
     Press(f32, f32),
-    /// While the drive regulates the position: this position, mechanical turns, is 0 from now on, and the shaft goes there.
-    /// With the encoder as angle source this holds until new settings; without, until the next start.
+    /// While the drive regulates the position: make this position, mechanical turns, position 0 from now on, and move the
+    /// shaft there. With the encoder as angle source this is valid until new settings; without, until the next start.
     Home(f32),
-    /// Reference of the direct-axis (magnetising) current, A peak.
+    /// D-axis (magnetising) current reference, A peak.
     Magnetising(f32),
     /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
-    /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
+    /// over the angle (Figure 19). Only with the encoder as angle source; a start resets it.
     TurnInjection(f32),
-    /// A voltage in the flux frame, V, added to that of the current loop from the next period on: to
-    /// identify the plant of the loop. Up to 60 V a component; a start takes it back.
+    /// Add this voltage in the flux frame, V, to the output of the current loop from the next period
+    /// on, to identify the plant of the loop. Up to 60 V per component; a start resets it.
     TestVoltage(Dq),
-    /// Rotor time constant that the slip is computed with, s, as `online` finds it.
-    /// Only with `track_rotor`; within
-    /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and approached by no more than 2 % with each command.
+    /// Rotor time constant for the slip, s, as `online` estimates it. Only with `track_rotor`; within
+    /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and changed by at most 2 % with each command.
     RotorTimeConstant(f32),
-    /// Reading of the motor's temperature sensor, °C, or the fault that it shows; in every state, ten times a second. Without effect
-    /// where the settings have no sensor. A fault, or a motor that is too hot, switches off; a start is refused while it stands.
+    /// Reading of the motor's temperature sensor, °C, or the fault that the sensor shows; accepted in every state, ten times a
+    /// second. Without effect if the settings have no sensor. A fault or a motor that is too hot switches the drive off, and a start
+    /// is refused as long as it is present.
     MotorTemperature(Result<f32, Fault>),
     /// Replace all settings. Only while off or in fault.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -73,28 +73,28 @@ pub enum Command {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stop {
-    /// Take the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. Whatever is set, the outputs are off
-    /// [`COAST_S`](crate::COAST_S) after the command, and later by the time of the [brake](Command::Brake) if there is one. While the motor
-    /// at rest is tested, switch off at once.
+    /// Reduce the torque to zero by `sequence.stop_a_per_s`, then switch off: the shaft coasts. With any setting, the outputs are off
+    /// [`COAST_S`](crate::COAST_S) after the command, or later by the time of the [brake](Command::Brake) if there is one. A drive that
+    /// tests a motor at rest switches off at once.
     #[default]
     Coast,
-    /// Take the speed to zero by `speed.ramp_rpm_per_s`, then as [`Coast`](Self::Coast).
+    /// Reduce the speed to zero by `speed.ramp_rpm_per_s`, then stop as by [`Coast`](Self::Coast).
     Ramp,
-    /// The same by `speed.quick_rpm_per_s`, also during a stop by ramp.
+    /// Stop as by [`Ramp`](Self::Ramp), but by `speed.quick_rpm_per_s`; also possible during a stop by ramp.
     Quick,
-    /// Switch off at once, whatever the drive does: the motor's current decays through the diodes of the inverter.
+    /// Switch off at once in any state. The motor's current decays through the diodes of the inverter.
     Now,
 }
 
 /// An accepted command.
 ///
-/// Exhaustive on purpose: an answer that is overlooked would be taken for another.
+/// Exhaustive on purpose, so that no answer is overlooked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Accepted {
-    /// As it was given.
+    /// The value was accepted as given.
     AsGiven,
-    /// Limited to the range of the machine; the value that holds now.
+    /// The value was limited to the range of the machine; this value is valid now.
     Limited(f32),
 }
 
@@ -103,30 +103,30 @@ pub enum Accepted {
 #[non_exhaustive]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Refused {
-    /// The value is not a number or infinite.
+    /// The value is NaN or infinite.
     #[error("the value is not a finite number")]
     NotFinite,
-    /// Not in this state.
+    /// The command is not possible in this state.
     #[error("not possible while the drive is {0}")]
     State(State),
-    /// Only while the shaft stands.
+    /// The command needs a shaft at rest.
     #[error("the shaft turns: bring it to rest first")]
     Turning,
-    /// The encoder is needed for this mode and the settings name another angle source.
+    /// This mode needs the encoder, and the settings name another angle source.
     #[error("this mode needs the encoder as angle source")]
     NeedsEncoder,
-    /// The injection is needed as angle source; to learn, with a demodulation that tracks.
-    #[error("this needs the injection, demodulated by a way that tracks")]
+    /// The command needs the injection as angle source; to learn, with a demodulation that can track.
+    #[error("this needs the injection and a demodulation that can track")]
     NeedsInjection,
-    /// The direct current is the one that tables and lock monitor are for.
-    #[error("the direct current cannot change while the lock monitor watches the angle")]
+    /// The tables and the lock monitor are valid for one d-axis current only.
+    #[error("the d-axis current cannot change while the lock monitor watches the angle")]
     FluxIsFixed,
     /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
     #[error(
         "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
     )]
     NotLearned,
-    /// Rated frequency and speed of the nameplate are those of other pairs of poles.
+    /// Rated frequency and speed of the nameplate belong to another number of pole pairs.
     #[error(
         "nameplate.speed_rpm must be 0.85 to 1 times 60 nameplate.frequency_hz/motor.pole_pairs"
     )]
@@ -140,8 +140,8 @@ pub enum Refused {
     /// A fault is latched; clear it first.
     #[error("fault {code} is latched: {0}", code = .0.code())]
     Fault(Fault),
-    /// This fault stands.
-    #[error("fault {code} stands: {0}", code = .0.code())]
+    /// This fault is still present.
+    #[error("fault {code} is present: {0}", code = .0.code())]
     Stands(Fault),
     /// The value is outside the allowed range.
     #[error("the value is outside the allowed range {min} to {max}")]

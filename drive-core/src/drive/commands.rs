@@ -1,4 +1,4 @@
-//! The commands: accepted, limited or refused, depending on the state.
+//! Execution of the commands: they are accepted, limited or refused, depending on the state.
 
 use super::{Drive, Field, FluxPhase, Frame, Goal, Phase, Start};
 use super::{allowed::allowed, brake::BRAKE_MAX_S, prepare::Prepare, scalar::Scalar};
@@ -10,18 +10,18 @@ use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::{Angle, AngleSource};
 
-/// Periods for which a jog goes on: 0.5 s.
+/// Periods for which a jog continues: 0.5 s.
 const JOG: u32 = 3000;
 
 impl Drive {
-    /// Takes a command; not from within [`step`](Self::step), but between two steps.
+    /// Executes a command. Call it between two steps, not from within [`step`](Self::step).
     ///
-    /// References are accepted from the start command on, and a start sets them to zero: references of an
-    /// earlier run move nothing.
+    /// References are accepted from the start command on. A start sets them to zero, so that references
+    /// of an earlier run move nothing.
     ///
     /// # Errors
-    /// The reason of the refusal; nothing has changed then.
-    // Not inlined: it stays in the flash.
+    /// The reason of the refusal. A refused command changes nothing.
+    // It is not inlined, so that it stays in the flash.
     #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
@@ -84,7 +84,7 @@ impl Drive {
             }
             Command::Magnetising(i_d) => {
                 finite(i_d)?;
-                // Tables and monitor are those of one direct current.
+                // The tables and the monitor are valid for one d-axis current only.
                 if self.c.lock_monitor.is_some() {
                     return Err(Refused::FluxIsFixed);
                 }
@@ -135,7 +135,7 @@ impl Drive {
         Ok(Accepted::AsGiven)
     }
 
-    /// The mode that the drive was started in; of one that is off or stops, none is asked for.
+    /// Returns the mode in which the drive was started. The mode of a drive that is off or stops is never used.
     pub(super) fn mode(&self) -> Mode {
         match &self.phase {
             Phase::Off(_) | Phase::Fault(..) => Mode::Torque,
@@ -146,7 +146,7 @@ impl Drive {
         }
     }
 
-    /// The goal of the current, with its reference.
+    /// Returns the goal of the current control, with its reference.
     fn goal(&mut self) -> Option<&mut Goal> {
         match &mut self.phase {
             Phase::Prepare(Prepare { job: Start::Field(goal), .. })
@@ -156,7 +156,7 @@ impl Drive {
         }
     }
 
-    /// Takes the speed, for so many periods where it is a jog.
+    /// Sets the speed reference; the speed of a jog is valid for so many periods.
     fn set_speed(&mut self, rpm: f32, periods: u32) -> Result<Accepted, Refused> {
         finite(rpm)?;
         let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
@@ -172,7 +172,7 @@ impl Drive {
         Ok(accepted(rpm, taken))
     }
 
-    /// Lets the position loop begin anew where the shaft is, without torque.
+    /// Restarts the position loop at the present position of the shaft, without torque.
     fn hold_present_position(&mut self) {
         if let Phase::Field(field) = &mut self.phase {
             let count = self.kept.rotor_count;
@@ -198,7 +198,7 @@ impl Drive {
         Ok(Accepted::AsGiven)
     }
 
-    /// Magnetises again along phase a, as a start at rest does, with the current flowing on.
+    /// Magnetises again along phase a, like a start at rest, while the current continues to flow.
     fn relock(&mut self) -> Result<(), Refused> {
         let (c, k) = (&self.c, &mut self.kept);
         let Phase::Field(field) = &mut self.phase else { return Ok(()) };

@@ -1,5 +1,5 @@
-//! Current in a frame of the flux: the control law, top to bottom, and the phases in which the flux is found, built up and
-//! verified.
+//! Current control in the flux frame: the control law from top to bottom, and the phases in which the flux is found, built
+//! up and verified.
 
 use super::flying_start::Residual;
 use super::slow_tasks::StepResults;
@@ -19,7 +19,7 @@ use crate::protect::saliency_check::SaliencyCheckAction;
 use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured};
 
 impl Field {
-    /// Without a current yet, for this goal.
+    /// Begins without current, for this goal.
     pub fn begin(&mut self, c: &Coefficients, goal: Goal, carried: &CarryOver) {
         self.frame = match (c.source, goal) {
             (_, Goal::Learn) => Frame::LockedShaft,
@@ -27,13 +27,13 @@ impl Field {
             (AngleSource::Injection, _) => Frame::Tracked,
         };
         self.goal = goal;
-        // A start on a turning shaft measures none of them.
+        // A flying start measures none of these quantities.
         self.carried = *carried;
         self.inverter_drop.volts = carried.inverter_drop;
         self.observer.resistance = carried.resistance;
         c.turn(&mut self.axes, 0.0, c.injection_axis, false);
         c.estimator.start(&mut self.estimator);
-        // A learning begins anew.
+        // A self-commissioning begins without the earlier asymmetry.
         if self.frame != Frame::LockedShaft {
             self.estimator.changed = carried.asymmetry;
         }
@@ -51,22 +51,22 @@ impl Field {
         }
     }
 
-    /// Whether torque, speed or position is regulated as asked for.
+    /// Whether torque, speed or position is regulated as commanded.
     pub fn regulates(&self) -> bool {
         matches!(self.flux, FluxPhase::Ready(_)) && self.goal.regulates()
     }
 
-    /// Whether there is torque for a purpose: as asked for, or to come to rest.
+    /// Whether the drive makes torque, as commanded or to come to rest.
     pub fn has_torque(&self) -> bool {
         self.regulates() || matches!(self.goal, Goal::Brake { .. } | Goal::Hold { .. })
     }
 
-    /// What this run leaves to the next one.
+    /// Returns the quantities that this run passes on to the next run.
     pub fn carry_over(&self) -> CarryOver {
-        // Until a speed is found nothing is known but what it was given.
+        // Until the speed is found, only the residual flux of the run before is known.
         let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
         let residual = Some(self.carried.residual.unwrap_or_else(turning));
-        // Until the flux is verified the shaft may turn, and what was measured may be its voltage.
+        // Until the flux is verified the shaft may rotate, and its voltage may have falsified the measurements.
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             return CarryOver { residual, ..self.carried };
         }
@@ -78,10 +78,10 @@ impl Field {
         }
     }
 
-    /// One period. The compare values go to `put_out` before the rest is done.
+    /// Runs one period. The compare values go to `put_out` before the checks and slow tasks.
     ///
     /// # Errors
-    /// Why the outputs go off: a fault, or it has stopped.
+    /// The reason why the outputs are switched off: a fault, or the end of a stop.
     pub fn step(
         &mut self,
         c: &Coefficients,
@@ -106,9 +106,9 @@ impl Field {
         };
         k.seen.reference = reference;
 
-        // Flux angle at the sample.
+        // Flux angle at the sample
         let flux = if counted {
-            // While it learns, the shaft is locked, and the flux may lead the frame.
+            // During self-commissioning the shaft is locked, and the flux may lead the frame.
             let count = if s.frame == Frame::Encoder { measured.encoder } else { 0 };
             let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
             flux.less(s.lead)
@@ -119,8 +119,8 @@ impl Field {
         let phi = flux.phi.unit_vector();
         let axes = s.axes;
 
-        // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
-        // alone it would let the sidebands of a turning carrier through.)
+        // The expected injection current is subtracted; the filter removes the rest. (Its notch is 6 Hz
+        // wide. Alone it would pass the sidebands of a rotating injection.)
         let carrier = if carrier_is_off || !c.inject {
             CarrierPeriod::default()
         } else {
@@ -145,7 +145,7 @@ impl Field {
             c.indirect.slip(&mut s.indirect, flux_current.q);
             (flux_current, s.indirect.rotor_freq)
         } else {
-            // By the reference: the measured current would feed the angle error back.
+            // The slip is computed from the reference, because the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
             let turning = c.observe_fundamental(s, index, rest, phi);
@@ -161,12 +161,12 @@ impl Field {
             + s.induced.at(reference) * s.induced_share
             + k.references.test_voltage;
 
-        // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
+        // Injection, Eq. 3.6: along theta = phi + 90°.
         let applied = phi.turned_by(axes.applied);
         let carrier_voltage = (axes.injection * carrier.voltage).to_alpha_beta(applied);
         let total = voltage.to_alpha_beta(applied) + carrier_voltage;
 
-        // Dead-time compensation, by the signs of the currents that will flow: with the carrier, or in a step.
+        // Dead-time compensation by the signs of the coming currents: with the injection current, or after a step.
         let coming = match carrier_is_off {
             true => current - k.seen.current,
             false => axes.injection * carrier.mean_current,
@@ -199,14 +199,14 @@ impl Field {
             s.measure_drop(c, k.elapsed, &sample);
         }
 
-        // No output from a state that is not finite. (The voltage contains current and reference of the step
-        // before, the speed contains the demodulated signal.)
+        // A state that is not finite gives no output. (The voltage contains current and reference of the
+        // previous step, and the speed contains the demodulated signal.)
         if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
             return Err(s.not_finite(c, k).unwrap_or(Fault::NonFiniteState).into());
         }
         put_out(c.front_end.compare(modulated.duties));
 
-        // Checks and slow tasks, one a sample.
+        // Checks and slow tasks, one per sample.
         let results = StepResults {
             measured,
             current: measured_current,
@@ -223,7 +223,7 @@ impl Field {
         Ok(modulated.duties)
     }
 
-    /// Measures the drop of the inverter, and with it the stator resistance.
+    /// Measures the inverter voltage error, and with it the stator resistance.
     #[cold]
     fn measure_drop(&mut self, c: &Coefficients, elapsed: u32, sample: &DropSample) {
         if let Some(ratio) = c.inverter_drop.step(&mut self.inverter_drop, elapsed, sample) {
@@ -232,7 +232,7 @@ impl Field {
         }
     }
 
-    /// Shows the state of the demodulation, the checks and the position.
+    /// Copies the state of the demodulation, the checks and the position to the telemetry.
     pub fn show(&self, c: &Coefficients, k: &mut Common) {
         let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
         seen.saliency = saliency.q;
@@ -243,10 +243,10 @@ impl Field {
         seen.turns = c.motion.turns(&self.motion, k.rotor_count);
     }
 
-    /// The current to regulate, A; moves on to the next phase of the flux, or the next goal, where it is time.
+    /// Returns the current to regulate, A. Enters the next phase of the flux or the next goal when it is due.
     ///
     /// # Errors
-    /// Why the outputs go off.
+    /// The reason why the outputs are switched off.
     fn advance(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             return self.find_flux(c, k);
@@ -272,7 +272,7 @@ impl Field {
         Ok(Dq { d, q: k.limits.clamp_torque(i_q) })
     }
 
-    /// The current while the flux is found, built up and verified, A.
+    /// Returns the current while the flux is found, built up and verified, A.
     #[cold]
     fn find_flux(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
         Ok(match self.flux {
@@ -286,7 +286,7 @@ impl Field {
         })
     }
 
-    /// The torque current of the speed or the position loop, A.
+    /// Returns the q-axis current of the speed or the position loop, A.
     fn follow(&mut self, c: &Coefficients, k: &mut Common) -> f32 {
         let mut range = k.limits.now.i_q;
         let goal = match &mut self.goal {
@@ -325,13 +325,13 @@ impl Field {
         i_q
     }
 
-    /// Goes on in this phase of the flux.
-    #[inline(always)] // a small phase is written, not the memory that it shares
+    /// Continues in this phase of the flux.
+    #[inline(always)] // writes the small phase only, not the memory that it shares
     pub fn enter(&mut self, k: &mut Common, flux: FluxPhase) {
         (self.flux, k.elapsed) = (flux, 0);
     }
 
-    /// Goes on with a shaft that stands: measures the asymmetry where that is of use, then lets the flux build up.
+    /// Continues with a shaft at rest: measures the asymmetry if that is useful, then builds up the flux.
     #[cold]
     pub fn continue_at_standstill(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
         let learns = self.frame == Frame::LockedShaft;
@@ -343,10 +343,10 @@ impl Field {
         }
     }
 
-    /// The current while flux that is left decays and the asymmetry is measured: none.
+    /// Returns the current while the residual flux decays and the asymmetry is measured, which is zero.
     ///
     /// # Errors
-    /// [`Fault::NothingLearned`] for more asymmetry than a learning accepts.
+    /// [`Fault::NothingLearned`] if the asymmetry is larger than a self-commissioning accepts.
     #[cold]
     fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let (Some(at_start), FluxPhase::Asymmetry(state)) = (&c.at_start, &mut self.flux) else {
@@ -371,7 +371,7 @@ impl Field {
         Ok(Dq::ZERO)
     }
 
-    /// Holds the frame along phase a, and lets the flux build up there.
+    /// Fixes the frame along phase a and builds up the flux there.
     #[cold]
     pub fn enter_hold(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
         (self.lock, self.inverter_drop) = Default::default();
@@ -390,7 +390,7 @@ impl Field {
         self.enter(k, FluxPhase::Hold);
     }
 
-    /// The current while the flux is built up, and while the saliency is checked, A.
+    /// Returns the current while the flux is built up and the saliency is checked, A.
     #[cold]
     fn magnetise(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let level = c.inverter_drop.level(k.elapsed);
@@ -419,7 +419,7 @@ impl Field {
                 };
                 k.elapsed = 0;
             }
-            // A drive that learns judges the slope.
+            // A self-commissioning judges the saliency sensitivity instead.
             SaliencyCheckAction::Failed if learns => {
                 k.references.injection_axis = c.injection_axis;
             }
@@ -428,7 +428,7 @@ impl Field {
         Ok(magnetising)
     }
 
-    /// The current while the lock is verified, A: the axis is tracked for a while without torque.
+    /// Returns the current while the lock is verified, A. The axis is tracked for a while without torque.
     #[cold]
     fn verify(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         if k.elapsed >= c.sequence.verify {
@@ -441,13 +441,13 @@ impl Field {
         Ok(Dq { d: k.references.current.d, q: 0.0 })
     }
 
-    /// Angle of the rotor, flux less slip, counted as by an encoder.
+    /// Returns the angle of the rotor, flux less slip, counted as by an encoder.
     #[inline(never)] // inlined at both calls, 8 bytes more of control code
     pub fn count_by_flux(&mut self) -> u32 {
         self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
     }
 
-    /// The fault when a result is not finite: settings, references or state, whichever is not.
+    /// Returns the fault of a result that is not finite: settings, references or state, whichever is not finite.
     #[cold]
     fn not_finite(&self, c: &Coefficients, k: &Common) -> Option<Fault> {
         let state = (!self.estimator.is_finite()).then_some(Fault::NonFiniteState);

@@ -1,4 +1,4 @@
-//! Start on a turning shaft.
+//! Flying start: start on a rotating shaft.
 
 use core::f32::consts::TAU;
 
@@ -11,68 +11,68 @@ use crate::math::within;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::{Coefficients, Dq, Fault, FlyingStart, PERIOD_S};
 
-/// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
-/// rotor.
+/// Share of the search current that bypasses the reference filter. The faster the current rises, the larger is the flux that rotates with
+/// the rotor.
 const INITIAL_SHARE: f32 = 0.5;
-/// Voltage of flux that was left which drives no current to speak of, V.
+/// Voltage of a residual flux that drives only a negligible current, V.
 const NEGLIGIBLE_EMF_V: f32 = 1.0;
-/// Current per missing magnetising current.
+/// Forcing current per missing magnetising current.
 const FORCING_GAIN: f32 = 10.0;
-/// Highest frequency of a rotor that is caught, electrical turns per period: 2700 rpm of four poles, with the error of the
-/// search. Above it the voltage of the rotor drowns in the noise of the sensors.
+/// Highest frequency of a rotor for a flying start, electrical turns per period: 2700 rpm of four poles, with the error of
+/// the search. Above it the voltage of the rotor is smaller than the noise of the sensors.
 const HIGHEST: f32 = 91.0 * PERIOD_S;
 
-/// Flux of a run before.
+/// Residual flux of the run before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Residual {
-    /// Voltage that it induced when that run ended, V.
+    /// Voltage that the flux induced when that run ended, V.
     volts: f32,
-    /// Control periods since then, of those that count.
+    /// Control periods since then, as far as they are counted.
     ago: u32,
 }
 
 impl Residual {
-    /// Flux that induces this voltage now, V.
+    /// Returns a flux that induces this voltage now, V.
     pub fn of(volts: f32) -> Self {
         Self { volts, ago: 0 }
     }
 
-    /// Flux of a rotor that turns with `freq`, electrical turns per period.
+    /// Returns the `flux` of a rotor that rotates at `freq`, electrical turns per period.
     pub fn turning(freq: f32, flux: f32) -> Self {
         Self::of(freq.abs() * (TAU / PERIOD_S) * flux)
     }
 
-    /// The same so many periods later.
+    /// Returns the residual flux so many periods later.
     pub fn after(self, periods: u32) -> Self {
         Self { ago: self.ago.saturating_add(periods), ..self }
     }
 
-    /// Whether there may be some of it left.
+    /// Whether some of the flux may be left.
     pub fn is_recent(&self, c: &Coefficients) -> bool {
         c.flying_start.is_some_and(|start| self.ago < start.flux_decay)
     }
 
-    /// Whether it would drive too much current yet, `elapsed` periods later.
+    /// Whether the flux would still drive too much current `elapsed` periods later.
     pub fn waits(&self, c: &Coefficients, elapsed: u32) -> bool {
         let Some(start) = &c.flying_start else { return false };
         let x = self.ago.saturating_add(elapsed) as f32 * start.decay;
-        // It decays by e^x, which is more than this.
+        // The flux decays by e^x, which is more than this series.
         self.volts > start.residual_v * (1.0 + x * (1.0 + 0.5 * x))
     }
 }
 
 impl Field {
-    /// The current while a turning shaft is looked for, A.
+    /// Returns the current during the search for a rotating shaft, A.
     ///
     /// # Errors
-    /// [`Fault::NotCaught`] for a shaft that turns too fast.
+    /// [`Fault::NotCaught`] if the shaft rotates too fast.
     #[cold]
     pub(super) fn search(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
         let (Some(start), FluxPhase::Search(search)) = (&c.flying_start, &mut self.flux) else {
             self.continue_at_standstill(c, k, 0);
             return Ok(Dq::ZERO);
         };
-        // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
+        // At first there is no current, so that the bootstrap capacitors charge and a residual flux is not short-circuited.
         let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
@@ -106,11 +106,11 @@ impl Field {
         Ok(Dq { d, q: 0.0 })
     }
 
-    /// The current while the flux of a turning rotor builds up, `n` periods after it began: as much flux as the voltage allows,
-    /// and with all current until it has built up.
+    /// Returns the current while the flux of a rotating rotor builds up, `n` periods after the beginning. The goal is as much
+    /// flux as the voltage allows, with the full current until it has built up.
     ///
     /// # Errors
-    /// [`Fault::NotCaught`] where no voltage shows it: in a frame that does not turn with the rotor there is none.
+    /// [`Fault::NotCaught`] if no voltage shows the flux. In a frame that does not rotate with the rotor there is no flux.
     #[cold]
     pub(super) fn build(&mut self, c: &Coefficients, k: &mut Common, n: u32) -> Result<Dq, Fault> {
         let most = k.limits.voltage.most.d;
@@ -119,11 +119,12 @@ impl Field {
         let d = within(most + FORCING_GAIN * missing, (0.0, current));
         if n >= built {
             Fault::NotCaught.unless(c.prediction.sees_flux(&self.prediction))?;
-            // At speed the carrier current without torque does not tell that under torque: what comes is the baseline.
+            // At speed the injection current without torque does not predict the current under torque, so the baseline is measured
+            // later.
             if self.hand_over.leads {
                 self.lock = LockMonitorState::default();
             }
-            // The loops go on from the speed that the shaft has.
+            // The loops continue from the present speed of the shaft.
             let speed = self.estimator.rotor_freq / c.freq_per_speed;
             c.motion.start(&mut self.motion, k.rotor_count);
             c.motion.take_over(&mut self.motion, k.rotor_count, speed, 0.0);
@@ -132,8 +133,8 @@ impl Field {
         Ok(Dq { d, q: 0.0 })
     }
 
-    /// The fault of a drive that ends with this one: where a turning shaft is looked for or magnetised, a wrong speed shows as a
-    /// voltage or a current that it does not explain.
+    /// Returns the fault to be reported for this one. While a rotating shaft is searched or magnetised, a wrong speed shows as
+    /// an unexplained voltage or current, which is reported as a failed flying start.
     #[cold]
     pub(super) fn as_catch_failure(&self, fault: Fault) -> Fault {
         use Fault::{CurrentNotAsPredicted, FluxNotAsPredicted, LostLock, NotCaught};

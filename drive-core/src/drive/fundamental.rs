@@ -1,4 +1,4 @@
-//! The observer of the fundamental wave, beside the injection.
+//! The back-EMF observer of the fundamental wave, beside the injection.
 
 use core::f32::consts::TAU;
 
@@ -8,8 +8,8 @@ use crate::flux::hand_over::{Source, Turning};
 use crate::{AlphaBeta, Coefficients, UnitVector};
 
 impl Coefficients {
-    /// One period of the observer; the turn of the flux that it sees. `current` is the measured one without the expected carrier, `phi`
-    /// the axis of the flux at the sample.
+    /// Runs one period of the observer and returns the turn of the flux that it estimates. `current` is the measured current without
+    /// the expected injection current, `phi` the axis of the flux at the sample.
     pub(super) fn observe_fundamental(
         &self,
         s: &mut Field,
@@ -30,21 +30,21 @@ impl Coefficients {
         s.hand_over.turning(index, turned, state.slip * PER_RADIAN, observer.age)
     }
 
-    /// Whether the filter has the angle.
+    /// Whether the angle filter tracks the angle.
     #[inline(never)] // in the flash; inlined at both calls, 232 bytes more of control code
     fn filter_tracks(&self, s: &Field, step: &StepResults) -> bool {
         step.trust.rotates
             && self.injects(s)
             && !s.hand_over.leads
-            // Flux that builds up shows no angle.
+            // A flux that still builds up shows no angle.
             && (step.trust.resistance
                 || self.observer.as_ref().is_none_or(|observer| observer.has_flux(&s.observer)))
     }
 
-    /// Shows the filter the speed that the observer has seen in the carrier period.
+    /// Passes the speed that the observer has estimated in the injection period to the angle filter.
     pub(super) fn see_speed(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
-        // Where the resistance does not follow the filter, neither does the speed.
+        // If the resistance does not follow the filter, neither does the speed.
         let shows = step.trust.resistance && step.trust.source == Source::Both;
         if shows && observer.has_flux(&s.observer) {
             let seen = observer.seen_speed(&s.observer, s.hand_over.mean_turn(), step.flux_freq);
@@ -52,7 +52,7 @@ impl Coefficients {
         }
     }
 
-    /// Corrects the tracked angle, speed and resistance by what carrier and observer show.
+    /// Corrects the tracked angle, speed and resistance by the measurements of injection and observer.
     pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
         let filters = self.filter_tracks(s, step);
         if !filters {
@@ -65,14 +65,14 @@ impl Coefficients {
         }
     }
 
-    /// Decides which source leads.
+    /// Decides which source gives the angle.
     pub(super) fn hand_over(&self, s: &mut Field, step: &StepResults) {
         if self.observer.is_some() && step.trust.observes() {
             s.hand_over.update(step.flux_freq, step.trust.source);
         }
     }
 
-    /// The slow part of the observer.
+    /// Runs the slow part of the observer.
     pub(super) fn update_observer(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
         let leads = s.hand_over.leads;
@@ -82,7 +82,8 @@ impl Coefficients {
             observer.compare_with_injection(&mut s.observer, error, step.flux_freq);
         }
         s.induced = observer.induced(&s.observer, step.flux_freq);
-        // What another share changes, the controllers have been putting out.
+        // The controllers are corrected by the voltage that the feed-forward takes over or gives up, so that the output does not
+        // jump.
         let (induced, share) = (s.induced.at(step.reference), f32::from(u8::from(leads)));
         s.current_loop.back_calculate(induced * (s.induced_share - share));
         s.induced_share = share;

@@ -1,4 +1,4 @@
-//! Learning with the shaft locked, as a state of the drive.
+//! Saliency self-commissioning with the shaft locked, as a state of the drive.
 
 use super::{Common, Drive, End, Field, FluxPhase, Phase};
 use crate::identify::learning::{Learned, LearningSample, Start, Verdict};
@@ -6,12 +6,12 @@ use crate::math::limited;
 use crate::{Angle, AngleSource, Coefficients, Fault};
 
 impl Drive {
-    /// Result of the last learning, used or not; none before the first has ended.
+    /// Returns the result of the last self-commissioning, accepted or not; none before the first has ended.
     pub fn learned(&self) -> Option<&Learned> {
         self.kept.learned.as_ref()
     }
 
-    /// The point that is being measured, from 1 on, and the number of points; `None` unless the drive learns.
+    /// Returns the number of the point that is being measured, from 1, and the number of points; `None` unless the drive learns.
     pub fn learning_progress(&self) -> Option<(usize, usize)> {
         match &self.phase {
             Phase::Field(Field { flux: FluxPhase::Learn(learning), .. }) => {
@@ -25,8 +25,8 @@ impl Drive {
         self.c.inject && self.c.demodulate && self.c.estimator.demodulator.tracks()
     }
 
-    /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the
-    /// flash. Returns the fault of one that cannot be used.
+    /// Evaluates a self-commissioning that has measured all points. The outputs are off, and it takes a part of a
+    /// period, from the flash. Returns the fault if the result cannot be used.
     #[cold]
     pub(super) fn evaluate_learning(&mut self) -> Option<Fault> {
         let (c, Phase::Field(field)) = (&self.c, &self.phase) else { return None };
@@ -53,8 +53,8 @@ impl Drive {
 }
 
 impl Field {
-    /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
-    /// result replaces the settings, and the drive stops.
+    /// Returns the q-axis current to regulate during self-commissioning, A, and turns the frame behind the flux.
+    /// At the end an accepted result replaces the settings, and the drive stops.
     #[cold]
     pub(super) fn learn(&mut self, c: &Coefficients, k: &mut Common) -> Result<f32, End> {
         let FluxPhase::Learn(learning) = &mut self.flux else { return Ok(0.0) };
@@ -78,7 +78,7 @@ impl Field {
 }
 
 impl Coefficients {
-    /// Replaces settings by an accepted result of a learning.
+    /// Replaces settings by an accepted result of a self-commissioning.
     #[cold]
     pub fn take(&mut self, learned: &Learned) {
         if !learned.verdict.is_accepted() {
@@ -100,7 +100,7 @@ impl Coefficients {
         if learned.slope.is_some() {
             self.saliency_check = self.saliency_check.and_then(|check| check.of_learned(learned));
             self.unlearned = false;
-            // With the encoder no slope is needed.
+            // With the encoder no saliency sensitivity is needed.
             if self.source == AngleSource::Injection {
                 self.protection.i_q = limited(self.protection.i_q, learned.limit_a);
                 self.motion.limit_current(learned.limit_a);

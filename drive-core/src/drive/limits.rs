@@ -1,4 +1,4 @@
-//! The chain of limits of the torque current, with the reason of the one that acts.
+//! The chain of limits of the q-axis current, with the reason of the active limit.
 
 use super::{Common, Drive, Phase, PowerLimit};
 use crate::current::voltage_limit::VoltageLimitState;
@@ -7,23 +7,23 @@ use crate::drive::coefficients::Coefficients;
 use crate::protect::thermal::Thermal;
 use crate::{Fault, Measured};
 
-/// Limits of the torque current. What the brake resistor has taken outlives a run.
+/// Limits of the q-axis current. The heat of the brake resistor outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Limits {
     pub dc_link: DcLinkState,
     pub voltage: VoltageLimitState,
-    /// Power that the model of the power limit leaves, over 3/2, W.
+    /// Power that the model of the power limit does not explain, over 3/2, W.
     pub power_error: f32,
-    /// Present limits, by dc link, voltage and heat together.
+    /// Present limits, from dc link, voltage and heat together.
     pub now: DcLinkLimits,
-    /// Why the torque current is smaller than asked for.
+    /// Reason why the q-axis current is smaller than commanded.
     pub why: Limiting,
-    /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
+    /// Reduction of the largest q-axis current by the temperature of heat sink, motor or inverter, A, and its reason.
     pub thermal_reduction_a: f32,
     pub thermal_reason: Limiting,
-    /// Share of the squared current that the motor does not bear by its sensor, of 255.
+    /// Reduction of the squared current by the temperature sensor of the motor, in 1/255.
     pub motor_hot: u8,
-    /// What stands against a start by that sensor.
+    /// Fault of that sensor that prevents a start.
     pub motor_fault: Option<Fault>,
 }
 
@@ -40,15 +40,15 @@ impl Limits {
         self.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 
-    /// The torque current within the limits, A.
+    /// Returns the q-axis current within the limits, A.
     pub fn clamp_torque(&mut self, i_q: f32) -> f32 {
         let (held, why) = self.now.clamp(i_q);
         self.why = why;
         held
     }
 
-    /// Takes the dc link and the speed of the rotor, electrical turns per period, of a carrier period, with the limit by
-    /// the voltage, A.
+    /// Updates the limits by the dc link, V, and the speed of the rotor, electrical turns per period, of an injection
+    /// period, with the limit by the voltage, A.
     pub fn step(
         &mut self,
         c: &Coefficients,
@@ -72,11 +72,11 @@ impl Common {
         }
     }
 
-    /// Adds the current of the last [`Thermal::EVERY`] periods to the thermal loads, and finds the torque current that heat
-    /// sink, motor and inverter do not bear; in every state. `is_energised`: whether a current is driven.
+    /// Adds the current of the last [`Thermal::EVERY`] periods to the thermal loads, and computes the thermal reduction of
+    /// the q-axis current, in every state. `is_energised`: whether a current is driven.
     ///
     /// # Errors
-    /// The load that is too high; off it cools, and is not judged.
+    /// The fault of a load that is too high. While the drive is off, motor and inverter cool and are not judged.
     pub fn load(
         &mut self,
         c: &Coefficients,
@@ -94,7 +94,7 @@ impl Common {
         }
     }
 
-    /// Finds the torque current that heat sink, motor and inverter do not bear.
+    /// Computes the reduction of the q-axis current by the temperature of heat sink, motor and inverter.
     #[inline(never)] // inlined in two places, 328 bytes more of control code
     fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
         let Self { limits, thermal, references, .. } = self;
@@ -114,12 +114,13 @@ impl Common {
 }
 
 impl Drive {
-    /// Whether the dc link is charged: a relay that there is has closed.
+    /// Whether the dc link is charged: if there is a precharge relay, it has closed.
     pub(super) fn is_charged(&self) -> bool {
         self.c.relay.is_none() || self.kept.relay.closed
     }
 
-    /// Takes a reading of the motor's sensor: from the first temperature on the squared current falls, to none at the second.
+    /// Processes a reading of the motor's temperature sensor. The squared current falls from the first temperature to zero at the
+    /// second.
     #[cold]
     pub(super) fn take_motor_temperature(&mut self, reading: Result<f32, Fault>) {
         let Some([from, trip]) = self.c.motor_c.map(|c| c.map(f32::from)) else { return };
@@ -134,7 +135,7 @@ impl Drive {
         }
     }
 
-    /// Why the torque is smaller than asked for.
+    /// Returns the reason why the torque is smaller than commanded.
     pub fn limiting(&self) -> Limiting {
         match &self.phase {
             Phase::Field(field) if field.has_torque() => self.kept.limits.why,

@@ -1,4 +1,4 @@
-//! From off to the first current: offsets, bootstraps, wiring.
+//! Preparation from off to the first current: offsets, bootstraps, wiring.
 
 use super::scalar::Scalar;
 use super::standstill_test::StandstillTest;
@@ -12,10 +12,10 @@ use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
 use crate::{Coefficients, Dq, Fault, Measured, PERIOD_S, UnitVector};
 
-/// Periods from the order to switch the low sides on until a sample sees them on, with margin.
+/// Periods from the command to switch the low sides on to the first sample with the low sides on, with a margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
 
-/// A drive that prepares: the outputs are off, or on without control.
+/// A drive in preparation. The outputs are off, or on without control.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepare {
     pub step: Preparation,
@@ -25,11 +25,11 @@ pub(super) struct Prepare {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Preparation {
-    /// Outputs off, offsets being measured.
+    /// The outputs are off, and the offsets are measured.
     Offsets(OffsetCheckState),
-    /// Low sides on, to charge the bootstrap capacitors; shunts are measured again.
+    /// The low sides are on, to charge the bootstrap capacitors; the offsets of shunts are measured again.
     LowSides(OffsetCheckState),
-    /// Pulses check the wiring.
+    /// Voltage pulses check the wiring.
     Wiring(WiringCheckState),
 }
 
@@ -44,7 +44,7 @@ impl Prepare {
 }
 
 impl Drive {
-    /// A step of the preparation.
+    /// Runs a step of the preparation.
     #[cold]
     pub(super) fn prepare(&mut self, measured: &Measured) -> Result<Option<[f32; 3]>, Fault> {
         let (c, k) = (&self.c, &mut self.kept);
@@ -55,7 +55,8 @@ impl Drive {
                 let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
                 if !waits && let Some(offsets) = c.offsets.step(state, measured)? {
                     k.offsets = offsets;
-                    // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
+                    // A residual flux of the run before would be short-circuited by the low sides. If the wiring was not checked
+                    // yet, there was no run.
                     if residual.is_some() && !k.wiring_unchecked {
                         self.energise(measured.encoder);
                     } else {
@@ -66,12 +67,12 @@ impl Drive {
                 return Ok(None);
             }
             Preparation::LowSides(state) => {
-                // The first samples still see the bridge off.
+                // In the first samples the bridge is still off.
                 if k.elapsed >= LOW_SIDES_ON_FROM {
                     c.offsets.step_again(state, measured)?;
                 }
                 if k.elapsed >= c.sequence.precharge {
-                    // The boost of V/f and the pulses of the commissioning check the wiring themselves.
+                    // The boost of V/f control and the pulses of the commissioning check the wiring themselves.
                     if matches!(prepare.job, Start::Field(_)) && k.wiring_unchecked {
                         prepare.step = Preparation::Wiring(WiringCheckState::default());
                         k.elapsed = 0;
@@ -92,7 +93,7 @@ impl Drive {
         Ok(Some(LOW_SIDES_ON))
     }
 
-    /// Goes on to the work that the drive was started for.
+    /// Continues with the work for which the drive was started.
     #[cold]
     fn energise(&mut self, encoder: u32) {
         let Phase::Prepare(prepare) = &self.phase else { return };
@@ -102,7 +103,7 @@ impl Drive {
             Start::Test(wanted) => self.enter(Phase::Test(StandstillTest::new(wanted, left))),
             Start::Field(goal) => {
                 let catches = prepare.job.catches(&self.c);
-                // Built where it stays: it is large.
+                // The field is large, so it is built in place.
                 self.enter(Phase::Field(Field::default()));
                 let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
                     return;
@@ -118,7 +119,7 @@ impl Drive {
         }
     }
 
-    /// Begins to prepare for this work.
+    /// Begins the preparation for this work.
     pub(super) fn prepare_for(&mut self, job: Start) {
         let mut carried = self.carry_over();
         let (c, k) = (&self.c, &mut self.kept);
@@ -145,7 +146,7 @@ impl Drive {
 }
 
 impl Common {
-    /// Makes everything fresh that does not outlive a run.
+    /// Resets all state that does not outlive a run.
     fn start(&mut self, c: &Coefficients, i_d: f32, inverter_drop: f32) {
         self.starts = self.starts.wrapping_add(1);
         self.offsets = [0.0; 3];
@@ -155,12 +156,12 @@ impl Common {
         self.no_torque(i_d, c.injection_axis);
     }
 
-    /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
+    /// Whether the shaft is at rest, as far as the angle shows; NaN is not at rest.
     pub fn is_at_standstill(&self, c: &Coefficients) -> bool {
         self.seen.rotor_freq.abs() <= c.sequence.standing_freq
     }
 
-    /// References of nothing but this direct current, A.
+    /// Sets the references to this d-axis current, A, and no torque.
     pub fn no_torque(&mut self, i_d: f32, injection_axis: UnitVector) {
         let current = Dq::new(i_d, 0.0);
         self.references = References { current, test_voltage: Dq::ZERO, injection_axis };

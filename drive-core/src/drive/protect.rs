@@ -1,4 +1,4 @@
-//! The checks of every step: the sample before it is used, and the state when a result is not finite.
+//! Checks of every step: the sample before it is used, and the state if a result is not finite.
 
 use super::Common;
 use crate::drive::coefficients::Coefficients;
@@ -7,10 +7,10 @@ use crate::io::{Hardware, Measured};
 use crate::protect::wiring_check::{Pulse, WiringCheck, WiringCheckState};
 
 impl Coefficients {
-    /// Checks a sample, with the outputs on or about to be.
+    /// Checks a sample while the outputs are on or about to be switched on.
     ///
     /// # Errors
-    /// The first fault that it shows.
+    /// The first fault that the sample shows.
     pub(super) fn protect(&self, measured: &Measured) -> Result<(), Fault> {
         let unused =
             if self.dc_link.has_chopper() { Hardware::empty() } else { Hardware::CHOPPER_OFF };
@@ -39,10 +39,10 @@ impl Coefficients {
 }
 
 impl Coefficients {
-    /// A period of a pulse train, short voltages without control; `None` after its end.
+    /// Runs a period of a pulse train, short voltages without control. Returns `None` after its end.
     ///
     /// # Errors
-    /// [`Fault`] of a wiring that drives too much current.
+    /// The fault of a wiring with too much current.
     #[cold]
     pub(super) fn pulse(
         &self,
@@ -60,8 +60,8 @@ impl Coefficients {
 }
 
 impl Common {
-    /// The fault when a result is not finite and settings, or references, are not; `goal_is_finite` says it of the references of
-    /// the goal.
+    /// Returns the fault of a result that is not finite, if the settings or the references are not finite; `goal_is_finite`
+    /// tells whether the references of the goal are.
     #[cold]
     pub(super) fn not_finite(&self, c: &Coefficients, goal_is_finite: bool) -> Option<Fault> {
         if !c.is_finite() {
@@ -74,7 +74,8 @@ impl Common {
     }
 }
 
-/// The fault of the most telling event: the one that switched off first comes first. An event without a name is one of the converters.
+/// Returns the fault of the most significant event, in the order in which the events switch off. An event without a name is an
+/// event of the ADCs.
 fn of_hardware(events: Hardware) -> Fault {
     [
         (Hardware::BREAK, Fault::Break),
@@ -116,7 +117,7 @@ mod tests {
             assert_eq!(at(half, half), Ok(()));
             assert_eq!(at(half, half * 1.002), Err(Fault::OverCurrentC));
         }
-        // An event that has no name is a fault, too.
+        // An event that has no name is also a fault.
         let hardware = Hardware::from_bits_retain(1 << 7);
         let unknown = Measured { hardware, dc_link: 311.0, ..Measured::default() };
         let found = coefficients.protect(&unknown);

@@ -1,4 +1,4 @@
-//! Running by voltage and frequency, without a model of the motor: see [`volts_per_hertz`](crate::flux::volts_per_hertz).
+//! V/f control, without a model of the motor; see [`volts_per_hertz`](crate::flux::volts_per_hertz).
 
 use super::{CarryOver, Common, End, Telemetry};
 use crate::dc_link::DIVIDER;
@@ -9,13 +9,13 @@ use crate::{Abc, Coefficients, Fault, Limiting, Measured, PERIOD_S};
 /// Frequency below which a motor that stops is switched off, turns per period.
 const STANDS: f32 = 0.2 * PERIOD_S;
 
-/// A drive that turns by voltage and frequency.
+/// A drive in V/f control.
 #[derive(Clone, Debug)]
 pub(super) struct Scalar {
     turning: VoltsPerHertzState,
-    /// Reference of the speed, mechanical turns/s.
+    /// Speed reference, mechanical turns/s.
     pub speed: f32,
-    /// Whether it comes to rest by the ramp of a quick stop, where it stops.
+    /// Present while the drive stops: whether by the ramp of a quick stop.
     pub stop: Option<bool>,
     pub carried: CarryOver,
 }
@@ -29,10 +29,10 @@ impl Scalar {
         if self.stop.is_some() { State::BrakingByFrequency } else { State::VoltsPerHertz }
     }
 
-    /// One period. All protections of a sample act, over-speed by the frequency, and the thermal loads.
+    /// Runs one period. All protections of a sample are active, over-speed (by the frequency) and the thermal loads.
     ///
     /// # Errors
-    /// Why the outputs go off.
+    /// The reason why the outputs are switched off.
     #[cold]
     pub fn step(
         &mut self,
@@ -51,7 +51,7 @@ impl Scalar {
         if k.elapsed.is_multiple_of(u32::from(DIVIDER)) {
             let by_voltage = (f32::INFINITY, Limiting::None);
             k.limits.step(c, measured.dc_link, rotor_freq, by_voltage);
-            // Its voltage has the drop of the inverter in it.
+            // The voltage of V/f control contains the inverter voltage error.
             k.limit_power(c, k.seen.current.d, 0.0);
             if rotor_freq.abs() > c.protection.rotor_freq {
                 return Err(Fault::OverSpeed.into());

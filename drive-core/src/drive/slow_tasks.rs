@@ -1,22 +1,22 @@
-//! The tasks that are due once a carrier period: each of its ten samples does another one, so that no step
-//! takes much longer than another.
+//! The tasks that are due once an injection period. Each of its ten samples does a different task, so that
+//! no step takes much longer than another.
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
 //! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
-//! | 1 | torque that the dc link bears; direct current of the least loss; voltages for the prediction at 3; lock monitor | saliency (0) |
+//! | 1 | torque limit by the dc link; loss minimisation; voltages for the prediction at 3; lock monitor | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3; every sixth time the thermal loads; covariance of the filter after the speed (9) | magnetising current (0) |
-//! | 3 | room for the carrier; currents that the voltage allows; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | carrier for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
-//! | 5 | reference current of the saliency; covariance of the filter after the carrier (4); the slowly turning axes; travel of the sensors | - |
-//! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
+//! | 3 | voltage left for the injection; current limits by the voltage; judgement of the prediction | voltages (1), rotor voltage (2) |
+//! | 4 | injection signal for the filter, corrections of the tracked angle | saliency (0), covariance (2) |
+//! | 5 | reference current of the saliency; covariance of the filter after the injection (4); slow axes; travel of the sensors | - |
+//! | 6 | gains of the observer; injection current in both channels; voltages for the prediction at 8 | sums (9) |
 //! | 7 | rotor voltage for the prediction at 8; prediction of the filter | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | averages of the demodulation; the sums begin anew; speed for the filter | ten samples mixed, ten turns summed |
+//! | 9 | averages of the demodulation; restart of the sums; speed for the filter | ten samples mixed, ten turns summed |
 //!
-//! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
-//! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
-//! averages of sample 9.
+//! The noise watch takes its six readings in samples 0 to 2 (channel a) and 7 to 9 (channel b), three
+//! consecutive samples each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), so that it is
+//! as old as the averages of sample 9.
 
 use super::trust::{Check, Lock, Trust};
 use super::{Common, Field, FluxPhase};
@@ -27,23 +27,23 @@ use crate::protect::Thermal;
 use crate::protect::plausibility::{RotorFlux, Uncertainty};
 use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
 
-/// Sample behind which a command is taken: its tasks and the command take less than the longest sample.
+/// Sample after which a command is executed. Its tasks and the command together take less time than the longest sample.
 pub(super) const COMMANDS_BEHIND: usize = 8;
 
-/// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
+/// Results of the step that the tasks use in addition to the state. Frequencies are in electrical turns per period.
 pub(super) struct StepResults<'a> {
     pub measured: &'a Measured,
     /// The measured current in the stator frame, A.
     pub current: AlphaBeta,
-    /// Current that makes flux and slip, A.
+    /// Current that determines flux and slip, A.
     pub flux_current: Dq,
-    /// Filtered reference of the current, A.
+    /// Filtered current reference, A.
     pub reference: Dq,
-    /// Voltage without the carrier, V.
+    /// Voltage without the injection, V.
     pub voltage: Dq,
-    /// Injection axis when the carrier current flowed that is sampled now.
+    /// Injection axis at the time when the injection current flowed that is sampled now.
     pub carrier_axis: UnitVector,
-    /// Flux axis when the filtered current flowed.
+    /// Flux axis at the time when the filtered current flowed.
     pub flux_axis: UnitVector,
     /// Frequency of the flux.
     pub flux_freq: f32,
@@ -53,7 +53,7 @@ pub(super) struct StepResults<'a> {
 }
 
 impl Coefficients {
-    /// Does the task of sample `index` of the carrier period, which counts with or without a carrier.
+    /// Runs the task of sample `index` of the injection period, which is counted with or without injection.
     ///
     /// # Errors
     /// The fault that a check finds.
@@ -101,7 +101,8 @@ impl Coefficients {
                 Ok(())
             }
             REFERENCE_AT => {
-                // Here too: less than half a turn between two looks is told from one backwards, so up to 600 Hz.
+                // The rotor is also counted here. Two counts are less than half a turn apart up to 600 Hz, so the direction is
+                // unambiguous.
                 s.count_by_flux();
                 s.estimator.synchronous.average_reference(step.reference.q);
                 s.estimator.filter.reduce();
@@ -137,7 +138,7 @@ impl Coefficients {
         }
     }
 
-    /// Takes one of the six looks at the noise of the current sensors.
+    /// Takes one of the six readings of the noise of the current sensors.
     fn watch_noise(&self, s: &mut Field, look: usize, measured: &Measured) -> Result<(), Fault> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.judges_noise()),
@@ -145,7 +146,7 @@ impl Coefficients {
         }
     }
 
-    /// Watches, where no carrier does, that both sensors follow a current that turns.
+    /// Checks that both sensors follow a rotating current while there is no injection.
     fn watch_travel(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let freq = if self.injects(s) { 0.0 } else { step.flux_freq };
         match &mut s.flux {
@@ -154,9 +155,9 @@ impl Coefficients {
         }
     }
 
-    /// Computes the rotor voltage that the next judgement of the current reckons with.
+    /// Computes the rotor voltage for the next check of the current against the voltage.
     fn predict(&self, s: &mut Field, step: &StepResults) {
-        // On iron a weakened flux is larger than the current model says: the observer measures it.
+        // If the motor saturates, a weakened flux is larger than the current model says, and the observer measures it.
         let magnetising = match &self.observer {
             Some(observer) if step.trust.observes() => observer.magnetising(&s.observer),
             _ => s.indirect.magnetising,
@@ -164,14 +165,14 @@ impl Coefficients {
         let flux = RotorFlux {
             magnetising,
             rotor_freq: step.rotor_freq,
-            // While it learns, the flux leads the frame.
+            // During self-commissioning the flux leads the frame.
             axis: step.flux_axis.turned_by(s.lead_axis),
             flux_freq: step.flux_freq,
         };
         self.prediction.predict(&mut s.prediction, &flux);
     }
 
-    /// Limits the currents to those that the voltage of the dc link allows.
+    /// Limits the currents by the voltage of the dc link.
     fn limit_voltage(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
@@ -187,7 +188,7 @@ impl Coefficients {
         self.voltage_limit.step(&mut k.limits.voltage, &now);
     }
 
-    /// Follows the direct current of the least loss.
+    /// Sets the d-axis current of the least loss.
     #[cold] // in the flash
     fn minimise_loss(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
@@ -195,7 +196,7 @@ impl Coefficients {
         *i_d = self.voltage_limit.least_loss(*i_d, step.reference.q, carrier);
     }
 
-    /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
+    /// Limits the q-axis current by dc link, heat sink, motor and inverter.
     fn limit_torque(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
         let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
@@ -203,16 +204,16 @@ impl Coefficients {
         k.limit_power(self, s.indirect.magnetising, s.inverter_drop.volts);
     }
 
-    /// Whether the demodulation has a carrier.
+    /// Whether there is an injection to be demodulated.
     pub(super) fn injects(&self, s: &Field) -> bool {
         self.inject && s.hand_over.demodulates()
     }
 
-    /// Judges the current by the voltage.
+    /// Checks the current against the voltage.
     fn judge(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let trust = &step.trust;
         if !trust.mean_voltage {
-            // The drop of the inverter may not be known either.
+            // The inverter voltage error may also be unknown.
             s.prediction.forget_mean();
         }
         let tracked = self.observer.is_some() && trust.observes();
@@ -226,7 +227,7 @@ impl Coefficients {
         judged
     }
 
-    /// Checks that the tracked angle is that of the flux.
+    /// Checks that the tracked angle is the angle of the flux.
     #[inline(never)] // inlined, 56 bytes more of control code
     fn check_lock(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
@@ -242,7 +243,7 @@ impl Coefficients {
         monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, baseline)
     }
 
-    /// Checks that both current sensors see the carrier.
+    /// Checks that both current sensors see the injection current.
     fn check_both_channels(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         if !self.injects(s) {
             return Ok(());
@@ -252,7 +253,7 @@ impl Coefficients {
         s.carrier_watch.step(current, step.carrier_axis, amplitude)
     }
 
-    /// Fits the carrier into the voltage that the fundamental leaves.
+    /// Reduces the injection to the voltage that the fundamental leaves.
     fn check_carrier_headroom(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         if !self.inject || s.hand_over.is_carrier_off() {
             return Ok(());

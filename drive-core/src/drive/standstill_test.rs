@@ -1,7 +1,7 @@
-//! TestSignal of a motor at rest for the [commissioning](crate::commission).
+//! Test signals to a motor at rest, for the [commissioning](crate::commission).
 //!
-//! The current along phase a is regulated by one controller, with an optional carrier; the voltage across it is the
-//! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
+//! One controller regulates the current along phase a, with an optional injection. The voltage across phase a is
+//! the injection alone, without control. The dead time is not compensated, since the commissioning measures it.
 
 use super::{CarryOver, Common, Drive, Phase, Start};
 use crate::carrier::{CARRIER_COS, CARRIER_SAMPLES};
@@ -16,35 +16,35 @@ use crate::protect::WiringCheck;
 use crate::protect::wiring_check::WiringCheckState;
 use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
 
-/// Control periods in which the carrier rises to its amplitude: twenty of its own.
+/// Control periods in which the injection rises to its amplitude: twenty injection periods.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
 
-/// A motor at rest is tested.
+/// State of a drive that tests a motor at rest.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StandstillTest {
     wanted: TestSignal,
     low_pass: LpfState,
     control: Control,
-    /// Pulse trains that have ended.
+    /// Number of pulse trains that have ended.
     trains: u32,
     pulses: WiringCheckState,
     pub carried: CarryOver,
 }
 
-/// State of the current along phase a and its carrier.
+/// State of the current along phase a and of the injection.
 #[derive(Clone, Copy, Debug, Default)]
 struct Control {
     regulator: PiState,
     reference: ReferenceState,
-    /// Present amplitude of the carrier, V.
+    /// Present amplitude of the injection, V.
     carrier: AlphaBeta,
-    /// Sample within the period of the carrier.
+    /// Sample within the injection period.
     index: usize,
     /// Register of the binary sequence; zero before its first sample.
     register: u8,
 }
 
-/// The next sample, plus or minus one, of the sequence of largest length by x^8 + x^6 + x^5 + x^4 + 1.
+/// Returns the next sample, plus or minus one, of the maximum-length sequence by x^8 + x^6 + x^5 + x^4 + 1.
 pub(super) fn next_bit(register: &mut u8) -> f32 {
     let r = if *register == 0 { 1 } else { *register };
     *register = (r << 1) | ((r >> 7 ^ r >> 5 ^ r >> 4 ^ r >> 3) & 1);
@@ -63,7 +63,7 @@ impl StandstillTest {
         }
     }
 
-    /// A step of the test.
+    /// Runs a step of the test.
     #[cold]
     pub fn step(
         &mut self,
@@ -116,19 +116,19 @@ impl StandstillTest {
         let seen = &mut k.seen;
         (seen.measured, seen.realised) = (current, realised);
         seen.dc_link = measured.dc_link;
-        // For the thermal loads.
+        // The thermal loads use this current.
         seen.current = Dq::new(current.alpha, current.beta);
         Ok(duties)
     }
 }
 
 impl Drive {
-    /// Whether `Collector` is to be given what the last step saw.
+    /// Whether the measurements of the last step are to be passed to the `Collector`.
     pub fn is_testing(&self) -> bool {
         matches!(&self.phase, Phase::Test(test) if test.state() == State::Exciting)
     }
 
-    /// What the commissioning needs of this drive.
+    /// Returns the quantities of the drive that the commissioning needs.
     pub fn test_report(&self) -> TestReport {
         let (trains, answers) = match &self.phase {
             Phase::Test(test) => (test.trains, test.pulses.answers()),
@@ -143,7 +143,7 @@ impl Drive {
         }
     }
 
-    /// Takes [`Command::Test`](super::Command::Test).
+    /// Executes [`Command::Test`](super::Command::Test).
     pub(super) fn take_test(&mut self, wanted: TestSignal) -> Result<Accepted, Refused> {
         if let TestSignal::Current { amperes, regulator, carrier, .. } = wanted {
             let max = self.c.protection.trip_a;

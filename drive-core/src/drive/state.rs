@@ -1,78 +1,76 @@
-//! The states of the drive.
+//! States of the drive.
 
 use core::fmt;
 
 use crate::Fault;
 
-/// The quantity that the drive regulates once it runs.
+/// Quantity that the drive regulates once it runs.
 ///
-/// Exhaustive on purpose: who names or translates modes has to handle a new one.
+/// Exhaustive on purpose, so that code that names or translates the modes has to handle a new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
-    /// Torque, by the current on the quadrature axis.
+    /// Torque, by the q-axis current.
     Torque,
     /// Speed of the rotor; see `motion`.
     Speed,
     /// Position of the rotor. Without the encoder it drifts; see `motion`.
     Position,
-    /// Speed of a motor that nobody has identified, by voltage in proportion to the frequency; see
-    /// `volts_per_hertz`.
+    /// Speed by V/f control, for a motor that was not identified; see `volts_per_hertz`.
     VoltsPerHertz,
-    /// Learning of the reference of the angle tracking with the shaft locked (see `crate::identify::learning`), then
-    /// stops.
+    /// Saliency self-commissioning with the shaft locked (see `crate::identify::learning`); then the drive stops.
     Learning,
-    /// [TestSignal](crate::TestSignal) of the motor at rest, for the commissioning.
+    /// A [test signal](crate::TestSignal) to the motor at rest, for the commissioning.
     Commissioning,
 }
 
-/// The state of the drive.
+/// State of the drive.
 ///
-/// Exhaustive on purpose: supervision and field bus have to decide on a new state.
+/// Exhaustive on purpose, so that supervision and field bus have to handle a new state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
-    /// Outputs off.
+    /// The outputs are off.
     #[default]
     Off,
-    /// Outputs off, offsets of the current sensors being measured.
+    /// The outputs are off, and the offsets of the current sensors are measured.
     Calibrating,
-    /// Low sides on, to charge the bootstrap capacitors of the high-side gate drives.
+    /// The low sides are on, to charge the bootstrap capacitors of the high-side gate drives.
     Precharge,
-    /// Short voltage pulses show whether sensors and phases belong together.
+    /// Short voltage pulses check whether sensors and phases belong together.
     CheckingWiring,
-    /// Exciting the motor at rest, for the commissioning.
+    /// Test signals are applied to the motor at rest, for the commissioning.
     Exciting,
-    /// Current along phase a, to find the speed of a turning shaft; then its flux builds up.
+    /// Flying start: a current along phase a shows the speed of a rotating shaft; then its flux builds up.
     FlyingStart,
-    /// Current on the direct axis only, until the flux stands.
+    /// Current on the d axis only, until the flux is established.
     Magnetising,
-    /// Flux built up, tracking without torque: is it the flux that is tracked?
+    /// The flux is built up; tracking without torque verifies that the flux is tracked.
     Verifying,
-    /// Regulating torque.
+    /// The torque is regulated.
     Torque,
-    /// Regulating speed.
+    /// The speed is regulated.
     Speed,
-    /// Regulating position.
+    /// The position is regulated.
     Position,
-    /// Turning by voltage and frequency.
+    /// V/f control.
     VoltsPerHertz,
-    /// Learning with the shaft locked.
+    /// Saliency self-commissioning with the shaft locked.
     Learning,
-    /// Taking the speed to zero, then [`Stopping`](Self::Stopping).
+    /// The speed is reduced to zero, then [`Stopping`](Self::Stopping).
     Braking,
-    /// Taking the frequency to zero, then off: a stop by ramp from [`VoltsPerHertz`](Self::VoltsPerHertz).
+    /// The frequency is reduced to zero, then off: a stop by ramp from [`VoltsPerHertz`](Self::VoltsPerHertz).
     BrakingByFrequency,
-    /// Taking the torque to zero, then off.
+    /// The torque is reduced to zero, then off.
     Stopping,
-    /// Outputs off until the fault is cleared.
+    /// The outputs are off until the fault is cleared.
     Fault(Fault),
 }
 
 impl State {
-    /// The state in which a drive started in `mode` runs.
+    /// Returns the state in which a drive runs that was started in `mode`.
     pub const fn of_mode(mode: Mode) -> Self {
         match mode {
             Mode::Torque => Self::Torque,
@@ -84,7 +82,7 @@ impl State {
         }
     }
 
-    /// The stage of a run that the state belongs to.
+    /// Returns the stage of a run to which the state belongs.
     #[inline(always)] // out of line, 32 bytes more of control code
     pub const fn stage(self) -> Stage {
         match self {
@@ -98,7 +96,7 @@ impl State {
         }
     }
 
-    /// The latched fault.
+    /// Returns the latched fault.
     pub const fn fault(self) -> Option<Fault> {
         match self {
             Self::Fault(fault) => Some(fault),
@@ -106,12 +104,12 @@ impl State {
         }
     }
 
-    /// Whether the outputs are off, and stay off until the next command.
+    /// Whether the outputs are off and stay off until the next command.
     pub const fn is_off(self) -> bool {
         matches!(self.stage(), Stage::Off | Stage::Fault)
     }
 
-    /// Whether the current is regulated in the frame of the flux, for whatever purpose: with a wiring that was found right.
+    /// Whether the current is regulated in the flux frame for any purpose, which requires that the wiring was found to be right.
     pub const fn has_current(self) -> bool {
         match self {
             Self::FlyingStart | Self::Magnetising | Self::Verifying | Self::Learning => true,
@@ -122,31 +120,31 @@ impl State {
         }
     }
 
-    /// Whether torque, speed or position is regulated as asked for.
+    /// Whether torque, speed or position is regulated as commanded.
     pub const fn regulates(self) -> bool {
         matches!(self, Self::Torque | Self::Speed | Self::Position)
     }
 
-    /// Whether it is coming to an end with the outputs on.
+    /// Whether the drive is stopping with the outputs on.
     pub const fn is_stopping(self) -> bool {
         matches!(self.stage(), Stage::Stopping)
     }
 }
 
-/// A stage of a run.
+/// Stage of a run.
 ///
-/// Exhaustive on purpose: supervision and field bus have to decide on a new stage.
+/// Exhaustive on purpose, so that supervision and field bus have to handle a new stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Outputs off.
+    /// The outputs are off.
     Off,
-    /// On the way from off to running.
+    /// Starting, with the outputs off or on.
     Starting,
-    /// Doing what it was started for.
+    /// Running in the mode that was started.
     Running,
-    /// Coming to an end with the outputs on.
+    /// Stopping, with the outputs on.
     Stopping,
-    /// Outputs off until the fault is cleared.
+    /// The outputs are off until the fault is cleared.
     Fault,
 }
 

@@ -1,4 +1,4 @@
-//! The ways to stop.
+//! Ways to stop.
 
 use crate::io::PERIOD_S;
 
@@ -6,10 +6,10 @@ use super::{Common, Drive, End, Field, FluxPhase, Goal, Phase};
 use crate::Coefficients;
 use crate::drive::command::Stop;
 
-/// Longest time from a stop by [`Stop::Coast`] to the outputs off, s. With the time of the contact, the main loop and the command it stays
-/// below the 200 ms that the manual promises.
+/// Longest time from a stop by [`Stop::Coast`] until the outputs are off, s. Together with the times of the contact, the main loop and the
+/// command it stays below the 200 ms that the manual states.
 pub const COAST_S: f32 = 0.15;
-/// The same in control periods.
+/// That time in control periods.
 pub(super) const COAST: u32 = (COAST_S / PERIOD_S + 0.5) as u32;
 
 impl Drive {
@@ -42,15 +42,15 @@ impl Field {
         }
         let regulates = self.regulates();
         let brakes = regulates && matches!(stop, Stop::Ramp | Stop::Quick);
-        // The brake closes at once, and is helped until it has.
+        // The brake begins to close at once, and the drive holds the shaft until it has closed.
         let holds = !brakes && self.has_torque() && k.brake > 0;
         if regulates && (brakes || holds) {
-            // The speed loop takes over at the present speed and torque current.
+            // The speed loop takes over at the present speed and q-axis current.
             let speed = k.seen.rotor_freq / c.freq_per_speed;
             let (i_q, _) = k.limits.now.clamp(k.references.current.q);
             c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
         }
-        // A torque that was asked for during the start has not come yet.
+        // A torque that was commanded during the start has not been applied yet, and is cancelled.
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             k.references.current.q = 0.0;
         }

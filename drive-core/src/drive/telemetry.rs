@@ -1,4 +1,4 @@
-//! The quantities of a step that the drive shows.
+//! Quantities of a step that the drive shows.
 
 use core::mem::offset_of;
 
@@ -20,26 +20,26 @@ pub struct Telemetry {
     pub reference: Dq,
     /// Filtered current in the estimated flux frame, A.
     pub current: Dq,
-    /// Wanted voltage without the carrier, V.
+    /// Wanted voltage without the injection, V.
     pub voltage: Dq,
-    /// Measured current in the stator frame, A, not filtered: it contains the carrier.
+    /// Measured current in the stator frame, A, unfiltered, so it contains the injection current.
     pub measured: AlphaBeta,
-    /// Voltage of the period that begins with the next sample, limited, dead-time compensation not
-    /// counted, V.
+    /// Voltage of the period that begins with the next sample, limited, without the dead-time
+    /// compensation, V.
     pub realised: AlphaBeta,
-    /// Current difference that any but the synchronous demodulation sees, A.
+    /// Current difference from a demodulation other than the synchronous one, A.
     pub delta_i: f32,
-    /// Saliency that the synchronous demodulation sees.
+    /// Saliency from the synchronous demodulation.
     pub saliency: f32,
-    /// Square of the carrier current along the injection axis, A^2.
+    /// Square of the injection current along the injection axis, A^2.
     pub carrier_squared: f32,
-    /// Share of the carrier that is put out: below 1 where the fundamental leaves too little voltage.
+    /// Share of the injected voltage that is applied, below 1 if the fundamental leaves too little voltage.
     pub carrier_share: f32,
-    /// Share of the flux-fixed saliency that the lock monitor misses; 1 is a flux that is gone.
+    /// Saliency deficit of the lock monitor: the missing share of the flux-fixed saliency; 1 means no flux.
     pub saliency_loss: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
-    /// Voltage per phase that the power stage drops beyond its dead time, as measured at the start, V.
+    /// Inverter voltage error per phase beyond the dead time, as measured at the start, V.
     pub inverter_drop: f32,
     /// Position in mechanical turns from the start; without the encoder it drifts, see
     /// `motion`.
@@ -47,7 +47,7 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Without current, with the whole carrier.
+    /// Returns the telemetry without current, with the full injection.
     pub(super) fn still() -> Self {
         Self { carrier_share: 1.0, ..Self::default() }
     }
@@ -56,32 +56,33 @@ impl Telemetry {
 /// Limits of the present torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TorqueLimits {
-    /// Least and largest torque current, A, at the present speed, dc link and heat sink; only while the drive regulates.
+    /// Least and largest q-axis current, A, at the present speed, dc link and heat-sink temperature; only while the drive
+    /// regulates.
     pub i_q: (f32, f32),
-    /// Torque current that the heat sink does not bear, of the largest current, A.
+    /// Reduction of the largest q-axis current by the heat-sink temperature, A.
     pub thermal_reduction_a: f32,
-    /// Voltage that the limit of the direct current reckons with, V peak; 0 where the direct
-    /// current is that of the setting.
+    /// Voltage that the limit of the d-axis current uses, V peak; 0 if the d-axis current is that
+    /// of the setting.
     pub voltage: f32,
 }
 
 impl Drive {
-    /// Where in a drive its [telemetry](Self::telemetry) is, bytes.
+    /// Position of the [telemetry](Self::telemetry) in a drive, bytes.
     pub const TELEMETRY: usize = offset_of!(Self, kept.seen);
 
-    /// Limits of the present torque.
+    /// Returns the limits of the present torque.
     pub fn torque_limits(&self) -> TorqueLimits {
         let limits = &self.kept.limits;
         let (i_q, voltage) = (limits.now.i_q, limits.voltage.available);
         TorqueLimits { i_q, thermal_reduction_a: limits.thermal_reduction_a, voltage }
     }
 
-    /// The telemetry of the last step with the outputs on.
+    /// Returns the telemetry of the last step with the outputs on.
     pub const fn telemetry(&self) -> &Telemetry {
         &self.kept.seen
     }
 
-    /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
+    /// Returns the tracked stator resistance relative to the settings, less one; only while an observer tracks it.
     pub fn stator_resistance(&self) -> Option<f32> {
         match &self.phase {
             Phase::Field(field) if self.c.observer.is_some() && field.has_torque() => {

@@ -1,5 +1,5 @@
-//! The drive on a resistive-inductive load: sequence, protections, commands. How it drives a motor
-//! is tested with the simulator.
+//! Tests of the drive on a resistive-inductive load: sequence, protections, commands. The simulator
+//! tests it with a motor.
 
 mod motor;
 mod protections;
@@ -30,12 +30,12 @@ const MODES: [Mode; 6] = [
     Mode::Commissioning,
 ];
 
-/// A whole period of a drive with its front end.
+/// Runs a whole period of a drive with its front end.
 fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
     drive.period(front_end, sample, &mut |_| {}).0
 }
 
-/// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
+/// Three windings of 6.2 ohm and 51.5 mH, which represent the motor for the current loop.
 struct Load {
     current: AlphaBeta,
     pending: Compare,
@@ -43,8 +43,8 @@ struct Load {
     /// The only direction in which a current can flow when a phase is open.
     only: Option<UnitVector>,
     front_end: FrontEndState,
-    /// A random number of this period. Without noise the converter's steps make a regular oscillation, which a start takes for a
-    /// rotor that turns.
+    /// Random number of this period. Without noise, the steps of the ADC cause a regular oscillation, which a start mistakes for
+    /// a rotating rotor.
     random: u32,
 }
 
@@ -67,7 +67,7 @@ impl Load {
         }
     }
 
-    /// A period of the drive, without one of the load.
+    /// Runs a period of the drive, without a period of the load.
     fn step(&mut self, drive: &mut Drive) -> Compare {
         self.step_with(drive, &self.sample())
     }
@@ -94,12 +94,12 @@ fn settings() -> Settings {
     let mut settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
     // The load has no dead time.
     settings.inverter.compensate = false;
-    // Its saliency is that of the settings.
+    // The load is used with the saliency of the settings.
     settings.injection.synchronous.allow_unlearned = true;
     settings
 }
 
-/// A sensorless drive on this load, which has no saliency.
+/// Returns settings of a sensorless drive on this load, which has no saliency.
 fn sensorless() -> Settings {
     let mut settings = settings();
     settings.angle_source = AngleSource::Injection;
@@ -111,7 +111,7 @@ fn drive() -> Drive {
     Drive::new(settings().build().unwrap())
 }
 
-/// Steps until the drive is in `state`; false when it is not after three seconds.
+/// Runs until the drive is in `state`; returns false if it is not after three seconds.
 fn run_to(drive: &mut Drive, load: &mut Load, state: State) -> bool {
     for _ in 0..18_000 {
         if drive.state() == state {
@@ -122,7 +122,7 @@ fn run_to(drive: &mut Drive, load: &mut Load, state: State) -> bool {
     false
 }
 
-/// A period of drive and load.
+/// Runs a period of drive and load.
 fn period(drive: &mut Drive, load: &mut Load) {
     let compare = load.step(drive);
     load.advance(compare);
@@ -135,7 +135,7 @@ fn running() -> (Drive, Load) {
     (drive, load)
 }
 
-/// The part of a drive that regulates current.
+/// Returns the part of a drive that regulates the current.
 fn field(drive: &mut Drive) -> &mut Field {
     match &mut drive.phase {
         Phase::Field(field) => field,
@@ -143,7 +143,7 @@ fn field(drive: &mut Drive) -> &mut Field {
     }
 }
 
-/// The reference of the speed of a drive that starts, turns/s.
+/// Returns the speed reference of a drive that starts, turns/s.
 fn speed(drive: &Drive) -> Option<f32> {
     match drive.phase {
         Phase::Prepare(Prepare { job: Start::Field(Goal::Speed { speed, .. }), .. }) => Some(speed),
@@ -175,7 +175,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
     assert_eq!(seen, all);
     assert!((58..=61).contains(&low_sides), "10 ms of low sides: {low_sides} periods");
 
-    // Two settled references: the loop has no steady error but the converter's step.
+    // With two settled references, the loop has no steady error except the step of the ADC.
     for (i_q, expected) in [(2.0, 2.0), (-1.0, -1.0)] {
         drive.command(&Command::Torque(i_q)).unwrap();
         for _ in 0..1200 {
@@ -190,7 +190,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
     let before = drive.telemetry().reference.q;
     assert!(run_to(&mut drive, &mut load, State::Off));
     assert_eq!(load.step(&mut drive), Compare::OFF);
-    // Ramped, not dropped: 1 A at 30 A/s.
+    // The current is ramped down, 1 A at 30 A/s.
     assert!(before < -0.9);
 }
 
@@ -233,7 +233,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         let mut good = settings();
         if number == 4 {
             good.angle_source = AngleSource::Injection;
-            // This load has no saliency, and no voltage of a rotor that turns.
+            // This load has no saliency and no back-EMF.
             good.injection.synchronous.check = false;
             good.sequence.catch = false;
         }
@@ -243,7 +243,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         break_it(&mut drive);
         let mut compare = load.step(&mut drive);
         if number == 2 {
-            // A reference is behind its filter, which gives it out in the next step.
+            // The output of the reference filter follows in the next step.
             compare = load.step(&mut drive);
         }
         assert_eq!((compare, drive.state()), (Compare::OFF, State::Fault(fault)), "case {number}");
@@ -255,7 +255,8 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
     }
 }
 
-/// The compare values leave before the checks that come once a carrier period; one that fails takes them back in the same period.
+/// The compare values are output before the checks that are made once an injection period. A check that fails cancels them in the
+/// same period.
 #[test]
 fn a_late_check_takes_the_compare_values_back() {
     let (mut drive, mut load) = running();
@@ -280,7 +281,7 @@ fn a_late_check_takes_the_compare_values_back() {
     assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
 }
 
-/// The period that leaves time is the one behind which nothing else of the carrier period is computed.
+/// The period that leaves time for a command is the one after which nothing else of the injection period is computed.
 #[test]
 fn one_period_of_ten_leaves_time_for_a_command() {
     let off = drive();
@@ -311,7 +312,7 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(&Command::Torque(f32::NAN)), Err(Refused::NotFinite));
     assert_eq!(d.command(&Command::Torque(f32::INFINITY)), Err(Refused::NotFinite));
     assert_eq!(d.kept.references.current.q, 1.0, "refused commands change nothing");
-    // sqrt(3.5^2 - 0.7^2)
+    // The largest current is sqrt(3.5^2 - 0.7^2).
     let Ok(Accepted::Limited(most)) = d.command(&Command::Torque(-99.0)) else { panic!() };
     assert!((most + 3.429).abs() < 1e-3);
     assert_eq!(
@@ -336,7 +337,7 @@ fn commands_are_taken_limited_or_refused() {
     d.command(&Command::Start(Mode::Position)).unwrap();
     assert_eq!(d.command(&Command::Speed(1.0)), Err(Refused::State(State::Position)));
     assert_eq!(d.command(&Command::Position(-1e9)), Ok(Accepted::Limited(-1000.0)));
-    // While it starts there is nothing to press against, and no place to be position 0.
+    // While the drive starts, there is nothing to press against, and no position that could be 0.
     let starting = Err(Refused::State(State::Calibrating));
     assert_eq!(d.command(&Command::Press(30.0, 0.5)), starting);
     assert_eq!(d.command(&Command::Home(0.0)), starting);
@@ -357,7 +358,7 @@ fn a_test_voltage_is_put_out_bounded_and_taken_back() {
     assert!(matches!(d.command(&Command::TestVoltage(volts)), Err(Refused::State(_))));
 }
 
-/// With the injection along the flux as Ha and Sul have it, and along the quadrature axis otherwise.
+/// The injection is along the flux for the demodulation of Ha and Sul, and along the q axis otherwise.
 #[test]
 fn a_start_puts_the_injection_on_its_axis() {
     for (kind, axis) in [
@@ -418,7 +419,7 @@ fn settings_out_of_range_are_refused_by_name() {
     }
 }
 
-/// What a host, a bit flip and a broken wire can do.
+/// Returns samples that a host, a bit flip or a broken wire can cause.
 fn any_sample() -> impl Strategy<Value = Sample> {
     (0u16..=4095, 0u16..=4095, 0u16..=4095, any::<u32>(), 0u8..20).prop_map(
         |(current_a, current_b, dc_link, encoder, n)| Sample {
@@ -458,7 +459,7 @@ proptest! {
                 5 => Command::TurnInjection(value),
                 _ => Command::Clear,
             });
-            // Mostly quiet samples, so that it gets somewhere.
+            // Most samples are quiet, so that the drive advances.
             let sample = if n % 40 == 39 { &sample } else { &quiet };
             let compare = step(&mut drive, &mut front_end, sample);
             prop_assert!(compare.a <= 14_167 && compare.b <= 14_167 && compare.c <= 14_167);

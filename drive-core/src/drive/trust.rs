@@ -1,5 +1,5 @@
-//! Quantities that may be used and checks that may act, by the phase of the flux: one table, a row a phase. `docs/control-law.md`
-//! prints it.
+//! Quantities that may be used and checks that may act, by the phase of the flux: one table with a row per phase, which
+//! `docs/control-law.md` shows.
 
 use Check::{Narrow, Wide};
 use Lock::{Baseline, Off, Watch};
@@ -9,11 +9,11 @@ use super::{Field, FluxPhase, Frame};
 use crate::Coefficients;
 use crate::flux::hand_over::Source;
 
-/// How strictly the measured current is compared with that which voltage and flux explain.
+/// Tolerance of the comparison of the measured current with the current that voltage and flux explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Check {
     Off,
-    /// Residual flux turns relative to the new one.
+    /// A wide tolerance, because a residual flux rotates relative to the new one.
     Wide,
     Narrow,
 }
@@ -22,9 +22,9 @@ pub(super) enum Check {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lock {
     Off,
-    /// It measures its baseline.
+    /// The monitor measures its baseline.
     Baseline,
-    /// It judges; where the start has not measured the baseline, it measures it first.
+    /// The monitor watches. If the start has not measured the baseline, the monitor measures it first.
     Watch,
 }
 
@@ -32,31 +32,32 @@ pub(super) enum Lock {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Trust {
     pub source: Source,
-    /// Whether the frame turns with the rotor.
+    /// Whether the frame rotates with the rotor.
     pub rotates: bool,
     pub lock: Lock,
     pub current: Check,
-    /// Whether the mean of the unexplained voltage is kept and judged; otherwise it begins anew.
+    /// Whether the mean of the unexplained voltage is kept and judged; otherwise it is reset.
     pub mean_voltage: bool,
     /// Whether flux and injection show the stator resistance.
     pub resistance: bool,
-    /// Whether the drop of the inverter is measured, and with it the resistance.
+    /// Whether the inverter voltage error is measured, and with it the resistance.
     pub measures_drop: bool,
 }
 
 impl Trust {
-    /// Whether the observer has a part in the angle, or follows it.
+    /// Whether the back-EMF observer takes part in the angle, or follows it.
     pub fn observes(&self) -> bool {
         self.source != Slip
     }
 }
 
 impl Field {
-    /// The row of the present phase, `elapsed` periods after it began.
+    /// Returns the row of the present phase, `elapsed` periods after it began.
     #[rustfmt::skip] // A phase, a row.
     pub(super) fn trust(&self, c: &Coefficients, elapsed: u32) -> Trust {
         match (&self.flux, self.frame) {
-            // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
+            // Flying start: the shaft is searched; below, it was found, and at first the injection alone, then also the observer
+            // rotates the frame.
             (FluxPhase::Search(_), _) => Trust { source: Nothing, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             // There is neither current nor flux.
             (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },

@@ -1,7 +1,7 @@
 use super::*;
 use crate::generated;
 
-/// The numbers are in logs and manuals: this list may grow, nothing in it may change.
+/// The numbers are used in logs and manuals, so this list may grow, but no entry may change.
 #[test]
 fn codes_never_change() {
     let table = [
@@ -69,7 +69,7 @@ fn codes_never_change() {
     assert_eq!(table.len(), Fault::ALL.len());
 }
 
-/// Plain ASCII, and short enough for a line of the console together with the state of the drive.
+/// Texts are plain ASCII, and short enough for a line of the console together with the state of the drive.
 #[test]
 fn texts_fit_a_line_of_the_console() {
     for fault in Fault::ALL {
@@ -81,7 +81,7 @@ fn texts_fit_a_line_of_the_console() {
     }
 }
 
-/// The page of the faults lists each with its text and a link to its section, which gives at least one cause, and the cure.
+/// The page of the faults lists each fault with its text and a link to its section, which gives at least one cause, and the cure.
 #[test]
 fn the_manual_says_the_same() {
     let manual = std::fs::read_to_string(generated::root().join("docs/faults.md")).unwrap();
@@ -100,7 +100,7 @@ fn the_manual_says_the_same() {
     generated::check("faults.md", "faults", &table);
 }
 
-/// The faults of a heading: " 4: ...", "s 1 to 3: ...", "s 7, 8 and 38: ...".
+/// Returns the faults of a heading: " 4: ...", "s 1 to 3: ...", "s 7, 8 and 38: ...".
 fn numbers(heading: &str) -> Vec<u8> {
     let (list, _) = heading.split_once(':').expect("numbers");
     let found: Vec<u8> = list.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();

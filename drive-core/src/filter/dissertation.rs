@@ -31,8 +31,8 @@ use crate::filter::sos::{Sos, SosState};
 /// noise filter. 600 Hz lies 6.5 Hz inside the -40 dB edge, so in alpha-beta the sidebands of the
 /// injection leak through above about 6 Hz electrical.
 ///
-/// `b0` is 1 in all sections but the last, which carries the whole gain: the multiplications by 1 vanish, since the
-/// coefficients are constant.
+/// `b0` is 1 in all sections except the last, which carries the whole gain. Since the coefficients are constant,
+/// the compiler removes the multiplications by 1.
 #[rustfmt::skip]
 pub const LPF_AS_PRINTED: Sos<4> = Sos::from_f64(&[
     [1.0, -1.7146060941391668, 1.0, -1.6493510618854281, 0.8415222895964312],
@@ -55,7 +55,7 @@ pub const BPF: Sos<2> = Sos::from_f64(&[
     [0.09379053126985266, 0.06774457498501514, 0.09379053126985266, -1.3678961390655335, 0.8441402684907214],
 ]);
 
-/// "PP" (Table 8): a 4th-order low pass, 100 Hz, behind the demodulation.
+/// "PP" (Table 8): a 4th-order low pass, 100 Hz, after the demodulation.
 #[rustfmt::skip]
 pub const PP: Sos<2> = Sos::from_f64(&[
     [0.008951966550252578, -0.013874994329057859, 0.008951966550252578, -1.9091540566236969, 0.9131833315968833],
@@ -74,11 +74,12 @@ pub type PpState = SosState<f32, 2>;
 const LPF_LAG: f32 = 1.530_412;
 const LPF_LAG_SQUARED: f32 = 5.315_48;
 
-/// Phase delay of [`LPF`], samples, at `omega_t` rad/sample: 1.530412 + 5.31548 (ωT)². The phase lag is
-/// this delay times `omega_t`.
+/// Returns the phase delay of [`LPF`], samples, at `omega_t` rad/sample: 1.530412 + 5.31548 (ωT)². The
+/// phase lag is this delay times `omega_t`.
 ///
-/// Least-squares fit of the phase up to 60 Hz. Error of the phase, measured: below 0.0002° up to
-/// 60 Hz, 0.01° at 100 Hz, 0.5° at 200 Hz. Even in `omega_t`; defined for every value.
+/// It is a least-squares fit of the phase up to 60 Hz. The measured error of the phase is below
+/// 0.0002° up to 60 Hz, 0.01° at 100 Hz, and 0.5° at 200 Hz. The function is even in `omega_t` and
+/// defined for every value.
 pub fn lpf_lag_samples(omega_t: f32) -> f32 {
     LPF_LAG + LPF_LAG_SQUARED * (omega_t * omega_t)
 }

@@ -37,7 +37,7 @@ mod tests {
     #[test]
     fn the_sum_is_that_of_the_last_samples() {
         let mut sums = MovingSum::<1, 8>::default();
-        // The sum of the last two samples.
+        // This is the sum of the last two samples.
         let last = [1, 2, 3].iter().zip([0, 1, 0]).map(|(x, index)| sums.step(index, [*x])[0]);
         assert!(last.eq([1, 3, 5]));
     }

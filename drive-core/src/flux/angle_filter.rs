@@ -1,33 +1,36 @@
-//! Kalman filter of the flux angle: the carrier shows the angle, the voltage of the fundamental wave its rate, and each counts by
-//! its variance.
+//! Kalman filter of the flux angle. The injection shows the angle, the voltage of the fundamental wave shows its rate, and each
+//! is weighted by its variance.
 //!
 //! ```text
 //! x  = (e, w, a, r, b)          w' = a      a' = noise      r' = -r/tau_s + noise      b' = -b/tau + f e + noise
-//! z1 = e + n1                   once a carrier period, from the saliency
-//! z2 = l e + w + h r + b + n2   mean of (turned - slip) of the observer over a carrier period
+//! z1 = e + n1                   once an injection period, from the saliency
+//! z2 = l e + w + h r + b + n2   mean of (turned - slip) of the observer over an injection period
 //! ```
 //!
-//! `e` is the angle error, flux less estimate, rad; `w` the electrical speed of the rotor, rad/s; `a` its rate; `r` the deviation of
-//! the stator resistance, relative; `b` another slow error of the seen speed, rad/s. `l` and `h` are those of the
-//! [observer](super::observer::SeenSpeed). An angle error adds `i_q e` to the direct current, so that within
-//! `tau_r` the flux grows by its share `d = i_q e/i_d` above the believed one: the voltage turns it by `d` faster than is seen, the slip is
-//! smaller by `d`, and `b` grows by `w d`. So `f = k w i_q/(tau_r i_d)`. The flux forgets within `tau_r`, `b` within 2 s: hence `k = 0.5`.
-//! (Without `f` angle and flux oscillate at 1 Hz where the torque current is three times the direct one; with `w` taken for the negative
-//! slip, as it is at zero stator frequency, 52 of 1000 runs at up to 600 rpm were lost, with `k = 0.2`
-//! 20 of 300. With `k = 1` iron errs by a quarter more with wrong parameters.) `r` returns to the resistance that the start measured
-//! within `tau_s`, 5 s, and does not where none was measured. The carrier errs while the torque current moves (its reference lags), and so does the
-//! observer (its leakage errs): both variances grow with the largest change of the current in a carrier period. A torque step is
-//! then known by inertia and slip, a load step by the voltage. `r` is learned from torque steps: `h r` jumps, `w` cannot.
+//! `e` is the angle error, flux less estimate, rad; `w` the electrical speed of the rotor, rad/s; `a` its rate; `r` the relative deviation
+//! of the stator resistance; `b` another slow error of the observed speed, rad/s. `l` and `h` come from the
+//! [observer](super::observer::SeenSpeed). An angle error adds `i_q e` to the d-axis current, so that within `tau_r` the flux grows by the
+//! share `d = i_q e/i_d` above the estimated flux. Then the voltage turns the flux by the share `d` faster than the observer sees, the slip
+//! is smaller by `d`, and `b` grows by `w d`. Therefore `f = k w i_q/(tau_r i_d)`. The effect on the flux decays within `tau_r`, but `b`
+//! within 2 s, hence `k = 0.5`. (Without `f`, angle and flux oscillate at 1 Hz if the q-axis current is three times the d-axis current. If
+//! `w` is replaced by the negative slip, which is correct at zero stator frequency, 52 of 1000 runs at up to 600 rpm lost the lock; with
+//! `k = 0.2` it was 20 of 300. With `k = 1` and wrong parameters, the angle error of motors that saturate is a quarter larger.) `r` returns
+//! to the resistance that the start has measured with the time constant `tau_s`, 5 s; if none was measured, it does not return. While the
+//! q-axis current changes, the angle from the injection has an error (the saliency offset lags), and so has the speed from the observer
+//! (the leakage is not exact). Therefore both variances grow with the largest change of the current in an injection period. During a torque
+//! step, inertia and slip then determine the angle; during a load step, the voltage does. `r` is learned from torque steps: `h r` jumps,
+//! and `w` cannot.
 //!
 //! `w`, `a` and `r` are corrections of the tracked speed, its rate and the observer's resistance, so that only `b` and the covariance
-//! stay here. They begin anew where the filter does not have the angle: before the frame turns, while the observer leads, and
-//! while the demodulation fills.
+//! stay here. They are reset while the filter does not track the angle: before the frame rotates, while the observer gives the angle,
+//! and while the averages of the demodulation fill.
 //!
-//! A carrier period has six parts, in six of its samples, so that none takes long: predict the flux, predict, see the speed, reduce
-//! P, see the carrier, reduce P. They run from the flash (`memory.x`), so none is inlined: 1318 bytes of control code less.
+//! The work of an injection period has six parts, in six of its samples, so that none takes long: predict the flux, predict, see
+//! the speed, reduce P, see the injection, reduce P. They run from the flash (`memory.x`) and are not inlined, which saves 1318
+//! bytes of control code.
 //!
-//! Without an observer there is z1 alone. At a steady covariance that is a loop of third order with Butterworth's poles at
-//! `w_n = (rate noise/(variance of z1 x T))^(1/6)`.
+//! Without an observer there is z1 alone. With a steady covariance, the filter is then a loop of third order with
+//! Butterworth poles at `w_n = (rate noise/(variance of z1 x T))^(1/6)`.
 
 use core::f32::consts::TAU;
 
@@ -39,54 +42,54 @@ use crate::math::limited;
 
 /// Number of states.
 const N: usize = 5;
-/// A carrier period, s.
+/// Injection period, s.
 const T: f32 = CARRIER_S;
 /// Clamp of the angle error that the saliency shows, rad.
 const LARGEST_ERROR: f32 = 0.6;
-/// Variance of the speed that comes in a second, (rad/s)^2: slip by another rotor resistance.
+/// Variance of the speed that is added in a second, (rad/s)^2: slip due to a change of the rotor resistance.
 const SPEED_NOISE: f32 = 4.0;
-/// Variance of the resistance that comes in a second: heating by 1 %.
+/// Variance of the resistance that is added in a second: heating by 1 %.
 const RESISTANCE_NOISE: f32 = 0.01 * 0.01;
-/// Deviation of the slow error, rad/s: slip by another rotor resistance, and the voltage of the inverter, a thousandth of the dc
-/// link over the flux. Motors of one rated frequency have about the same.
+/// Standard deviation of the slow error, rad/s. It is due to the slip with a wrong rotor resistance, and to the inverter voltage
+/// error, a thousandth of the dc link over the flux. Motors with the same rated frequency have about the same value.
 const SLOW: f32 = 1.5;
-/// Share of the largest change of the current that still counts after a carrier period.
+/// Share of the largest change of the current that still counts after an injection period.
 const REMEMBERED: f32 = 0.7;
-/// Deviations of angle, speed, its rate and slow error at the beginning: rad, rad/s, rad/s^2, rad/s.
+/// Initial standard deviations of angle, speed, its rate and slow error: rad, rad/s, rad/s^2, rad/s.
 const FIRST: [f32; N - 1] = [0.1, 5.0, 100.0, SLOW];
 
 /// Variances of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleFilter {
-    /// Of the rate of the speed that comes in a second, (rad/s^2)^2.
+    /// Variance of the rate of the speed that is added in a second, (rad/s^2)^2.
     pub rate: f32,
-    /// Of the saliency of a carrier period.
+    /// Variance of the saliency of an injection period.
     pub saliency: f32,
-    /// Error of the angle that the saliency shows, per change of the torque current in a carrier period, rad/A.
+    /// Error of the angle from the saliency, per change of the q-axis current in an injection period, rad/A.
     pub angle_per_a: f32,
-    /// Of the speed that the observer sees in a carrier period, (rad/s)^2.
+    /// Variance of the speed that the observer sees in an injection period, (rad/s)^2.
     pub speed: f32,
-    /// Error of that speed per change of the torque current in a carrier period, rad/s/A.
+    /// Error of that speed per change of the q-axis current in an injection period, rad/s/A.
     pub speed_per_a: f32,
-    /// Change of the seen speed per angle error, torque current and speed of the rotor, `k/(tau_r i_d)`, 1/(s A).
+    /// Change of the observed speed per angle error, q-axis current and speed of the rotor, `k/(tau_r i_d)`, 1/(s A).
     pub flux_by_angle: f32,
-    /// Time constant of the slow error of the seen speed, s.
+    /// Time constant of the slow error of the observed speed, s.
     pub slow_s: f32,
 }
 
 /// State of the filter.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AngleFilterState {
-    /// Lower triangle of the covariance P, row by row. (With both triangles, each rounded by itself, it loses its definiteness within
-    /// a minute.)
+    /// Lower triangle of the covariance P, row by row. (With both triangles, each rounded separately, the covariance loses its
+    /// definiteness within a minute.)
     covariance: [f32; N * (N + 1) / 2],
-    /// What was seen in this carrier period: P h', the reciprocal variance of the innovation, and the corrections.
+    /// Results of the present injection period: P h', the reciprocal variance of the innovation, and the corrections.
     ph: [f32; N],
     per_variance: f32,
     x: [f32; N],
-    /// Slow error of the seen speed, rad/s.
+    /// Slow error of the observed speed, rad/s.
     slow: f32,
-    /// Torque current of the last carrier period, and its largest change lately, A.
+    /// Q-axis current of the last injection period, and its largest recent change, A.
     i_q: f32,
     moved: f32,
 }
@@ -112,7 +115,7 @@ impl AngleFilterState {
         self.covariance = [e, 0.0, w, 0.0, 0.0, a, 0.0, 0.0, 0.0, r * r, 0.0, 0.0, 0.0, 0.0, b];
     }
 
-    /// Takes the torque current of a carrier period, A.
+    /// Takes the q-axis current of an injection period, A.
     pub fn follow(&mut self, i_q: f32) {
         let moved = (i_q - self.i_q).abs();
         let remembered = REMEMBERED * self.moved;
@@ -120,13 +123,13 @@ impl AngleFilterState {
         self.moved = if moved > remembered { moved } else { remembered };
     }
 
-    /// The variance of a source, of this one at rest and of an error `per_a` of the change of the current.
+    /// Returns the variance of a source, from its variance at constant current and its error `per_a` per change of the current.
     fn variance(&self, at_rest: f32, per_a: f32) -> f32 {
         let moved = per_a * self.moved;
         at_rest + moved * moved
     }
 
-    /// Part after each that has seen something: `P -= P h' h P/variance`.
+    /// Part after each update by a measurement: `P -= P h' h P/variance`.
     #[inline(never)]
     pub fn reduce(&mut self) {
         let per_variance = core::mem::take(&mut self.per_variance);
@@ -141,7 +144,8 @@ impl AngleFilterState {
 }
 
 impl AngleFilter {
-    /// First part of a carrier period: the flux by the angle, of `P = F P F'`, with a rotor of `rotor_freq`, electrical turns per period.
+    /// First part of an injection period: the effect of the angle on the flux in `P = F P F'`, with a rotor speed `rotor_freq`,
+    /// electrical turns per period.
     #[inline(never)]
     pub fn predict_flux(&self, state: &mut AngleFilterState, rotor_freq: f32) {
         let f = T * TAU / PERIOD_S * self.flux_by_angle * rotor_freq * state.i_q;
@@ -154,7 +158,8 @@ impl AngleFilter {
         *br += f * *re;
     }
 
-    /// Second part: the rest of `P = F P F' + Q`, for a deviation of the resistance that decays by this share in a carrier period.
+    /// Second part: the rest of `P = F P F' + Q`. `resistance_decay` is the share by which the deviation of the resistance decays
+    /// in an injection period.
     #[inline(never)]
     pub fn predict(&self, state: &mut AngleFilterState, resistance_decay: f32) {
         let kept = 1.0 - T / self.slow_s;
@@ -178,7 +183,8 @@ impl AngleFilter {
         state.slow *= kept;
     }
 
-    /// Third part: what the observer has `seen`, and by how much its speed is above the tracked one, electrical turns per period.
+    /// Third part: update by the speed that the observer has `seen`. It is above the tracked speed by `faster`, electrical turns
+    /// per period.
     #[inline(never)]
     pub fn see_speed(&self, state: &mut AngleFilterState, seen: &SeenSpeed, faster: f32) {
         let [ee, we, ww, ae, aw, _, re, rw, ra, rr, be, bw, ba, br, bb] = state.covariance;
@@ -198,8 +204,9 @@ impl AngleFilter {
         state.x = state.ph.map(|ph| ph * share);
     }
 
-    /// Part behind the first reduction: the angle `error`, rad, of a demodulation that takes `per_saliency`, rad, for
-    /// a saliency of 1. Returns the corrections, and that of the relative stator resistance.
+    /// Part after the first reduction: update by the angle `error`, rad, of the demodulation, where `per_saliency`,
+    /// rad, is the angle for a saliency of 1. Returns the corrections, and the correction of the relative stator
+    /// resistance.
     #[inline(never)]
     pub fn see_carrier(
         &self,
@@ -231,7 +238,7 @@ mod tests {
     #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
 
-    /// Of the dissertation's motor at 1.4 A.
+    /// Filter for the dissertation's motor at 1.4 A.
     const FILTER: AngleFilter = AngleFilter {
         rate: 26.5e3,
         saliency: 5.2e-5,
@@ -242,7 +249,7 @@ mod tests {
         slow_s: 2.0,
     };
     const PER_SALIENCY: f32 = -14.3;
-    /// -300 rpm, generating.
+    /// Rotor speed: -300 rpm, generating.
     const ROTOR_FREQ: f32 = -10.0 * PERIOD_S;
     const RESISTANCE_DECAY: f32 = T / 5.0;
 
@@ -251,7 +258,7 @@ mod tests {
     }
 
     impl AngleFilter {
-        /// A whole carrier period.
+        /// Runs a whole injection period.
         fn step(
             &self,
             state: &mut AngleFilterState,
@@ -277,7 +284,7 @@ mod tests {
         state
     }
 
-    /// Noise of variance 1/3.
+    /// Returns noise of variance 1/3.
     fn noise(seed: &mut u32) -> f32 {
         *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (*seed >> 8) as f32 / (1 << 23) as f32 - 1.0
@@ -285,7 +292,7 @@ mod tests {
 
     type Matrix = nalgebra::SMatrix<f64, N, N>;
 
-    /// The covariance; Cholesky's decomposition, in double precision, shows that it is positive definite.
+    /// Returns the covariance. The Cholesky decomposition in double precision shows that it is positive definite.
     fn covariance(state: &AngleFilterState) -> Matrix {
         let p = Matrix::from_fn(|n, m| {
             f64::from(state.covariance[n.max(m) * (n.max(m) + 1) / 2 + n.min(m)])
@@ -294,7 +301,8 @@ mod tests {
         p
     }
 
-    /// The filter in double precision with Joseph's form of the update, whose covariance stays definite: one carrier period.
+    /// Runs one injection period of the filter in double precision with the Joseph form of the update, whose covariance stays
+    /// definite.
     fn reference(p: Matrix, seen: Option<&SeenSpeed>, k: f64) -> (Matrix, [f64; N]) {
         let t = f64::from(T);
         let mut f = Matrix::identity();
@@ -324,8 +332,9 @@ mod tests {
         (p, gain)
     }
 
-    /// A million carrier periods, half an hour, in f32: at constant torque without a turning flux, with the flux of a drive that
-    /// turns and reverses, and without an observer. (With the two halves of the covariance computed apart it was lost after 45 s.)
+    /// Runs a million injection periods, half an hour, in f32: at constant torque without a rotating flux, with the flux of a
+    /// drive that reverses, and without an observer. (When the two halves of the covariance were computed separately, it lost its
+    /// definiteness after 45 s.)
     #[test]
     fn the_covariance_stays_definite_for_a_million_carrier_periods() {
         for case in 0..3 {
@@ -352,8 +361,8 @@ mod tests {
         }
     }
 
-    /// Steady covariances are those of the same filter in double precision, for stator frequencies from 0 to 16 Hz, and the gains
-    /// those of filter theory.
+    /// Steady covariances equal those of the filter in double precision, for stator frequencies from 0 to 16 Hz, and the gains
+    /// are those of filter theory.
     #[test]
     fn the_steady_covariance_is_that_of_double_precision() {
         for (l, h) in [(0.0, 50.0), (18.0, 1.0), (35.0, -11.0), (86.0, 18.0)] {
@@ -372,8 +381,8 @@ mod tests {
         }
     }
 
-    /// Without an observer the poles are Butterworth's: the gains of a carrier period are 2 w T, 2 w^2 T and w^3 T,
-    /// the second with a tenth more by the noise of the speed.
+    /// Without an observer the filter has Butterworth poles: the gains of an injection period are 2 w T, 2 w^2 T
+    /// and w^3 T, and the second is a tenth larger because of the noise of the speed.
     #[test]
     fn the_carrier_alone_tracks_with_the_poles_of_butterworth() {
         let (w, mut state) = (core::f32::consts::TAU * 3.5, started());
@@ -383,14 +392,14 @@ mod tests {
             filter.step(&mut state, 0.0, PER_SALIENCY, None);
         }
         let p = state.covariance;
-        // Gain of an update: P after it over the variance.
+        // The gain of an update is P after it over the variance.
         let gains = [p[0], p[1], p[3]].map(|p| p / variance / T);
         for (gain, expected) in gains.into_iter().zip([2.0 * w, 2.0 * w * w, w * w * w]) {
             assert!((gain / expected - 1.0).abs() < 0.12, "{gain} for {expected}");
         }
     }
 
-    /// An angle error beyond the clamp counts as much as one at it, and a saliency while the current moves less than one at rest.
+    /// An angle error beyond the clamp counts as much as one at the clamp, and a saliency counts less while the current changes.
     #[test]
     fn large_errors_and_moving_currents_count_less() {
         let after = |error: f32, amperes: f32| {
@@ -409,8 +418,8 @@ mod tests {
         assert!((state.moved - REMEMBERED * REMEMBERED).abs() < 1e-6);
     }
 
-    /// A resistance that is 10 % higher than believed shows as a jump of the seen speed with the torque current, and only so: it is
-    /// learned from steps, and a load step is not taken for it.
+    /// A resistance that is 10 % higher than estimated shows only as a jump of the observed speed with the q-axis current. The
+    /// filter learns it from torque steps and does not mistake a load step for it.
     #[test]
     fn torque_steps_teach_the_resistance_and_load_steps_do_not() {
         let found = |steps: bool, r: f32| {

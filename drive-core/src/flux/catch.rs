@@ -1,7 +1,7 @@
-//! Start on a turning shaft: the speed of the rotor from the decay of its flux.
+//! Flying start: the speed of the rotor from the decay of its flux.
 //!
-//! A step of direct current I into a motor leaves a rotor flux that decays and turns with the rotor, whether or not there was
-//! flux before:
+//! A step of the d-axis current I leaves a rotor flux that decays and rotates with the rotor, whether or not there was a flux
+//! before:
 //!
 //! ```text
 //! dpsi/dt = -(alpha - j w_r) psi + R_R I         lambda = sum e     (e: see the observer)
@@ -9,27 +9,27 @@
 //! C_L     = sum D_L[n] conj(D_L[n-L])     P_L = sum |D_L[n]|^2       w_L = arg C_L / (L T)
 //! ```
 //!
-//! with T = 667 us, the mean of four periods, and L = 4, 10 and 48: the short lag tells how often the long one has turned, the
-//! long one tells slow rotors from noise, of which |C| is 0.67 P with half a turn. Simulated, 2.5 A: found within 11 rpm up to
-//! 2700 rpm on four poles.
+//! with T = 667 us, the mean of four periods, and L = 4, 10 and 48. The short lag shows by how many turns the longer one is
+//! ambiguous. The long lag distinguishes slow rotors from noise, for which |C| is 0.67 P with half a turn. In simulation with
+//! 2.5 A, the speed is found within 11 rpm up to 2700 rpm with four poles.
 
 use core::f32::consts::TAU;
 
 use crate::{Angle, Dq, Motor, PERIOD_S};
 
-/// Control periods that are averaged.
+/// Control periods per average.
 const AVERAGED: u8 = 4;
-/// The lags, averages, each with the least |C| relative to P.
+/// The lags, in averages, each with its least |C| relative to P.
 const SHORT: (usize, f32) = (4, 0.5);
 const MIDDLE: (usize, f32) = (10, 0.85);
 const LONG: (usize, f32) = (48, 0.7);
-/// Averages that are kept: the longest lag three times.
+/// Averages that are kept: three times the longest lag.
 const KEPT: usize = 3 * LONG.0 + 1;
-/// Control periods until the current stands, and until the end: 20 and 250 ms.
+/// Control periods until the current has settled, and until the end: 20 and 250 ms.
 pub const FROM: u32 = 120;
 const END: u32 = 1500;
-/// Highest frequency that the short lag tells, from which on it is believed alone, and the lowest that counts as turning, electrical
-/// turns per period.
+/// Highest frequency that the short lag can measure, frequency above which the short lag alone is used, and lowest frequency that
+/// counts as rotating, electrical turns per period.
 const HIGHEST: f32 = 151.0 * PERIOD_S;
 const FAST: f32 = 75.0 * PERIOD_S;
 const LOWEST: f32 = 0.32 * PERIOD_S;
@@ -45,7 +45,7 @@ struct Correlation {
 /// State of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct CatchState {
-    /// Sum of e, V s, and of its values in the present average.
+    /// Sum of e, V s, and sum of its values in the present average.
     flux: Dq,
     sum: Dq,
     summed: u8,
@@ -70,27 +70,28 @@ impl Default for CatchState {
 /// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SearchResult {
-    /// The search goes on.
+    /// The search continues.
     Searching,
-    /// The shaft stands, or turns so slowly that a start does not mind.
+    /// The shaft is at rest, or rotates so slowly that a normal start is possible.
     Standing,
-    /// The flux of a turning rotor turns at this speed, electrical turns per period.
+    /// The shaft rotates, and its flux rotates at this speed, electrical turns per period.
     Turning(f32),
 }
 
-/// Path of the current that the turning flux drives through rotor, stator and proportional controller, `Z = k_c e^(-1.5 jwT) + r_s +
-/// jw sigma L_s`. The current turns the flux back: the rotor turns by `1 + R_R Re(1/Z)` faster.
+/// Path of the current that the rotating flux drives through rotor, stator and proportional controller,
+/// `Z = k_c e^(-1.5 jwT) + r_s + jw sigma L_s`. This current turns the flux back, so the rotor is faster by the factor
+/// `1 + R_R Re(1/Z)` than the flux.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Path {
     r_r: f32,
-    /// k_c + r_s, ohm.
+    /// Resistance k_c + r_s, ohm.
     pub resistance: f32,
-    /// By the frequency in turns per period.
+    /// Reactance per frequency in turns per period, ohm.
     reactance: f32,
 }
 
 impl Path {
-    /// With a controller of the gain `k_c`, V/A.
+    /// Creates the path with a controller of the gain `k_c`, V/A.
     pub fn new(motor: &Motor, k_c: f32) -> Self {
         Self {
             r_r: motor.coupled_inductance() / motor.tau_r(),
@@ -99,7 +100,7 @@ impl Path {
         }
     }
 
-    /// Speed of the rotor by that of its flux, electrical turns per period.
+    /// Returns the speed of the rotor from the speed of its flux, electrical turns per period.
     pub fn rotor(&self, freq: f32) -> f32 {
         let (r, x) = (self.resistance, self.reactance * freq);
         freq * (1.0 + self.r_r * r / (r * r + x * x))
@@ -107,7 +108,7 @@ impl Path {
 }
 
 impl CatchState {
-    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands. From [`FROM`] on
+    /// Takes the voltage `e` of the rotor in period `elapsed` of the search, V s in a fixed frame. From [`FROM`] on
     /// the controller is proportional.
     pub fn step(&mut self, elapsed: u32, e: Dq) -> SearchResult {
         if elapsed < FROM {
@@ -137,12 +138,12 @@ impl CatchState {
         let (by_short, by_middle) = (short.frequency(SHORT), middle.frequency(MIDDLE));
         let freq = match (by_short, by_middle, long.frequency(LONG)) {
             (Some(near), Some(far), _) if near.abs() < HIGHEST => {
-                // Turns within the middle lag that the short one sees.
+                // The short lag shows the number of turns within the middle lag.
                 const TURN: f32 = 1.0 / (MIDDLE.0 * AVERAGED as usize) as f32;
                 let turns = (near - far) * (1.0 / TURN);
                 far + (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32 as f32 * TURN
             }
-            // Not the remainder that the long lag sees; noise alone is half a turn.
+            // The long lag shows the remainder of a turn only and is not used here; noise alone is half a turn.
             (Some(near), None, _) if near.abs() > FAST && near.abs() < HIGHEST => near,
             (_, Some(freq), _) | (_, _, Some(freq)) => freq,
             _ => 0.0,
@@ -152,7 +153,7 @@ impl CatchState {
 }
 
 impl Correlation {
-    /// Adds the average `count` of those that are kept.
+    /// Adds the average with the number `count`.
     fn add(&mut self, lag: usize, kept: &[Dq; KEPT], count: usize) {
         if count < 3 * lag {
             return;
@@ -166,14 +167,14 @@ impl Correlation {
         self.power += now.length_squared();
     }
 
-    /// Electrical turns per period, where it is more than noise.
+    /// Returns the frequency, electrical turns per period, if it is more than noise.
     fn frequency(&self, (lag, least): (usize, f32)) -> Option<f32> {
         let least = least * self.power;
         if self.re * self.re + self.im * self.im <= least * least {
             return None;
         }
         let (re, im) = (self.re.abs(), self.im.abs());
-        // Within the range of whole numbers.
+        // The scale keeps the numbers within the range of integers.
         let scale = 1e9 / if re > im { re } else { im };
         let turn = idsp::atan2((self.im * scale) as i32, (self.re * scale) as i32);
         Some(Angle::from_bits(turn).to_turns() / (lag * usize::from(AVERAGED)) as f32)

@@ -1,8 +1,8 @@
-//! Sensorless flux angle from the injected carrier: demodulation, reference, tracking.
+//! Sensorless flux angle from the injection: demodulation, saliency offset, tracking.
 //!
 //! Each [demodulator](crate::carrier::demodulator) feeds one of two loops: the loop of the dissertation
 //! (reference of the current difference and PII controller) or, for the synchronous demodulation, the
-//! [filter](super::angle_filter) with learned reference and slip feed-forward.
+//! [filter](super::angle_filter) with a learned saliency offset and slip feed-forward.
 
 use crate::carrier::demodulator::Demodulator;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
@@ -24,21 +24,21 @@ pub struct ConstantReference {
     pub full: f32,
     /// Slope below `from`, A/A.
     pub slope: f32,
-    /// Quadrature current from which on the reference is constant, A.
+    /// Q-axis current above which the reference is constant, A.
     pub from: f32,
 }
 
 /// Reference of the current difference over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
-    /// As printed, section 3.3.
+    /// Reference as printed, section 3.3.
     Constant(ConstantReference),
     /// Learned table, A.
     Learned(ReferenceTable),
 }
 
 impl Reference {
-    /// Reference of the current difference at `i_q`, both A.
+    /// Returns the reference of the current difference at `i_q`, both A.
     fn at(&self, i_q: f32) -> f32 {
         match self {
             Self::Learned(table) => table.at(i_q),
@@ -52,7 +52,7 @@ impl Reference {
 /// Angle-tracking loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AngleLoop {
-    /// PII controller of section 3.11, for all demodulators but the synchronous one.
+    /// PII controller of section 3.11, for all demodulators except the synchronous one.
     Pii {
         /// Reference of the current difference.
         reference: Reference,
@@ -61,7 +61,7 @@ pub enum AngleLoop {
     },
     /// Filter for the synchronous demodulation.
     Filter {
-        /// Reference and slope of the saliency.
+        /// Saliency offset and saliency sensitivity over i_q.
         schedule: GainSchedule,
         /// Filter of the flux angle.
         filter: AngleFilter,
@@ -81,14 +81,14 @@ pub struct Estimator {
     pub ampere_per_ohm: f32,
     /// The tracking loop.
     pub angle_loop: AngleLoop,
-    /// Lag of the sampled carrier current behind the injection axis, samples.
+    /// Lag of the sampled injection current behind the injection axis, samples.
     pub lag: f32,
     /// Additional lag of the band-pass, samples, for demodulators that rotate after it.
     pub band_pass_lag: f32,
 }
 
 /// State of the estimator.
-// The large demodulator, seldom used, comes last: all other fields stay within reach of one base address.
+// The large demodulator, which is seldom used, comes last, so that all other fields stay within reach of one base address.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub struct EstimatorState {
@@ -102,14 +102,14 @@ pub struct EstimatorState {
     pub rotor_freq: f32,
     /// Output of the selected demodulator as a current difference, A; 0 with the synchronous one.
     pub delta_i: f32,
-    /// Angle error by the latest saliency if it lasts, flux less estimate, rad.
+    /// Lasting angle error from the latest saliency, flux less estimate, rad.
     pub angle_error: f32,
-    /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
-    /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
+    /// Correction per period from the latest saliency. It is held for an injection period, which adds 1.1
+    /// ms on average to the 3.2 ms delay of the averages, little for a loop of 4 Hz.
     correction: Correction,
     /// State of the filter.
     pub filter: AngleFilterState,
-    /// Asymmetry beyond the learned one that this start and those before have found.
+    /// Asymmetry beyond the learned one that this start and the starts before have found.
     pub changed: Asymmetry,
     demodulator: Demodulator,
 }
@@ -119,17 +119,17 @@ const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
-/// The tracker has reached its speed limit, or turned by what is no number: the flux angle is lost.
+/// The flux angle is lost: the tracker has reached its speed limit, or turned by NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackingLost;
 
 impl EstimatorState {
-    /// Estimated flux angle at the present sample.
+    /// Returns the estimated flux angle at the present sample.
     pub fn flux(&self) -> FluxAngle {
         FluxAngle { phi: self.tracker.angle - Angle::QUARTER, freq: self.tracker.freq }
     }
 
-    /// Lets the axis turn on with a rotor of this speed, electrical turns per period.
+    /// Lets the axis rotate with a rotor of this speed, electrical turns per period.
     pub fn preset_speed(&mut self, rotor_freq: f32) {
         (self.rotor_freq, self.tracker.freq) = (rotor_freq, rotor_freq);
     }
@@ -140,7 +140,7 @@ impl EstimatorState {
             && self.synchronous.saliency.q.is_finite()
     }
 
-    /// Result of the synchronous demodulation. `q` stays 0 where another demodulator tracks.
+    /// Returns the result of the synchronous demodulation. `q` stays 0 if another demodulator tracks.
     pub fn saliency(&self) -> &Saliency {
         &self.synchronous.saliency
     }
@@ -171,7 +171,7 @@ impl Estimator {
         *angle_error = 0.0;
     }
 
-    /// Takes an accepted result of a learning.
+    /// Takes an accepted result of a self-commissioning.
     pub fn take(&mut self, learned: &Learned) {
         match &mut self.angle_loop {
             AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
@@ -191,9 +191,9 @@ impl Estimator {
         }
     }
 
-    /// Computes the saliency of the previous carrier period, where the synchronous demodulation tracks;
-    /// called once per carrier period, after its last sample. `axis` is the injection axis of the present sample, delayed
-    /// by [`lag`](Self::lag), `flux_freq` its frequency, electrical turns per period.
+    /// Computes the saliency of the previous injection period, if the synchronous demodulation tracks; called once per
+    /// injection period, after its last sample. `axis` is the injection axis of the present sample, delayed by
+    /// [`lag`](Self::lag), `flux_freq` its frequency, electrical turns per period.
     pub fn update_saliency(&self, state: &mut EstimatorState, axis: UnitVector, flux_freq: f32) {
         if let AngleLoop::Filter { asymmetry, .. } = &self.angle_loop {
             let synchronous = &mut state.synchronous;
@@ -203,15 +203,15 @@ impl Estimator {
         }
     }
 
-    /// Begins a carrier period of the filter, see [`AngleFilter`].
+    /// Begins an injection period of the filter, see [`AngleFilter`].
     pub fn predict_flux(&self, state: &mut EstimatorState) {
         if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
             filter.predict_flux(&mut state.filter, state.rotor_freq);
         }
     }
 
-    /// Goes on with it, with a reference of the quadrature current `i_q`, A, and the share of a deviation of the stator resistance that decays in a
-    /// carrier period.
+    /// Continues the injection period of the filter, with a q-axis current reference `i_q`, A, and the share of a deviation of the stator
+    /// resistance that decays in an injection period.
     pub fn predict(&self, state: &mut EstimatorState, i_q: f32, resistance_decay: f32) {
         state.filter.follow(i_q);
         if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
@@ -219,18 +219,18 @@ impl Estimator {
         }
     }
 
-    /// Takes what the observer has `seen` in the carrier period.
+    /// Takes the speed that the observer has `seen` in the injection period.
     pub fn see_speed(&self, state: &mut EstimatorState, seen: &SeenSpeed) {
         if let AngleLoop::Filter { filter, .. } = &self.angle_loop {
-            // The tracked speed, as old as what was seen.
+            // This is the tracked speed at the time of the observed speed.
             let tracked = state.rotor_freq - state.tracker.acceleration * seen.age;
             filter.see_speed(&mut state.filter, seen, seen.rotor_freq - tracked);
         }
     }
 
-    /// Computes the corrections from the saliency of the previous carrier period where the filter has the angle; called once per
-    /// carrier period. `known` is the rotor's acceleration reference, electrical turns per period squared, which is fed forward.
-    /// Returns the correction of the relative stator resistance.
+    /// Computes the corrections from the saliency of the previous injection period, if the filter tracks the angle; called once
+    /// per injection period. `known` is the rotor's acceleration reference, electrical turns per period squared, which is fed
+    /// forward. Returns the correction of the relative stator resistance.
     #[inline(always)] // out of line, 48 bytes more of control code and 18 cycles
     pub fn update_correction(&self, state: &mut EstimatorState, filters: bool, known: f32) -> f32 {
         let AngleLoop::Filter { schedule, filter, .. } = &self.angle_loop else { return 0.0 };
@@ -247,7 +247,7 @@ impl Estimator {
         resistance
     }
 
-    /// Runs the selected demodulator, all but the synchronous one.
+    /// Runs the selected demodulator, if it is not the synchronous one.
     #[cold]
     fn demodulate(&self, state: &mut EstimatorState, mut sample: CarrierSample, flux_freq: f32) {
         if state.demodulator.rotates_output() {
@@ -258,12 +258,12 @@ impl Estimator {
     }
 
     /// Advances the injection axis to the next sample; called in every control period. `i_q` is the
-    /// reference of the quadrature current, A, `slip_freq` the slip, electrical turns per period.
+    /// q-axis current reference, A, `slip_freq` the slip, electrical turns per period.
     ///
     /// # Errors
-    /// `TrackingLost` when the PII tracker has reached its speed limit, or the other loop turned by what is no number. (The
-    /// drive itself checks the speed of the other loop.)
-    #[inline(always)] // a part of every period, with its values in registers
+    /// `TrackingLost` when the PII tracker has reached its speed limit, or the other loop has turned by NaN. (The drive
+    /// itself checks the speed of the other loop.)
+    #[inline(always)] // runs in every period, with its values in registers
     pub fn track(
         &self,
         state: &mut EstimatorState,
@@ -315,7 +315,7 @@ mod tests {
         }
     }
 
-    /// The loop turns the axis by reference less difference; the rotor is what turns beside the slip.
+    /// The loop rotates the axis by reference less difference. The speed of the rotor is the speed of the axis less the slip.
     #[test]
     fn the_rotor_is_the_flux_less_the_slip() {
         let (estimator, mut state) = (pii(0.1), EstimatorState::default());
@@ -324,7 +324,7 @@ mod tests {
         state.delta_i = 0.015;
         estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         assert!(state.flux().freq < 0.0, "the difference is beyond its reference");
-        // At the reference the speed stays.
+        // At the reference the speed does not change.
         state.delta_i = 0.01;
         estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         let freq = state.flux().freq;
@@ -333,7 +333,7 @@ mod tests {
         }
         assert_eq!(state.flux().freq, freq);
         assert!((state.rotor_freq - (freq - 1e-3)).abs() < 1e-7, "{}", state.rotor_freq);
-        // By 5 ms, 30 periods: 63 % of a step.
+        // After 5 ms, 30 periods, the mean has reached 63 % of a step.
         for _ in 0..30 {
             estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         }
@@ -352,7 +352,7 @@ mod tests {
         ));
     }
 
-    /// Difference that is seen of a carrier that is larger along dm than along qm, on an axis that turns.
+    /// Returns the measured difference of an injection current that is larger along dm than along qm, on a rotating axis.
     fn difference(demodulator: DemodulatorKind, step: f32, band_pass_lag: f32, scale: f32) -> f32 {
         let estimator = Estimator { demodulator, band_pass_lag, ampere_per_ohm: scale, ..pii(0.1) };
         let mut state = EstimatorState::default();
@@ -380,7 +380,7 @@ mod tests {
 
     #[test]
     fn the_lag_of_the_band_pass_is_made_up_for() {
-        // 300 rpm with two pole pairs.
+        // The axis rotates at 300 rpm with two pole pairs.
         let step = 10.0 / 6000.0;
         let seen = |step, lag| difference(DemodulatorKind::Rectified, step, lag, 1.0);
         let standing = seen(0.0, 0.0);

@@ -1,54 +1,54 @@
-//! Two sources for one angle: at low frequency of the stator the [filter](super::angle_filter) turns it, at high frequency the
-//! [observer](super::observer) leads.
+//! Hand-over of the angle between two sources: at low stator frequency the [filter](super::angle_filter) gives the angle, at
+//! high stator frequency the [back-EMF observer](super::observer).
 //!
-//! The observer leads from above 16 Hz until below 12 Hz. There is nothing between: a blend would show the filter a speed that is
-//! partly its own. Angles do not jump at a switch, and nothing has to be preset. The carrier is off above 26 Hz and comes on below
-//! 24 Hz, so that it goes on showing the stator resistance to the observer. For eight carrier periods the demodulation fills, and the
-//! observer leads.
+//! The observer leads (gives the angle) from above 16 Hz until below 12 Hz. The sources are not blended, because a blend would show
+//! the filter a speed that is partly its own. Angles do not jump at a switch, and nothing has to be preset. The injection is switched
+//! off above 26 Hz and on below 24 Hz, so that it still shows the stator resistance to the observer. The averages of the demodulation
+//! fill in eight injection periods, during which the observer leads.
 //!
-//! For three periods after the carrier has come on or gone off the current of a sample does not belong to the voltages before it;
-//! there the flux turns as in the last carrier period. (Without, the angle jumped by 4 degrees.)
+//! For three periods after the injection was switched on or off, the current of a sample does not belong to the voltages before
+//! it. In these periods the flux rotates as in the last injection period. (Otherwise the angle jumped by 4 degrees.)
 //!
-//! While the carrier is on, the observer's turn is its mean over a carrier period: a wobble of the axis at 600 Hz would bias the
-//! demodulation, by up to 12 degrees at 3 A.
+//! While the injection is on, the turn from the observer is its mean over an injection period, because an oscillation of the
+//! axis at 600 Hz would bias the demodulation, by up to 12 degrees at 3 A.
 
 use crate::PERIOD_S;
 use crate::carrier::CARRIER_SAMPLES;
 
-/// Frequencies of the stator above which the observer leads, and below which the injection does, turns per period.
+/// Stator frequencies above which the observer leads, and below which the injection leads, turns per period.
 const OBSERVER_LEADS: f32 = 16.0 * PERIOD_S;
 const INJECTION_LEADS: f32 = 12.0 * PERIOD_S;
-/// Frequencies above which the carrier goes off, and below which it comes on, turns per period.
+/// Stator frequencies above which the injection is switched off, and below which it is switched on, turns per period.
 const CARRIER_OFF: f32 = 26.0 * PERIOD_S;
 const CARRIER_ON: f32 = 24.0 * PERIOD_S;
-/// Periods after a change of the carrier in which voltage and current of the observer do not belong together.
+/// Periods after the injection was switched in which voltage and current of the observer do not belong together.
 const BLIND: u8 = 3;
-/// Carrier periods until the demodulation is filled.
+/// Injection periods until the averages of the demodulation are filled.
 const FILLED: u8 = 8;
-/// Carrier periods in which the injection leads until the noise is judged.
+/// Injection periods for which the injection must lead before the noise is judged.
 const NOISE_IS_JUDGED_AFTER: u8 = 120;
-/// Mean age of a turn that is averaged over a carrier period, samples.
+/// Mean age of a turn that is averaged over an injection period, samples.
 const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
 
-/// Sources that may turn the frame of a drive without an encoder.
+/// Sources that may rotate the frame of a drive without an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The slip injection_only: the shaft is locked.
+    /// The slip alone, with a locked shaft.
     Slip,
-    /// Nothing, and the carrier is off.
+    /// No source, and the injection is off.
     Nothing,
-    /// The injection, whatever the frequency.
+    /// The injection at any frequency.
     Injection,
     /// Injection and observer, by the hand-over.
     Both,
 }
 
-/// The carrier, for the demodulation.
+/// State of the injection, for the demodulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum CarrierState {
     #[default]
     On,
-    /// On, and the demodulation is filled after this many carrier periods.
+    /// On, and the averages of the demodulation are filled after this many injection periods.
     Filling(u8),
     Off,
 }
@@ -56,16 +56,16 @@ enum CarrierState {
 /// State of the hand-over.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HandOver {
-    /// Whether the observer turns the angle.
+    /// Whether the observer gives the angle.
     pub leads: bool,
-    /// Whether the frequency is that of the observer.
+    /// Whether the frequency is in the range of the observer.
     is_fast: bool,
     carrier: CarrierState,
-    /// Periods for which the observer sees nothing, and one.
+    /// Number of periods for which the observer is blind, plus one.
     blind: u8,
-    /// Carrier periods until the noise of the sensors is judged.
+    /// Injection periods until the noise of the sensors is judged.
     periods_until_noise_is_judged: u8,
-    /// Turns of the last ten periods, their sum, and the sum of the present carrier period.
+    /// Turns of the last ten periods, their sum, and the sum of the present injection period.
     turns: [f32; CARRIER_SAMPLES],
     sum: f32,
     fresh: f32,
@@ -74,19 +74,19 @@ pub struct HandOver {
 /// Turn of the flux as the observer sees it, for the tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Turning {
-    /// Whether the angle follows it.
+    /// Whether the angle follows the observer.
     pub leads: bool,
     /// Turn in a period, electrical turns.
     pub turned: f32,
-    /// Slip in it, electrical turns.
+    /// Slip in that turn, electrical turns.
     pub slip: f32,
     /// Age of the turn, samples.
     pub age: f32,
 }
 
 impl HandOver {
-    /// Updates leading source and carrier at the stator frequency `flux_freq`, electrical turns per period, for a frame that this
-    /// `source` may turn; once a carrier period.
+    /// Updates the leading source and the injection by the stator frequency `flux_freq`, electrical turns per period, for a frame
+    /// that this `source` may rotate; called once an injection period.
     pub fn update(&mut self, flux_freq: f32, source: Source) {
         let freq = flux_freq.abs();
         self.is_fast = freq > if self.is_fast { INJECTION_LEADS } else { OBSERVER_LEADS };
@@ -106,7 +106,7 @@ impl HandOver {
         self.leads = leads && matches!(source, Source::Both | Source::Slip);
     }
 
-    /// Turns the carrier off, and leaves the angle to itself.
+    /// Switches the injection off, without a source for the angle.
     pub fn switch_carrier_off(&mut self) {
         self.switch(CarrierState::Off);
         self.leads = false;
@@ -120,34 +120,35 @@ impl HandOver {
         }
     }
 
-    /// Whether the carrier is off.
+    /// Whether the injection is off.
     pub fn is_carrier_off(&self) -> bool {
         self.carrier == CarrierState::Off
     }
 
-    /// Whether the demodulation has the carrier, and what is judged by it may be.
+    /// Whether the demodulation is valid, so that it may be used for checks.
     pub fn demodulates(&self) -> bool {
         self.carrier == CarrierState::On
     }
 
-    /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it leads.
+    /// Whether the noise of the sensors may be judged by the limit of the injection, which is about 0.2 s after the injection has
+    /// begun to lead.
     pub fn judges_noise(&self) -> bool {
         self.periods_until_noise_is_judged == 0
     }
 
-    /// Begins a period; whether the observer sees nothing in it.
+    /// Begins a period. Returns whether the observer is blind in it.
     pub fn advance_blanking(&mut self) -> bool {
         self.blind = self.blind.saturating_sub(1);
         self.blind > 0
     }
 
-    /// Mean turn of the last carrier period, electrical turns per period.
+    /// Returns the mean turn of the last injection period, electrical turns per period.
     pub fn mean_turn(&self) -> f32 {
         self.sum * (1.0 / CARRIER_SAMPLES as f32)
     }
 
-    /// The turn for the tracking from what the observer saw in the period of this `index` in the carrier period:
-    /// `turned` and `slip`, electrical turns, of a current of this `age`, samples.
+    /// Returns the turn for the tracking from the results of the observer in the period `index` of the injection
+    /// period: `turned` and `slip`, electrical turns, of a current of this `age`, samples.
     pub fn turning(&mut self, index: usize, turned: f32, slip: f32, age: f32) -> Turning {
         let carrier_is_off = self.is_carrier_off();
         self.fresh += turned;
@@ -156,7 +157,7 @@ impl HandOver {
             *oldest = turned;
         }
         if index + 1 == CARRIER_SAMPLES {
-            // Rounding does not accumulate.
+            // The sum is replaced, so that rounding does not accumulate.
             self.sum = core::mem::take(&mut self.fresh);
         }
         let (turned, age) = if carrier_is_off {
@@ -172,8 +173,8 @@ impl HandOver {
 mod tests {
     use super::*;
 
-    /// The observer is blind for three periods after the carrier has gone off or come on, and not in between, whichever
-    /// source leads.
+    /// The observer is blind for three periods after the injection was switched off or on, and not in between,
+    /// whichever source leads.
     #[test]
     fn the_observer_is_blind_after_a_change_of_the_carrier() {
         let mut state = HandOver::default();
@@ -186,8 +187,9 @@ mod tests {
         assert_eq!(blind, [0, 0, 3, 3]);
     }
 
-    /// Up and down, both ways round: the first frequencies, tenths of a hertz, at which the source or the carrier has changed. The
-    /// carrier comes on below 24 Hz, and the observer leads at least for the eight carrier periods of the demodulation.
+    /// The frequency goes up and down in both directions. The test finds the first frequencies, tenths of a hertz, at which the
+    /// source or the injection has changed. The injection is switched on below 24 Hz, and the observer leads at least for the
+    /// eight injection periods of the demodulation.
     #[test]
     fn sources_and_carrier_change_at_their_frequencies() {
         for (source, sign, expected) in [
@@ -199,7 +201,7 @@ mod tests {
         ] {
             let mut state = HandOver::default();
             let mut changes = [0; 4];
-            // Half a step beside the frequencies themselves.
+            // The frequencies are half a step beside the limits themselves.
             for tenth in (0..=300).chain((0..300).rev()) {
                 let (led, was_off) = (state.leads, state.is_carrier_off());
                 for _ in 0..20 {
@@ -234,7 +236,7 @@ mod tests {
         assert!(state.is_carrier_off() && !state.leads);
     }
 
-    /// The mean of the last ten turns and its age while the carrier is on, the last turn without it.
+    /// While the injection is on, the result is the mean of the last ten turns and its age; without injection, it is the last turn.
     #[test]
     fn a_turn_is_averaged_over_the_carrier_period() {
         let mut state = HandOver::default();
@@ -250,7 +252,7 @@ mod tests {
         assert_eq!(turn, Turning { leads: false, turned: 7.0, slip: 0.5, age: 3.0 });
     }
 
-    /// Noise is judged where the injection has led for so many carrier periods, and not where the observer leads.
+    /// Noise is judged if the injection has led for so many injection periods, and not if the observer leads.
     #[test]
     fn noise_is_judged_some_time_after_the_observer_has_left() {
         let mut state = HandOver::default();

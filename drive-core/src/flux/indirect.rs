@@ -1,8 +1,8 @@
 //! Indirect rotor-flux angle from the encoder, Eq. 2.10:
 //! `phi = theta_r + (1 / tau_r) ∫ i_q / i_d dt`.
 //!
-//! `i_d` is the magnetising current here, which follows the direct current with the rotor time constant
-//! `tau_r = L_r / r_r`. Both are equal at constant flux, where the printed form holds.
+//! Here `i_d` is the magnetising current, which follows the d-axis current with the rotor time constant
+//! `tau_r = L_r / r_r`. Both are equal at constant flux, for which the printed form is valid.
 
 use core::f32::consts::TAU;
 
@@ -28,7 +28,7 @@ pub struct Indirect {
     most_counts: i32,
     /// Largest plausible distance the rotor can have moved while the counter stood still, electrical turns.
     missed: f32,
-    /// Speed from which on a standing counter is judged, electrical turns per period.
+    /// Speed above which a counter that stands still is judged, electrical turns per period.
     judged_from: f32,
 }
 
@@ -42,7 +42,7 @@ pub struct IndirectState {
     pub slip_freq: f32,
     /// Magnetising current, A: rotor flux / L_m.
     pub magnetising: f32,
-    /// Slip per quadrature current at the present flux, electrical turns per period and A.
+    /// Slip per q-axis current at the present flux, electrical turns per period and A.
     slip_per_ampere: f32,
     /// Mean electrical speed of the rotor, turns per period.
     pub rotor_freq: f32,
@@ -62,21 +62,21 @@ pub struct FluxAngle {
 }
 
 impl FluxAngle {
-    /// The angle less `lead`: that of a frame that the flux leads.
+    /// Returns the angle less `lead`, which is the angle of a frame that the flux leads.
     pub fn less(self, lead: Angle) -> Self {
         Self { phi: self.phi - lead, ..self }
     }
 }
 
-/// The encoder moved, or stood still, in a way the rotor cannot.
+/// The encoder moved, or stood still, in a way that is impossible for the rotor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImplausibleEncoder;
 
-/// Minimum stopping distance from [`JUDGED_FROM`], mechanical turns: 1.4°. A shorter one would take
-/// 2200 rad/s^2, 26 N m on 0.012 kg m^2, several times the torque of such a motor.
+/// Minimum stopping distance from [`JUDGED_FROM`], mechanical turns: 1.4°. A shorter distance would
+/// take 2200 rad/s^2, 26 N m on 0.012 kg m^2, several times the torque of such a motor.
 const STOPS_WITHIN: f32 = 4e-3;
-/// Minimum speed for judging a standing counter, mechanical turns/s: 100 rpm. Below, the rotor may have
-/// stopped.
+/// Minimum speed at which a counter that stands still is judged, mechanical turns/s: 100 rpm. Below it,
+/// the rotor may have stopped.
 const JUDGED_FROM: f32 = 100.0 / 60.0;
 
 /// Accepted range of tau_r relative to the settings; a rotor at 150 °C has 0.65.
@@ -89,8 +89,8 @@ pub const TAU_R_STEP: f32 = 0.02;
 const SPEED_FILTER_S: f32 = 5e-3;
 
 impl Indirect {
-    /// Orientation for a motor with `counts` of the encoder per mechanical turn, the nominal magnetising
-    /// current `i_d`, A, and the `highest` plausible speed, mechanical turns/s.
+    /// Creates the orientation for a motor with `counts` of the encoder per mechanical turn, the nominal
+    /// magnetising current `i_d`, A, and the `highest` plausible speed, mechanical turns/s.
     pub fn new(motor: &Motor, counts: u32, i_d: f32, highest: f32) -> Self {
         let bits = (u64::from(motor.pole_pairs) << 32) as f64 / f64::from(counts);
         let rate = PERIOD_S / motor.tau_r();
@@ -107,7 +107,7 @@ impl Indirect {
     }
 
     /// Moves the rotor time constant towards `tau_r`, s, by at most `TAU_R_STEP` of the settings' rate,
-    /// and returns the one now in use, s. Not for the control step: it divides.
+    /// and returns the time constant in use now, s. It is not for the control step, since it divides.
     ///
     /// # Errors
     /// The smallest and the largest allowed value, s, when `tau_r` is outside [`TAU_R_LIMITS`].
@@ -127,11 +127,11 @@ impl Indirect {
         Ok(PERIOD_S / self.rate)
     }
 
-    /// Flux angle at the present sample from the encoder `count`.
+    /// Returns the flux angle at the present sample from the encoder `count`.
     ///
     /// # Errors
     /// `ImplausibleEncoder` when the counter moved further than the rotor can turn in a period, or stopped
-    /// abruptly while the rotor was fast: cable or supply interrupted.
+    /// abruptly while the rotor was fast, because a cable or the supply is interrupted.
     pub fn angle(
         &self,
         state: &mut IndirectState,
@@ -156,13 +156,13 @@ impl Indirect {
         Ok(FluxAngle { phi: rotor + state.slip, freq: state.rotor_freq + state.slip_freq })
     }
 
-    /// Integrates the slip over one control period at the quadrature current `i_q`, A.
+    /// Integrates the slip over one control period at the q-axis current `i_q`, A.
     pub fn slip(&self, state: &mut IndirectState, i_q: f32) {
         state.slip_freq = state.slip_per_ampere * i_q;
         state.slip += Angle::within_turn(state.slip_freq);
     }
 
-    /// Updates the magnetising current with the direct current `i_d`, A; called once per carrier period.
+    /// Updates the magnetising current with the d-axis current `i_d`, A; called once per injection period.
     pub fn magnetise(&self, state: &mut IndirectState, i_d: f32) {
         let i_m =
             state.magnetising + CARRIER_SAMPLES as f32 * self.rate * (i_d - state.magnetising);
@@ -189,15 +189,15 @@ mod tests {
             ind.angle(&mut state, count).unwrap();
         }
         let quarter = ind.angle(&mut state, 2500).unwrap();
-        // 2500 counts are a quarter turn, half an electrical turn; rounding of one count is 1e-10.
+        // 2500 counts are a quarter turn, half an electrical turn; the rounding of one count is 1e-10.
         assert!((quarter.phi.to_turns().abs() - 0.5).abs() < 1e-6);
     }
 
     #[test]
     fn a_counter_that_stands_still_while_the_rotor_was_fast_is_refused() {
         let ind = indirect();
-        // 8 counts a period are 288 rpm: refused after 40 counts that did not come, five periods.
-        // 2 are 72 rpm: it may have stopped.
+        // 8 counts per period are 288 rpm, which is refused after 40 missing counts, five periods.
+        // 2 counts per period are 72 rpm, and the rotor may have stopped.
         for (counts, periods) in [(8, Some(5)), (-8, Some(5)), (2, None)] {
             let (mut state, mut count) = (IndirectState::default(), 0_u32);
             for _ in 0..300 {
@@ -213,7 +213,7 @@ mod tests {
     fn slip_integrates_the_ratio_of_the_currents() {
         let ind = indirect();
         let mut state = IndirectState::default();
-        // flux built up for 10 time constants, then i_q = 2 i_d for 0.1 s
+        // The flux builds up for 10 time constants, then i_q = 2 i_d for 0.1 s.
         for _ in 0..1200 {
             ind.magnetise(&mut state, 0.7);
         }
@@ -255,7 +255,7 @@ mod tests {
             let [least, most] = ind.track_tau_r(beyond).unwrap_err();
             assert!((least / tau_r - 0.5).abs() < 1e-5 && (most / tau_r - 2.0).abs() < 1e-5);
         }
-        assert_eq!(ind, indirect(), "what is refused changes nothing");
+        assert_eq!(ind, indirect(), "a refused value changes nothing");
     }
 
     #[test]
@@ -268,9 +268,9 @@ mod tests {
             let flux = ind.angle(&mut state, 5 * k).unwrap();
             assert_eq!(flux.freq, state.rotor_freq + state.slip_freq);
         }
-        // Five counts of 10 000 and two pole pairs: a thousandth of a turn a period.
+        // Five counts of 10 000 with two pole pairs are a thousandth of a turn per period.
         assert!((state.rotor_freq - 1e-3).abs() < 1e-6, "{}", state.rotor_freq);
-        // 2 i_d / i_q, over tau_r in periods
+        // The slip is 2 i_d / i_q over tau_r in periods.
         let slip = -2.0 / (Motor::default().tau_r() * 6000.0) / TAU;
         assert!((state.slip_freq / slip - 1.0).abs() < 1e-3, "{}", state.slip_freq);
     }
@@ -281,7 +281,7 @@ mod tests {
         let mut state = IndirectState::default();
         ind.magnetise(&mut state, 0.0);
         ind.slip(&mut state, 1.0);
-        // Without flux the slip is that of a fifth of the magnetising current.
+        // Without flux the slip is computed with a fifth of the magnetising current.
         let slip = 1.0 / (0.2 * 0.7) * PERIOD_S / Motor::default().tau_r() / TAU;
         assert!((state.slip_freq / slip - 1.0).abs() < 1e-5);
         for _ in 0..(600.0 * Motor::default().tau_r()) as u32 {
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn the_rotor_turns_no_faster_than_it_can() {
-        // 60 turns/s are 100 counts a period; two more are allowed.
+        // 60 turns/s are 100 counts per period; two more are allowed.
         for (counts, possible) in [(102, true), (-102, true), (103, false), (-103, false)] {
             let mut state = IndirectState::default();
             indirect().angle(&mut state, 7).unwrap();
@@ -303,10 +303,10 @@ mod tests {
 
     #[test]
     fn an_eighth_of_a_turn_is_a_quarter_of_the_flux() {
-        // Two pole pairs, 10 000 counts per mechanical turn, 0.7 A, at most 60 turns/s.
+        // The motor has two pole pairs, 10 000 counts per mechanical turn, 0.7 A, and at most 60 turns/s.
         let indirect = Indirect::new(&Motor::default(), 10_000, 0.7, 60.0);
         let mut state = IndirectState::default();
-        // An eighth of a mechanical turn, without slip so far.
+        // The rotor is an eighth of a mechanical turn further, without slip so far.
         let flux = indirect.angle(&mut state, 1250).unwrap();
         assert!((flux.phi.to_degrees() - 90.0).abs() < 0.01);
         // At standstill, 1250 counts from one period to the next are implausible.

@@ -1,9 +1,9 @@
-//! Rotor flux from the voltage of the fundamental wave: a reduced-order observer, which takes over from the injection
-//! where the motor turns.
+//! Back-EMF observer: rotor flux from the voltage of the fundamental wave, by a reduced-order observer that takes
+//! over from the injection at speed.
 //!
-//! Inverse-gamma model with `k = L_m/L_r`: `R_R = k^2 r_r`, `L_M = k L_m`, `alpha = 1/tau_r`, `psi = k |psi_r|`. The flux is
-//! an angle, the one of the [estimator](super::estimator), and a length; the frame lies along it. From the difference of two
-//! currents `di` and the voltage between them,
+//! The model is the inverse-gamma circuit with `k = L_m/L_r`: `R_R = k^2 r_r`, `L_M = k L_m`, `alpha = 1/tau_r`,
+//! `psi = k |psi_r|`. The flux is represented by the angle of the [estimator](super::estimator) and by a length; the frame lies
+//! along it. From the difference `di` of two currents and the voltage between them,
 //!
 //! ```text
 //! e   = T (v - r_s i) - sigma L_s ((n + m |i|) di - s conj(di))      s = a f(psi) + b i^2/|i|
@@ -12,18 +12,19 @@
 //! x   = (e_q + g w_r eps)/(psi + e_d + g alpha eps)                  turned = x - x^3/3
 //! ```
 //!
-//! `s` is the saliency that the injection sees, in the fundamental wave: without it the angle errs by 7 degrees. `n + m |i|` is
-//! the leakage of the fundamental wave relative to sigma L_s, which [`commission`](crate::commission) measures. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
-//! 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The length follows the current model while the
-//! injection has the angle, and the voltage while the observer leads.
+//! `s` is the saliency that the injection sees, as it affects the fundamental wave: without it the angle is off by 7 degrees. `n + m |i|`
+//! is the leakage of the fundamental wave relative to sigma L_s, which [`commission`](crate::commission) measures. The gain is that of
+//! Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron. 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The
+//! length follows the current model while the injection gives the angle, and the voltage while the observer leads.
 //!
-//! The current is the one before the low-pass filter, less the expected carrier: what the saliency adds to that turns the flux by
-//! 0.2 degrees at 600 Hz, which the mean over a carrier period takes out. (Behind the filter a step of the torque turns the
-//! flux by 7 degrees more, for the voltage does not pass the filter.)
+//! The current is taken before the low-pass filter, less the expected injection current. The part of the injection current that
+//! is due to the saliency turns the flux by 0.2 degrees at 600 Hz, which the mean over an injection period removes. (With the
+//! current after the filter, a torque step turns the flux by 7 degrees more, because the voltage does not pass the filter.)
 //!
-//! Errors of the parameters turn the angle (simulated, 0.7 A of direct current): a stator resistance 20 % off by 7 degrees at
-//! 300 rpm and 1.2 at 1800; a leakage 20 % off by 12 degrees at any speed. So the [filter](super::angle_filter) tracks the resistance
-//! with the angle, and the leakage must be right within 3 %.
+//! Errors of the parameters cause errors of the angle (simulated, 0.7 A of d-axis current). If the stator resistance is off by 20 %,
+//! the angle is off by 7 degrees at 300 rpm and by 1.2 degrees at 1800 rpm. If the leakage is off by 20 %, the angle is off by 12
+//! degrees at any speed. Therefore the [filter](super::angle_filter) tracks the resistance with the angle, and the leakage must be
+//! right within 3 %.
 
 use core::f32::consts::TAU;
 
@@ -35,7 +36,7 @@ use crate::{AlphaBeta, Dq, Motor, PERIOD_S, UnitVector};
 /// Gains `s_0` and `c`. Values of `c` from 0.2 to 0.7 differ by 0.1 degrees.
 const GAIN_AT_STANDSTILL: f32 = 1.0;
 const GAIN_PER_SPEED: f32 = 0.4;
-/// Most that the flux may turn in a period, as a tangent.
+/// Largest turn of the flux in a period, as a tangent.
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
 const LEAST_FLUX: f32 = 0.01;
@@ -43,33 +44,34 @@ const LEAST_FLUX: f32 = 0.01;
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Least flux that shows an angle and a speed, as a share of the nominal one.
 const LEAST_FLUX_SHARE: f32 = 0.6;
-/// Mean age of the ten turns of a carrier period in its last sample, and the period until the tracked speed is that of the next
-/// sample, samples.
+/// Mean age of the ten turns of an injection period in its last sample, plus the period until the tracked speed belongs to the
+/// next sample, samples.
 const SEEN_AGE: f32 = 5.5;
-/// Time in which a deviation from a measured resistance decays, s. Without this decay all of a lasting error of the seen speed ends in
-/// the resistance, however little that shows: in a slow reversal at the torque limit (`r`) it ran away by more than 30 %; with 10 s as
-/// well, with 7 s it comes to 19 %.
+/// Time constant with which a deviation from a measured resistance decays, s. Without this decay, a lasting error of the observed
+/// speed is attributed to the resistance, even if the resistance has hardly any effect. In a slow reversal at the torque limit (`r`)
+/// the resistance ran away by more than 30 %, also with 10 s; with 7 s it reaches 19 %.
 const RESISTANCE_S: f32 = 5.0;
 const DECAY: f32 = CARRIER_S / RESISTANCE_S;
-/// Largest relative deviation from the measured resistance, by how much it grows in a second, and its upper limit: a winding
-/// at one and a half times its rated current warms by less than 0.2 % a second. (In a wide range from the start on, resistance and slow
-/// error ran away together while the q-axis current was constant, by 35 % and 12 Hz at 368 Hz rated. If the centre follows
-/// instead, a small error of the inverter's voltage moved it for minutes, until fault 41.)
+/// Largest relative deviation from the measured resistance, its growth per second, and its upper limit: the resistance of a winding at
+/// one and a half times its rated current rises by less than 0.2 % per second. (With a wide range from the start on, resistance and
+/// slow error ran away together while the q-axis current was constant, by 35 % and 12 Hz at 368 Hz rated. When the centre of the range
+/// followed instead, a small error of the inverter's voltage moved it for minutes, until fault 41.)
 const NEAR: f32 = 0.1;
 const WARMING_PER_S: f32 = 0.002;
 const FARTHEST: f32 = 0.5;
 /// Standard deviation of the resistance behind a measurement, and without one: 0.27 of the voltage across it for model A at 0.7 A.
 const MEASURED: f32 = 0.03;
 pub(super) const UNMEASURED: f32 = 0.3;
-/// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
-/// (The leakage is not tracked in this way: with both, the error of one hides in the other.)
+/// Share of the resistance error, computed from the angle error of the injection beside the observer, that is corrected
+/// in an injection period. (The leakage is not tracked in this way: with both, the error of one would hide in the
+/// other.)
 const FROM_INJECTION: f32 = 0.02;
-/// Largest angle error that is taken, rad: 3 degrees. That of a resistance 20 % off is not larger, and an injection that errs
-/// by more at this speed does little.
+/// Largest angle error that is used, rad: 3 degrees. The angle error of a resistance that is 20 % off is not larger, and an
+/// injection with a larger error at this speed has little effect.
 const LARGEST_ERROR: f32 = 0.05;
-/// Share of the learned torque limit in the middle of the currents.
+/// Middle of the currents, as a share of the learned torque limit.
 const LEARNED_AT_SHARE: f32 = 0.5;
-/// Voltages that are kept: enough for a current of age 6, two more than its age.
+/// Number of voltages that are kept, which is enough for a current of age 6: two more than its age.
 const VOLTAGES: usize = 8;
 
 /// Coefficients of the observer, per control period.
@@ -77,7 +79,7 @@ const VOLTAGES: usize = 8;
 pub struct Observer {
     /// T r_s, V s/A.
     r_s: f32,
-    /// sigma L_s, H, the share of it at no current, its change per ampere, 1/A, and the saliency per ampere, 1/A.
+    /// sigma L_s, H, its share at zero current, the change of that share per ampere, 1/A, and the saliency per ampere, 1/A.
     leakage: f32,
     leakage_share: f32,
     leakage_slope: f32,
@@ -88,7 +90,7 @@ pub struct Observer {
     rate: f32,
     /// L_M, H.
     coupled: f32,
-    /// Nominal direct current, A, and its flux, V s.
+    /// Nominal d-axis current, A, and its flux, V s.
     i_d: f32,
     nominal: f32,
     /// Least flux, V s.
@@ -100,43 +102,44 @@ pub struct Observer {
 /// State of the observer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObserverState {
-    /// Voltages of the last periods, V, backwards from `latest` on, and around.
+    /// Ring of the voltages of the last periods, V, backwards from `latest` on.
     voltages: [AlphaBeta; VOLTAGES],
     latest: usize,
     last: AlphaBeta,
     /// Length of the flux, V s.
     pub flux: f32,
-    /// Current in the frame of the flux, A.
+    /// Current in the flux frame, A.
     current: Dq,
-    /// Change of the flux in the last period by the voltage, V s.
+    /// Change of the flux in the last period due to the voltage, V s.
     pub change: Dq,
     /// Angle by which the flux turned in the last period, rad.
     pub turned: f32,
-    /// Angle that the slip had in it, rad.
+    /// Angle of the slip in that turn, rad.
     pub slip: f32,
-    /// g alpha and g w_r, of the last carrier period.
+    /// Gains g alpha and g w_r, from the last injection period.
     gain: Dq,
     /// `b/|i|`, 1/A^2, and `n + m |i|`.
     per_current: f32,
     leakage: f32,
-    /// Saliency fixed to the flux, of the last carrier period.
+    /// Saliency fixed to the flux, from the last injection period.
     flux_saliency: f32,
     /// Stator resistance.
     pub resistance: Resistance,
 }
 
-/// The tracked stator resistance, with what bounds it. A start on a turning shaft measures none and goes on with that of the run before.
+/// The tracked stator resistance with its bounds. A flying start does not measure the resistance and continues with the resistance
+/// of the run before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Resistance {
-    /// Relative to the settings, less one.
+    /// Present resistance relative to the settings, less one.
     pub now: f32,
-    /// The same, as the last start at rest has measured it.
+    /// Resistance that the last start at rest has measured, relative to the settings, less one.
     measured: f32,
-    /// Largest deviation from it.
+    /// Largest deviation from the measured resistance.
     near: f32,
     /// Standard deviation with which the filter begins; 0 until it was measured.
     pub deviation: f32,
-    /// Share of the deviation from it that decays in a carrier period; 0 until it was measured.
+    /// Share of the deviation from the measured resistance that decays in an injection period; 0 until it was measured.
     pub decay: f32,
 }
 
@@ -147,21 +150,21 @@ pub struct Leakage {
     pub flux_saliency: f32,
     /// Saliency per ampere of stator current, 1/A.
     pub current_saliency: f32,
-    /// Leakage inductance of the fundamental wave at no current, as a share of that of the motor's parameters.
+    /// Leakage inductance of the fundamental wave at zero current, as a share of the leakage of the motor's parameters.
     pub share: f32,
     /// Change of that share per ampere, 1/A.
     pub slope: f32,
 }
 
-/// Speed of the rotor that the observer sees: with an angle error e and a relative deviation r of the resistance, true speed +
-/// `per_angle` e + `per_resistance` r.
+/// Speed of the rotor that the observer sees. With an angle error e and a relative deviation r of the resistance, it is true
+/// speed + `per_angle` e + `per_resistance` r.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenSpeed {
-    /// Mean of a carrier period, electrical turns per period.
+    /// Mean speed of an injection period, electrical turns per period.
     pub rotor_freq: f32,
-    /// Its age, samples.
+    /// Age of that mean, samples.
     pub age: f32,
-    /// `g w_r w_s`, rad/s per rad: the pull towards the flux of the observer's own model.
+    /// `g w_r w_s`, rad/s per rad: the pull towards the flux of the observer's current model.
     pub per_angle: f32,
     /// `r_s (i_q - g w_r i_d)/psi`, rad/s.
     pub per_resistance: f32,
@@ -170,32 +173,32 @@ pub struct SeenSpeed {
 /// Voltage that flux and leakage induce, for the feed-forward of the current loop.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Induced {
-    /// By the torque current against the direct axis, and by the direct current along the quadrature axis, V/A.
+    /// Voltage of the q-axis current against the d axis, and of the d-axis current along the q axis, V/A.
     across: f32,
     along: f32,
-    /// By the flux, V.
+    /// Voltage of the flux, V.
     flux: f32,
 }
 
 impl ObserverState {
-    /// Begins anew without flux, with the resistance as it was, for this observer, where there is one.
+    /// Resets the state to no flux and keeps the resistance, for this observer, if there is one.
     pub fn start(&mut self, observer: Option<&Observer>) {
         let flux = observer.map_or(0.0, |observer| observer.least);
         *self = Self { flux, resistance: self.resistance, ..Self::default() };
     }
 
-    /// Takes the voltage that a step puts out, without the carrier, V.
+    /// Takes the voltage of a step without the injection, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
         self.latest = self.latest.wrapping_add(VOLTAGES - 1) % VOLTAGES;
         self.voltages[self.latest] = voltage;
     }
 
-    /// The voltage that was put out so many periods before the latest, fewer than [`VOLTAGES`], V.
+    /// Returns the voltage of so many periods before the latest, fewer than [`VOLTAGES`], V.
     fn before(&self, periods: usize) -> AlphaBeta {
         self.voltages[self.latest.wrapping_add(periods) % VOLTAGES]
     }
 
-    /// One period whose `current`, A, does not belong to the voltages.
+    /// Skips a period whose `current`, A, does not belong to the voltages.
     #[cold] // its stores are not merged with those of a step
     pub fn skip(&mut self, current: AlphaBeta) {
         self.last = current;
@@ -203,25 +206,26 @@ impl ObserverState {
 }
 
 impl Resistance {
-    /// Takes a measured one, relative to the settings, less one.
+    /// Takes a measured resistance, relative to the settings, less one.
     pub fn take(&mut self, measured: f32) {
         *self = Self { now: measured, measured, near: NEAR, deviation: MEASURED, decay: DECAY };
     }
 
-    /// Takes into account that the winding may have warmed or cooled for so many seconds, in which nothing showed its resistance.
+    /// Takes into account that the winding may have warmed or cooled for so many seconds during which its resistance was not
+    /// observed.
     pub fn rest(&mut self, seconds: f32) {
         let change = if self.decay > 0.0 { seconds * WARMING_PER_S } else { 0.0 };
         self.near = limited(self.near + change, FARTHEST);
         self.deviation = limited(self.deviation + change, UNMEASURED);
     }
 
-    /// Adds a correction of the filter; the deviation from the measured one decays.
+    /// Adds a correction of the filter; the deviation from the measured resistance decays.
     pub fn correct(&mut self, correction: f32) {
         self.near = limited(self.near + CARRIER_S * WARMING_PER_S, FARTHEST);
         self.turn(correction - self.decay * (self.now - self.measured));
     }
 
-    /// Adds a change.
+    /// Adds a change within the bounds.
     fn turn(&mut self, change: f32) {
         let range = if self.decay > 0.0 {
             (self.measured - self.near, self.measured + self.near)
@@ -233,7 +237,7 @@ impl Resistance {
 }
 
 impl Observer {
-    /// Observer for a motor at the direct current `i_d`, A, with currents of this `age`, samples.
+    /// Creates the observer for a motor at the d-axis current `i_d`, A, with currents of this `age`, samples.
     pub fn new(motor: &Motor, leakage: &Leakage, i_d: f32, age: f32) -> Self {
         let coupled = motor.coupled_inductance();
         Self {
@@ -252,11 +256,11 @@ impl Observer {
         }
     }
 
-    /// Takes an accepted result of a learning.
+    /// Takes an accepted result of a self-commissioning.
     ///
-    /// The demodulation sees `q = Im s/(1 - Re s)` of the saliency, with `Im s = 2 a e` by a small angle error e and
-    /// `2 b i_d i_q/|i|` by the torque current, so that a learned b is too small by `1 - Re s`: some `1 - a + b |i|` in
-    /// the middle of the currents.
+    /// The demodulation sees `q = Im s/(1 - Re s)` of the saliency, where `Im s` is `2 a e` for a small angle error e
+    /// and `2 b i_d i_q/|i|` for the q-axis current. Therefore a learned b is too small by the factor `1 - Re s`, about
+    /// `1 - a + b |i|` in the middle of the currents.
     pub fn take(&mut self, learned: &Learned) {
         if let Some(slope) = &learned.slope {
             let k = slope.at_rest();
@@ -269,9 +273,9 @@ impl Observer {
         }
     }
 
-    /// One period, from the `current` of a sample, A, and the voltages that were put out before it. `frame` is the axis of the
-    /// flux when the current before flowed; `leads`: whether the observer has the angle.
-    #[inline(always)] // a part of every period, with its values in registers
+    /// Runs one period, with the `current` of a sample, A, and the voltages before it. `frame` is the axis of the flux at the
+    /// time of the previous current; `leads`: whether the observer gives the angle.
+    #[inline(always)] // runs in every period, with its values in registers
     pub fn step(
         &self,
         state: &mut ObserverState,
@@ -313,8 +317,8 @@ impl Observer {
         state.current = mean;
     }
 
-    /// Computes the gains for a rotor of `rotor_freq`, electrical turns per period, and the saliency at the present flux; once a
-    /// carrier period.
+    /// Computes the gains for a rotor speed `rotor_freq`, electrical turns per period, and the saliency at the present flux;
+    /// called once an injection period.
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (GAIN_AT_STANDSTILL * a + GAIN_PER_SPEED * w.abs()) / (a * a + w * w);
@@ -322,20 +326,20 @@ impl Observer {
         state.flux_saliency = self.flux_saliency * (state.flux / self.nominal);
     }
 
-    /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, at a flux of `flux_freq`, electrical turns
-    /// per period, while the observer leads; once a carrier period.
+    /// Tracks the resistance while the observer leads, by the angle `error` of the injection, rad, flux less estimate, at a flux of
+    /// `flux_freq`, electrical turns per period; called once an injection period.
     pub fn compare_with_injection(&self, state: &mut ObserverState, error: f32, flux_freq: f32) {
         let angle = self.r_s * self.i_d / (state.flux * flux_freq * TAU);
         state.resistance.turn(FROM_INJECTION * angle * limited(error, LARGEST_ERROR));
     }
 
-    /// Whether there is flux enough to show an angle and a speed.
+    /// Whether there is enough flux to show an angle and a speed.
     pub fn has_flux(&self, state: &ObserverState) -> bool {
         state.flux > LEAST_FLUX_SHARE * self.nominal
     }
 
-    /// The speed of the rotor that it sees, for a mean `turn` of the flux in a carrier period, less the present slip, at a flux of
-    /// `flux_freq`, both electrical turns per period.
+    /// Returns the observed speed of the rotor, for a mean `turn` of the flux in an injection period, less the present slip, at a
+    /// flux of `flux_freq`, both in electrical turns per period.
     pub fn seen_speed(&self, state: &ObserverState, turn: f32, flux_freq: f32) -> SeenSpeed {
         let current = state.current.q - state.gain.q * state.current.d;
         SeenSpeed {
@@ -346,12 +350,12 @@ impl Observer {
         }
     }
 
-    /// Current that makes the flux, A, with the magnetising inductance of the settings.
+    /// Returns the current that makes the flux, A, with the magnetising inductance of the settings.
     pub fn magnetising(&self, state: &ObserverState) -> f32 {
         state.flux / self.coupled
     }
 
-    /// Voltage that flux and leakage induce at `flux_freq`, electrical turns per period.
+    /// Returns the voltage that flux and leakage induce at `flux_freq`, electrical turns per period.
     pub fn induced(&self, state: &ObserverState, flux_freq: f32) -> Induced {
         let w = flux_freq * TAU / PERIOD_S;
         let leakage =
@@ -361,7 +365,7 @@ impl Observer {
 }
 
 impl Induced {
-    /// The voltage at this current, V.
+    /// Returns the voltage at this current, V.
     pub fn at(&self, current: Dq) -> Dq {
         Dq { d: -self.across * current.q, q: self.along * current.d + self.flux }
     }
@@ -381,7 +385,7 @@ mod tests {
         assert!(observer.age < (VOLTAGES - 2) as f32, "{}", observer.age);
     }
 
-    /// A deviation from the measured resistance decays; one from that of the run before does not.
+    /// A deviation from the measured resistance decays. A deviation from the resistance of the run before does not.
     #[test]
     fn the_resistance_returns_to_the_measured_one() {
         let after = |measured: Option<f32>, seconds: f32| {
@@ -401,7 +405,7 @@ mod tests {
         assert!((after(Some(-0.1), RESISTANCE_S) - left).abs() < 1e-3);
     }
 
-    /// A resistance that was measured bounds the tracked one to what heating can have changed since.
+    /// The tracked resistance stays within the range of the measured resistance and its possible change by heating since then.
     #[test]
     fn the_resistance_stays_near_the_measured_one() {
         let mut resistance = Resistance::default();
@@ -416,9 +420,9 @@ mod tests {
         assert!((pull(300.0, 0.05) - (0.2 + FARTHEST)).abs() < 2e-3);
     }
 
-    /// A current that was near zero at the last update and grows to 3.5 A before the next: its saliency is wrong by no more than that of
-    /// the nominal current, and the flux is seen to stand. (With `b/|i|` of the last update half of the leakage's voltage is seen as
-    /// flux at 1 A already.)
+    /// A current that was near zero at the last update grows to 3.5 A before the next. Its saliency is wrong by no more than the
+    /// saliency of the nominal current, and the observed flux is constant. (With `b/|i|` of the last update, half of the voltage of the
+    /// leakage would be observed as flux at only 1 A.)
     #[test]
     fn a_current_that_passes_zero_does_not_turn_the_flux() {
         let motor = Motor::default();
@@ -434,7 +438,8 @@ mod tests {
         for n in 0..10 {
             let (before, after) = (change * n as f32, change * (n + 1) as f32);
             let mean = 0.5 * (before + after);
-            // Of a flux that stands: resistance, and leakage with its true saliency along the current.
+            // The voltage of a constant flux consists of the resistance and of the leakage with its true saliency along the
+            // current.
             let sigma = motor.sigma_l_s();
             let leakage = sigma * (1.0 - per_a * mean) * change;
             let alpha = motor.r_s * mean + leakage / PERIOD_S;
@@ -447,8 +452,8 @@ mod tests {
         }
     }
 
-    /// The observer in a frame that is `e` behind the flux, with a resistance that is `r` higher than it believes: the turn that it sees
-    /// of a flux that turns steadily, rad/s. Its current is regulated: the same in the frame, whatever the error.
+    /// Runs the observer in a frame that is `e` behind the flux, with a resistance that is `r` higher than estimated. Returns the
+    /// observed speed of a flux that rotates steadily, rad/s. The current is regulated, so it is the same in the frame with any error.
     fn seen_turn(stator: f32, rotor: f32, (e, r): (f32, f32), current: Dq) -> (f32, SeenSpeed) {
         let motor = Motor::default();
         let leakage = Leakage { flux_saliency: 0.0, current_saliency: 0.0, share: 1.0, slope: 0.0 };
@@ -477,7 +482,8 @@ mod tests {
         (state.turned / PERIOD_S, observer.seen_speed(&state, 0.0, freq))
     }
 
-    /// Size and sign of what the filter takes for an angle error and for the resistance, against finite differences of a machine.
+    /// Compares size and sign of the effects of an angle error and of the resistance, as the filter assumes them, with finite
+    /// differences of a machine.
     #[test]
     fn the_seen_speed_depends_on_angle_and_resistance_as_the_filter_takes_it() {
         for stator in [-80.0, -20.0, 10.0, 60.0] {

@@ -1,27 +1,27 @@
-//! Reference and slope of the saliency for the synchronous demodulation over the torque current.
+//! Saliency offset and saliency sensitivity over the q-axis current, for the synchronous demodulation.
 //!
-//! At the true angle the saliency `q` is not zero but depends on i_q, because part of the saliency
-//! follows the stator current. With the angle error e, flux less estimate,
+//! At the true angle the saliency `q` is not zero but has an offset that depends on i_q, because
+//! part of the saliency follows the stator current. With the angle error e, flux less estimate,
 //!
 //! ```text
 //! q = q_ref(i_q) + k(i_q) e          e = (q - q_ref(i_q)) / k(i_q)
 //! ```
 //!
-//! The reference is an odd table over i_q and the slope k an even one, of either sign; both are learned with the shaft
-//! locked. The learned slope is that of an error that lasts: current and flux have settled. It tells the size of such an error. (An
-//! angle error that is faster than the current loop rotates the current with the frame and with it the current-dependent part b
-//! of the saliency, so such errors see the slope k + 2 b |i| cos 2g, with cos 2g = (i_d^2 - i_q^2)/|i|^2.)
+//! The offset q_ref is an odd table over i_q, and the sensitivity k an even one, of either sign; both are learned with the shaft
+//! locked. The learned sensitivity is valid for a lasting error, for which current and flux have settled, and gives the size of
+//! such an error. (An angle error that is faster than the current loop rotates the current with the frame, and with it the
+//! current-dependent part b of the saliency. Its sensitivity is k + 2 b |i| cos 2g, with cos 2g = (i_d^2 - i_q^2)/|i|^2.)
 //!
-//! An error that is faster than the flux is seen with the slope without load, also where load has made the lasting one smaller.
-//! That slope is the most that the loop of the angle takes: with the gain of the lasting one, up to twice as large, an oscillation
-//! of 17 Hz grew near zero stator frequency.
+//! An error that is faster than the flux has the sensitivity without load, even where the load has made the lasting sensitivity
+//! smaller. The gain of the angle loop is at most the gain for that sensitivity. With the gain for the lasting sensitivity,
+//! which is up to twice as large, an oscillation of 17 Hz grew near zero stator frequency.
 
 use crate::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 
-/// Largest angle error per deviation of the saliency, relative to that without q-axis current.
+/// Largest angle error per deviation of the saliency, relative to its value without q-axis current.
 const MOST_GAIN: f32 = 2.0;
 
-/// Reference of the saliency and inverse slope over i_q.
+/// Saliency offset and inverse sensitivity over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSchedule {
     table: ReferenceTable,
@@ -29,23 +29,24 @@ pub struct GainSchedule {
     per_saliency: [f32; POINTS],
 }
 
-/// The schedule at a torque current.
+/// The schedule at a q-axis current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchedulePoint {
-    /// Reference of the saliency.
+    /// Saliency offset.
     pub reference: f32,
-    /// Angle error per deviation of the saliency, rad: of an error that lasts, and for the loop, at most that without load.
+    /// Angle error per deviation of the saliency, rad: for a lasting error, and for the loop, which is at most the value without
+    /// load.
     pub lasting: f32,
     pub gain: f32,
 }
 
 impl GainSchedule {
-    /// Schedule for a reference and a slope on the same grid.
+    /// Creates the schedule from an offset and a sensitivity on the same grid.
     pub fn new(table: &ReferenceTable, slope: &SlopeTable) -> Self {
         Self { table: *table, per_saliency: slope.inverses(MOST_GAIN) }
     }
 
-    /// Schedule for the same motor with a learned reference and, if learned, another slope.
+    /// Returns the schedule for the same motor with a learned offset and, if learned, another sensitivity.
     pub fn with_learned(&self, table: &ReferenceTable, slope: Option<&SlopeTable>) -> Self {
         match slope {
             Some(slope) => Self::new(table, slope),
@@ -53,7 +54,7 @@ impl GainSchedule {
         }
     }
 
-    /// The schedule at a quadrature current `i_q`, A.
+    /// Returns the schedule at a q-axis current `i_q`, A.
     pub fn at(&self, i_q: f32) -> SchedulePoint {
         let place = self.table.grid().place(i_q);
         let (lasting, [at_rest, ..]) = (between(&self.per_saliency, place), self.per_saliency);
@@ -70,12 +71,12 @@ mod tests {
     use super::*;
     use crate::table::Grid;
 
-    /// Slope of a saliency that is fixed to the flux alone.
+    /// Returns the sensitivity of a saliency that is fixed to the flux alone.
     fn fixed(a: f32) -> SlopeTable {
         SlopeTable::of_flux_saliency(Grid::REFERENCE, a)
     }
 
-    /// The reference with these values over the torque current, A.
+    /// Returns the offset with these values over the q-axis current, A.
     fn reference(q: impl Fn(f32) -> f32) -> ReferenceTable {
         let values = core::array::from_fn(|n| q(Grid::REFERENCE.current(n)));
         ReferenceTable::from_points(Grid::REFERENCE, values).unwrap()
@@ -100,7 +101,8 @@ mod tests {
     fn the_saliency_tells_the_angle() {
         let table = reference(|i_q| 0.02 * i_q.min(2.0));
         for k in [-0.07_f32, 0.1] {
-            // Beyond 1 A the slope is 0.7 of that without current, beyond 2 A a fifth: the angle is held to twice, the gain to once.
+            // Beyond 1 A the sensitivity is 0.7 of its value without current, beyond 2 A a fifth. The angle is limited to twice its
+            // value without current, the gain to once.
             let points = core::array::from_fn(|n| {
                 k * [1.0, 0.7, 0.2][n.div_ceil(4).min(3).saturating_sub(1)]
             });

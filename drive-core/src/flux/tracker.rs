@@ -1,5 +1,5 @@
 //! Tracking of the injection axis: the PII controller of the dissertation ([`Tracker`]), and the axis that follows the corrections of
-//! the [filter](super::angle_filter) or the turn that the observer sees.
+//! the [filter](super::angle_filter) or the turn of the observer.
 //!
 //! The PII controller of Eq. 3.7 / 3.44 rotates the injection axis until `delta_i` equals its reference:
 //! `u[k+1] = 2 u[k] - u[k-1] + k_s (e[k] - z_s e[k-1])`, written as two accumulators: the frequency, and
@@ -42,7 +42,7 @@ pub struct Tracker {
 pub struct TrackerState {
     /// Angle of the injection axis at the present sample, electrical.
     pub angle: Angle,
-    /// Its frequency, electrical turns per period.
+    /// Frequency of the axis, electrical turns per period.
     pub freq: f32,
     error: f32,
     /// Acceleration of the rotor, electrical turns per period squared.
@@ -50,14 +50,14 @@ pub struct TrackerState {
 }
 
 impl Tracker {
-    /// Tracker with gain `k_s`, rad/A, and zero `z_s` of Eq. 3.44; `limit` is the largest frequency,
-    /// electrical turns per period, below 1/2.
+    /// Creates a tracker with gain `k_s`, rad/A, and zero `z_s` of Eq. 3.44; `limit` is the largest
+    /// frequency, electrical turns per period, below 1/2.
     pub fn new(k_s: f32, z_s: f32, limit: f32) -> Self {
         Self { gain: k_s / TAU, zero: z_s, limit }
     }
 
     /// Advances by one period with `error` = reference - `delta_i`, A. Returns false when the frequency
-    /// has reached its limit or is NaN: the angle is lost.
+    /// has reached its limit or is NaN, which means that the angle is lost.
     pub fn step(&self, state: &mut TrackerState, error: f32) -> bool {
         let freq = state.freq + self.gain * (error - self.zero * state.error);
         state.error = error;
@@ -67,15 +67,15 @@ impl Tracker {
     }
 }
 
-/// Share of the newest value in the speed that the observer sees: 5 ms.
+/// Share of the newest value in the speed from the observer: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
-/// Share of the acceleration that is forgotten in a period where the observer has the angle.
+/// Share by which the acceleration decays in a period while the observer gives the angle.
 const FORGETTING: f32 = 0.01;
 impl TrackerState {
-    /// Advances by one period where saliency and voltage track: with the latest correction and the slip, or, where the observer
-    /// leads, by the turn that it sees. `rotor_freq` is the speed of the rotor; frequencies in electrical turns per period. Returns
-    /// whether the turn is finite. (The drive checks that the speed is finite and within limits.)
-    #[inline(always)] // a part of every period, with its values in registers
+    /// Advances by one period while saliency and voltage track: with the latest correction and the slip or, while the observer
+    /// leads, by the turn of the observer. `rotor_freq` is the speed of the rotor; frequencies are in electrical turns per period.
+    /// Returns whether the turn is finite. (The drive checks that the speed is finite and within limits.)
+    #[inline(always)] // runs in every period, with its values in registers
     pub fn step(
         &mut self,
         rotor_freq: &mut f32,
@@ -87,7 +87,7 @@ impl TrackerState {
             self.acceleration *= 1.0 - FORGETTING;
             *rotor_freq += ROTOR_SMOOTHING * (turning.turned - turning.slip - *rotor_freq);
             let freq = *rotor_freq + slip_freq;
-            // The turn is that of an older current: the change of the speed since then is made up for.
+            // The turn belongs to an older current, so the change of the speed since then is compensated.
             let turn = turning.turned + turning.age * (freq - self.freq);
             self.freq = freq;
             turn
@@ -107,7 +107,7 @@ mod tests {
     #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
 
-    /// A turn that is no number leaves speed and frequency finite: it would go unseen as one of nothing.
+    /// A turn that is NaN leaves speed and frequency finite, so without a report it would be undetected.
     #[test]
     fn a_turn_that_is_no_number_is_told() {
         for leads in [false, true] {
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// Corrections move angle, speed and acceleration; the slip is fed forward. A source that does not lead moves nothing.
+    /// Corrections change angle, speed and acceleration; the slip is fed forward. A source that does not lead changes nothing.
     #[test]
     fn corrections_and_slip_move_the_axis_until_the_observer_leads() {
         let (mut state, mut rotor_freq) = (TrackerState::default(), 0.001);
@@ -132,12 +132,12 @@ mod tests {
             let before = state.angle;
             assert!(state.step(&mut rotor_freq, &correction, 2e-4, &seen));
             let n = f32::from(n);
-            // 1e-5 a period, and 1e-6 + 2e-6 + ... of the acceleration.
+            // The speed rises by 1e-5 per period, and by 1e-6 + 2e-6 + ... due to the acceleration.
             let speed = 0.001 + 1e-5 * n + 1e-6 * 0.5 * n * (n + 1.0);
             assert!((rotor_freq - speed).abs() < 1e-8);
             assert!(((state.angle - before).to_turns() - (speed + 2e-4 + 1e-3)).abs() < 1e-6);
         }
-        // Led, the axis turns with what the observer sees, less the age of it where the speed stands.
+        // While the observer leads, the axis rotates with its turn; without an age the change of the speed does not matter.
         let led = Turning { leads: true, turned: 0.02, slip: 2e-4, age: 0.0 };
         let before = state.angle;
         assert!(state.step(&mut rotor_freq, &correction, 2e-4, &led));

@@ -1,6 +1,6 @@
-//! Voltage in proportion to the frequency: turns a motor that nobody has identified, from its nameplate alone.
+//! V/f control: voltage in proportion to the frequency, for a motor that was not identified, from its nameplate alone.
 //!
-//! The frame turns with the stator's frequency; its d axis is that of the flux in the steady state. With `psi` the flux of
+//! The frame rotates with the stator frequency; its d axis is the flux axis in the steady state. With `psi` the flux of
 //! the nameplate, `i_0` the boost current and `R` the resistance that the boost has shown:
 //!
 //! ```text
@@ -12,71 +12,72 @@
 //! ramp    -= K (i_q - i_q within its limits)
 //! ```
 //!
-//! The currents of the last three lines are measured. Torque that does not fit into the current limit, or that the dc link
-//! does not bear, thus changes the speed: the motor slows down under a load that is too heavy, and brakes no faster than the
-//! link allows. The share `s` goes down to 0.65 where the reactive current alone takes 0.55 of the limit, and further where
-//! the link has no more voltage. More than the shown share of `R i_q`, or less damping, makes motors hunt below 10 Hz.
+//! The currents of the last three lines are measured. Torque beyond the current limit or beyond the limits of the dc link
+//! therefore changes the speed (stall prevention): the motor slows down under a load that is too heavy, and brakes no faster
+//! than the link allows. The share `s` falls to 0.65 if the reactive current alone is 0.55 of the limit, and further if the
+//! link has no more voltage. With more than the shown share of `R i_q`, or with less damping, motors hunt below 10 Hz.
 //!
-//! A phase that opens shows as a current that turns backwards. Nothing here knows the rotor. A current beyond the limit for
-//! 20 ms is taken for a motor that has pulled out: the frequency goes down until the current does. A motor that stays at its
-//! limits below 4 Hz for two seconds is taken for one that stands.
+//! An open phase shows as a current that rotates backwards. There is no model of the rotor. A current beyond the limit for
+//! 20 ms means that the motor has pulled out; then the frequency falls until the current does. A motor that stays at its
+//! limits below 4 Hz for two seconds counts as stalled.
 //!
-//! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate injection_only: half the rated speed within 1 % of
-//! the rated one without load, within 3 % with 0.3 of the rated torque.
+//! In simulations of eight motors of 0.19 to 18.5 kW with the nameplate alone, half the rated speed was reached within 1 %
+//! of the rated speed without load, and within 3 % with 0.3 of the rated torque.
 
 use crate::math::{limited, within};
 use crate::{AlphaBeta, Angle, Dq, Fault, PERIOD_S, UnitVector};
 
-/// Gains of the boost, as shares of the base impedance: proportional, and per second.
+/// Gains of the boost controller, as shares of the base impedance: proportional, and per second.
 const BOOST_K: f32 = 0.03;
 const BOOST_PER_S: f32 = 0.5;
-/// Largest voltage of the boost: that of this share of the base impedance, which no stator resistance reaches.
+/// Largest voltage of the boost, as a share of the base impedance, which no stator resistance reaches.
 const BOOST_MOST: f32 = 0.3;
-/// Tolerance of the boost current, and control periods for which it must hold, 0.5 s: the flux has built up by then in most
-/// motors.
+/// Tolerance of the boost current, and control periods for which the current must stay within it, 0.5 s. Then the flux of
+/// most motors has built up.
 const BOOST_WITHIN: f32 = 0.05;
 const BOOST_HOLDS: u32 = 3000;
-/// Share of the voltage across the resistance that is added for the torque current: 1 would be on the verge of stability.
+/// Share of the voltage across the resistance that is added for the q-axis current: 1 would be on the verge of stability.
 const COMPENSATED: f32 = 0.55;
 /// Resistance that limits the current, as a share of the base impedance.
 const LIMITING: f32 = 0.6;
-/// Share of the current limit from which on the torque current makes the frequency give way.
+/// Share of the current limit above which the q-axis current changes the frequency (stall prevention).
 const FOLD_BACK_FROM: f32 = 0.83;
-/// Least time for a change by the rated frequency, s: the flux of most motors follows.
+/// Least time for a change by the rated frequency, s, in which the flux of most motors can follow.
 const STEEPEST_S: f32 = 2.0;
-/// Share of it that must be left for the whole acceleration.
+/// Share of the current limit that must be left for the full acceleration.
 const LEAST_RAMP_SHARE: f32 = 0.25;
-/// A current beyond the limit for these control periods, 20 ms, is that of a motor that has pulled out. The frequency then
-/// goes down, the rated one in this time, s, until the current is below this share of the limit.
+/// Control periods, 20 ms, after which a current beyond the limit means that the motor has pulled out; time in which the
+/// frequency then falls by the rated frequency, s; and share of the limit below which the current must fall.
 const PULLED_OUT: u32 = 120;
 const RECOVERY_S: f32 = 0.5;
 const RECOVERED: f32 = 0.75;
-/// Control periods for which the motor may be at its limit below this frequency, 2 s, four for each.
+/// Control periods for which the motor may be at its limit below this frequency, 2 s, counted as four each.
 const STALLED: u32 = 4 * 12_000;
 const STALLED_BELOW: f32 = 4.0 * PERIOD_S;
-/// Time in which an excess of the whole current limit would take the rated frequency off, s.
+/// Time in which an excess by the whole current limit would reduce the frequency by the rated frequency, s.
 const EXCESS_S: f32 = 0.34;
 /// Largest share of the current limit for the reactive current, and time in which the flux follows, s.
 const REACTIVE: f32 = 0.55;
 const TRIM_S: f32 = 0.75;
 /// Least share of the flux.
 const LEAST_FLUX: f32 = 0.65;
-/// Share of the rated frequency that the torque current takes off while it changes by the rated current.
+/// Share of the rated frequency by which a change of the q-axis current by the rated current reduces the frequency.
 const DAMPING: f32 = 0.15;
 /// Time constants of the currents for limits, damping, and slip, s.
 const FAST: f32 = PERIOD_S / 0.002;
 const SLOW: f32 = PERIOD_S / 0.08;
 const SLIP: f32 = PERIOD_S / 0.1;
-/// Frequency from which on the whole slip is compensated: a motor that is to stand gets a field that stands.
+/// Frequency above which the whole slip is compensated. A motor that is to be at rest gets a fixed field.
 const SLIP_WHOLE_FROM: f32 = 3.0 * PERIOD_S;
-/// The current that turns backwards: time constant, largest share of the whole, frequency from which on it is measured,
-/// and after how many control periods it is judged, 0.5 s.
+/// The current that rotates backwards: time constant, largest share of the whole current, frequency above which it is
+/// measured, and control periods after which it is judged, 0.5 s.
 const BACKWARDS: f32 = PERIOD_S / 0.1;
 const BACKWARDS_SQUARED: f32 = 0.4 * 0.4;
 const JUDGED_FROM: f32 = 8.0 * PERIOD_S;
 const JUDGED_AFTER: u32 = 3000;
-/// Across the boost, a sensor with the wrong sign or two that are exchanged make 1.15 or more of the current along it; the dead
-/// time of an inverter of low voltage makes up to 0.58, as an open phase would, which shows later.
+/// Largest current across the boost, relative to the current along it. A sensor with the wrong sign or two exchanged sensors
+/// cause 1.15 or more. The dead time of an inverter of low voltage causes up to 0.58, and so does an open phase, which is
+/// detected later.
 const ACROSS: f32 = 0.7;
 const ACROSS_OF_POLARITY: f32 = 0.8;
 /// Share of the circle inside the hexagon that is used.
@@ -84,12 +85,12 @@ const MODULATION_SHARE: f32 = 0.97;
 /// Periods from the sample to the middle of the period of its voltage.
 const VOLTAGE_DELAY: f32 = 1.5;
 
-/// Nameplate and limits; the voltages are peaks of a phase.
+/// Nameplate and limits. The voltages are phase peak values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltsPerHertzSettings {
     /// Voltage per frequency, V/Hz.
     pub volts_per_hz: f32,
-    /// The same of the nameplate.
+    /// Voltage per frequency of the nameplate, V/Hz.
     pub rated_volts_per_hz: f32,
     /// Rated frequency, Hz.
     pub frequency_hz: f32,
@@ -97,34 +98,34 @@ pub struct VoltsPerHertzSettings {
     pub slip_hz: f32,
     /// Rated torque, Nm.
     pub torque_nm: f32,
-    /// Pairs of poles.
+    /// Pole pairs.
     pub pole_pairs: f32,
     /// Rated current, A peak.
     pub rated_a: f32,
     /// Current limit, A peak.
     pub limit_a: f32,
-    /// Boost, A peak.
+    /// Boost current, A peak.
     pub boost_a: f32,
     /// Base impedance, ohm.
     pub impedance: f32,
-    /// Voltage that the inverter may lose at the boost, V.
+    /// Largest inverter voltage error at the boost, V.
     pub lost_v: f32,
     /// Change of the frequency, Hz/s.
     pub ramp_hz_per_s: f32,
-    /// That of a quick stop, Hz/s.
+    /// Change of the frequency in a quick stop, Hz/s.
     pub quick_hz_per_s: f32,
     /// Share of the slip that is compensated.
     pub slip_share: f32,
 }
 
-/// Coefficients. Frequencies in electrical turns per control period.
+/// Coefficients of the V/f control. Frequencies are in electrical turns per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltsPerHertz {
-    /// V per frequency.
+    /// Voltage per frequency, V.
     volts: f32,
-    /// Slip per torque current at the whole flux.
+    /// Slip per q-axis current at full flux.
     slip: f32,
-    /// Current of the standing motor, A.
+    /// Current of the motor at rest, A.
     pub boost_a: f32,
     boost: (f32, f32),
     most_v: f32,
@@ -139,7 +140,7 @@ pub struct VoltsPerHertz {
     per_room: f32,
 }
 
-/// State.
+/// State of the V/f control.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VoltsPerHertzState {
     angle: Angle,
@@ -149,15 +150,15 @@ pub struct VoltsPerHertzState {
     pub freq: f32,
     /// Slip of the rotor.
     pub slip: f32,
-    /// Voltage of the boost, V, and periods for which its current has held.
+    /// Voltage of the boost, V, and periods for which its current has been within the tolerance.
     boost: f32,
     held: u32,
     fast: Dq,
     slow: Dq,
     backwards: Dq,
-    /// Periods for which it was measured.
+    /// Periods for which the backwards current was measured.
     measured: u32,
-    /// Periods beyond the limit, and at it at a low frequency, four for each.
+    /// Periods with a current beyond the limit, and periods at the limit at a low frequency, counted as four each.
     beyond: u32,
     stalled: u32,
     /// Whether the motor has pulled out.
@@ -171,17 +172,17 @@ pub struct VoltsPerHertzState {
 /// Demand and limits of a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Frequency of the rotor that is asked for, electrical turns per period.
+    /// Reference of the rotor frequency, electrical turns per period.
     pub freq: f32,
-    /// Whether by the ramp of a quick stop.
+    /// Whether the ramp is that of a quick stop.
     pub quick: bool,
-    /// Least and largest torque current, A.
+    /// Least and largest q-axis current, A.
     pub i_q: (f32, f32),
     /// Largest voltage, V.
     pub largest_v: f32,
 }
 
-/// A period's result.
+/// Result of a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turned {
     /// Frame of the current.
@@ -195,7 +196,7 @@ pub struct Turned {
 }
 
 impl VoltsPerHertz {
-    /// For a motor with these data, all greater than zero.
+    /// Creates the V/f control for a motor with these data, all greater than zero.
     pub fn new(s: &VoltsPerHertzSettings) -> Self {
         const TAU: f32 = core::f32::consts::TAU;
         let (rated, flux) = (s.rated_volts_per_hz / TAU, s.volts_per_hz / TAU);
@@ -220,11 +221,11 @@ impl VoltsPerHertz {
         }
     }
 
-    /// One period with the measured `current`, A.
+    /// Runs one period with the measured `current`, A.
     ///
     /// # Errors
     /// While the boost rises [`Fault::WiringNoCurrent`], [`Fault::WiringPolarityA`], [`Fault::WiringPolarityB`] or
-    /// [`Fault::WiringExchanged`]; later [`Fault::CurrentNotAsPredicted`] where the current turns backwards.
+    /// [`Fault::WiringExchanged`]; later [`Fault::CurrentNotAsPredicted`] if the current rotates backwards.
     pub fn step(
         &self,
         state: &mut VoltsPerHertzState,
@@ -254,12 +255,12 @@ impl VoltsPerHertz {
         Ok(Turned { angle, applied, current: seen, voltage })
     }
 
-    /// Whether the boost stands, and references act.
+    /// Whether the boost has built up, so that references take effect.
     pub fn is_built(&self, state: &VoltsPerHertzState) -> bool {
         state.held >= BOOST_HOLDS
     }
 
-    /// The voltage of a motor that stands, while its current rises.
+    /// Returns the voltage of a motor at rest while the boost current rises.
     fn rise(&self, state: &mut VoltsPerHertzState, current: AlphaBeta) -> Result<Dq, Fault> {
         let length = fpu_sqrt::sqrtf(current.length_squared());
         let error = self.boost_a - length;
@@ -276,7 +277,7 @@ impl VoltsPerHertz {
         Ok(Dq { d: state.boost + self.boost.0 * error, q: 0.0 })
     }
 
-    /// Brings the frequency to the one that is asked for, as far as the current allows.
+    /// Changes the frequency towards its reference as far as the current allows.
     fn follow(&self, state: &mut VoltsPerHertzState, demand: &Demand) -> Result<(), Fault> {
         let (square, limit) = (state.fast.length_squared(), self.limit_a * self.limit_a);
         let most = FOLD_BACK_FROM * FOLD_BACK_FROM * limit - state.slow.d * state.slow.d;
@@ -286,7 +287,7 @@ impl VoltsPerHertz {
         let excess = i_q - within(i_q, range);
         let ramp = if demand.quick { self.quick_ramp } else { self.ramp };
         let step = limited(demand.freq - state.rotor_freq, ramp);
-        // Less acceleration, the less torque current is left for it.
+        // The less q-axis current is left, the smaller is the acceleration.
         let room = if step < 0.0 { i_q - range.0 } else { range.1 - i_q };
         let share = within(room * self.per_room, (0.0, 1.0));
 
@@ -305,14 +306,14 @@ impl VoltsPerHertz {
         Fault::Stalled.unless(state.stalled <= STALLED)
     }
 
-    /// The voltage of a motor that turns.
+    /// Returns the voltage of a rotating motor.
     fn turn(&self, state: &mut VoltsPerHertzState, demand: &Demand) -> Result<Dq, Fault> {
         self.follow(state, demand)?;
         let room = (self.reactive_a - state.slow.d) * (5.0 / self.reactive_a);
         let flux = state.flux + limited(room, 1.0) * (PERIOD_S / TRIM_S);
         state.flux = within(flux, (LEAST_FLUX, 1.0));
         let whole = self.volts * state.freq;
-        // The drop of the resistance comes first.
+        // The voltage across the resistance has priority.
         let resistance = state.boost / self.boost_a;
         let drop = COMPENSATED * resistance * state.slow.q;
         let left = MODULATION_SHARE * demand.largest_v - drop.abs() - state.boost;
@@ -328,7 +329,7 @@ impl VoltsPerHertz {
         Ok(Dq { d: state.boost, q: flux * whole + drop })
     }
 
-    /// Checks that all three phases carry the current, by its part that turns backwards.
+    /// Checks by the current that rotates backwards that all three phases carry current.
     fn judge(&self, state: &mut VoltsPerHertzState, backwards: Dq) -> Result<(), Fault> {
         if state.freq.abs() < JUDGED_FROM {
             (state.backwards, state.measured) = (Dq::ZERO, 0);
@@ -344,7 +345,7 @@ impl VoltsPerHertz {
     }
 }
 
-/// Checks that a voltage along phase a makes a current along phase a.
+/// Checks that a voltage along phase a causes a current along phase a.
 fn wired(i: AlphaBeta) -> Result<(), Fault> {
     let along = i.alpha.abs();
     if i.alpha > 0.0 && i.beta.abs() < ACROSS * along {
@@ -367,7 +368,7 @@ mod tests {
         Settings::default().build().unwrap().volts_per_hertz.unwrap()
     }
 
-    /// The answer to a voltage along phase a, by the direction of the current in degrees.
+    /// Tests the result for a voltage along phase a, by the direction of the current in degrees.
     #[test]
     fn the_direction_of_the_current_tells_the_wiring() {
         for (from, to, expected) in [
@@ -386,7 +387,7 @@ mod tests {
         assert_eq!(wired(AlphaBeta::ZERO), Err(Fault::WiringNoCurrent));
     }
 
-    /// At its limit below 4 Hz for two seconds, or for a part of the time for longer: more than a fifth of it counts.
+    /// A motor is stalled if it is at its limit below 4 Hz for two seconds, or for longer at more than a fifth of the time.
     #[test]
     fn a_motor_at_its_limit_that_hardly_turns_stands() {
         let coefficients = coefficients();
@@ -410,7 +411,7 @@ mod tests {
         }
     }
 
-    /// More than 0.4 of the current turns backwards for half a second, at 8 Hz or faster without a break.
+    /// The fault needs more than 0.4 of the current to rotate backwards for half a second, at 8 Hz or above without interruption.
     #[test]
     fn a_current_that_turns_backwards_is_an_open_phase() {
         let coefficients = coefficients();

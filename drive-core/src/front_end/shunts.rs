@@ -1,16 +1,17 @@
-//! Currents by three shunts below the low sides.
+//! Currents from three shunts below the low sides.
 //!
-//! A shunt sees the current of its phase only while the low side of that leg is on. The currents are sampled in the middle
-//! of that time, at the top of the counter. A leg whose low side is on for less than the [window](Shunts::new) cannot be
-//! read; its current then is minus the sum of the others. The modulator leaves at most one leg so
-//! ([`Modulator::readable`](crate::current::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
+//! A shunt carries the current of its phase only while the low side of that leg is on. The currents are sampled in the middle of
+//! that time, at the top of the counter. If the low side of a leg is on for less than the [window](Shunts::new), the leg cannot be
+//! read, and its current is computed as minus the sum of the others. The modulator leaves at most one leg unreadable
+//! ([`Modulator::readable`](crate::current::modulation::Modulator::readable)). While all three legs can be read, the sum of the
+//! currents must be zero.
 
 use crate::{Line, PERIOD_S};
 
 /// Time constant of the mean of the sum, samples.
 const MEAN_SAMPLES: f32 = 16.0;
 
-/// Coefficients of the third current and of the choice of the phases.
+/// Coefficients of the third current and of the selection of the phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shunts {
     /// Calibration of current c, A.
@@ -21,24 +22,24 @@ pub struct Shunts {
     pub largest_sum: f32,
 }
 
-/// State of the choice.
+/// State of the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ShuntState {
-    /// Duties of the period before the next sample, and of the period after it.
+    /// Duties of the period before the next sample and of the period after it.
     before: [f32; 3],
     after: [f32; 3],
-    /// Mean of the sum while all three are read, A.
+    /// Mean of the sum of the currents while all three are read, A.
     sum: f32,
 }
 
 impl Shunts {
-    /// A leg can be read if its low side is on for at least `window_s`, s, before and after the sample: dead time, settling of the
-    /// amplifier, and sampling.
+    /// Creates the coefficients. A leg can be read if its low side is on for at least `window_s`, s, before and after the sample:
+    /// dead time, settling of the amplifier, and sampling.
     pub fn new(current_c: Line, window_s: f32, largest_sum: f32) -> Self {
         Self { current_c, readable: 1.0 - 2.0 * window_s / PERIOD_S, largest_sum }
     }
 
-    /// The currents of phases a and b, A, from three readings, A; a reading that cannot be used is replaced.
+    /// Returns the currents of phases a and b, A, from three readings, A; a reading that cannot be used is replaced.
     pub fn choose(&self, state: &mut ShuntState, [a, b, c]: [f32; 3]) -> (f32, f32) {
         let hidden =
             |leg: usize| state.before[leg] > self.readable || state.after[leg] > self.readable;
@@ -54,14 +55,14 @@ impl Shunts {
         }
     }
 
-    /// Whether the sum of the currents is zero within its limit; not for NaN.
+    /// Whether the sum of the currents is zero within its limit; false for NaN.
     pub fn sums_to_zero(&self, state: &ShuntState) -> bool {
         state.sum.abs() <= self.largest_sum
     }
 }
 
 impl ShuntState {
-    /// Notes the output of a step, which takes effect with the period after the next sample.
+    /// Records the output of a step, which takes effect with the period after the next sample.
     pub fn applied(&mut self, duties: [f32; 3]) {
         self.before = self.after;
         self.after = duties;
@@ -80,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_window_is_the_share_of_the_period_around_the_sample() {
-        // 10 us of 166.7 us: 94 %.
+        // The window is 10 us of 166.7 us, so 94 % can be read.
         assert!((shunts().readable - 0.94).abs() < 1e-6);
     }
 

@@ -1,33 +1,36 @@
-//! Learning with locked shaft: reference and slope of the angle tracking over the torque current, the
-//! current-dependent saliency, and the asymmetry of sensors and stator.
+//! Saliency self-commissioning with a locked shaft. It learns the saliency offset and the saliency
+//! sensitivity over the q-axis current, the current-dependent saliency, and the asymmetry of sensors
+//! and stator.
 //!
-//! With the shaft locked the flux rotates at slip frequency, and its angle is known from the currents
-//! without a position sensor. At each point a torque current is regulated in a frame that lies behind the flux by the lead
-//! e of the flux, and the demodulated signal q is averaged:
+//! With the shaft locked the flux rotates at slip frequency, and its angle is known from the currents without a position
+//! sensor. At each point a q-axis current is regulated in a frame that the flux leads by the angle e, and the demodulated
+//! signal q is averaged:
 //!
 //! ```text
-//! reference(i_q) = q(i_q, 0)        slope k(i_q) = dq/de = (q(i_q, x) - q(i_q, -x)) / 2x
+//! q_ref(i_q) = q(i_q, 0)            k(i_q) = dq/de = (q(i_q, x) - q(i_q, -x)) / 2x
 //! i_d' = i_d cos e + i_q sin e      i_q' = i_q cos e - i_d sin e
 //! ```
 //!
-//! The flux sees i_d' and i_q', which give its magnetising current and its slip. It does not slip where tan x = i_q/i_d, so
-//! tan x is an odd multiple of half a step of the table over i_d: the first from 5.7° on, up to 17°. Each point has a mirrored one, (-i_q, -e);
-//! q is odd. In the mirrored one the flux turns back over the angles of the first: what depends on the angle alone drops out.
+//! In the flux frame the current is i_d' and i_q', which give the magnetising current and the slip. The flux does not slip if tan
+//! x = i_q/i_d. Therefore tan x is an odd multiple of half a step of the table over i_d, the first one above 5.7°, up to 17°. Each point
+//! has a mirrored one, (-i_q, -e), since q is odd. In the mirrored point the flux turns back over the angles of the first, so that parts
+//! that depend on the angle alone cancel.
 //!
-//! From the current on at which the flux makes a half turn in about the averaging time, points last for whole half turns. The
-//! three smallest of these currents come first. (At larger ones a gain mismatch also makes a real current that turns the
-//! other way.) Components that repeat there with every half turn are the [asymmetry](crate::carrier::asymmetry) of sensors and stator, with the part of q that is
-//! even; they are taken out of the samples of all other points, which need no whole turn. A part that repeats four times in a turn
-//! comes from a current sensor that is not linear, and cannot be taken out: where it is large, learning refuses.
+//! At currents at which the flux makes a half turn in about the averaging time or less, points last for whole half turns. The three
+//! smallest of these currents come first. (At larger currents a gain mismatch also causes a real current that rotates backwards.)
+//! Components of q that repeat there with every half turn, and the even part of q, are the [asymmetry](crate::carrier::asymmetry) of
+//! sensors and stator. They are subtracted from the samples of all other points, which need no whole turn. A part that repeats four times
+//! in a turn is due to a current sensor that is not linear, and cannot be subtracted. If it is large, the result is refused.
 //!
-//! The reference is learned at every current of the table, the slope at every other one: between them it is interpolated.
-//! A pair has the magnetising current i_d' of its neighbour to a few percent, or exactly, so the flux hardly has to settle.
+//! The offset is learned at every current of the table, the sensitivity at every other current, with interpolation between.
+//! The magnetising current i_d' of a pair equals that of its neighbour within a few percent, or exactly, so the flux hardly
+//! has to settle.
 //!
-//! Two checks detect a shaft that is not locked. A shaft turned from outside induces a quadrature voltage
-//! that is equal at both points of a pair, while all other components change sign. A
-//! free shaft follows the current, and the flux aligns with the current: the whole stator inductance then
-//! acts on the direct axis, instead of the leakage `sigma L_s` alone. (This requires a compensated
-//! inverter drop.)
+//! Two checks detect a shaft that is not locked. A shaft that is turned from outside induces a q-axis
+//! voltage that is equal at both points of a pair, while all other components change sign. A free shaft
+//! follows the current, and the flux aligns with the current. Then the whole stator inductance acts on
+//! the d axis, instead of the leakage `sigma L_s` alone. (This requires that the inverter voltage error
+//! is compensated.)
 
 mod evaluate;
 mod points;
@@ -44,48 +47,50 @@ pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;
 use points::{AVERAGE_S, LEFT, Point, SETTLE_T};
 
-/// Pairs that the asymmetry is taken from, and the most half turns that a point may last beyond the averaging time.
+/// Number of pairs from which the asymmetry is computed, and largest number of half turns for which a point may last beyond the
+/// averaging time.
 const TURNING: usize = 3;
 const MOST_HALVES: f32 = 3.0;
-/// Lag of the synchronous demodulation, samples: 19 of the averages, and 4.5 on average because they are
-/// evaluated once in ten samples.
+/// Lag of the synchronous demodulation, samples: 19 for the averages, and 4.5 on average because they
+/// are evaluated once in ten samples.
 const LAG: f32 = 23.5;
-/// Largest quadrature voltage common to both signs of the torque current, as an electrical speed at the flux of the
-/// drive, rad/s: 22 rpm of four poles. With the dissertation's motor it is 0.5 V; the noise of the mean is below 0.05 V.
+/// Largest q-axis voltage common to both signs of the q-axis current, as an electrical speed at the flux of the drive,
+/// rad/s: 22 rpm of four poles. With the dissertation's motor it is 0.5 V; the noise of the mean is below 0.05 V.
 const MOVED_RAD_PER_S: f32 = 4.66;
-/// Expected direct voltage of a free shaft from which on the shaft is judged, likewise. Half of it counts as moved.
+/// Expected d-axis voltage of a free shaft above which the shaft is judged, as an electrical speed, rad/s. Half of that voltage
+/// means that the shaft has moved.
 const JUDGED_RAD_PER_S: f32 = 9.32;
-/// Least tangent of the lead of the flux: 5.7°. A larger one meets the second zero of the signal at a smaller torque current. A smaller
-/// one learns the slope with more noise, and does not see how near that zero is: with 4.6° a drive accepted a torque that it
-/// could not hold.
+/// Least tangent of the lead of the flux: 5.7°. A larger lead reaches the second zero of the signal at a smaller q-axis current. A
+/// smaller lead gives a noisier sensitivity and does not show how near that zero is: with 4.6° a drive accepted a torque at which it
+/// then lost the lock.
 const LEAST_TAN_LEAD: f32 = 0.1;
-/// Largest tangent that half a step may give, 15°, and the tangent where it gives more: a small direct current, with which
-/// the flux slips at every lead below half a step.
+/// Largest tangent that half a step may give, 15°, and the tangent that is used if it gives more. Then the d-axis current
+/// is small, and the flux slips at every lead below half a step.
 const MOST_TAN_LEAD: f32 = 0.27;
 const LONE_TAN_LEAD: f32 = 0.2;
 
-/// rad/s per turn per control period.
+/// Conversion from turns per control period to rad/s.
 const RAD_PER_S: f32 = TAU / PERIOD_S;
 
-/// Coefficients of the learning.
+/// Coefficients of the self-commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
-    /// Longest point, control periods.
+    /// Longest time of a point, control periods.
     longest: u32,
     /// Table point of the first pair.
     first: usize,
-    /// Torque currents of the table.
+    /// Q-axis currents of the table.
     grid: Grid,
     /// Number of table points to learn, without zero.
     points: usize,
-    /// Whether the signal is the saliency, so that its slope is learned, too. Otherwise it is a current difference.
+    /// Whether the signal is the saliency, so that its sensitivity is also learned. Otherwise it is a current difference.
     pub(crate) normalised: bool,
     /// Lead x of the flux, rad.
     lead: f32,
-    /// Settling times of the flux, in rotor time constants: from one current with a lead to the next, and where the lead
-    /// changes its sign at the largest current.
+    /// Settling times of the flux, in rotor time constants: from one current with a lead to the next, and at the largest
+    /// current, where the lead changes its sign.
     flux_t: [f32; 2],
-    /// Direct current, A.
+    /// D-axis current, A.
     i_d: f32,
     /// Rotor time constant, s.
     tau_r: f32,
@@ -95,18 +100,18 @@ pub struct Learning {
     coupled: f32,
 }
 
-/// Input of the learning, one per control period.
+/// Input of the self-commissioning, one per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearningSample {
     /// Demodulated signal: the saliency, or a current difference in A.
     pub signal: f32,
-    /// Squared carrier current, A^2.
+    /// Squared injection current, A^2.
     pub carrier_squared: f32,
     /// Angle of the injection axis, electrical.
     pub theta: Angle,
     /// Frequency of the injection axis, electrical turns per period.
     pub flux_freq: f32,
-    /// Voltage without the carrier in the drive's frame, V peak.
+    /// Voltage without the injection in the drive's frame, V peak.
     pub voltage: Dq,
 }
 
@@ -120,16 +125,16 @@ struct Sums {
     /// Completed half turns.
     halves: u32,
     signal: f32,
-    /// Squares of the carrier current, A^2.
+    /// Squares of the injection current, A^2.
     carrier: f32,
     /// Parts in phase with cosine (d) and sine (q) of twice the angle of the injection axis.
     twice: Dq,
-    /// The same of four times that angle.
+    /// Parts in phase with cosine (d) and sine (q) of four times that angle.
     four_times: Dq,
     voltage: Dq,
 }
 
-/// State of the learning.
+/// State of the self-commissioning.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LearningState {
     /// Number of the present point.
@@ -137,36 +142,36 @@ pub struct LearningState {
     sums: Sums,
     /// Mean signal and voltage, V, of the first point of the present pair.
     first_of_pair: (f32, Dq),
-    /// Odd part of the signal over the torque current: without lead, with the lead x, and with -x.
+    /// Odd part of the signal over the q-axis current: without lead, with the lead x, and with the lead -x.
     odd: [[f32; POINTS]; LEADS.len()],
     /// Even part of the signal over all pairs: sum, least, largest.
     even: (f32, f32, f32),
-    /// Means over the first pairs of the parts in phase with the sine and the cosine.
+    /// Means over the first pairs of the parts in phase with the sine and the cosine of twice the angle.
     turning: Asymmetry,
     /// Largest square of the part that repeats four times in a turn, of the points of whole half turns.
     ripple: f32,
-    /// Mean squared carrier current over both signs of every current without lead, A^2.
+    /// Mean squared injection current over both signs of every current without lead, A^2.
     carrier: [f32; POINTS],
-    /// At the first current: direct voltage without that of the leakage, V, and slip times torque current,
-    /// rad/s A.
+    /// Values at the first current: d-axis voltage without the voltage of the leakage, V, and slip times
+    /// q-axis current, rad/s A.
     first: Option<(f32, f32)>,
 }
 
-/// Leads of the flux at the pairs of a torque current, in units of x.
+/// Leads of the flux at the pairs of a q-axis current, in units of x.
 const LEADS: [f32; 3] = [0.0, 1.0, -1.0];
 
 /// Operating point that the drive is to regulate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Operate {
-    /// Torque current, A.
+    /// Q-axis current, A.
     pub i_q: f32,
-    /// Lead of the flux before the drive's frame, rad.
+    /// Angle by which the flux leads the drive's frame, rad.
     pub lead: f32,
 }
 
 impl Learning {
-    /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak, at the torque currents of `grid`.
-    /// `normalised`: the signal is the saliency, not a current difference.
+    /// Creates the self-commissioning for a motor with the d-axis current `i_d`, A, and currents up to `largest_a`, A peak, at the
+    /// q-axis currents of `grid`. `normalised`: the signal is the saliency, not a current difference.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32, grid: Grid, normalised: bool) -> Self {
         let most = fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
@@ -177,10 +182,10 @@ impl Learning {
             let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
             half_step * if odd > 1.0 { odd } else { 1.0 }
         };
-        // A grid up to the largest torque current has it as a point, whatever the rounding.
+        // With any rounding, a grid up to the largest q-axis current contains that current as a point.
         let points = ((most + 1e-3) as usize).min(POINTS - 1);
         let lead = libm::atanf(tan_lead);
-        // The flux makes a half turn in pi tau_r i_d / i_q.
+        // The flux makes a half turn in the time pi tau_r i_d / i_q.
         let half_turn_s = PI * motor.tau_r() * i_d / grid.step_a();
         let first = (libm::ceilf(half_turn_s / AVERAGE_S) as usize + TURNING - 1).min(points);
         let slowest = first.saturating_sub(TURNING - 1).max(1) as f32;
@@ -208,10 +213,10 @@ impl Learning {
         Operate { i_q: sign * self.grid.current(point.n), lead: sign * lead }
     }
 
-    /// Processes one control period; returns the operating point of the next one, or `None` when all points are measured.
+    /// Processes one control period. Returns the operating point of the next period, or `None` when all points are measured.
     ///
     /// # Errors
-    /// [`Fault::ShaftNotLocked`] when the shaft moved, or a point took too long: the flux does not rotate.
+    /// [`Fault::ShaftNotLocked`] if the shaft moved, or if a point took too long because the flux does not rotate.
     pub fn step(
         &self,
         state: &mut LearningState,
@@ -289,7 +294,7 @@ impl Learning {
         let (sum, least, largest) = state.even;
         state.even = match state.point {
             2 => (even, even, even),
-            // NaN stays in the sum.
+            // A NaN stays in the sum.
             _ => (sum + even, least.min(even), largest.max(even)),
         };
         let even = (voltage + first_voltage) * 0.5;
@@ -298,8 +303,8 @@ impl Learning {
         Fault::ShaftNotLocked.unless(even.q.abs() <= MOVED_RAD_PER_S * flux && !follows)
     }
 
-    /// Whether a free shaft follows the current, by the mean direct voltage, V, of a pair without lead and the slip, turns
-    /// per period.
+    /// Whether a free shaft follows the current, from the mean d-axis voltage of a pair without lead, V, and the slip,
+    /// turns per period.
     fn follows(&self, state: &mut LearningState, point: Point, voltage: f32, slip: f32) -> bool {
         let x = RAD_PER_S * slip.abs() * self.grid.current(point.n);
         let direct = voltage + self.leakage * x;

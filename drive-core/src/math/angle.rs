@@ -7,9 +7,9 @@ use fixed::types::I0F32;
 
 /// An angle in turns, in `[-0.5, 0.5)`; arithmetic wraps.
 ///
-/// One unit in the last place is 2^-32 turn (84 n°). Electrical unless the name of the variable
-/// says `mechanical`. `idsp::cossin` takes the bits directly, so host and target compute the same
-/// sine and cosine to the bit.
+/// One unit in the last place is 2^-32 turn (84 n°). An angle is electrical unless the name of the
+/// variable says `mechanical`. `idsp::cossin` takes the bits directly, so host and target compute
+/// the same sine and cosine to the bit.
 ///
 /// ```
 /// use induction_drive_core::Angle;
@@ -35,17 +35,17 @@ impl Angle {
     /// An eighth of a turn, 45°.
     pub const EIGHTH: Self = Self::from_bits(1 << 29);
 
-    /// Angle of `bits` / 2^32 turns.
+    /// Returns the angle of `bits` / 2^32 turns.
     pub const fn from_bits(bits: i32) -> Self {
         Self(Wrapping(I0F32::from_bits(bits)))
     }
 
-    /// The angle in units of 2^-32 turn.
+    /// Returns the angle in units of 2^-32 turn.
     pub const fn to_bits(self) -> i32 {
         self.0.0.to_bits()
     }
 
-    /// Angle from turns. Whole turns are removed exactly up to ±2^30 turns; NaN gives zero.
+    /// Returns the angle from turns. Whole turns are removed exactly up to ±2^30 turns; NaN gives zero.
     ///
     /// The fraction keeps the precision of `f32` (relative 6e-8).
     pub fn from_turns(turns: f32) -> Self {
@@ -61,39 +61,39 @@ impl Angle {
         })
     }
 
-    /// Angle from turns known to lie within ±0.5: one multiplication and one conversion.
+    /// Returns the angle from turns known to lie within ±0.5, by one multiplication and one conversion.
     ///
-    /// Saturates beyond that range; NaN gives zero.
+    /// It saturates beyond that range; NaN gives zero.
     pub fn within_turn(turns: f32) -> Self {
         Self::from_bits((turns * UNITS_PER_TURN) as i32)
     }
 
-    /// Angle from radians; see [`Angle::from_turns`].
+    /// Returns the angle from radians; see [`Angle::from_turns`].
     pub fn from_radians(radians: f32) -> Self {
         Self::from_turns(radians * (1.0 / TAU))
     }
 
-    /// Angle from degrees; see [`Angle::from_turns`].
+    /// Returns the angle from degrees; see [`Angle::from_turns`].
     pub fn from_degrees(degrees: f32) -> Self {
         Self::from_turns(degrees * (1.0 / 360.0))
     }
 
-    /// The angle in turns, `[-0.5, 0.5)`; exact to 2^-25 turn.
+    /// Returns the angle in turns, `[-0.5, 0.5)`, exact to 2^-25 turn.
     pub fn to_turns(self) -> f32 {
         self.to_bits() as f32 * (1.0 / UNITS_PER_TURN)
     }
 
-    /// The angle in radians, `[-pi, pi)`.
+    /// Returns the angle in radians, `[-pi, pi)`.
     pub fn to_radians(self) -> f32 {
         self.to_turns() * (2.0 * PI)
     }
 
-    /// The angle in degrees, `[-180, 180)`.
+    /// Returns the angle in degrees, `[-180, 180)`.
     pub fn to_degrees(self) -> f32 {
         self.to_turns() * 360.0
     }
 
-    /// Cosine and sine of the angle.
+    /// Returns cosine and sine of the angle.
     ///
     /// The error of either component and of the length is below 1.2e-5 (tested against f64 over a turn):
     /// the table of `idsp` interpolates to 9e-6, and its amplitude of 2^31 - 0.85 * 2^15 is divided out
@@ -115,18 +115,18 @@ pub struct UnitVector {
 }
 
 impl Default for UnitVector {
-    /// The vector of the angle 0.
+    /// Returns the vector of the angle 0.
     fn default() -> Self {
         Self { cos: 1.0, sin: 0.0 }
     }
 }
 
 impl UnitVector {
-    /// The vector rotated by a small angle in turns, with the series `1 - x^2/2` and `x - x^3/6` instead of
-    /// a table.
+    /// Returns the vector rotated by a small angle in turns, with the series `1 - x^2/2` and `x - x^3/6`
+    /// instead of a table.
     ///
-    /// Error below 1e-5 up to 0.02 turns, no more than that of [`Angle::unit_vector`]; the error of the
-    /// length there is x^4/72 = 4e-6.
+    /// The error is below 1e-5 up to 0.02 turns, not more than the error of [`Angle::unit_vector`];
+    /// there the error of the length is x^4/72 = 4e-6.
     #[inline]
     pub fn turned_slightly(self, turns: f32) -> Self {
         let x = turns * TAU;
@@ -134,7 +134,7 @@ impl UnitVector {
         self.turned_by(Self { cos: 1.0 - half, sin: x - x * half * (1.0 / 3.0) })
     }
 
-    /// The vector rotated by the angle of `other`.
+    /// Returns the vector rotated by the angle of `other`.
     pub fn turned_by(self, other: Self) -> Self {
         Self {
             cos: self.cos * other.cos - self.sin * other.sin,
@@ -160,7 +160,7 @@ mod tests {
             worst = worst.max((c - exact.cos()).abs()).max((s - exact.sin()).abs());
             worst_length = worst_length.max((c.hypot(s) - 1.0).abs());
         }
-        // 9e-6 is what idsp states for each component; the length is no worse.
+        // The documentation of idsp states 9e-6 for each component; the length is no worse.
         assert!(worst < 1.2e-5, "component error {worst:e}");
         assert!(worst_length < 1.2e-5, "length error {worst_length:e}");
     }
@@ -181,7 +181,7 @@ mod tests {
         #[test]
         fn whole_turns_vanish(turns in -0.49f32..0.49, whole in -100i32..100) {
             let moved = Angle::from_turns(turns + whole as f32) - Angle::from_turns(turns);
-            // f32 keeps 24 bits of turns + whole
+            // f32 keeps 24 bits of turns + whole.
             prop_assert!(moved.to_turns().abs() < 1e-5);
         }
 

@@ -1,7 +1,8 @@
 //! Reference frames as types, with the transformations of Clarke and Park (section 2.1).
 //!
-//! Amplitude-invariant: a component is a peak phase value. Each frame has its own type, so frames
-//! cannot be mixed by accident; only a transformation converts one into another.
+//! The transformations are amplitude-invariant: a component is a peak phase value. Each frame has
+//! its own type, so frames cannot be mixed by accident; only a transformation converts one into
+//! another.
 //!
 //! ```
 //! use induction_drive_core::{Abc, Angle};
@@ -40,7 +41,7 @@ macro_rules! frame {
             /// The zero vector.
             pub const ZERO: Self = Self { $($field: 0.0,)+ };
 
-            /// Vector of the given components.
+            /// Returns the vector of the given components.
             pub const fn new($($field: f32),+) -> Self {
                 Self { $($field,)+ }
             }
@@ -102,7 +103,7 @@ pub const SQRT_3: f32 = 1.732_050_8;
 pub const FRAC_1_SQRT_3: f32 = 0.577_350_26;
 
 impl Abc {
-    /// Clarke transformation, Eq. 2.3. The zero-sequence component is dropped.
+    /// Applies the Clarke transformation, Eq. 2.3. The zero-sequence component is dropped.
     pub fn to_alpha_beta(self) -> AlphaBeta {
         AlphaBeta {
             alpha: (2.0 / 3.0) * self.a - (1.0 / 3.0) * (self.b + self.c),
@@ -112,40 +113,40 @@ impl Abc {
 }
 
 impl AlphaBeta {
-    /// Clarke transformation of two measured phases, Eq. 2.4, with a + b + c = 0.
+    /// Applies the Clarke transformation to two measured phases, Eq. 2.4, with a + b + c = 0.
     pub fn from_two_phases(a: f32, b: f32) -> Self {
         Self { alpha: a, beta: FRAC_1_SQRT_3 * a + (2.0 * FRAC_1_SQRT_3) * b }
     }
 
-    /// Inverse of Eq. 2.3 without zero-sequence component.
+    /// Applies the inverse of Eq. 2.3, without zero-sequence component.
     pub fn to_abc(self) -> Abc {
         let (half_alpha, other) = (0.5 * self.alpha, (0.5 * SQRT_3) * self.beta);
         Abc { a: self.alpha, b: other - half_alpha, c: -other - half_alpha }
     }
 
-    /// Park transformation, Eq. 2.5 / 2.6: into the frame whose d axis lies along `axis`.
+    /// Applies the Park transformation, Eq. 2.5 / 2.6, into the frame whose d axis lies along `axis`.
     pub fn to_dq(self, axis: UnitVector) -> Dq {
         let (d, q) = self.seen_from(axis);
         Dq { d, q }
     }
 
-    /// Rotation into the measuring frame whose dm axis is `axis` = `e^(j (theta - 45°))`.
+    /// Rotates the vector into the measuring frame whose dm axis is `axis` = `e^(j (theta - 45°))`.
     pub fn to_dm_qm(self, axis: UnitVector) -> DmQm {
         let (dm, qm) = self.seen_from(axis);
         DmQm { dm, qm }
     }
 
-    /// Vector of signed `length` along `axis`.
+    /// Returns the vector of signed `length` along `axis`.
     pub fn along(axis: UnitVector, length: f32) -> Self {
         Self { alpha: axis.cos * length, beta: axis.sin * length }
     }
 
-    /// The square of the length.
+    /// Returns the square of the length.
     pub fn length_squared(self) -> f32 {
         self.alpha * self.alpha + self.beta * self.beta
     }
 
-    /// Components along `axis` and across it, 90° ahead.
+    /// Returns the components along `axis` and across it, 90° ahead.
     pub fn seen_from(self, axis: UnitVector) -> (f32, f32) {
         (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
     }
@@ -153,19 +154,19 @@ impl AlphaBeta {
 
 impl core::ops::Mul<f32> for UnitVector {
     type Output = Dq;
-    /// Vector of this length along an axis given in the flux frame.
+    /// Returns the vector of this length along an axis given in the flux frame.
     fn mul(self, length: f32) -> Dq {
         Dq { d: self.cos * length, q: self.sin * length }
     }
 }
 
 impl Dq {
-    /// The same vector in a frame that is ahead by `lead`.
+    /// Returns the same vector in a frame that is ahead by `lead`.
     pub fn seen_from(self, lead: UnitVector) -> Self {
         Self { d: self.d * lead.cos + self.q * lead.sin, q: self.q * lead.cos - self.d * lead.sin }
     }
 
-    /// Inverse Park transformation from the frame whose d axis lies along `axis`.
+    /// Applies the inverse Park transformation from the frame whose d axis lies along `axis`.
     pub fn to_alpha_beta(self, axis: UnitVector) -> AlphaBeta {
         AlphaBeta {
             alpha: axis.cos * self.d - axis.sin * self.q,
@@ -173,7 +174,7 @@ impl Dq {
         }
     }
 
-    /// The square of the length.
+    /// Returns the square of the length.
     pub fn length_squared(self) -> f32 {
         self.d * self.d + self.q * self.q
     }
@@ -242,7 +243,7 @@ mod tests {
             let axis = Angle::from_bits(bits).unit_vector();
             let v = AlphaBeta::new(alpha, beta);
             let back = v.to_dq(axis).to_alpha_beta(axis);
-            // |axis|^2 differs from 1 by up to 2.4e-5
+            // |axis|^2 differs from 1 by up to 2.4e-5.
             prop_assert!((back.alpha - alpha).abs() < 1.5e-4 && (back.beta - beta).abs() < 1.5e-4);
         }
     }

@@ -1,16 +1,16 @@
-//! The ramp of the speed reference.
+//! Ramp of the speed reference with limited jerk.
 //!
-//! The reference changes by at most `most` in a step, and this change by at most `jerk`. Braking from a change `a`, by `jerk` in
-//! every step, the reference goes on by `a + (a - jerk) + (a - 2 jerk) + ...` down to the last positive one, with this step
-//! counted. Solved for a way `e` that is left,
+//! The reference changes by at most `most` in a step, and this change by at most `jerk`. When it brakes from a change `a`, by
+//! `jerk` in every step, the reference continues by `a + (a - jerk) + (a - 2 jerk) + ...` down to the last positive term,
+//! including the present step. Solved for a remaining distance `e`,
 //!
 //! ```text
 //! n = floor((sqrt(1 + 8 e/jerk) - 1)/2)        steps of braking
 //! a = (e + jerk n (n + 1)/2)/(n + 1)
 //! ```
 //!
-//! is the largest change from which the reference ends at the goal and not beyond it. A goal that has come nearer than the way
-//! of braking is passed by the rest of that way.
+//! is the largest change from which the reference ends at the goal and not beyond it. If a goal has come nearer than the
+//! braking distance, the reference overshoots it by the rest of that distance.
 
 use crate::math::{limited, within};
 
@@ -29,14 +29,14 @@ pub struct Ramp {
 pub struct RampState {
     /// The reference.
     pub reference: f32,
-    /// Its change in the last step.
+    /// Change of the reference in the last step.
     pub change: f32,
 }
 
 impl Ramp {
-    /// A ramp of at most `most` in a step, which takes `rise` steps to come up to it; straight below half a step.
+    /// Creates a ramp of at most `most` in a step, which takes `rise` steps to reach it; below half a step the jerk is not limited.
     pub fn new(most: f32, rise: f32) -> Self {
-        // From one direction into the other in a single step.
+        // Without a limit, the change may reverse in a single step.
         let jerk = if rise > 0.5 { most / rise } else { 2.0 * most };
         Self { most, jerk, eight_per_jerk: 8.0 / jerk }
     }
@@ -50,7 +50,7 @@ impl Ramp {
         change
     }
 
-    /// Largest change, with its sign, from which the reference can still end `left` further on.
+    /// Returns the largest change, with its sign, from which the reference can still end `left` further on.
     fn largest(&self, left: f32) -> f32 {
         let way = left.abs();
         let steps = 0.5 * (fpu_sqrt::sqrtf(1.0 + self.eight_per_jerk * way) - 1.0);
@@ -61,7 +61,7 @@ impl Ramp {
 }
 
 impl RampState {
-    /// Moves the reference on by `more` in the same step.
+    /// Moves the reference by `more` in the same step.
     pub fn shift(&mut self, more: f32) {
         self.reference += more;
         self.change += more;
@@ -74,8 +74,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever goals come, each at any moment: change and its change stay within their limits, and the reference ends at
-        /// the goal. It passes one only where it was already on its way past it when the goal came.
+        /// For any goals at any times, the change and its change stay within their limits, and the reference ends at the
+        /// goal. The reference overshoots a goal only if it was already too close to brake when the goal came.
         #[test]
         fn goals_are_met_within_the_limits_and_not_passed(
             goals in prop::collection::vec((-24.0_f32..24.0, 1_u32..400), 1..12),
@@ -84,11 +84,11 @@ mod tests {
         ) {
             let ramp = Ramp::new(most, rise);
             let mut state = RampState::default();
-            // Some thousand roundings of numbers up to 24.
+            // The tolerance covers some thousand roundings of numbers up to 24.
             let tiny = 1e-3;
             let last = goals.len() - 1;
             for (n, (goal, steps)) in goals.into_iter().enumerate() {
-                // The way that it goes on whatever it does.
+                // This is the braking distance.
                 let a = state.change.abs();
                 let way: f32 = (1..=(a / ramp.jerk) as u32).map(|k| a - k as f32 * ramp.jerk).sum();
                 let end = state.reference + way.copysign(state.change);
@@ -109,7 +109,8 @@ mod tests {
         }
     }
 
-    /// The change rises in `rise` steps, stays, and falls in as many: the way takes `rise` steps more than straight.
+    /// The change rises in `rise` steps, stays constant, and falls in `rise` steps, so the ramp takes `rise` steps more than a
+    /// straight one.
     #[test]
     fn it_takes_as_long_as_the_jerk_makes_it() {
         let steps = |rise: f32| {

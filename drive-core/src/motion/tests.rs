@@ -1,11 +1,11 @@
 use super::*;
 
-/// No limit but the own.
+/// Range without a limit from outside.
 const ANY: (f32, f32) = (f32::MIN, f32::MAX);
 use crate::tuning::{SpeedSource, design_motion_loops};
 use core::f64::consts::TAU;
 
-/// 1 A accelerates the motor of Table 5 with 0.012 kg m^2 by 26.8 rad/s^2.
+/// Acceleration of the motor of Table 5 with 0.012 kg m^2 by 1 A: 26.8 rad/s^2.
 const ACCELERATION: f64 = 26.8 / TAU;
 const COUNTS: u32 = 10_000;
 
@@ -23,16 +23,16 @@ fn motion(limit: f32, ramp: f32) -> Motion {
 /// Result of a run of a rigid rotor, in f64.
 #[derive(Debug, Default)]
 struct Done {
-    /// Position, speed.
+    /// Position and speed at the end.
     end: (f64, f64),
     furthest: f64,
     fastest: f64,
-    /// When it was more than a degree from the end for the last time, s.
+    /// Last time at which the position was more than a degree from the end, s.
     settled: f64,
 }
 
-/// With a load in A of torque current from `load.0` s on, and a motor whose inertia is `heavier`
-/// than the design's.
+/// Runs with a load in A of q-axis current from `load.0` s on, and a motor whose inertia is larger
+/// than in the design by the factor `heavier`.
 fn run(motion: &Motion, goal: Target, load: (f64, f64), heavier: f64, seconds: f64) -> Done {
     const DT: f64 = 1.0 / 6000.0;
     let mut state = MotionState::default();
@@ -74,13 +74,13 @@ fn speed_is_reached_held_under_load_and_limited() {
         let motion = motion(limit, 10.0);
         let done = run(&motion, Target::Speed(goal), (4.0, 1.5), 1.0, 6.0);
         assert!((done.end.1 - end).abs() < 0.01, "{done:?}");
-        // The friction it did not know of on the way up.
+        // The overshoot is due to the friction, which was unknown during the acceleration.
         assert!(done.fastest < end * 1.04, "{done:?}");
     }
 }
 
-/// A load that the current cannot hold, for two seconds, then none: the integrator has not wound
-/// up, and the speed comes back without going beyond the reference by more than a tenth.
+/// For two seconds there is a load that the current cannot hold, then none. The integrator has not
+/// wound up, and the speed returns without overshooting the reference by more than a tenth.
 #[test]
 fn limits_do_not_wind_up() {
     let (motion, mut state) = (motion(24.0, 10.0), MotionState::default());
@@ -111,7 +111,7 @@ fn position_works_from_a_wrapped_count() {
 fn the_rotor_is_counted_over_turns_both_ways() {
     let mut rotor = RotorCount::default();
     for k in 0..=10_000 {
-        // 0.47 turns a step, the most there is: 4700 turns.
+        // 0.47 turns per step is about the largest possible; the sum is 4700 turns.
         rotor.follow(Angle::from_turns((f64::from(k) * 0.47 % 1.0) as f32));
     }
     assert!(rotor.count.abs_diff(4700 * Motion::COUNTS_PER_TURN) <= 1, "{rotor:?}");
@@ -121,7 +121,7 @@ fn the_rotor_is_counted_over_turns_both_ways() {
     assert!((rotor.count as i32 + 4700 * Motion::COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
 }
 
-/// v^2 / 2 a turns are needed from v on with the deceleration a; near the goal k_x e is slower.
+/// From the speed v with the deceleration a, v^2 / 2 a turns are needed; near the goal k_x e is slower.
 #[test]
 fn the_braking_curve_ends_at_the_goal() {
     let motion = motion(24.0, 12.0);

@@ -2,23 +2,23 @@
 
 use crate::Fault;
 
-/// Checks of the heat sink, in codes.
+/// Checks of the heat sink, in ADC counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeatSink {
-    /// Smallest and largest code that does not trip.
+    /// Smallest and largest ADC counts that do not trip.
     pub window: (u16, u16),
-    /// Whether the code falls with the temperature.
+    /// Whether the ADC counts fall with the temperature.
     pub hot_is_low: bool,
-    /// Code of a heat sink that is hotter than believable.
+    /// ADC counts of the hottest plausible heat sink.
     pub shorted: u16,
-    /// Code at which no current is left.
+    /// ADC counts at which no current is left.
     pub hot: f32,
-    /// Share of the current per code; positive where the code rises with the temperature.
+    /// Share of the current per ADC count; positive if the counts rise with the temperature.
     pub per_code: f32,
 }
 
 impl HeatSink {
-    /// The fault of a code outside the window.
+    /// Returns the fault of ADC counts outside the window.
     pub fn fault(&self, code: u16) -> Fault {
         let (cold, shorted) = if self.hot_is_low {
             (code > self.window.1, code <= self.shorted)
@@ -32,8 +32,9 @@ impl HeatSink {
         }
     }
 
-    /// Share of the current that is left at a code; 1 or more for all of it, 0 or less for none. It falls straight with the code from where it begins to the
-    /// temperature that trips, which is within 0.06 of straight with the temperature.
+    /// Returns the share of the current that is left at these ADC counts; 1 or more for all of it, 0 or less for none. The share falls
+    /// linearly with the counts from the beginning of the derating to the trip temperature, which is within 0.06 of a linear fall with the
+    /// temperature.
     pub fn share(&self, code: u16) -> f32 {
         (self.hot - f32::from(code)) * self.per_code
     }

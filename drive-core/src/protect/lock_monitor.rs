@@ -1,38 +1,40 @@
-//! Lock monitor: checks in every carrier period that the tracked angle is that of the flux.
+//! Lock monitor: checks in every injection period that the tracked angle is the angle of the flux.
 //!
 //! The tracker uses only the saliency component across the injection axis (`q`,
-//! [`crate::carrier::synchronous`]) and drives it to its reference. The reference is also met when the flux
-//! has decayed, or turns under the axis too fast to be followed. A false lock ends in this condition:
+//! [`crate::carrier::synchronous`]) and drives it to its offset. The offset is also met when the flux has
+//! decayed, or rotates under the axis too fast to be followed. A false lock ends in this condition: a
 //! current in the wrong direction lets the flux decay, and with it the saliency that would pull the axis
 //! back.
 //!
-//! The other component changes the amplitude of the carrier current along the axis, which the demodulation
-//! provides as well. With the saliency vector `s` in the estimated flux frame,
+//! The other component changes the amplitude of the injection current along the axis, which the
+//! demodulation also provides. With the saliency vector `s` in the estimated flux frame,
 //!
 //! ```text
 //! |C| ~ 1 - Re s     q ~ Im s     s = a f e^(2 j e) + (current-dependent part)
 //! loss = (1 - |C|^2 / |C|_ref^2) (-1/k) = 1 - f cos 2e                 k = 2a
 //! ```
 //!
-//! (a of either sign, fixed to the flux; e the angle error, f = 1 at nominal flux). The loss is 0 at the true angle, 1
-//! without flux, 2 at an error of 90°, and averages to 1 when the flux turns under the axis. Resistances,
-//! dead time and speed hardly influence it, and no perturbation is needed. The voltage equation does not
-//! help at low speed: a wrong angle changes it by less than 1 V, while the dead time alone leaves 2 V.
+//! (a of either sign, fixed to the flux; e the angle error, f = 1 at nominal flux). `loss` is the saliency deficit. It
+//! is 0 at the true angle, 1 without flux, 2 at an error of 90°, and averages to 1 when the flux rotates under the
+//! axis. Resistances, dead time and speed hardly influence the deficit, and no perturbation is needed. The voltage
+//! equation does not help at low speed: a wrong angle changes it by less than 1 V, while the dead time alone leaves 2
+//! V.
 //!
-//! The unit is the learned slope k at the torque current, at most 2.5 times that without current: on a motor of iron it is
-//! the slope, not the saliency seen at rest, that says how much |C| changes. Both signs of the loss are wrong. Too much flux
-//! gives a negative loss with a negative slope. With a positive slope, of a motor whose main flux saturates, a flux that is gone
-//! reads some -0.45: the chord inductance across the flux falls back to the unsaturated one, and that outweighs the lost
-//! saliency. So the limits depend on the sign of the slope.
+//! The unit is the learned sensitivity k at the q-axis current, at most 2.5 times its value without current. For a motor that
+//! saturates, the sensitivity, not the saliency at rest, determines how much |C| changes. A deficit of either sign is a fault.
+//! With a negative sensitivity, too much flux gives a negative deficit. With a positive sensitivity, of a motor whose main flux
+//! saturates, zero flux gives a deficit of about -0.45: the chord inductance across the flux returns to the unsaturated one,
+//! which outweighs the missing saliency. Therefore the limits depend on the sign of the sensitivity.
 //!
-//! While the torque current moves, the tables are those of another current, and the loss is not judged: for 12 carrier
-//! periods after a move, but at most 40 % of the time, so that a command that never rests does not blind the monitor.
+//! While the q-axis current changes, the tables belong to another current, and the deficit is not judged. The monitor
+//! pauses for 12 injection periods after a change, but at most 40 % of the time, so that a command that always changes
+//! does not blind it.
 //!
-//! An error of 180° gives no loss by symmetry, but the current does not maintain it: the flux decays through
-//! zero to the true sign, or the loss is detected on the way.
+//! An error of 180° gives no deficit by symmetry, but the current does not maintain it: the flux decays
+//! through zero to the true sign, or the deficit is detected during the decay.
 //!
-//! `|C|_ref` is the carrier current measured during magnetisation, when the direction of the flux is known,
-//! times a learned even function of i_q.
+//! `|C|_ref` is the injection current measured during magnetisation, when the direction of the flux is
+//! known, times a learned even function of i_q.
 
 use crate::Fault;
 use crate::carrier::Saliency;
@@ -43,56 +45,56 @@ use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 /// Coefficients of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitor {
-    /// Torque currents of the carrier table.
+    /// Q-axis currents of the table of the injection current.
     grid: Grid,
-    /// 1 / ratio^2 of the carrier table.
+    /// 1 / ratio^2 of the table of the injection current.
     inverse_square: [f32; POINTS],
-    /// Loss per relative change of the squared carrier current, -1/k.
+    /// Saliency deficit per relative change of the squared injection current, -1/k.
     per_change: [f32; POINTS],
-    /// Share of the newest value in the mean loss.
+    /// Share of the newest value in the mean deficit.
     smoothing: f32,
-    /// Allowed loss, and whether the slope is positive, which gives the other limit.
+    /// Allowed deficit, and whether the sensitivity is positive, which determines the limit of a negative deficit.
     allowed: f32,
     is_positive: bool,
-    /// Change of the torque current in a carrier period that counts as a move, A.
+    /// Change of the q-axis current in an injection period above which the monitor pauses, A.
     moved: f32,
-    /// Square of the minimum carrier current, A^2.
+    /// Square of the minimum injection current, A^2.
     least: f32,
 }
 
 /// Settings of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitorSettings {
-    /// Slope of the saliency, on the grid of the carrier table.
+    /// Saliency sensitivity, on the grid of the table of the injection current.
     pub slope: SlopeTable,
-    /// Time constant of the mean loss, s.
+    /// Time constant of the mean deficit, s.
     pub smoothing_s: f32,
-    /// Allowed mean loss; 1 corresponds to zero flux.
+    /// Allowed mean deficit; 1 corresponds to zero flux.
     pub allowed: f32,
-    /// Expected carrier current along the injection axis, A peak.
+    /// Expected injection current along the injection axis, A peak.
     pub carrier_a: f32,
-    /// Change of the torque current in a carrier period that counts as a move, A.
+    /// Change of the q-axis current in an injection period above which the monitor pauses, A.
     pub moved_a: f32,
 }
 
 /// State of the monitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LockMonitorState {
-    /// Mean squared carrier current at i_q = 0, A^2.
+    /// Mean squared injection current at i_q = 0, A^2.
     pub baseline: f32,
     /// 1 / `baseline`; 0 until it is first needed.
     per_baseline: f32,
-    /// Mean loss.
+    /// Mean saliency deficit.
     pub loss: f32,
-    /// Torque current of the last carrier period, A.
+    /// Q-axis current of the last injection period, A.
     i_q: f32,
-    /// Carrier periods for which it has rested.
+    /// Injection periods for which the q-axis current has been constant.
     rested: u8,
-    /// Rest that it may still take; see [`REST`].
+    /// Allowance for pauses; see [`REST`].
     allowance: u8,
-    /// Consecutive carrier periods with too little carrier current.
+    /// Consecutive injection periods with too little injection current.
     weak: u8,
-    /// Carrier periods in the baseline since the start.
+    /// Injection periods in the baseline since the start.
     measured: u8,
 }
 
@@ -103,24 +105,25 @@ impl LockMonitorState {
     }
 }
 
-/// Carrier periods in the mean baseline, 0.05 s: noise of 5 mA causes 0.14 % of error in it, 0.04 in the loss.
+/// Injection periods in the mean baseline, 0.05 s: noise of 5 mA causes an error of 0.14 % in the baseline and of 0.04 in the
+/// deficit.
 const AVERAGED: u8 = 30;
-/// Carrier periods that make a baseline: 0.1 s.
+/// Injection periods for a baseline: 0.1 s.
 const MEASURED: u8 = 60;
-/// Minimum carrier current as a share of the expected one. With an open phase the carrier current is
+/// Minimum injection current as a share of the expected one. With an open phase the injection current is
 /// reduced by the squared cosine of the angle between the injection axis and the remaining current axis.
 const LEAST_CARRIER: f32 = 0.5;
-/// Consecutive weak carrier periods until the fault. The averages of the demodulation need four to fill.
+/// Consecutive injection periods with too little current until the fault. The averages of the demodulation need four to fill.
 const WEAK_PERIODS: u8 = 8;
 
-/// Allowed negative loss, with a negative and with a positive slope.
+/// Allowed negative deficit, with a negative and with a positive sensitivity.
 const ALLOWED_GAIN: [f32; 2] = [0.6, 0.3];
-/// Largest unit relative to that without torque current.
+/// Largest unit relative to the unit without q-axis current.
 const MOST_UNIT: f32 = 2.5;
-/// Carrier periods of rest after a move.
+/// Injection periods of a pause after a change of the current.
 const REST: u8 = 12;
-/// Allowance for rest: each resting carrier period takes 3, each other one gives 2 up to the largest. So it is 40 % of the
-/// time at most, and 24 carrier periods at once.
+/// Allowance for pauses: each injection period of a pause costs 3, each other period adds 2 up to the largest value.
+/// Pauses therefore take 40 % of the time at most, and 24 injection periods at once.
 const ALLOWANCE: (u8, u8, u8) = (3, 2, 72);
 
 fn per_change(slope: &SlopeTable) -> [f32; POINTS] {
@@ -132,7 +135,7 @@ fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
 }
 
 impl LockMonitor {
-    /// Monitor with the carrier current over i_q of `table`.
+    /// Creates the monitor with the injection current over i_q of `table`.
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {
@@ -147,7 +150,7 @@ impl LockMonitor {
         }
     }
 
-    /// Takes an accepted result of a learning.
+    /// Takes an accepted result of a self-commissioning.
     pub fn take(&mut self, learned: &Learned) {
         if let (Some(carrier), Some(slope)) = (&learned.carrier, &learned.slope) {
             (self.grid, self.inverse_square) = (carrier.grid(), inverse_square(carrier));
@@ -155,14 +158,14 @@ impl LockMonitor {
         }
     }
 
-    /// Evaluates one carrier period.
+    /// Evaluates one injection period.
     ///
-    /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held` by something else than
-    /// the injection (magnetisation, or the observer), the flux lies along it, and the baseline is measured.
+    /// `per_share_squared` is 1 / (share of the injection amplitude in use)^2. While the axis is `held` by a source other
+    /// than the injection (magnetisation, or the observer), the flux lies along it, and the baseline is measured.
     ///
     /// # Errors
-    /// [`Fault::CarrierWeak`] after eight consecutive carrier periods with too little carrier current at any
-    /// angle; [`Fault::LostLock`] when the mean loss exceeds the allowed one.
+    /// [`Fault::CarrierWeak`] after eight consecutive injection periods with too little injection current at
+    /// any angle; [`Fault::LostLock`] when the mean deficit exceeds the allowed one.
     pub fn step(
         &self,
         state: &mut LockMonitorState,
@@ -203,7 +206,7 @@ impl LockMonitor {
         Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)
     }
 
-    /// Whether the torque current `i_q`, A, has just moved, so that the loss is not judged.
+    /// Whether the q-axis current `i_q`, A, has just changed, so that the deficit is not judged.
     fn rests(&self, state: &mut LockMonitorState, i_q: f32) -> bool {
         let moved = (i_q - state.i_q).abs() > self.moved;
         state.i_q = i_q;

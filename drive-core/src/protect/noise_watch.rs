@@ -1,22 +1,22 @@
 //! Noise watch: detects current-sensor noise that would disturb the tracked angle.
 //!
-//! Sensor noise disturbs the angle before it shows anywhere else: 15 mA rms in one sensor, 0.4 % of its
-//! range, cause errors of 15°. The noise is measured in a combination of samples without signal. Once per
-//! carrier period each channel forms the second difference of three consecutive samples, and the second
-//! difference of these over the carrier periods:
+//! Sensor noise disturbs the angle before it has any other effect: 15 mA rms in one sensor, 0.4 % of its
+//! range, cause errors of 15°. The noise is measured in a combination of samples that contains no signal.
+//! Once per injection period each channel forms the second difference of three consecutive samples, and
+//! the second difference of these over the injection periods:
 //!
 //! ```text
-//! h = i[n] - 2 i[n-1] + i[n-2]        d = h - 2 h[1] + h[2]        [m]: m carrier periods ago
+//! h = i[n] - 2 i[n-1] + i[n-2]        d = h - 2 h[1] + h[2]        [m]: m injection periods ago
 //! ```
 //!
-//! The first rejects most of the fundamental, the second all of a carrier at standstill and 95 % of one at
-//! 700 rpm. White noise appears in `d` with 36 times its variance. The mean square of `d` over 67 ms is
-//! compared with that of the allowed noise.
+//! The first rejects most of the fundamental. The second rejects all of the injection current at
+//! standstill and 95 % of it at 700 rpm. White noise appears in `d` with 36 times its variance. The mean
+//! square of `d` over 67 ms is compared with that of the allowed noise.
 //!
-//! The allowed noise is relative to the part of the carrier current caused by the saliency, `|a| I`, which
-//! is 9.1 mA for 3.5 % of 0.26 A: 1.1 times that part. Measured on the simulated motor with 12-bit
-//! converters and 5 mA in the other sensor, 200 runs of a second for each row and torque current, 0.5 A to
-//! 3 A, shaft locked:
+//! The allowed noise is 1.1 times the part of the injection current that is caused by the saliency,
+//! `|a| I`, which is 9.1 mA for 3.5 % of 0.26 A. The results were measured on the simulated motor with
+//! 12-bit ADCs and 5 mA in the other sensor, in 200 runs of a second for each row and q-axis current, 0.5
+//! A to 3 A, with the shaft locked:
 //!
 //! | noise of one sensor, rms | largest angle error without the watch | time to the fault, mean and longest |
 //! |---|---|---|
@@ -32,29 +32,30 @@
 //! 15° with the outputs on, by 1.2°. With 5 mA in both sensors the mean square reached at most 0.7 of the
 //! allowed one in 2400 s with reversals of 3 A and up to 600 rpm.
 //!
-//! While the observer has a share in the angle, five times the noise is allowed: the carrier that turns and switches, and the
-//! fundamental wave at speed, show in `d` (2 A at 3000 rpm as 3 mA of noise), and noise turns the angle less: 178 mA rms by
-//! 15° at 3000 rpm, 360 mA by 20° at 1800 and by 39° at 900 (1.4 A of direct current, found without this limit).
+//! While the observer takes part in the angle, five times the noise is allowed. The injection, which rotates and is switched,
+//! and the fundamental wave at speed appear in `d` (2 A at 3000 rpm like 3 mA of noise). Noise also turns the angle less: 178
+//! mA rms by 15° at 3000 rpm, 360 mA by 20° at 1800 rpm and by 39° at 900 rpm (1.4 A of d-axis current, found without this
+//! limit).
 
 use crate::{Fault, Measured};
 
-/// Allowed noise relative to the carrier current caused by the saliency.
+/// Allowed noise relative to the injection current caused by the saliency.
 const ALLOWED: f32 = 1.1;
-/// Allowed noise while the observer has a share in the angle, relative to that without it.
+/// Allowed noise while the observer takes part in the angle, relative to the allowed noise without it.
 const AT_SPEED: f32 = 5.0;
 /// Variance of `d` for white noise of variance 1: sum of the squared weights, 6 times 6.
 const WEIGHTS: f32 = 36.0;
-/// Share of the newest square in the mean: 40 carrier periods.
+/// Share of the newest square in the mean: 40 injection periods.
 const SMOOTHING: f32 = 1.0 / 40.0;
 /// Clamp of one square relative to the allowed mean square, so that a current step does not trip.
 const MOST: f32 = 4.0;
-/// Samples per channel and carrier period.
+/// Samples per channel and injection period.
 const LOOKS: usize = 3;
 
 /// Coefficients of the watch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseWatch {
-    /// Reciprocal of the allowed mean square of `d` where it is quiet, 1/A^2.
+    /// Reciprocal of the allowed mean square of `d` without the observer, 1/A^2.
     per_allowed: f32,
 }
 
@@ -69,21 +70,21 @@ pub struct NoiseWatchState {
 struct Channel {
     /// Partial sum of `h`, A.
     difference: f32,
-    /// `h` of the last two carrier periods, A.
+    /// `h` of the last two injection periods, A.
     last: [f32; 2],
-    /// Mean square of `d` relative to the allowed one: what was little at speed is little where it is quiet.
+    /// Mean square of `d` relative to the allowed one, so that it stays valid when the allowed noise changes.
     level: f32,
 }
 
 impl NoiseWatch {
-    /// Watch for a flux-fixed saliency and a carrier current of `carrier_a`, A peak.
+    /// Creates the watch for a flux-fixed saliency and an injection current of `carrier_a`, A peak.
     pub fn new(flux_saliency: f32, carrier_a: f32) -> Self {
         let allowed = ALLOWED * flux_saliency * carrier_a;
         Self { per_allowed: 1.0 / (WEIGHTS * allowed * allowed) }
     }
 
-    /// Processes a sample, number `look` of six per carrier period: 0 to 2 are three consecutive samples
-    /// for channel a, 3 to 5 for channel b. `quiet`: whether the injection has the angle alone, and has had it for a while.
+    /// Processes a sample, number `look` of six per injection period: 0 to 2 are three consecutive samples for channel a, 3
+    /// to 5 for channel b. `quiet`: whether the injection alone has given the angle for a while.
     ///
     /// # Errors
     /// [`Fault::SensorNoisyA`] or [`Fault::SensorNoisyB`], with the third sample of the channel.
@@ -114,7 +115,7 @@ impl NoiseWatch {
 }
 
 impl Channel {
-    /// Updates the mean square; returns whether it is within the allowed one.
+    /// Updates the mean square and returns whether it is within the allowed one.
     fn is_still(&mut self, per_allowed: f32, quiet: bool) -> bool {
         let [one, two] = self.last;
         let d = self.difference - 2.0 * one + two;
@@ -134,21 +135,21 @@ mod tests {
     use crate::math::frames::Abc;
     use core::f64::consts::TAU;
 
-    /// A per code.
+    /// A per ADC count.
     const GAIN: f32 = 0.0022;
 
-    /// 9.1 mA: 10 mA are allowed.
+    /// Returns a watch for 9.1 mA, which allows 10 mA.
     fn watch() -> NoiseWatch {
         NoiseWatch::new(-0.035, 0.26)
     }
 
-    /// Two currents, A, behind a converter.
+    /// Returns two currents, A, as sampled by an ADC.
     fn sample(currents: [f64; 2]) -> Measured {
         let [a, b] = currents.map(|i| (i / f64::from(GAIN)).round() as f32 * GAIN);
         Measured { phases: Abc::new(a, b, -(a + b)), ..Measured::default() }
     }
 
-    /// Sample `n` of ten in a carrier period, three of each half looked at.
+    /// Processes sample `n` of ten in an injection period, of which the watch uses three in each half.
     fn look(
         watch: &NoiseWatch,
         state: &mut NoiseWatchState,
@@ -163,7 +164,7 @@ mod tests {
         }
     }
 
-    /// Normal noise of variance 1 by the sum of twelve.
+    /// Returns normal noise of variance 1 as the sum of twelve random numbers.
     fn normal(x: &mut u64) -> f64 {
         let mut uniform = || {
             *x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -172,11 +173,11 @@ mod tests {
         (0..12).map(|_| uniform()).sum::<f64>() - 6.0
     }
 
-    /// Frequency above which there is no carrier, Hz.
+    /// Frequency above which there is no injection, Hz.
     const CARRIER_HZ: f64 = 26.0;
 
-    /// Seconds until the fault of a motor with 3 A at `hz` and a carrier that turns with it, the noise of
-    /// both sensors in A rms; at most `seconds`.
+    /// Returns the seconds until the fault, at most `seconds`, of a motor with 3 A at `hz` and an
+    /// injection that rotates with it. `noise` is the noise of both sensors, A rms.
     fn until(noise: [f64; 2], hz: f64, seconds: f64, seed: u64) -> Option<(f64, Fault)> {
         let carrier_a = if hz.abs() < CARRIER_HZ { 0.26 } else { 0.0 };
         let (watch, mut state, mut x) = (watch(), NoiseWatchState::default(), seed);
@@ -201,7 +202,7 @@ mod tests {
     #[test]
     fn a_noisy_sensor_is_found_and_named() {
         for seed in 1..20 {
-            // 16 mA have the mean square at the limit after 67 ms ln(1 / (1 - 0.39)) = 33 ms, on average.
+            // With 16 mA the mean square is at the limit after 67 ms ln(1 / (1 - 0.39)) = 33 ms, on average.
             let (t, fault) = until([0.016, 0.005], 2.0, 1.0, seed).unwrap();
             assert!(t < 0.13 && fault == Fault::SensorNoisyA, "{t} {fault:?}");
             let (t, fault) = until([0.005, 0.1], -10.0, 1.0, seed).unwrap();
@@ -213,8 +214,8 @@ mod tests {
     fn at_speed_the_fundamental_wave_is_no_noise_and_a_noisy_sensor_is_found() {
         for (seed, hz) in [(1, 30.0), (2, -60.0), (3, 100.0), (4, 120.0)] {
             assert_eq!(until([0.02, 0.02], hz, 10.0, seed), None, "{hz} Hz");
-            // 90 mA have 3.2 times the mean square of 50 mA. Its squares are clamped at 4: 52 ms on average, 123 ms at most
-            // of 200 simulated.
+            // 90 mA have 3.2 times the mean square of 50 mA. The squares are clamped at 4, so the time is 52 ms on average,
+            // and 123 ms at most in 200 simulations.
             let (t, fault) = until([0.005, 0.09], hz, 1.0, seed).unwrap();
             assert!(t < 0.15 && fault == Fault::SensorNoisyB, "{t} {fault:?}");
         }
@@ -225,7 +226,7 @@ mod tests {
         let (watch, mut state) = (watch(), NoiseWatchState::default());
         for n in 0..60_000_usize {
             let i = if n / 1000 % 2 == 0 { 3.0 } else { -3.0 };
-            // It becomes quiet right behind every seventh step.
+            // The watch becomes quiet directly after every seventh step.
             let quiet = n / 1010 % 7 > 0;
             assert_eq!(look(&watch, &mut state, n, &sample([i, -i]), quiet), Ok(()), "{n}");
         }

@@ -1,9 +1,9 @@
-//! Measurement of the offsets of the current sensors, while no current flows.
+//! Measurement of the offsets of the current sensors while no current flows.
 
 use crate::fault::Fault;
 use crate::io::Measured;
 
-/// Samples of the second measurement: the time with the low sides on holds them.
+/// Samples of the second measurement, which fit into the time with the low sides on.
 const SAMPLES_AGAIN: u16 = 32;
 
 /// Coefficients of the measurement.
@@ -13,7 +13,7 @@ pub struct OffsetCheck {
     pub samples: u16,
     /// Largest accepted offset, A.
     pub largest: f32,
-    /// Whether there is a third sensor, and all three are shunts below the low sides.
+    /// Whether there is a third sensor and all three are shunts below the low sides.
     pub shunts: bool,
 }
 
@@ -25,7 +25,7 @@ pub struct OffsetCheckState {
 }
 
 impl OffsetCheck {
-    /// Averages one sample with the outputs off; `Some` with the offsets of a, b and c, A, when they are measured.
+    /// Averages one sample with the outputs off. Returns `Some` with the offsets of a, b and c, A, when they are measured.
     ///
     /// # Errors
     /// [`Fault::OffsetA`], [`Fault::OffsetB`] or [`Fault::OffsetC`] when an offset is above the limit.
@@ -37,11 +37,11 @@ impl OffsetCheck {
         self.mean(state, measured, (self.samples, self.largest))
     }
 
-    /// Averages one sample with all low sides on, where the currents are zero as well but the shunts are connected as they
-    /// are while the drive runs. Only with shunts.
+    /// Averages one sample with all low sides on. The currents are zero too, but the shunts are connected as while the
+    /// drive runs. This is done with shunts only.
     ///
     /// # Errors
-    /// As [`step`](Self::step), at half its limit: the offsets change when the bridge switches.
+    /// The faults of [`step`](Self::step), at half its limit, because the offsets change when the bridge switches.
     pub fn step_again(
         &self,
         state: &mut OffsetCheckState,
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use crate::math::frames::Abc;
 
-    /// The first result with these currents, A, that stay.
+    /// Returns the first result with these constant currents, A.
     fn found(shunts: bool, [a, b, third]: [f32; 3]) -> Result<[f32; 3], Fault> {
         let check = OffsetCheck { samples: 64, largest: 0.2, shunts };
         let (phases, mut state) = (Abc::new(a, b, -(a + b)), OffsetCheckState::default());

@@ -1,25 +1,25 @@
-//! Plausibility of the current sensors: two checks without a third sensor.
+//! Plausibility of the current sensors, by two checks that need no third sensor.
 //!
-//! * [`CarrierWatch`]: both channels must show the carrier wherever the injection axis has a component
-//!   along their axis. It detects an open or stuck channel.
-//! * [`Prediction`]: the current must follow the applied voltage. The voltage unexplained by a first-order
-//!   model of the motor and the back-emf of its rotor flux is filtered and must stay small. It detects a
-//!   faulty sensor, an open phase, and a wrong angle or speed at speeds with a noticeable back-emf. Its mean in the frame
-//!   of the flux detects a flux that is gone or elsewhere, from a back-emf of some 10 V on.
+//! * [`CarrierWatch`]: both channels must show the injection current if the injection axis has a
+//!   component along their axis. It detects an open or stuck channel.
+//! * [`Prediction`]: the current must follow the applied voltage. The voltage that a first-order model of the motor and
+//!   the back-EMF of its rotor flux do not explain is filtered and must stay small. It detects a faulty sensor, an open
+//!   phase, and a wrong angle or speed at speeds with a noticeable back-EMF. Its mean in the flux frame detects a flux
+//!   that is missing or has another angle, with a back-EMF of about 10 V or more.
 
 use core::f32::consts::TAU;
 
 use crate::carrier::{CARRIER_SAMPLES, CarrierCurrent};
 use crate::{AlphaBeta, Dq, Fault, FirstOrder, Motor, PERIOD_S, SQRT_3, UnitVector};
 
-/// Share of the expected carrier amplitude below which a channel counts as silent.
+/// Share of the expected injection current below which a channel counts as silent.
 const SILENT: f32 = 0.25;
-/// Minimum component of the injection axis along the axis of a channel for a judgement.
+/// Minimum component of the injection axis along the axis of a channel at which the channel is judged.
 const LEAST_SHARE: f32 = 0.4;
-/// Consecutive silent carrier periods until the fault: 5 ms at 600 Hz.
+/// Consecutive silent injection periods until the fault: 5 ms at 600 Hz.
 const SILENT_PERIODS: u8 = 3;
 
-/// Watch for the carrier in both current channels.
+/// Watch for the injection current in both current channels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CarrierWatch {
     silent: [u8; 2],
@@ -27,8 +27,8 @@ pub struct CarrierWatch {
 }
 
 impl CarrierWatch {
-    /// Evaluates one carrier period: its carrier `current`, the injection `axis` in the stator frame, and
-    /// the `expected` amplitude of the carrier current along that axis, A peak.
+    /// Evaluates one injection period: its injection `current`, the injection `axis` in the stator frame,
+    /// and the `expected` amplitude of the injection current along that axis, A peak.
     ///
     /// # Errors
     /// [`Fault::CarrierMissingA`] or [`Fault::CarrierMissingB`] after three consecutive silent periods.
@@ -38,12 +38,12 @@ impl CarrierWatch {
         axis: UnitVector,
         expected: f32,
     ) -> Result<(), Fault> {
-        // Components along phases a and b: cos(theta) and cos(theta - 120°) of the injection axis, and
-        // those of the axis 90° ahead of it.
+        // These are the components along phases a and b: cos(theta) and cos(theta - 120°) of the
+        // injection axis, and the components of the axis 90° ahead of it.
         let phases = |x: f32, y: f32| [x, 0.5 * (SQRT_3 * y - x)];
         let along = phases(axis.cos, axis.sin);
         let across = phases(-axis.sin, axis.cos);
-        // The first two carrier periods are not settled.
+        // The first two injection periods are not settled.
         if self.settled < 2 {
             self.settled += 1;
             return Ok(());
@@ -70,24 +70,24 @@ pub struct Prediction {
     per_ampere: f32,
     /// Pole of the current response.
     pole: f32,
-    /// Voltage along the rotor flux per magnetising current, by its decay, V/A.
+    /// Voltage along the rotor flux per magnetising current, due to the decay of the flux, V/A.
     decay: f32,
-    /// Back-emf across the rotor flux, V/A per electrical turn per period of the rotor.
+    /// Back-EMF across the rotor flux, V/A per electrical turn per period of the rotor.
     emf: f32,
     /// Allowed unexplained voltage at standstill, V peak.
     allowed: f32,
-    /// Allowed mean of it in the frame of the flux, V peak: with a resistance as of the start, and with a tracked one.
+    /// Allowed mean of the unexplained voltage in the flux frame, V peak: with the resistance of the start, and with a tracked one.
     allowed_mean: [f32; 2],
 }
 
-/// Rotor flux in a sample. Frequencies in electrical turns per period.
+/// Rotor flux in a sample. Frequencies are in electrical turns per period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFlux {
     /// Magnetising current, A.
     pub magnetising: f32,
     /// Speed of the rotor.
     pub rotor_freq: f32,
-    /// Axis of the flux when the sampled current flowed, in the stator frame.
+    /// Axis of the flux at the time when the sampled current flowed, in the stator frame.
     pub axis: UnitVector,
     /// Frequency of the flux.
     pub flux_freq: f32,
@@ -96,11 +96,11 @@ pub struct RotorFlux {
 /// Knowledge of resistance and flux in a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Uncertainty {
-    /// Deviation of the stator resistance from the settings, relative.
+    /// Relative deviation of the stator resistance from the settings.
     pub deviation: f32,
-    /// Whether that is tracked; otherwise it is as of the start.
+    /// Whether the resistance is tracked; otherwise it is the resistance of the start.
     pub tracked: bool,
-    /// Whether the flux of a turning shaft builds up.
+    /// Whether the flux of a rotating shaft builds up.
     pub building: bool,
 }
 
@@ -119,35 +119,36 @@ pub struct PredictionState {
     rotor: AlphaBeta,
     /// Filtered unexplained voltage, V.
     unexplained: AlphaBeta,
-    /// Axis of the flux in the middle of the samples, and its back-emf, V.
+    /// Axis of the flux in the middle of the samples, and its back-EMF, V.
     flux: (UnitVector, f32),
-    /// Mean unexplained voltage in the frame of the flux, V.
+    /// Mean unexplained voltage in the flux frame, V.
     mean: Dq,
 }
 
-/// Samples between two comparisons: half a carrier period. Over a whole one the carrier would average to
-/// zero, but a faulty sensor would drive the current for twice as long.
+/// Samples between two comparisons: half an injection period. Over a whole period the injection would
+/// average to zero, but a faulty sensor would drive the current for twice as long.
 const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
 
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
 const SMOOTHING: f32 = 0.276;
-/// Tolerated error of the expected back-emf as a share of it. The more, the longer a broken sensor drives the current at
-/// speed; half of it never stopped a run of `full-range` that the whole had not, but for starts on a turning shaft, whose flux
-/// is not as large yet as it is believed to be.
+/// Tolerated error of the expected back-EMF, as a share of it. With a larger share, a broken sensor drives the current for
+/// longer at speed. A share of one half stopped no run of `full-range` that a share of one did not also stop, except flying
+/// starts, whose flux is not yet as large as estimated. The second share is for these.
 const EMF_SHARE: f32 = 0.5;
 const EMF_SHARE_BUILDING: f32 = 1.0;
-/// Share of the newest value in the mean in the frame of the flux: 50 ms.
+/// Share of the newest value in the mean in the flux frame: 50 ms.
 const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
-/// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.
+/// Tolerated share of the back-EMF in that mean. If the flux is missing or has another angle, the whole back-EMF is missing.
 const MEAN_EMF_SHARE: f32 = 0.5;
-/// Share of the back-emf, and of the allowed mean, that a flux which has built up without torque may miss. (192 right starts on three
-/// motors missed no more than the first; a frame that is 2 Hz too fast or too slow misses all of it.)
+/// Share of the back-EMF, and share of the allowed mean, that may be missing when the flux has built up without torque. (In 192
+/// correct starts on three motors, no more than the first share was missing. In a frame that is 2 Hz too fast or too slow, the whole
+/// back-EMF is missing.)
 const MISSED_SHARE: f32 = 0.25;
 const MISSED: f32 = 0.1;
 
 impl Prediction {
-    /// Comparison for a motor with the current response `plant`, A/V, and an allowed unexplained voltage at
-    /// standstill of `allowed_v`, V peak, and of `allowed_mean_v` in the mean of 50 ms: with the stator resistance of the
+    /// Creates the comparison for a motor with the current response `plant`, A/V. The allowed unexplained voltage at
+    /// standstill is `allowed_v`, V peak, and in the mean of 50 ms `allowed_mean_v`: with the stator resistance of the
     /// start, and with a tracked one.
     pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32, allowed_mean_v: [f32; 2]) -> Self {
         let coupled = motor.coupled_inductance();
@@ -169,28 +170,29 @@ impl Prediction {
             d: self.decay * flux.magnetising,
             q: -self.emf * flux.magnetising * flux.rotor_freq,
         };
-        // Distance from here back to the middle of the samples.
+        // This is the distance from the present sample back to the middle of the samples.
         const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
         let axis = flux.axis.turned_slightly(-MIDDLE * flux.flux_freq);
         state.rotor = rotor.to_alpha_beta(axis);
         state.flux = (axis, self.emf * flux.magnetising * flux.flux_freq);
     }
 
-    /// Whether the mean of the unexplained voltage leaves room for a flux that turns with the frame: without one the whole back-emf
-    /// is missing.
+    /// Whether the mean of the unexplained voltage is small enough for a flux that rotates with the frame. Without such a flux the
+    /// whole back-EMF is missing.
     pub fn sees_flux(&self, state: &PredictionState) -> bool {
         let (_, emf) = state.flux;
         let missing = if emf < 0.0 { -state.mean.q } else { state.mean.q };
         missing <= MISSED_SHARE * emf.abs() + MISSED * self.allowed_mean[1]
     }
 
-    /// Compares the `current`, A, after it was collected; called in every fifth
-    /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five.
+    /// Compares the `current`, A, with its prediction, after the current was collected; called in
+    /// every fifth sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged
+    /// over the five.
     ///
     /// # Errors
-    /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit, [`Fault::FluxNotAsPredicted`]
-    /// when its mean in the frame of the flux does: the flux is not where, or not as large as, it is believed to be. At rest
-    /// and without slip no voltage shows that.
+    /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit, [`Fault::FluxNotAsPredicted`] when
+    /// its mean in the flux frame does, because the flux does not have the estimated angle or magnitude. At rest and without
+    /// slip no voltage shows that.
     pub fn judge(
         &self,
         state: &mut PredictionState,
@@ -203,7 +205,7 @@ impl Prediction {
         let unexplained = (explained - state.taken) * MEAN - state.rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         (state.last, state.currents) = (current, AlphaBeta::ZERO);
-        // The two uncertainties are independent: their squares add.
+        // The two uncertainties are independent, so their squares add.
         let share = if known.building { EMF_SHARE_BUILDING } else { EMF_SHARE };
         let allowed = self.allowed * self.allowed + share * share * state.rotor.length_squared();
         Fault::CurrentNotAsPredicted.unless(state.unexplained.length_squared() <= allowed)?;
@@ -222,13 +224,13 @@ impl PredictionState {
         self.voltages += computed;
     }
 
-    /// Forgets what was unexplained so far: the model was that of another speed.
+    /// Resets the unexplained voltage, because the model was used with another speed.
     pub fn forget(&mut self) {
         self.unexplained = AlphaBeta::ZERO;
         self.forget_mean();
     }
 
-    /// Forgets the mean in the frame of the flux: the flux was not there.
+    /// Resets the mean in the flux frame, because there was no established flux.
     pub fn forget_mean(&mut self) {
         self.mean = Dq::ZERO;
     }

@@ -1,12 +1,12 @@
 //! Saliency check: verifies at every start, before torque, that the motor has the saliency that the
 //! injection needs.
 //!
-//! Stator current masks the flux-fixed saliency, since it causes a saliency of its own, along the flux when
-//! there is no torque. The current is therefore removed once the flux is built up. While the flux decays
-//! with the rotor time constant, the carrier, turned to 60° from it, shows the saliency of the flux alone.
-//! (60° instead of 45°: the flux lies along phase a, and at multiples of 30° the voltage drop of the power
-//! stage has the direction of the carrier. At 45° a drop of 1.6 V per phase looks like a saliency of
-//! 0.0135.) Then the flux is built up again.
+//! Stator current masks the flux-fixed saliency, since it causes its own saliency, which lies along the
+//! flux when there is no torque. The current is therefore removed once the flux is built up. While the flux
+//! decays with the rotor time constant, the injection, turned by 60° from the flux, shows the saliency of
+//! the flux alone. (The angle is 60° instead of 45°, because the flux lies along phase a, and at multiples
+//! of 30° the inverter voltage error has the direction of the injection. At 45° an error of 1.6 V per phase
+//! looks like a saliency of 0.0135.) Then the flux is built up again.
 
 use crate::learned::Learned;
 use crate::{SQRT_3, UnitVector, periods};
@@ -49,24 +49,26 @@ pub enum SaliencyCheckAction {
 
 /// Settling time of the averages of the demodulation, s.
 const SETTLE_S: f32 = 0.020;
-/// Delay of the averages, s: they show the flux of this much earlier.
+/// Delay of the averages, s, by which the flux that they show is earlier.
 const DELAY_S: f32 = 0.004;
 /// Averaging time in rotor time constants, and its limits, s. A longer average would contain less flux.
 const AVERAGE_T: f32 = 0.645;
 const AVERAGE_S: (f32, f32) = (0.03, 0.4);
-/// Threshold relative to the mean that the saliency of the settings gives: midway between a tenth and half of it. With
-/// 3.5 % of the dissertation's motor both are more than four standard deviations away, by noise of 5 mA.
+/// Threshold relative to the mean for the saliency of the settings: midway between a tenth and half of it. With the
+/// 3.5 % of the dissertation's motor, both are more than four standard deviations away, with noise of 5 mA.
 const LEAST_SHARE: f32 = 0.3;
-/// Least flux-fixed saliency relative to the slope, which is twice the effective one, for a check of a learned motor.
+/// Least flux-fixed saliency relative to the sensitivity, which is twice the effective saliency, at which a learned motor is
+/// checked.
 const LEAST_SEEN: f32 = 0.375;
-/// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
+/// Time to build the flux up again, in rotor time constants, after which it is within 5 %.
 const RESTORE_T: f32 = 2.4;
-/// And at least, s: five time constants of the mean carrier current by which the lock monitor judges afterwards.
+/// Least time to build the flux up again, s: five time constants of the mean injection current that the lock monitor uses
+/// afterwards.
 const RESTORE_S: f32 = 0.25;
 
-/// Mean saliency seen at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
+/// Returns the mean saliency at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
 ///
-/// The flux-fixed saliency is taken to follow 2 r/(1 + r) with the square r = e^(-2t/tau_r) of the relative flux. The
+/// The flux-fixed saliency is assumed to follow 2 r/(1 + r) with the square r = e^(-2t/tau_r) of the relative flux. The
 /// mean from t_0 to t_1 = t_0 + w is 0.866 (tau_r/w) ln((1 + e^(-2 t_0/tau_r)) / (1 + e^(-2 t_1/tau_r))): 0.54 with the
 /// dissertation's motor.
 fn seen_share(window: f32, tau_r: f32) -> f32 {
@@ -76,7 +78,7 @@ fn seen_share(window: f32, tau_r: f32) -> f32 {
 }
 
 impl SaliencyCheck {
-    /// Check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
+    /// Creates the check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
     #[cold]
     pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
         let window = (AVERAGE_T * tau_r).clamp(AVERAGE_S.0, AVERAGE_S.1);
@@ -91,21 +93,22 @@ impl SaliencyCheck {
         }
     }
 
-    /// The check of a motor that was learned. It expects what the check saw then. None where that is less than 3/8 of the
-    /// slope or of the other sign: a saliency that falls with a power of the flux is gone before it is averaged, and one of
-    /// the current is not seen. The verification of the lock does the work alone then.
+    /// Returns the check for a learned motor, which expects the saliency that the check of the self-commissioning has
+    /// measured. None if that saliency is less than 3/8 of the sensitivity or has the other sign: a saliency that falls
+    /// with a power of the flux vanishes before it is averaged, and a saliency of the current is not visible without
+    /// current. Then only the verification of the lock protects the start.
     pub fn of_learned(&self, learned: &Learned) -> Option<Self> {
         let (seen, slope) = (learned.flux_saliency, learned.slope_at_rest);
         let suits = seen * slope > 0.0 && seen.abs() >= LEAST_SEEN * slope.abs();
         suits.then_some(Self { least: LEAST_SHARE * self.seen_share * seen, ..*self })
     }
 
-    /// Mean saliency that a finished check has seen.
+    /// Returns the mean saliency that a finished check has measured.
     pub fn mean(&self, state: &SaliencyCheckState) -> f32 {
         state.sum * self.per_average
     }
 
-    /// Flux-fixed saliency at nominal flux per mean saliency.
+    /// Returns the flux-fixed saliency at nominal flux per mean saliency.
     pub fn per_mean(&self) -> f32 {
         1.0 / self.seen_share
     }
@@ -139,7 +142,7 @@ impl SaliencyCheck {
 mod tests {
     use super::*;
 
-    /// Periods in each phase, the last phase, and the state, with this saliency seen throughout.
+    /// Runs the check with a constant saliency. Returns the periods in each phase, the last phase, and the state.
     fn run(check: &SaliencyCheck, q: f32) -> ([usize; 2], SaliencyCheckAction, SaliencyCheckState) {
         let (mut state, mut count) = (SaliencyCheckState::default(), [0; 2]);
         for elapsed in 0..100_000 {
@@ -156,7 +159,7 @@ mod tests {
     fn enough_saliency_of_the_right_sign_passes() {
         for expected in [-0.035, 0.05] {
             let check = SaliencyCheck::new(expected, 0.186);
-            // The mean over the decaying flux is 0.5402 of the saliency; 0.3 of what is expected is enough.
+            // The mean over the decaying flux is 0.5402 of the saliency; 0.3 of the expected value is enough.
             for (share, passes) in
                 [(1.0, true), (2.0, true), (0.31, true), (0.29, false), (-1.0, false)]
             {
@@ -166,7 +169,7 @@ mod tests {
                 assert_eq!(end, expected_end, "{expected} {share}");
                 let seen = check.mean(&state) * check.per_mean();
                 assert!((seen / (share * expected) - 1.0).abs() < 1e-3, "{seen}");
-                // 20 ms to settle, 0.645 time constants to look, 2.4 time constants to restore.
+                // The times are 20 ms to settle, 0.645 time constants to look, and 2.4 time constants to restore.
                 assert_eq!(count[0], 840);
                 assert!(!passes || count[1].abs_diff(2678) <= 1, "{count:?}");
             }
@@ -174,8 +177,8 @@ mod tests {
         }
     }
 
-    /// The baseline of the lock monitor forgets what it saw without current with a time constant of 0.05 s; a rotor of 24 ms, of a motor
-    /// for 250 Hz, would have been back after 58 ms.
+    /// The baseline of the lock monitor approaches its value with current with a time constant of 0.05 s. A rotor of 24 ms, of a motor
+    /// for 250 Hz, would be magnetised after only 58 ms.
     #[test]
     fn a_fast_rotor_waits_for_the_baseline() {
         let check = SaliencyCheck::new(-0.035, 0.024);

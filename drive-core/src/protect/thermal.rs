@@ -1,37 +1,38 @@
-//! Thermal load of motor and inverter from the current, i²t.
+//! Thermal load of motor and inverter by the current, i²t.
 //!
-//! Each is a body of one time constant. Its load rises with the square of the current vector relative to the current that it
-//! carries for any time; 1 is that current for ever:
+//! Each is a body with one time constant. Its load follows the square of the current vector relative to its continuous
+//! current; 1 is the load at the continuous current:
 //!
 //! ```text
 //! tau d(load)/dt = |i|^2 / i_c^2 - load
 //! ```
 //!
-//! The vector counts, not the phase: at standstill a phase may carry its peak for ever, with the copper losses of the motor
-//! those of the vector. The load is remembered over stops and starts, but not over a reset.
+//! The vector counts, not the phase: at standstill a phase may carry its peak continuously, and the copper losses of the
+//! motor are those of the vector. The load is kept over stops and starts, but not over a reset.
 //!
-//! From a load of 1 on the torque current falls back, and with it the load: the drive settles at the current that the body
-//! carries for ever, at most 2.5 % above it. The trip is for what that cannot hold, a direct current that is too large.
+//! Above a load of 1 the q-axis current is reduced, and with it the load: the drive settles at the continuous current of
+//! the body, at most 2.5 % above it. The trip is for a load that this cannot limit, due to a d-axis current that is too
+//! large.
 
 use crate::{Fault, Limiting};
 
-/// Load that trips: 5 % more current than allowed for ever, with margin for ripple.
+/// Load that trips: 5 % more than the continuous current, with a margin for ripple.
 const TRIP: f32 = 1.1;
-/// Load at which no torque current is left. It falls from a load of 1 on, by its square.
+/// Load at which no q-axis current is left. Its square falls from a load of 1 on.
 const NOTHING_LEFT: f32 = 1.05;
 
 /// Coefficients of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
-    /// Load for ever per squared current, 1/A^2.
+    /// Steady load per squared current, 1/A^2.
     per_square: f32,
     /// Share of the newest value.
     smoothing: f32,
 }
 
 impl Body {
-    /// A body that carries `current_a`, A peak, for ever, with a thermal time constant of `tau_s`, s, and steps `period_s`
-    /// apart.
+    /// Creates a body with the continuous current `current_a`, A peak, and a thermal time constant of `tau_s`, s, for
+    /// steps `period_s` apart.
     pub fn new(current_a: f32, tau_s: f32, period_s: f32) -> Self {
         Self { per_square: 1.0 / (current_a * current_a), smoothing: period_s / tau_s }
     }
@@ -50,7 +51,7 @@ pub struct Thermal {
     pub inverter: Body,
 }
 
-/// Loads of motor and inverter; 1 is what each carries for ever.
+/// Loads of motor and inverter; 1 is the load at the continuous current.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ThermalLoads {
     /// The motor.
@@ -60,7 +61,8 @@ pub struct ThermalLoads {
 }
 
 impl ThermalLoads {
-    /// Share of the square of the largest current that both still bear, 1 or more for all of it, and which bears less.
+    /// Returns the share of the square of the largest current that both allow, 1 or more for all of it, and the one that allows
+    /// less.
     #[inline]
     pub fn share(&self) -> (f32, Limiting) {
         let (load, why) = if self.motor > self.inverter {
@@ -79,7 +81,7 @@ impl Thermal {
     /// Advances by a period with the `square` of the current vector, A^2.
     ///
     /// # Errors
-    /// [`Fault::MotorOverload`] or [`Fault::InverterOverload`] above a load of 1.1, also where it is not a number.
+    /// [`Fault::MotorOverload`] or [`Fault::InverterOverload`] above a load of 1.1, or if the load is NaN.
     pub fn step(&self, loads: &mut ThermalLoads, square: f32) -> Result<(), Fault> {
         self.motor.step(&mut loads.motor, square);
         self.inverter.step(&mut loads.inverter, square);
@@ -94,7 +96,7 @@ mod tests {
 
     const PERIOD_S: f32 = 0.01;
 
-    /// Seconds until the fault at a constant current, A, at most an hour.
+    /// Returns the seconds until the fault at a constant current, A, at most an hour.
     fn until(current: f32) -> Option<(f32, Fault)> {
         let thermal = Thermal {
             motor: Body::new(3.0, 300.0, PERIOD_S),
@@ -111,7 +113,7 @@ mod tests {
     fn what_is_borne_for_ever_does_not_trip_and_more_does_in_time() {
         assert_eq!(until(3.0), None);
         assert_eq!(until(0.0), None);
-        // tau ln(1 / (1 - 1.1 / x)), x the square of the relative current.
+        // The time is tau ln(1 / (1 - 1.1 / x)), with x the square of the relative current.
         let time = |tau: f32, x: f32| -tau * libm::logf(1.0 - 1.1 / x);
         for (current, tau, carried, fault) in [
             (4.0, 300.0, 3.0, Fault::MotorOverload),

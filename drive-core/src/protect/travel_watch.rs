@@ -1,30 +1,32 @@
-//! Travel watch: a current sensor whose signal stands while the current turns.
+//! Travel watch: detects a current sensor whose signal does not change while the current rotates.
 //!
-//! Where there is no carrier, nothing but the fundamental wave shows whether a sensor is alive. While the flux makes a quarter
-//! turn, a current that turns with it moves each phase by 0.29 of its amplitude at least, and the other phase by no more than
-//! five times of that. So a channel is silent that moved by less than [`SILENT_SHARE`] of the other one and less than
-//! [`SILENT_A`], while the other one moved by more than [`MOVES_A`]. No model and no voltage take part, so no control hides it.
+//! Without injection, only the fundamental wave shows whether a sensor works. While the flux makes a quarter turn, a current
+//! that rotates with it changes in each phase by at least 0.29 of its amplitude (its travel), and in the other phase by no more
+//! than five times that. A channel counts as silent if its travel is less than [`SILENT_SHARE`] of the other travel and less
+//! than [`SILENT_A`], while the travel of the other channel is more than [`MOVES_A`]. No model and no voltage are involved, so
+//! no control action can hide the defect.
 //!
-//! The currents are looked at once a carrier period, over as many of them as a quarter turn takes, four looks at least: a sensor
-//! that opens or sticks is noticed one carrier period after that. Simulated on the dissertation's motor at 900, 1800 and
-//! 3000 rpm: `tests/silent_sensors.rs`.
+//! The currents are recorded once an injection period, over as many periods as a quarter turn takes, with at least four records.
+//! A sensor that opens or sticks is detected one injection period after that. It was simulated on the dissertation's motor at
+//! 900, 1800 and 3000 rpm: `tests/silent_sensors.rs`.
 
 use crate::Fault;
 use crate::carrier::CARRIER_SAMPLES;
 use crate::math::frames::Abc;
 
-/// Looks that are kept, a power of two, and the carrier periods between the first and the last.
+/// Number of records that are kept, a power of two, and injection periods between the first and the last.
 const LOOKS: usize = 8;
 const LONGEST_PERIODS: usize = LOOKS - 1;
-/// Shortest time, carrier periods. In two, with three looks, a current that is reversed may show the same value three times (5 of
-/// 4600 such runs).
+/// Shortest time, injection periods. In two periods, with three records, a current that is reversed may show the same value three
+/// times (5 of 4600 such runs).
 const SHORTEST_PERIODS: usize = 3;
-/// Turn of the flux in which each phase moves.
+/// Turn of the flux in which the current of each phase must change.
 const TURN: f32 = 0.25;
-/// Travel of a sensor that is silent relative to the other one.
+/// Largest travel of a silent sensor, relative to the other one.
 const SILENT_SHARE: f32 = 0.12;
-/// The same, and the least travel of the other one, A on the reference board: 6 times and 80 times its noise. (With 0.06 A
-/// 3 of 9600 reversals above 1800 rpm on simulated iron showed the same value four times.)
+/// Largest travel of a silent sensor, and least travel of the other one, A on the reference board: 6 times and 80 times
+/// its noise. (With 0.06 A, 3 of 9600 reversals above 1800 rpm of a simulated motor that saturates showed the same value
+/// four times.)
 const SILENT_A: f32 = 0.03;
 const MOVES_A: f32 = 0.4;
 
@@ -40,26 +42,26 @@ pub struct TravelWatch {
 /// State of the watch.
 #[derive(Clone, Copy, Debug)]
 pub struct TravelWatchState {
-    /// Currents a and b of the last looks, A, around, and the place of the next.
+    /// Ring of the currents a and b of the last records, A, and position of the next one.
     looks: [[f32; 2]; LOOKS],
     next: usize,
-    /// Looks since it began anew.
+    /// Number of records since the last reset.
     taken: usize,
 }
 
 impl TravelWatchState {
-    /// No looks yet.
+    /// State without records.
     pub const NEW: Self = Self { looks: [[0.0; 2]; LOOKS], next: 0, taken: 0 };
 }
 
 impl TravelWatch {
-    /// Watch for sensors whose range is so many times that of the reference board.
+    /// Creates the watch for sensors whose range is `range` times that of the reference board.
     pub fn new(range: f32) -> Self {
         Self { silent_a: range * SILENT_A, moves_a: range * MOVES_A }
     }
 
-    /// Looks at the currents; once a carrier period. `flux_freq`: frequency of the flux, electrical turns per control period, or 0
-    /// where there is a carrier: then it begins anew.
+    /// Records the currents; called once an injection period. `flux_freq` is the frequency of the flux, electrical turns per
+    /// control period, or 0 with injection, which resets the watch.
     ///
     /// # Errors
     /// [`Fault::SensorSilentA`] or [`Fault::SensorSilentB`].
@@ -69,7 +71,8 @@ impl TravelWatch {
         phases: &Abc,
         flux_freq: f32,
     ) -> Result<(), Fault> {
-        // From one look to the next, but for half turns, which show a current and its opposite: around 300 Hz they show no more.
+        // This is the turn from one record to the next, modulo half a turn, since half a turn shows a current and its opposite.
+        // Around 300 Hz the records therefore show no change.
         let turn = flux_freq.abs() * CARRIER_SAMPLES as f32;
         let turn = if turn > TURN { (turn - 0.5).abs() } else { turn };
         if turn * (LONGEST_PERIODS as f32) < TURN {
@@ -94,7 +97,7 @@ impl TravelWatch {
 }
 
 impl TravelWatchState {
-    /// Largest less least value of both channels in so many carrier periods, A.
+    /// Returns the largest less the least value of both channels in so many injection periods, A.
     fn travel(&self, periods: usize) -> [f32; 2] {
         let look = |ago: usize, n: usize| self.looks[self.next.wrapping_sub(1 + ago) % LOOKS][n];
         [0, 1].map(|n| {
@@ -114,8 +117,8 @@ mod tests {
     use super::*;
     use core::f64::consts::TAU;
 
-    /// Looks until the fault, of a current of so many A that turns at `hz` from this angle, turns, on; from look `dead` on a sensor
-    /// shows this value instead.
+    /// Returns the records until the fault for a current with this amplitude, A, that rotates at `hz` from this angle, turns. From
+    /// record `dead` on a sensor shows a constant value instead.
     fn until(
         (ampere, hz, from): (f64, f64, f64),
         (dead, sensor, shown): (usize, usize, f32),
@@ -133,7 +136,7 @@ mod tests {
         })
     }
 
-    /// Frequencies from the least one of the watch to that of a spindle, and angles that fill a turn.
+    /// Returns frequencies from the least one of the watch to that of a spindle, and angles over a whole turn.
     fn cases() -> impl Iterator<Item = (f64, f64)> {
         let angles = |hz| (0..36).map(move |n| (hz, f64::from(n) / 36.0));
         let watched =
@@ -141,7 +144,7 @@ mod tests {
         watched.into_iter().flat_map(angles)
     }
 
-    /// Between 279 and 321 Hz the looks show a current and its opposite: nothing is judged.
+    /// Between 279 and 321 Hz the records show a current and its opposite, so nothing is judged.
     #[test]
     fn around_half_the_rate_of_the_looks_nothing_is_judged() {
         for n in 0..36 {
@@ -160,7 +163,8 @@ mod tests {
         }
     }
 
-    /// After a quarter turn, four looks at least, and one look more or less; and a current of 3 A moves the other sensor by enough then.
+    /// The fault comes after a quarter turn, at least four records, plus or minus one record. In this time a current of 3 A changes
+    /// the other sensor by enough.
     #[test]
     fn a_sensor_that_stands_is_named_within_a_quarter_turn() {
         for (hz, from) in cases() {
@@ -176,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Below the least frequency, with a carrier, and where the other sensor hardly moves, nothing is judged.
+    /// Below the least frequency, with injection, or if the other sensor hardly changes, nothing is judged.
     #[test]
     fn where_little_moves_nothing_is_judged() {
         assert_eq!(until((3.0, 21.0, 0.0), (0, 0, 0.0)), None);

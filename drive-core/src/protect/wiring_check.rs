@@ -1,10 +1,10 @@
-//! Wiring check: verifies assignment and polarity of the current sensors, once, before the flux is built up,
-//! with short voltage pulses.
+//! Wiring check: verifies assignment and polarity of the current sensors with short voltage pulses, once,
+//! before the flux is built up.
 //!
-//! Each phase in turn gets a positive and a negative voltage pulse along its axis. Over so short a time the
-//! motor acts as its transient inductance: the current of that phase rises to a known peak, those of the
-//! two others to half of it with opposite sign. A correct sensor responds most to the pulse of its own
-//! phase, with the sign of the pulse:
+//! Each phase in turn gets a positive and a negative voltage pulse along its axis. In such a short time the
+//! motor acts as its transient inductance. The current of that phase rises to a known peak, and the
+//! currents of the two others to half of it with opposite sign. A correct sensor responds most to the pulse
+//! of its own phase, with the sign of the pulse:
 //!
 //! | error | response |
 //! |---|---|
@@ -12,16 +12,16 @@
 //! | sensor reversed | largest to its own phase, negative |
 //! | sensors exchanged, or legs against sensors | largest to another phase |
 //!
-//! Two phases exchanged between sensors and motor are not detected: a motor at rest responds alike, it only
-//! turns the other way.
+//! Two phases that are exchanged between sensors and motor are not detected: a motor at rest responds in
+//! the same way, and only turns in the other direction.
 //!
 //! # Current bound
-//! The pulses are designed for an expected current with the inductance of the settings: 0.2 A with the dissertation's
-//! motor, in proportion to the rated current, and more where the pulse would not exceed the dead time (a spindle: 2 A, a
-//! sixth of the rated peak). Every sample is checked against the current that half that inductance gives, plus a margin for
-//! noise. A motor with at least half the inductance therefore stays below twice the expected current, whatever the
-//! sensors report. With less inductance, a working sensor ends the pulse at
-//! the next sample, which keeps the current below 2.5 times the expected one down to a fifth.
+//! The pulses are designed for an expected current with the inductance of the settings. It is 0.2 A with the dissertation's
+//! motor, in proportion to the rated current, and more if the pulse would not exceed the dead time (for a spindle 2 A, a
+//! sixth of the rated peak). Every sample is checked against the current that half that inductance would give, plus a
+//! margin for noise. A motor with at least half the inductance therefore stays below twice the expected current with any
+//! sensor readings. With less inductance, a working sensor ends the pulse at the next sample, which keeps the current below
+//! 2.5 times the expected one down to a fifth of the inductance.
 
 use crate::{Abc, AlphaBeta, Fault, PERIOD_S};
 
@@ -31,13 +31,13 @@ const LARGEST: f32 = 2.0;
 const LEAST_SHARE: f32 = 0.25;
 /// Shortest rise, periods: its first sample can still end the pulse if the current rises too fast.
 const SHORTEST_RISE: u32 = 2;
-/// Longest rise, periods: beyond, the resistance dominates the response.
+/// Longest rise, periods, beyond which the resistance dominates the response.
 const LONGEST_RISE: u32 = 60;
 /// Pause after a pulse, periods.
 const REST: u32 = 8;
 /// Pulses per phase and sign.
 const ROUNDS: u32 = 2;
-/// Phases times signs.
+/// Number of phases times signs.
 const PULSES_PER_ROUND: u32 = 6;
 
 /// Coefficients of the check.
@@ -89,15 +89,15 @@ pub struct WiringSettings {
     pub expected_a: f32,
     /// Margin for noise and the residual current of the previous pulse, A: ten times the rms of the noise.
     pub noise_a: f32,
-    /// Largest voltage of a pulse, V: available at the lowest dc link in use, and far above the voltage lost by the
-    /// dead time; a larger inductance gets a longer pulse.
+    /// Largest voltage of a pulse, V: available at the lowest dc link in use, and far above the voltage error of
+    /// the dead time. A larger inductance gets a longer pulse.
     pub highest_v: f32,
 }
 
 impl WiringCheckState {
-    /// Mean responses of sensors a and b to the pulses on phases a, b and c, A, once all pulses have been applied.
+    /// Returns the mean responses of sensors a and b to the pulses on phases a, b and c, A, once all pulses have been applied.
     pub fn answers(&self) -> [[f32; 2]; 3] {
-        // Loops, since the interrupt calls nothing outside its memory: `map` of a nested array is not inlined.
+        // These are loops, because `map` of a nested array is not inlined and the interrupt calls nothing outside its memory.
         let mut answers = self.answers;
         for answer in answers.iter_mut().flatten() {
             *answer *= 1.0 / (2 * ROUNDS) as f32;
@@ -117,8 +117,8 @@ impl WiringCheck {
         Self { expected: s.expected_a, noise: s.noise_a, volts, rise }
     }
 
-    /// Processes one sample of the phase currents, A. `None` when all pulses have been applied: then
-    /// [judge](WiringCheck::judge) the answers.
+    /// Processes one sample of the phase currents, A. Returns `None` when all pulses have been
+    /// applied; then [judge](WiringCheck::judge) the responses.
     ///
     /// # Errors
     /// [`Fault::WiringCurrent`] when the current exceeds its bound.
@@ -153,7 +153,7 @@ impl WiringCheck {
         Ok(Some(Pulse { voltage: AXES[leg] * volts, current: AXES[leg] * flowing }))
     }
 
-    /// Evaluates the answers.
+    /// Evaluates the responses.
     ///
     /// # Errors
     /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
@@ -162,7 +162,7 @@ impl WiringCheck {
     pub fn judge(&self, answers: &[[f32; 2]; 3]) -> Result<(), Fault> {
         let [a, b, c] = *answers;
         let least = LEAST_SHARE * self.expected;
-        // Responses of a sensor to its own phase and to the two others.
+        // These are the responses of a sensor to its own phase and to the two others.
         let (at_a, at_b) = ([a[0], b[0], c[0]], [b[1], a[1], c[1]]);
         let silent = |[x, y, z]: [f32; 3]| x.abs() < least && y.abs() < least && z.abs() < least;
         let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
@@ -184,7 +184,7 @@ mod tests {
     const EXPECTED_A: f32 = 0.2;
     const HIGHEST_V: f32 = 60.0;
 
-    /// The pulses for the dissertation's motor and board.
+    /// Returns the pulses for the dissertation's motor and board.
     fn pulses(sigma_ls: f32) -> WiringCheck {
         WiringCheck::new(&WiringSettings {
             sigma_ls,
@@ -195,7 +195,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is measured, it ends, and a voltage is never higher than asked for.
+        /// With any measurements the check ends, and the voltage is never higher than its limit.
         #[test]
         fn it_ends(sigma_ls in 1e-6_f32..100.0, bits: [u32; 16]) {
             let check = pulses(sigma_ls);
@@ -223,8 +223,8 @@ mod tests {
         assert_eq!(next, Err(Fault::WiringCurrent));
     }
 
-    /// Result of the check on a motor of `inductance` H where 51.5 mH are expected, with the phase currents
-    /// as `sensors` shows them; and the largest phase current, A.
+    /// Returns the result of the check on a motor of `inductance` H, while 51.5 mH are expected, with the
+    /// readings of `sensors`; and the largest phase current, A.
     fn check(inductance: f32, sensors: fn(Abc) -> Abc) -> (Result<(), Fault>, f32) {
         let check = pulses(0.0515);
         let (mut state, mut current, mut largest) =
@@ -233,7 +233,7 @@ mod tests {
         loop {
             match check.step(&mut state, sensors(current.to_abc())) {
                 Ok(Some(Pulse { voltage, current: flowing })) => {
-                    // The announced current flows while the voltage acts.
+                    // The expected current flows while the voltage acts.
                     current += acting * (PERIOD_S / inductance);
                     if voltage != AlphaBeta::ZERO {
                         let along = flowing.alpha * current.alpha + flowing.beta * current.beta;
@@ -254,7 +254,7 @@ mod tests {
         let (result, largest) = check(0.0515, |i| i);
         assert_eq!(result, Ok(()));
         assert!((largest - EXPECTED_A).abs() < 0.01, "{largest}");
-        // A motor with half the inductance, or with twice of it, is still the motor.
+        // A motor with half or twice the inductance still passes.
         for inductance in [0.027, 0.1] {
             assert_eq!(check(inductance, |i| i).0, Ok(()), "{inductance}");
         }
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(check(0.0515, |i| Abc::new(0.3 * i.a, i.b, 0.0)).0, Ok(()));
     }
 
-    /// Answers at the threshold and between equals pass; one to another phase alone is told from none.
+    /// Responses at the threshold and equal responses pass. A response to another phase alone is distinguished from no response.
     #[test]
     fn answers_at_the_bounds_are_told_apart() {
         let l = LEAST_SHARE * EXPECTED_A;
@@ -309,7 +309,7 @@ mod tests {
             assert_eq!(result, Err(Fault::WiringCurrent), "{share}");
             assert!(largest < 0.5, "{share}: {largest}");
         }
-        // A current where none was put.
+        // A current without a voltage is refused.
         for bad in [Abc::new(0.06, 0.0, 0.0), Abc::new(0.0, -0.06, 0.0)] {
             let next = pulses(0.05).step(&mut WiringCheckState::default(), bad);
             assert_eq!(next, Err(Fault::WiringCurrent));

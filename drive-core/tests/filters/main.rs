@@ -1,4 +1,4 @@
-//! The filters of Appendix C against the printed tables.
+//! Tests of the filters of Appendix C against the printed tables.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 mod precision;
@@ -17,7 +17,7 @@ fn rad(hz: f64) -> f64 {
     TAU * hz / RATE
 }
 
-/// Largest distance between two responses from dc to half the sampling rate.
+/// Returns the largest distance between two responses from dc to half the sampling rate.
 fn largest_distance(one: impl Fn(f64) -> Complex64, other: impl Fn(f64) -> Complex64) -> f64 {
     (0..=6000)
         .map(|n| PI * f64::from(n) / 6000.0)
@@ -30,7 +30,7 @@ fn is_stable(s: &Section) -> bool {
     a2 < 1.0 && a1 < 1.0 + a2 && -a1 < 1.0 + a2
 }
 
-/// Magnitude in dB.
+/// Returns the magnitude in dB.
 fn db(response: Complex64) -> f64 {
     20.0 * libm::log10(response.norm())
 }

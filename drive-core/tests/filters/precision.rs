@@ -1,4 +1,4 @@
-//! Single precision: the sections hold it, the printed direct form does not.
+//! Tests of single precision, which is sufficient for the sections, but not for the printed direct form.
 
 use core::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use super::db;
 use super::printed::{Direct32, Direct64, Printed, TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
 use super::{RATE, is_stable, largest_distance, rad};
 
-/// xorshift64*, uniform in [-1, 1).
+/// Random numbers by xorshift64*, uniform in [-1, 1).
 struct Noise(u64);
 
 impl Noise {
@@ -23,7 +23,7 @@ impl Noise {
 
 type Input = Box<dyn FnMut(usize) -> f32>;
 
-/// Currents up to 3 A, as the filters get them.
+/// Returns typical inputs of the filters, currents up to 3 A.
 fn inputs() -> [(&'static str, Input); 3] {
     let mut noise = Noise(0x9E37_79B9_7F4A_7C15);
     let sine = |f: f64, k: usize| libm::sin(TAU * (f * k as f64 / RATE));
@@ -31,13 +31,13 @@ fn inputs() -> [(&'static str, Input); 3] {
         ("white noise", Box::new(move |_| (3.0 * noise.next()) as f32)),
         ("dc", Box::new(|_| 3.0)),
         (
-            "3.7 Hz and carrier",
+            "3.7 Hz and injection",
             Box::new(move |k| (2.74 * sine(3.7, k) + 0.26 * sine(600.0, k)) as f32),
         ),
     ]
 }
 
-/// rms and largest of the difference of two filters over `samples`.
+/// Returns the rms and the largest difference of two filters over `samples`.
 fn difference(
     samples: usize,
     mut input: impl FnMut(usize) -> f32,
@@ -101,8 +101,8 @@ fn direct_single_against_double<const M: usize>(name: &str, printed: &Printed<M>
     })
 }
 
-/// Why there are sections: the printed coefficients in single precision, run as Eq. C.1, are wrong by
-/// as much as the signal the source looks for.
+/// Shows why there are sections: with the printed coefficients in single precision, Eq. C.1 is off by
+/// as much as the signal for which the source looks.
 #[test]
 fn single_precision_direct_form_is_useless() {
     for rms in direct_single_against_double("LPF", &TABLE_7_LPF) {
@@ -127,7 +127,7 @@ fn rounding_the_printed_coefficients() {
     assert!((notch + 41.8).abs() < 0.05 && (moved - 0.028).abs() < 0.001);
     assert!((pp_dc - 0.93942).abs() < 1e-5);
 
-    // Stable all the same; only the response is lost.
+    // The filter is still stable, but its response is wrong.
     let lpf = [TABLE_7_LPF.largest_pole(), single.largest_pole()];
     let pp = [TABLE_8_PP.largest_pole(), TABLE_8_PP.rounded().largest_pole()];
     println!("largest pole, exact and f32: LPF {lpf:.6?}, PP {pp:.6?}");
@@ -143,7 +143,7 @@ fn rounding_the_printed_coefficients() {
         println!("rounded to 1/{scale}: LPF {:.5}, PP {:.5}", found.0, found.1);
         assert!((found.0 - lpf).abs() < 2e-4 && (found.1 - pp).abs() < 5e-4);
     }
-    // The sections survive four decimals with a stable margin.
+    // With four decimals, the sections are stable with a margin.
     for filter in [LPF_AS_PRINTED.sections.as_slice(), &BPF.sections, &PP.sections] {
         for s in filter {
             let four = |c: f32| (decimals(1e4)(f64::from(c))) as f32;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Table 7 and 8, Eq. C.1: numerator and denominator in falling powers of z, as printed.
+/// A filter of Table 7 or 8 for Eq. C.1: numerator and denominator in falling powers of z, as printed.
 pub struct Printed<const N: usize> {
     b: [f64; N],
     a: [f64; N],
@@ -81,12 +81,12 @@ impl<const N: usize> Printed<N> {
         Self { b: self.b.map(&f), a: self.a.map(f) }
     }
 
-    /// Coefficients as an `f32` holds them.
+    /// Returns the coefficients rounded to `f32`.
     pub fn rounded(&self) -> Self {
         self.map(|c| f64::from(c as f32))
     }
 
-    /// By the eigenvalues of the companion matrix.
+    /// Returns the magnitude of the largest pole, by the eigenvalues of the companion matrix.
     pub fn largest_pole(&self) -> f64 {
         let companion = |row: usize, column: usize| {
             if row == 0 { -self.a[column + 1] } else { f64::from(row == column + 1) }
@@ -119,7 +119,7 @@ impl<'a, const N: usize> Direct64<'a, N> {
     }
 }
 
-/// Eq. C.1 as one would write it in single precision.
+/// Direct implementation of Eq. C.1 in single precision.
 pub struct Direct32<const N: usize> {
     b: [f32; N],
     a: [f32; N],

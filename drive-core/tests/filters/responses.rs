@@ -1,4 +1,4 @@
-//! Responses: transfer functions as printed, gains, delays.
+//! Tests of the responses: transfer functions as printed, gains, delays.
 
 use core::f64::consts::PI;
 
@@ -42,7 +42,7 @@ fn gains() {
     assert!((db(bpf) + 0.490).abs() < 0.001 && (bpf.arg().to_degrees() + 3.86).abs() < 0.01);
     assert!((db(PP.response(w)) + 75.83).abs() < 0.01);
     assert!((db(PP.response(rad(1200.0))) + 62.73).abs() < 0.01);
-    // The band stop lets everything above 650 Hz through: no anti-alias filter.
+    // The band stop passes everything above 650 Hz, so it is no anti-alias filter.
     assert!((db(LPF_AS_PRINTED.response(PI)) + 0.5).abs() < 0.001);
 }
 
@@ -50,14 +50,14 @@ fn gains() {
 fn lpf_has_unit_gain_at_dc() {
     let error = LPF.dc_gain() - 1.0;
     println!("LPF at dc: 1 + {error:.2e}; at 60 Hz {:.5}", LPF.response(rad(60.0)).norm());
-    // Rounding of the last section, whose zeros nearly cancel at dc.
+    // The error is the rounding of the last section, whose zeros nearly cancel at dc.
     assert!(error.abs() < 3e-7);
     assert!((LPF.response(rad(60.0)).norm() - 1.00125).abs() < 1e-5);
-    // Nothing else changes: same poles, same zeros.
+    // Poles and zeros are unchanged.
     let scaled = |w| LPF_AS_PRINTED.response(w) * (1.0 / LPF_AS_PRINTED.dc_gain());
     assert!(largest_distance(|w| LPF.response(w), scaled) < 3e-6);
 
-    // And so it settles on what it is fed: the noise of f32 is all that is left.
+    // Therefore the output settles at the input, except for the noise of f32.
     let mut state = SosState::default();
     let mut y = 0.0;
     for _ in 0..20_000 {
@@ -67,7 +67,7 @@ fn lpf_has_unit_gain_at_dc() {
     assert!((y - 3.0).abs() < 1e-5);
 }
 
-/// Group delay -d arg H / d(ωT) of a cascade, samples.
+/// Returns the group delay -d arg H / d(ωT) of a cascade, samples.
 fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
     let h = 1e-5;
     -(response(sections, omega_t + h) / response(sections, omega_t - h)).arg() / (2.0 * h)

@@ -1,4 +1,4 @@
-//! States: what a filter remembers is linear, bounded, and forgotten.
+//! Tests of the states of a filter: they are linear and bounded, and decay.
 
 use induction_drive_core::AlphaBeta;
 use induction_drive_core::filter::{BPF, LPF, PP, Sos, SosState};
@@ -11,7 +11,7 @@ proptest! {
         let (mut alpha, mut beta) = (SosState::default(), SosState::default());
         for (a, b) in xs {
             let y = LPF.step(&mut both, AlphaBeta::new(a, b));
-            // To the bit.
+            // The outputs are equal to the bit.
             prop_assert_eq!(y.alpha.to_bits(), LPF.step(&mut alpha, a).to_bits());
             prop_assert_eq!(y.beta.to_bits(), LPF.step(&mut beta, b).to_bits());
         }
@@ -33,7 +33,7 @@ proptest! {
 
     #[test]
     fn bounded_and_forgetting(xs in prop::collection::vec(-3f32..3.0, 1..2000)) {
-        // The sums of |h| of `impulse_responses_sum_to_a_known_bound`.
+        // The bounds are the sums of |h| of `impulse_responses_sum_to_a_known_bound`.
         let (mut lpf, mut bpf, mut pp) = (SosState::default(), SosState::default(), SosState::default());
         for x in xs {
             prop_assert!(LPF.step(&mut lpf, x).abs() < 3.0 * 4.18);

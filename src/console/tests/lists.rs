@@ -10,7 +10,7 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     assert_eq!(all.len(), keys::COUNT + 1);
     let motor = talk.say("get motor\n");
     assert_eq!((motor.len(), motor[0].as_str()), (11 + 1, "motor.r_s = 5.4 ohm (0.0001 to 1000)"));
-    // Nothing leaves, and meanwhile a line comes.
+    // No text can leave, and meanwhile a line comes.
     talk.port.room = 0;
     talk.port.sent.extend(b"get\n");
     talk.poll();
@@ -60,7 +60,7 @@ fn a_trace_with_a_trigger_is_announced_and_printed_when_asked_for() {
     assert_eq!(talk.ask("trace"), "error: no trace was recorded");
 }
 
-/// A sensor with a negative gain has a smaller code for a larger current; one that the board does not have is told.
+/// A sensor with a negative gain has a smaller count for a larger current; a sensor that the board does not have is reported.
 #[test]
 fn a_trigger_on_a_current_sensor_is_one_on_its_codes() {
     for board in [boards::ALL[0], boards::ALL[1]] {
@@ -80,8 +80,8 @@ fn a_trigger_on_a_current_sensor_is_one_on_its_codes() {
     assert_eq!(talk.ask("trace 4 on heat_sink_c above 40"), curved);
 }
 
-/// The object of a line of `describe`: names and texts of its values. They hold no commas between quotes but in help,
-/// which comes last.
+/// The object of a line of `describe`: names and texts of its values. Only the help text, which comes last, contains commas between
+/// quotes.
 fn object(line: &str) -> std::collections::BTreeMap<String, String> {
     let inner = line.strip_prefix('{').and_then(|line| line.strip_suffix('}')).expect(line);
     let (values, help) = inner.split_once(",\"help\":").expect(line);
@@ -106,7 +106,7 @@ fn describe_prints_each_setting_as_json() {
     let all = talk.say("describe\n");
     assert_eq!((all.len(), all.last().unwrap().as_str()), (keys::COUNT + 1, "ok"));
     for (line, key) in all.iter().zip(keys::all()) {
-        // Nothing cut off.
+        // No line is cut off.
         assert!(line.len() + 2 < line::OUTPUT && line.is_ascii() && !line.contains('\\'), "{line}");
         assert_eq!(line.matches('"').count() % 2, 0, "{line}");
         let object = object(line);
@@ -162,7 +162,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let list = talk.say("learned\n");
     let told = "slope -0.0700 /rad, torque current up to 2.75 A";
     // 3/2 P L_M i_d of Table 5 with 0.7 A: 0.322 Nm/A; L_m i_d: 0.124 Wb.
-    let range = "trackable from -0.88 to 0.88 Nm (14 % of rated, -2.75 to 2.75 A) at 0.124 Wb (0.70 A); the limit is the slope, which is lost beyond";
+    let range = "trackable from -0.88 to 0.88 Nm (14 % of rated, -2.75 to 2.75 A) at 0.124 Wb (0.70 A); the limit is the saliency sensitivity, too small beyond";
     let first = [format!("* learned: {told}; `save` keeps it"), format!("* learned: {range}")];
     let list = list.strip_prefix(&first).unwrap();
     assert_eq!(
@@ -179,7 +179,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_eq!((list.len(), list.last().unwrap().as_str()), (2 + 14 + 1, "ok"));
     assert_eq!(talk.ask("save"), "ok");
     assert_eq!(talk.drive.saved.unwrap().learned, Some(found()));
-    // What it does not depend on leaves it, and the drive works with it.
+    // A setting on which it does not depend leaves the learned result, and the drive works with it.
     assert_eq!(talk.ask("set limits.dc_over_v 390"), format!("ok: staged; {UNCONFIRMED}"));
     let limits = "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved";
     assert_eq!(talk.ask("apply"), format!("ok: {limits}; {UNCONFIRMED}"));
@@ -189,10 +189,10 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_ne!(*with, settings.build().unwrap());
     settings.learn(&found(), false);
     assert_eq!(*with, settings.build().unwrap());
-    // What was refused leaves it too.
+    // A refused setting leaves the learned result, too.
     assert!(talk.ask("set motor.r_r 0").starts_with("error"));
     assert!(talk.say("learned\n").len() > 10);
-    let forgotten = "ok: what was learned with another motor.r_r is forgotten: learn again";
+    let forgotten = "ok: values learned with another motor.r_r are dropped: learn again";
     assert_eq!(talk.ask("set motor.r_r 1.2"), "ok: staged");
     assert_eq!(talk.ask("apply"), forgotten);
     assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");

@@ -165,8 +165,8 @@ fn dot(a: &Column, b: &Column) -> f32 {
 mod tests {
     use super::*;
 
-    /// Against a simulation's numbers in `f64`, of the machine that the tables of the paper were made
-    /// with, at 375 rad/s and 50 µs: 0.39 and 1.41 ohm, 94 mH each, 91 mH between them.
+    /// Compares with numbers of a simulation in `f64`, of the machine in the tables of the paper, at
+    /// 375 rad/s and 50 µs: 0.39 and 1.41 ohm, 94 mH each, 91 mH between them.
     #[test]
     fn the_sampled_machine_is_that_of_the_series() {
         let f1 = [1.984_696_196_81, 0.018_526_703_998_9];
@@ -183,13 +183,13 @@ mod tests {
         for (n, got) in machine.coefficients(&x).into_iter().enumerate() {
             let [re, im] = [expected[0][n], expected[1][n]];
             let error = libm::hypot(f64::from(got.re) - re, f64::from(got.im) - im);
-            // A few roundings, though two of the four are differences of numbers up to 30 000 times
-            // as large.
+            // The error is a few roundings, although two of the four are differences of numbers up
+            // to 30 000 times as large.
             assert!(error < 1e-6 * libm::hypot(re, im), "{n}: {got:?} for {re} {im}");
         }
     }
 
-    /// An estimate is published at rest only, and the resistance travels long after the rate is right.
+    /// An estimate is published only when the fit has settled, and the resistance still changes long after the rate is right.
     #[test]
     fn a_resistance_that_travels_counts_as_a_move() {
         let machine = Machine { sigma_l_s: 0.0515, coupled: 0.1532, period: 10.0 / 6000.0 };

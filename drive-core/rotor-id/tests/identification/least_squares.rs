@@ -1,4 +1,4 @@
-//! The recursive least squares on samples of the machine.
+//! Tests of the recursive least squares on samples of the machine.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ const H: f64 = 50e-6;
 const OMEGA_M: f64 = 200.0;
 /// 311 V over 3.5 A are about the impedance of the motor at 60 Hz.
 const SETTINGS: RlsSettings = RlsSettings::paper(180.0, 5.0);
-/// Samples until the filters have settled, and those of the memory.
+/// Samples until the filters have settled, and samples of the memory.
 const SETTLE: usize = 212;
 const MEMORY: usize = 1000;
 
@@ -21,7 +21,7 @@ const MEMORY: usize = 1000;
 enum Signal {
     /// 60 Hz and five more sinusoids.
     Rich,
-    /// The same along phase a alone.
+    /// The same signal along phase a alone.
     OneAxis,
     Nothing,
 }
@@ -44,7 +44,7 @@ fn single(x: Complex64) -> AlphaBeta {
     AlphaBeta::new(x.re as f32, x.im as f32)
 }
 
-/// The machine and the estimator.
+/// Machine and estimator.
 #[derive(Clone, Copy)]
 struct Bench {
     machine: Machine,
@@ -58,7 +58,7 @@ impl Bench {
         Self { machine, rls: Rls::new(settings).unwrap(), n: 0 }
     }
 
-    /// One sample: voltage and current.
+    /// Runs one sample and returns voltage and current.
     fn step(&mut self, signal: Signal) -> (Complex64, Complex64) {
         let (v, i) = (signal.at(self.n), self.machine.current);
         self.rls.step(single(v), single(i));
@@ -73,7 +73,7 @@ impl Bench {
         }
     }
 
-    /// Samples until this holds.
+    /// Runs samples until the condition holds and returns their number.
     fn until(&mut self, signal: Signal, holds: impl Fn(&Rls) -> bool) -> usize {
         (0..20_000)
             .find(|_| {
@@ -103,7 +103,7 @@ fn the_coefficients_predict_the_current_and_hold_the_speed() {
     assert!(bench.rls.misfit() < 1e-3 && bench.rls.uncertainty() < 100.0);
 }
 
-/// A bench whose estimator has long found the machine.
+/// Returns a bench whose estimator has converged.
 fn settled() -> Bench {
     let mut bench = Bench::new(SETTINGS);
     bench.steps(Signal::Rich, 10_000);
@@ -118,7 +118,7 @@ fn it_is_valid_after_one_memory_of_good_samples() {
     bench.rls.begin_at(bench.rls.latest());
     let first = bench.until(Signal::Rich, Rls::is_valid);
     assert!((MEMORY..MEMORY + 200).contains(&first), "{first}");
-    // From zero, the errors of the first samples have to be forgotten too.
+    // From zero, the errors of the first samples have to be forgotten as well.
     bench.rls.reset();
     assert!(!bench.rls.is_valid() && bench.rls.misfit() == 1.0);
     let first = bench.until(Signal::Rich, |rls| rls.missing() == 0);
@@ -137,7 +137,7 @@ fn without_a_signal_it_is_valid_for_one_more_memory() {
     assert!((MEMORY..4 * MEMORY).contains(&again), "{again}");
 }
 
-/// The jump of the current shows at once; at 20 kHz it is over 0.12 s after the phase is closed.
+/// The jump of the current shows at once. At 20 kHz its effect is over 0.12 s after the phase is closed.
 #[test]
 fn a_phase_that_opens_is_noticed() {
     let mut bench = settled();
@@ -165,7 +165,7 @@ fn poor_excitation_is_never_valid() {
         assert_eq!(bench.rls.missing(), 20_000);
         assert_eq!(bench.rls.misfit(), 1.0);
     }
-    // A current that has nothing to do with the voltage.
+    // The current has nothing to do with the voltage.
     let (mut rls, mut random) = (Rls::new(SETTINGS).unwrap(), 1_u32);
     for n in 0..20_000 {
         let mut uniform = || {
@@ -201,8 +201,8 @@ fn a_sample_at_a_limit_is_left_out_and_the_filters_settle_anew() {
     }
 }
 
-/// The covariance is so small that nothing is learned and zero is predicted: the error is the increment of the
-/// filtered current.
+/// The covariance is so small that nothing is learned and zero is predicted, so the error is the increment of
+/// the filtered current.
 #[test]
 fn the_error_is_in_units_of_the_base() {
     let settings = RlsSettings { p0: 1e-3, lambda: 1.0, ..RlsSettings::paper(1000.0, 20.0) };

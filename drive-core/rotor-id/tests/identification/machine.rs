@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 pub const J: Complex64 = Complex64::I;
 
-/// Parameters and state. The flux is that of the rotor seen from the stator, (L_m / L_r) psi_r, V s.
+/// Parameters and state. The flux is the rotor flux as the stator sees it, (L_m / L_r) psi_r, V s.
 #[derive(Clone, Copy)]
 pub struct Machine {
     pub r_s: f64,
@@ -35,8 +35,8 @@ impl Machine {
         }
     }
 
-    /// Puts it into the steady state of `current`, A, in the flux frame: the voltage in that frame, V, and
-    /// the frequency of the flux, rad/s.
+    /// Puts the machine into the steady state of `current`, A, in the flux frame. Returns the voltage in
+    /// that frame, V, and the frequency of the flux, rad/s.
     pub fn settle(&mut self, current: Complex64) -> (Complex64, f64) {
         let omega = self.omega_m + self.rate * current.im / current.re;
         self.current = current;
@@ -50,7 +50,7 @@ impl Machine {
         [(v - self.r_s * i - d_flux) / self.sigma_l_s, d_flux]
     }
 
-    /// Two steps of the classical Runge-Kutta method.
+    /// Advances by two steps of the classical Runge-Kutta method.
     pub fn advance(&mut self, v: Complex64, seconds: f64) {
         let h = seconds / 2.0;
         for _ in 0..2 {

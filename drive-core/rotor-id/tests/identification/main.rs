@@ -1,4 +1,4 @@
-//! The identification from the terminals against a machine integrated in `f64`.
+//! Tests of the identification from the terminals, on a machine integrated in `f64`.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 mod least_squares;

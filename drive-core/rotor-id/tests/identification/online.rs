@@ -1,4 +1,4 @@
-//! Rotor time constant, resistance and speed from the terminals.
+//! Tests of rotor time constant, resistance and speed from the terminals.
 
 use std::f64::consts::TAU;
 
@@ -20,28 +20,28 @@ fn single(x: Complex64) -> AlphaBeta {
     AlphaBeta::new(x.re as f32, x.im as f32)
 }
 
-/// A machine on an inverter, and the estimator that listens.
+/// A machine on an inverter, and the estimator that gets its voltage and current.
 struct Bench {
     machine: Machine,
     online: Online,
-    /// In the flux frame, V, and how fast that turns, rad/s.
+    /// Voltage in the flux frame, V, and speed at which the frame rotates, rad/s.
     voltage: Complex64,
     omega: f64,
-    /// Voltage on the direct axis at 2 Hz, V.
+    /// Voltage on the d axis at 2 Hz, V.
     excitation: f64,
     /// Largest noise of the current, A.
     noise: f64,
     random: u32,
-    /// Share of a period by which the current is seen late.
+    /// Delay of the measured current, as a share of a period.
     delay: f64,
     n: usize,
     acting: Complex64,
-    /// Put out, not acting yet.
+    /// Commanded voltage that does not act yet.
     pending: Complex64,
 }
 
 impl Bench {
-    /// A machine in the steady state of [`CURRENT`].
+    /// Creates a machine in the steady state of [`CURRENT`].
     fn new(settings: &Settings, mut machine: Machine) -> Self {
         let (voltage, omega) = machine.settle(Complex64::new(CURRENT.d.into(), CURRENT.q.into()));
         Self {
@@ -64,7 +64,7 @@ impl Bench {
         f64::from(self.random) / f64::from(u32::MAX / 2) - 1.0
     }
 
-    /// One control period: the current is seen late, and a voltage acts a period after it was put out.
+    /// Runs one control period: the current is measured late, and a voltage acts a period after its command.
     fn period(&mut self) -> (AlphaBeta, AlphaBeta) {
         let period = f64::from(PERIOD_S);
         self.machine.advance(self.acting, (1.0 - self.delay) * period);
@@ -79,7 +79,7 @@ impl Bench {
         (single(seen), single(self.pending))
     }
 
-    /// A tenth of a second, then a step of the fit.
+    /// Runs a tenth of a second, then a step of the fit.
     fn call(&mut self, speed: SpeedInput) -> Result<RotorEstimate, NoEstimate> {
         for _ in 0..CALL {
             let (measured, realised) = self.period();
@@ -97,7 +97,7 @@ fn known() -> SpeedInput {
     SpeedInput::Known(OMEGA_M as f32)
 }
 
-/// Default settings without saliency, and their motor.
+/// Returns the default settings without saliency, and their motor.
 fn plain() -> (Settings, Machine) {
     let mut settings = Settings::default();
     settings.injection.synchronous.flux_saliency = 0.0;
@@ -139,7 +139,7 @@ fn with_a_flux_that_moves_the_speed_is_found_too() {
     }
 }
 
-/// The current turns the saliency's axis with it: sigma L_s (1 + share) along the current.
+/// The axis of the saliency rotates with the current: sigma L_s (1 + share) along the current.
 #[test]
 fn the_saliency_is_taken_into_account() {
     let (mut settings, mut machine) = plain();
@@ -168,7 +168,7 @@ fn it_speaks_after_three_seconds_and_again_three_seconds_after_a_transient() {
         );
         bench.online = Online::new(&settings).unwrap();
     }
-    // 0.175 A, a quarter of the magnetising current, do so too; in either axis.
+    // A change of 0.175 A, a quarter of the magnetising current, also counts as another machine, in either axis.
     for (step, steady) in [(0.17, true), (0.2, false)] {
         for axis in [Dq::new(1.0, 0.0), Dq::new(0.0, -1.0)] {
             let mut bench = Bench::new(&settings, machine);
@@ -187,13 +187,13 @@ fn it_speaks_after_three_seconds_and_again_three_seconds_after_a_transient() {
 #[test]
 fn poor_excitation_and_lost_samples_give_no_estimate() {
     let (settings, machine) = plain();
-    // No torque, no current in the rotor.
+    // Without torque there is no current in the rotor.
     let mut bench = Bench::new(&settings, machine);
     (bench.voltage, bench.omega) = bench.machine.settle(Complex64::new(0.7, 0.0));
     for _ in 0..60 {
         assert!(bench.call(known()).is_err());
     }
-    // 75 samples of 8 periods that were not used: a voltage beyond what the dc link can have.
+    // More than 75 samples of 8 periods are not used, because of a voltage beyond the largest dc link.
     for (lost, enough) in [(560, true), (610, false)] {
         let mut bench = Bench::new(&settings, machine);
         bench.calls(40, known()).unwrap();
@@ -204,7 +204,7 @@ fn poor_excitation_and_lost_samples_give_no_estimate() {
         let found = bench.online.refine(CURRENT, known());
         assert_eq!(found.err(), (!enough).then_some(NoEstimate::PoorExcitation), "{lost}");
     }
-    // Not a number: it begins anew.
+    // A value that is not a number restarts the estimation.
     for (bad, none) in [(AlphaBeta::new(f32::NAN, 0.0), AlphaBeta::ZERO)]
         .into_iter()
         .flat_map(|(a, b)| [(a, b), (b, a)])
@@ -244,12 +244,12 @@ fn estimates_out_of_range_are_refused() {
         let mut bench = Bench::new(&settings, machine);
         let seen: Vec<_> = (0..130).map(|_| bench.call(SpeedInput::Known(12.6)).err()).collect();
         assert!(seen.contains(&doubt), "{rotor} {stator}");
-        // (On its way to a resistance that is out of range, the fit passes others.)
+        // (On its way to a resistance out of range, the fit passes through valid ones.)
         assert!(doubt.is_none() || rotor == 1.0 || !seen.contains(&None), "{rotor} {stator}");
     }
 }
 
-/// The noise of the current scatters the estimates by about as much as they say themselves.
+/// The noise of the current scatters the estimates by about their own uncertainty.
 #[test]
 fn the_uncertainty_is_that_of_the_noise() {
     let (settings, machine) = plain();

@@ -1,5 +1,5 @@
-//! Declaration of settings: one row is the field with its default and documentation, the row of [`SETTINGS`](super::SETTINGS),
-//! and the rule that gives the value unless it is set.
+//! Declaration of settings. One row declares the field with its default and documentation, the row of
+//! [`SETTINGS`](super::SETTINGS), and the rule that gives the value unless it is set.
 
 /// Declares structures of settings and the table of all their rows. The rows of a structure of the control come first, as `=> [..];`.
 /// A structure is
@@ -23,9 +23,9 @@
 /// ];
 /// ```
 ///
-/// NUMBER is the setting's for life: a new one takes the next of `tests/numbers.txt`, wherever it stands. The kinds are those of
-/// `entry!`. A pure number, a word and a whole number have no unit; only `auto` has a rule, which becomes
-/// `Settings::rule`: the value that was set or, if none was, that of the rule.
+/// NUMBER never changes: a new setting takes the next number of `tests/numbers.txt`, wherever its row stands. The kinds are
+/// those of `entry!`. A pure number, a word and a whole number have no unit. Only `auto` has a rule, which becomes the function
+/// `Settings::rule`: it returns the value that was set or, if none was, the value of the rule.
 macro_rules! settings {
     (=> [$(
         #[doc = $first_help:literal]
@@ -93,7 +93,7 @@ macro_rules! settings {
     };
 }
 
-/// The function that gives the value in effect of a field with a rule.
+/// Declares the function that returns the value in effect of a field with a rule.
 macro_rules! rule {
     ($doc:expr, $rule:ident, [$($path:ident).*] $field:ident, $value:expr) => {
         #[doc = $doc]

@@ -1,4 +1,4 @@
-//! The design of the coefficients of the control step.
+//! Design of the coefficients of the control step.
 
 mod estimator;
 mod flying_start;
@@ -22,41 +22,42 @@ use drive_core::{
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
-/// Rated frequency, Hz, up to which 1 Hz counts as standing, 30 rpm of four poles; in proportion above it. An angle that is right to some
-/// degrees turns a shaft that nothing holds.
+/// Rated frequency, Hz, up to which a shaft below 1 Hz (30 rpm of four poles) counts as standing; above it the limit grows in proportion.
+/// An angle error of a few degrees turns a free shaft.
 const STANDING_OF_HZ: f32 = 60.0;
-/// Angle error, rad, that may push a free shaft while the lock is verified. A wrong lock pushes it ten times as hard.
+/// Angle error, rad, whose torque may push a free shaft while the lock is verified. A false lock pushes it ten times as hard.
 const PUSHING_ERROR: f32 = 0.1;
-/// Rotor time constants in which flux decays before the asymmetry is measured: the saliency, in its square, to 0.25 %.
+/// Rotor time constants for which the flux decays before the asymmetry is measured. The saliency, which is proportional to the
+/// square of the flux, decays to 0.25 %.
 const DECAY_T: f32 = 3.0;
 /// Time between two steps of the thermal loads, s.
 const THERMAL_S: f32 = Thermal::EVERY as f32 * PERIOD_S;
-/// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
-/// dissertation's motor, and 3 V beside the observer, which tracks the stator resistance.
+/// Allowed mean of the unexplained voltage in the flux frame, as a share of the allowed unexplained voltage: 6 V with
+/// the dissertation's motor, and 3 V with the observer, which tracks the stator resistance.
 const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
-/// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
-/// 18 A/s.
+/// Change of the q-axis current in an injection period above which the lock monitor pauses, with the dissertation's motor,
+/// A: 18 A/s.
 const MOVED_A: f32 = 0.03;
 /// Largest accepted offset of a current sensor with the dissertation's sensors, A.
 const LARGEST_OFFSET_A: f32 = 0.2;
-/// Largest mean sum of three phase currents with the dissertation's sensors, A: 7 % of the range.
+/// Largest mean sum of the three phase currents with the dissertation's sensors, A: 7 % of the range.
 const LARGEST_SUM_A: f32 = 0.3;
-/// Sampling time of the converters, s, rounded up: the shunts are connected for so long before the sample, and as long
-/// after it for the third current.
+/// Sampling time of the ADCs, s, rounded up. The shunts must be connected for this time before the sample, and for the
+/// same time after it for the third current.
 const SHUNT_SAMPLING_S: f32 = 1e-6;
 /// Peak current of the pulses of the wiring check with the dissertation's motor, A.
 const WIRING_A: f32 = 0.2;
-/// Its margin for noise with the dissertation's sensors, A.
+/// Margin of the wiring check for noise with the dissertation's sensors, A.
 const WIRING_NOISE_A: f32 = 0.05;
-/// Largest voltage of its pulses, V, and largest test voltage of an axis, at 311 V.
+/// Largest voltage of the pulses of the wiring check, V, and largest test voltage of an axis, with 311 V.
 const LARGEST_TEST_V: f32 = 60.0;
 
 impl Settings {
     /// Checks every value and runs the design rules.
     ///
     /// # Errors
-    /// The first value outside its range, by name, with the range; or why a design rule cannot be
-    /// met.
+    /// The first value outside its range, by name, with the range; or the reason why a design rule
+    /// cannot be met.
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         self.check()?;
         let m = &self.motor;
@@ -88,7 +89,7 @@ impl Settings {
         let largest_test_v = self.share_of_dc_link(LARGEST_TEST_V);
         let (dead_time_s, carrier_s) = (self.inverter.dead_time_s, self.inverter.carrier_s());
         let dead_time = DeadTime::new(dead_time_s, carrier_s, self.full_compensation_a());
-        // Pulses of twice the voltage that the dead time takes, over the two periods of the shortest one.
+        // The pulses have twice the voltage error of the dead time, over the two periods of the shortest pulse.
         let pulse_vs = 4.0 * PERIOD_S * dead_time_s / carrier_s * self.inverter.dc_link_v;
         let leakage = Leakage {
             flux_saliency: 0.5 * self.slope().at_rest(),
@@ -124,7 +125,7 @@ impl Settings {
             injection_turn,
             injection_axis,
             lock_monitor: self.watches_lock().then(|| self.lock_monitor(carrier_a)),
-            // A sensorless start with the synchronous demodulation alone is checked.
+            // Only a sensorless start with the synchronous demodulation is checked.
             saliency_check: (t.check && tracks)
                 .then(|| SaliencyCheck::new(t.flux_saliency, m.tau_r())),
             noise_watch: (self.angle_source == AngleSource::Injection)
@@ -184,13 +185,13 @@ impl Settings {
         })
     }
 
-    /// The learning with these settings; they must be [valid](Self::check).
+    /// Returns the saliency self-commissioning with these settings, which must be [valid](Self::check).
     pub fn learning(&self) -> Learning {
         let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
         Learning::new(&self.motor, self.i_d(), self.current_limit_a(), self.grid(), synchronous)
     }
 
-    /// The choice of the phases, with three shunts.
+    /// Returns the selection of the phases to be used, with three shunts.
     fn shunts(&self) -> Option<Shunts> {
         let s = &self.scales;
         let window_s = self.inverter.dead_time_s + s.shunt_settle_s + SHUNT_SAMPLING_S;
@@ -199,7 +200,7 @@ impl Settings {
             .then(|| Shunts::new(s.current_c, window_s, largest_sum))
     }
 
-    /// `carrier_a` is the expected carrier current along the injection axis, A peak.
+    /// Returns the lock monitor; `carrier_a` is the expected injection current along the injection axis, A peak.
     fn lock_monitor(&self, carrier_a: f32) -> LockMonitor {
         let t = &self.injection.synchronous;
         let settings = LockMonitorSettings {
@@ -216,7 +217,7 @@ impl Settings {
         tuning::motor_plant(&self.motor.into(), f64::from(PERIOD_S))
     }
 
-    /// The design of the current controllers, d and q, with valid settings.
+    /// Designs the current controllers, d and q, with valid settings.
     ///
     /// # Errors
     /// The design rule that cannot be met.
@@ -230,7 +231,7 @@ impl Settings {
         Ok([design(d)?, design(q)?])
     }
 
-    /// The design of the speed and the position loop, with valid settings.
+    /// Designs the speed loop and the position loop, with valid settings.
     ///
     /// # Errors
     /// The design rule that cannot be met.
@@ -258,7 +259,7 @@ impl Settings {
         let leakage = f64::from(m.sigma_l_s() / (m.coupled_inductance() * self.i_d() * turns));
         let source = SpeedSource::Estimate { slip, leakage };
         let estimated = design(source, Motion::ESTIMATED)?;
-        // With little flux and much slip the loop of the counted angle is the faster one.
+        // With little flux and much slip the loop on the counted angle is the faster one.
         Ok(if estimated.gains.k_c > counted.gains.k_c { estimated } else { counted })
     }
 

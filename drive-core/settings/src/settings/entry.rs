@@ -1,4 +1,4 @@
-//! A row of a table of settings.
+//! Rows of a table of settings.
 
 use super::SettingsError;
 use super::value::{AUTO, Value, ValueError, number as parsed};
@@ -6,29 +6,30 @@ use super::value::{AUTO, Value, ValueError, number as parsed};
 /// When a changed setting takes effect, and who may change it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Anybody, while the outputs are off; at once.
+    /// Anybody may change it while the outputs are off, and it takes effect at once.
     WhileOff,
-    /// Anybody, while the outputs are off; from the next reset on, once saved: the hardware locks it until then.
+    /// Anybody may change it while the outputs are off. It takes effect at the next reset, if it was saved, because the hardware
+    /// locks it until then.
     FromReset,
-    /// Only the code of the board: a property of its hardware.
+    /// Only the code of the board sets it, since it is a property of its hardware.
     Board,
 }
 
-/// How a bus master may change a setting that protects the drive or people. The console may set any value in its range.
+/// Changes that a bus master may make to a setting that protects the drive or people. The console may set any value in its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
-    /// Change it: it protects nothing.
+    /// Any change, since the setting protects nothing.
     None,
-    /// Make it smaller, or, of words, choose an earlier one: larger ones are looser.
+    /// A smaller value or an earlier word only, since larger values are looser.
     Lower,
-    /// Make it larger, or, of words, choose a later one: smaller ones are looser.
+    /// A larger value or a later word only, since smaller values are looser.
     Raise,
-    /// Nothing: it says what is there.
+    /// No change, since the setting describes the hardware that is there.
     Keep,
 }
 
 impl Guard {
-    /// Whether a level protects as well as another one. One that is not a number never does.
+    /// Whether `level` protects at least as well as `bound`. NaN never does.
     pub fn holds(self, level: f32, bound: f32) -> bool {
         match self {
             Self::None => true,
@@ -39,9 +40,9 @@ impl Guard {
     }
 }
 
-/// A setting of the settings `S`: number, name, unit, help, range, and the way to its value.
+/// A setting of the structure `S`: number, name, unit, help, range, and access to its value.
 pub struct Entry<S: 'static> {
-    /// Its number for life: in the flash, and of its registers on the bus. No other setting ever gets it.
+    /// Number of the setting in the flash and of its registers on the bus. It never changes, and no other setting ever gets it.
     pub id: u16,
     /// Name at the console and in files.
     pub name: &'static str,
@@ -51,25 +52,25 @@ pub struct Entry<S: 'static> {
     pub help: &'static str,
     /// Who may change it, and when.
     pub change: Change,
-    /// Whether learned values hold for this value only.
+    /// Whether learned values are valid for this value only.
     pub learned: bool,
     /// Whether the power stage is at stake: a protection or the scale of its sensor.
     pub hardware: bool,
-    /// Whether it protects, and what may be done to it from elsewhere than the console.
+    /// Whether the setting protects, and which changes are allowed from elsewhere than the console.
     pub guard: Guard,
     access: Access<S>,
     range: Range<S>,
 }
 
-/// The way to a value: the function that reads it, and the one that writes it.
+/// Access to a value: the function that reads it, and the function that writes it.
 pub enum Access<S> {
     /// A number.
     Number(fn(&S) -> f32, fn(&mut S, f32)),
-    /// A number that follows a rule while it is `None`; the third function reads the number in effect.
+    /// A number that follows a rule while it is `None`. The third function reads the number in effect.
     Auto(fn(&S) -> Option<f32>, fn(&mut S, Option<f32>), fn(&S) -> f32),
-    /// A whole number, which is written up to the largest of the range.
+    /// A whole number, which is limited to the largest value of the range when it is written.
     Whole(fn(&S) -> u32, fn(&mut S, u32)),
-    /// One of these words by its place among them; see [`Words`](super::value::Words).
+    /// One of these words, as its position among them; see [`Words`](super::value::Words).
     Word(fn(&S) -> usize, fn(&mut S, usize), &'static [&'static str]),
 }
 
@@ -80,7 +81,7 @@ enum Range<S> {
 }
 
 impl<S> Entry<S> {
-    /// A setting that anybody may change while the outputs are off. Give a number its range, too.
+    /// Creates a setting that anybody may change while the outputs are off. A number also needs its range.
     pub const fn new(
         id: u16,
         name: &'static str,
@@ -94,43 +95,43 @@ impl<S> Entry<S> {
         Self { id, name, unit, help, change, learned, hardware, guard, access, range }
     }
 
-    /// Accepted from `min` to `max`, both included.
+    /// Accepts values from `min` to `max`, both included.
     pub const fn from_to(mut self, min: f32, max: f32) -> Self {
         self.range = Range::Fixed(min, max);
         self
     }
 
-    /// Accepted in a range that depends on other settings.
+    /// Accepts values in a range that depends on other settings.
     pub const fn beside(mut self, range: fn(&S) -> (f32, f32)) -> Self {
         self.range = Range::Beside(range);
         self
     }
 
-    /// Learned values hold for this value only.
+    /// Declares that learned values are valid for this value only.
     pub const fn learned(mut self) -> Self {
         self.learned = true;
         self
     }
 
-    /// A wrong value may damage the power stage.
+    /// Declares that a wrong value may damage the power stage.
     pub const fn hardware(mut self) -> Self {
         self.hardware = true;
         self
     }
 
-    /// It protects: from elsewhere than the console it can only be tightened.
+    /// Declares that the setting protects: from elsewhere than the console it can only be tightened.
     pub const fn guarded(mut self, guard: Guard) -> Self {
         self.guard = guard;
         self
     }
 
-    /// Changed by others, or at another time.
+    /// Declares who may change the setting, or when.
     pub const fn changed(mut self, change: Change) -> Self {
         self.change = change;
         self
     }
 
-    /// The value.
+    /// Returns the value.
     pub fn get(&self, settings: &S) -> Value {
         match self.access {
             Access::Number(get, _) => Value::Number(get(settings)),
@@ -142,7 +143,7 @@ impl<S> Entry<S> {
         }
     }
 
-    /// The number in effect: that of the rule for `auto`; `None` for a word.
+    /// Returns the number in effect, which is the number of the rule for `auto`; `None` for a word.
     pub fn number(&self, settings: &S) -> Option<f32> {
         match self.access {
             Access::Number(get, _) => Some(get(settings)),
@@ -152,7 +153,7 @@ impl<S> Entry<S> {
         }
     }
 
-    /// The number in effect; of a word its place.
+    /// Returns the number in effect, or the position of a word.
     pub fn level(&self, settings: &S) -> f32 {
         match self.access {
             Access::Word(get, ..) => get(settings) as f32,
@@ -177,7 +178,7 @@ impl<S> Entry<S> {
         }
     }
 
-    /// The value that a text stands for.
+    /// Returns the value that a text stands for.
     ///
     /// # Errors
     /// The text is not a value of this setting.
@@ -187,7 +188,7 @@ impl<S> Entry<S> {
             Access::Auto(..) if text == AUTO => Ok(Value::Auto),
             Access::Auto(..) => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
             Access::Whole(..) => {
-                // Larger ones may not fit the type of the setting.
+                // Larger numbers may not fit the type of the setting.
                 let Range::Fixed(_, max) = self.range else { return Err(ValueError::Whole(0)) };
                 let max = max as u32;
                 let value = text.parse().ok().filter(|value| *value <= max);
@@ -208,7 +209,7 @@ impl<S> Entry<S> {
         self.check_in(self.range(settings), settings)
     }
 
-    /// The same against another range, `(min, max)`: that of a board may be narrower.
+    /// Checks the value in effect against another range, `(min, max)`; the range of a board may be narrower.
     ///
     /// # Errors
     /// [`SettingsError::Range`].
@@ -222,7 +223,7 @@ impl<S> Entry<S> {
         holds.then_some(()).ok_or(outside)
     }
 
-    /// The range beside the present settings, `(min, max)`; `None` for a word.
+    /// Returns the range with the present settings, `(min, max)`; `None` for a word.
     pub fn range(&self, settings: &S) -> Option<(f32, f32)> {
         match (&self.access, &self.range) {
             (Access::Word(..), _) => None,
@@ -231,7 +232,7 @@ impl<S> Entry<S> {
         }
     }
 
-    /// The words that may be set; none for a number.
+    /// Returns the words that may be set; none for a number.
     pub fn words(&self) -> &'static [&'static str] {
         if let Access::Word(.., words) = self.access { words } else { &[] }
     }
@@ -241,15 +242,15 @@ impl<S> Entry<S> {
         matches!(self.access, Access::Auto(..))
     }
 
-    /// Whether two sets of settings have the same value in effect. A value that is not a number is never the same.
+    /// Whether two sets of settings have the same value in effect. NaN is never the same.
     pub fn same(&self, one: &S, other: &S) -> bool {
         let in_effect = |settings| self.number(settings).map_or(self.get(settings), Value::Number);
         in_effect(one) == in_effect(other)
     }
 }
 
-/// A row of a table: number for life, kind with unit, name, path to the structure and field in it with its type, help. `Settings` is the type
-/// of this name where the table is.
+/// Declares a row of a table: permanent number, kind with unit, name, path to the structure, field in it with its type, and help.
+/// `Settings` is the type with this name in the module of the table.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry {
@@ -264,7 +265,7 @@ macro_rules! entry {
         ), $help)
     };
     ($id:literal: whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
-        // The range is within the type: see `parse`.
+        // The range is within the range of the type, see `parse`.
         Entry::new($id, $name, "", Access::Whole(
             |s: &Settings| s.$($path.)*$field as u32, |s, value| s.$($path.)*$field = value as $type
         ), $help)

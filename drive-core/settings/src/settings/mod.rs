@@ -1,7 +1,7 @@
 //! Settings in SI units.
 //!
-//! [`Settings::build`] makes [`Coefficients`](drive_core::Coefficients) of them, outside the interrupt: it checks every
-//! value against its range and runs the design rules. [`Settings::default`] is the drive of the
+//! [`Settings::build`] computes the [`Coefficients`](drive_core::Coefficients) from them, outside the interrupt: it
+//! checks every value against its range and runs the design rules. [`Settings::default`] is the drive of the
 //! dissertation.
 
 mod declare;
@@ -32,7 +32,7 @@ pub use list::{
 words! {
     /// Sensors of the phase currents.
     pub enum CurrentSensors {
-        /// Two, in the lines a and b.
+        /// Two sensors, in the lines a and b.
         InLine = "in-line",
         /// Three shunts below the low sides.
         LowSide = "low-side",
@@ -40,33 +40,33 @@ words! {
 }
 
 words! {
-    /// Rates at which the legs switch, kHz.
+    /// Switching frequencies, kHz.
     pub enum Carrier {
-        /// One pulse in a control period.
+        /// One pulse per control period.
         Khz6 = "6",
-        /// Two.
+        /// Two pulses.
         Khz12 = "12",
-        /// Three.
+        /// Three pulses.
         Khz18 = "18",
     }
 }
 
 impl Carrier {
-    /// Pulses of a leg in a control period.
+    /// Returns the pulses of a leg in a control period.
     pub const fn pulses(self) -> u16 {
         self as u16 + 1
     }
 }
 
 impl Inverter {
-    /// Period at which the legs switch, s.
+    /// Returns the switching period, s.
     pub fn carrier_s(&self) -> f32 {
         PERIOD_S / f32::from(self.carrier_khz.pulses())
     }
 }
 
 words! {
-    /// The plant that the current controllers are designed for.
+    /// Plants for which the current controllers can be designed.
     pub enum PlantSource {
         /// First-order plants identified on the motor with the filters in place (section 3.7).
         Identified = "identified",
@@ -91,12 +91,13 @@ words! {
 }
 
 words! {
-    /// The flux that the drive magnetises the motor with.
+    /// Flux with which the drive magnetises the motor.
     pub enum Flux {
-        /// That of the dissertation, 15 % of the rated flux of its motor, with the current limit and trip of its drive.
+        /// The flux of the dissertation, 15 % of the rated flux of its motor, with the current limit and trip of its drive.
         Low = "low",
-        /// The rated flux, or that of 0.707 times the rated current where it is smaller: a motor of iron can be tracked with it
-        /// where it hardly has a saliency at the low one, and current limit and trip are those of 150 % of the rated torque.
+        /// The rated flux, or the flux of 0.707 times the rated current if that is smaller. A motor that saturates can be
+        /// tracked with this flux even if it has hardly any saliency at the low one. Current limit and trip allow 150 % of the
+        /// rated torque.
         High = "high",
     }
 }
@@ -110,28 +111,29 @@ words!(DemodulatorKind {
     Envelope = "envelope",
 });
 
-/// Why shunts below the low sides are sampled in one zero vector and at 6 kHz, and why a demodulation is not there.
+/// Reasons why shunts below the low sides are sampled in one zero vector and at 6 kHz only, and why a demodulation is missing.
 const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
 const SLOW: &str = "shunts below the low sides settle too slowly for shorter pulses; set it to 6";
 const ABSENT: &str = "this image is built with synchronous alone";
 
 impl Scales {
-    /// Calibration of a current by its code, from that by one conversion: the code is the sum of both conversions.
+    /// Returns the calibration of a current by its ADC counts from the calibration `line` of one conversion. With both zero vectors
+    /// the counts are the sum of two conversions.
     pub fn of_code(&self, line: Line) -> Line {
         Line { gain: if self.both_zero_vectors { 0.5 } else { 1.0 } * line.gain, ..line }
     }
 }
 
 impl Settings {
-    /// Age of the currents at the top of the counter, s: the delay of their filters; the mean of both zero vectors is a quarter
-    /// of a period of the legs older.
+    /// Returns the age of the currents at the top of the counter, s: the delay of their filters. The mean of both zero vectors
+    /// is a quarter of a switching period older.
     pub fn current_age_s(&self) -> f32 {
         let both = if self.scales.both_zero_vectors { 0.25 } else { 0.0 };
         self.scales.current_delay_s + both * self.inverter.carrier_s()
     }
 
-    /// Checks the words, and every value against its range, the scales first: the rules of others follow from the
-    /// sensors' range.
+    /// Checks the words, and every value against its range. The scales come first, since the rules of other
+    /// settings follow from the sensors' range.
     ///
     /// # Errors
     /// [`SettingsError::Word`], or [`SettingsError::Range`] with the first value outside its range.
@@ -141,8 +143,8 @@ impl Settings {
         scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
     }
 
-    /// Checks that there is code of the demodulation in a build that has that of all, or of the synchronous one alone, and that
-    /// the sensors see what they are to.
+    /// Checks that the build contains the demodulation (`has_all`: it contains all, otherwise the synchronous one alone), and
+    /// that the sensors can measure in the way that is set.
     pub(crate) fn check_words(&self, has_all: bool) -> Result<(), SettingsError> {
         if self.scales.both_zero_vectors && self.scales.sensors == CurrentSensors::LowSide {
             return Err(SettingsError::Word("scales.both_zero_vectors", true.word(), BLIND));
@@ -157,7 +159,7 @@ impl Settings {
         present.then_some(()).ok_or(absent)
     }
 
-    /// The first setting, by name, for whose value results learned with the settings `other` are not valid.
+    /// Returns the name of the first setting for whose value results learned with the settings `other` are not valid.
     pub fn learned_with_another(&self, other: &Self) -> Option<&'static str> {
         let differing = SETTINGS.iter().find(|entry| entry.learned && !entry.same(self, other));
         differing.map(|entry| entry.name)
@@ -166,13 +168,13 @@ impl Settings {
 
 /// The reason why settings were refused.
 ///
-/// Exhaustive on purpose: who translates a reason has to translate a new one.
+/// Exhaustive on purpose, so that code that translates the reasons also has to translate a new one.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// A value outside its range.
     #[error(
         "{name} = {value}: allowed is {}{min} to {max}{}{unit}",
-        // NaN counts as none.
+        // A NaN limit counts as an empty range.
         if .min <= .max { "" } else { "nothing beside other settings: " },
         if .unit.is_empty() { "" } else { " " }
     )]
@@ -183,12 +185,12 @@ pub enum SettingsError {
         unit: &'static str,
         /// The value.
         value: f32,
-        /// Smallest allowed.
+        /// Smallest allowed value.
         min: f32,
-        /// Largest allowed.
+        /// Largest allowed value.
         max: f32,
     },
-    /// A setting by its name, its word, which this build or this board does not allow, and why.
+    /// Name of a setting, its word, which this build or this board does not allow, and the reason.
     #[error("{0} = {1}: {2}")]
     Word(&'static str, &'static str, &'static str),
     /// The design of the controllers failed.

@@ -1,4 +1,4 @@
-//! The temperature sensor of the motor: the resistance from ground to the input, by the divider with `motor.sensor_ohm`.
+//! The temperature sensor of the motor. Its resistance, from ground to the input, follows from the divider with `motor.sensor_ohm`:
 //!
 //! ```text
 //! pt1000   R = 1000 ohm (1 + 3.9083e-3 T - 5.775e-7 T^2)                  IEC 60751, without its cubic term: 0.01 K at -40 degC
@@ -6,21 +6,21 @@
 //! ntc-10k  R = 10 kohm exp(3435 K (1/T - 1/T_25))                         B parameter, as that of the heat sink
 //! ```
 //!
-//! Beyond the resistances of -40 and 200 degC the sensor is open or shorted.
+//! A sensor whose resistance is outside the range from -40 to 200 degC is open or shorted.
 
 use super::ntc::{COLDEST_C, HOTTEST_C};
 use super::{MotorSensor, Ntc, SensorKind};
 use drive_core::{CONVERTER_CODES, Fault};
 
 impl MotorSensor {
-    /// Temperatures from which on the torque falls and at which there is none, °C, if there is a sensor.
+    /// Returns the temperatures at which the torque begins to fall and at which it is zero, °C, if there is a sensor.
     pub(super) fn limits(&self) -> Option<[u8; 2]> {
         let from = self.sensor_trip_c.saturating_sub(self.sensor_band_k);
         (self.sensor != SensorKind::None).then_some([from, self.sensor_trip_c])
     }
 
-    /// Temperature at a code of the converter of 12 bits, °C; `None` without a sensor. A converter that gives no code is no sensor
-    /// that can be believed.
+    /// Returns the temperature at the reading `code` of the 12-bit ADC, °C; `None` without a sensor. If the ADC gives no reading,
+    /// the sensor cannot be trusted.
     ///
     /// # Errors
     /// [`Fault::MotorSensorOpen`], [`Fault::MotorSensorShorted`] or [`Fault::MotorSensorUnread`].
@@ -59,9 +59,9 @@ impl MotorSensor {
 mod tests {
     use super::*;
 
-    /// A sensor, resistances at temperatures, °C and ohm, and the tolerance, K.
+    /// A sensor, its resistances over temperature, °C and ohm, and the tolerance, K.
     type Table = (SensorKind, &'static [(f32, f32)], f32);
-    /// IEC 60751 for 1000 ohm, the data sheet of KTY84-130, and the formula of the B parameter.
+    /// Tables from IEC 60751 for 1000 ohm, the data sheet of KTY84-130, and the formula of the B parameter.
     const TABLES: [Table; 3] = [
         (
             SensorKind::Pt1000,
@@ -109,7 +109,7 @@ mod tests {
                     let code =
                         libm::roundf(f32::from(CONVERTER_CODES) * ohm / (ohm + sensor_ohm)) as u16;
                     let found = motor.celsius(Some(code)).unwrap().unwrap();
-                    // A code of the cold thermistor beside 1 kohm is 5 K.
+                    // One ADC count of the cold thermistor with 1 kohm is 5 K.
                     let coarse = if ohm > 20.0 * sensor_ohm { 7.0 } else { tolerance };
                     assert!((found - celsius).abs() < coarse, "{sensor:?} {celsius}: {found}");
                 }
@@ -118,7 +118,7 @@ mod tests {
                 let (low, high) = (Fault::MotorSensorShorted, Fault::MotorSensorOpen);
                 assert_eq!(motor.celsius(Some(0)), Some(Err(low)), "{sensor:?}");
                 assert_eq!(motor.celsius(Some(4095)), Some(Err(high)), "{sensor:?}");
-                // One band of believable codes, in which the temperature has one direction.
+                // There is one band of plausible ADC counts, in which the temperature is monotonic.
                 let mut before = f32::NAN;
                 let mut passed = 0;
                 for code in 0..=4095 {

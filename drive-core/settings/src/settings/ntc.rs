@@ -10,13 +10,13 @@ use drive_core::protect::HeatSink;
 const T_25: f32 = 298.15;
 /// 0 °C, K.
 const T_0: f32 = 273.15;
-/// Coldest and hottest believable heat sink and motor, °C: beyond them the sensor is open or shorted.
+/// Coldest and hottest plausible heat sink and motor, °C. Beyond them the sensor is open or shorted.
 pub(super) const COLDEST_C: f32 = -40.0;
 pub(super) const HOTTEST_C: f32 = 200.0;
 
 impl Ntc {
-    /// Temperature at a code, °C, within 0.1 °C of the formula from -40 to 150 °C; for telemetry. Codes at either end
-    /// of the range give the temperature of the next code.
+    /// Returns the temperature at the ADC counts `code`, °C, for telemetry. It is within 0.1 °C of the formula from
+    /// -40 to 150 °C. Counts at either end of the range give the temperature of the next count.
     pub fn celsius(&self, code: u16) -> f32 {
         let code = f32::from(code.clamp(1, CONVERTER_CODES - 1));
         let other = f32::from(CONVERTER_CODES) - code;
@@ -24,7 +24,7 @@ impl Ntc {
         1.0 / (1.0 / T_25 + ln(self.divider_ohm * ratio / self.ohm_25) / self.beta_k) - T_0
     }
 
-    /// The code at a temperature, °C.
+    /// Returns the ADC counts at a temperature, °C.
     pub fn code(&self, celsius: f32) -> u16 {
         let inverse = 1.0 / f64::from(celsius + T_0) - 1.0 / f64::from(T_25);
         let ohms = f64::from(self.ohm_25) * libm::exp(f64::from(self.beta_k) * inverse);
@@ -33,13 +33,13 @@ impl Ntc {
         libm::round(share * f64::from(CONVERTER_CODES)) as u16
     }
 
-    /// Smallest and largest code between the coldest believable temperature and `limit_c`, °C.
+    /// Returns the smallest and largest ADC counts between the coldest plausible temperature and `limit_c`, °C.
     pub fn window(&self, limit_c: f32) -> (u16, u16) {
         let (cold, hot) = (self.code(COLDEST_C), self.code(limit_c));
         if self.to_ground { (hot, cold) } else { (cold, hot) }
     }
 
-    /// Checks of a heat sink whose limits begin at `derate_c` and end at `limit_c`, °C.
+    /// Returns the checks of a heat sink whose derating begins at `derate_c` and ends at `limit_c`, °C.
     pub fn checks(&self, derate_c: f32, limit_c: f32) -> HeatSink {
         let (hot, from) = (f32::from(self.code(limit_c)), f32::from(self.code(derate_c)));
         HeatSink {
@@ -47,13 +47,14 @@ impl Ntc {
             hot_is_low: self.to_ground,
             shorted: self.code(HOTTEST_C),
             hot,
-            // Equal codes of two settings that are too close: no band.
+            // Two settings that are too close have equal counts, and there is no band.
             per_code: if hot == from { f32::MAX } else { 1.0 / (hot - from) },
         }
     }
 }
 
-/// Logarithm by micromath, within 1e-4. It errs by up to 0.08 below one, where it takes an approximate inverse.
+/// Returns the logarithm by micromath, within 1e-4. Below one, micromath takes an approximate inverse and is off by up to 0.08, so
+/// the argument is inverted here.
 fn ln(x: f32) -> f32 {
     if x < 1.0 { -F32(1.0 / x).ln().0 } else { F32(x).ln().0 }
 }
@@ -67,7 +68,7 @@ mod tests {
     const LOW: Ntc =
         Ntc { ohm_25: 10_000.0, beta_k: 3950.0, divider_ohm: 10_000.0, to_ground: true };
 
-    /// The formula in double precision, for every code.
+    /// Compares with the formula in double precision, for every ADC count.
     #[test]
     fn the_temperature_is_within_a_tenth_of_a_degree() {
         for ntc in [Ntc::default(), LOW, Ntc { ohm_25: 47_000.0, beta_k: 4050.0, ..LOW }] {
@@ -84,7 +85,7 @@ mod tests {
         }
     }
 
-    /// At 25 °C the divider is plain arithmetic: 4.7/14.7 and 10/20 of 4095.
+    /// At 25 °C the divider is simple: 4.7/14.7 and 10/20 of 4095.
     #[test]
     fn codes_and_temperatures_belong_together() {
         assert_eq!(Ntc::default().code(25.0), 1309);
@@ -92,7 +93,7 @@ mod tests {
         for celsius in [-20.0, 0.0, 25.0, 60.0, 85.0, 100.0] {
             for ntc in [Ntc::default(), LOW] {
                 let error = ntc.celsius(ntc.code(celsius)) - celsius;
-                // Half a code is 0.15 °C at most in this range.
+                // Half an ADC count is 0.15 °C at most in this range.
                 assert!(error.abs() < 0.3, "{celsius}: {error}");
             }
         }
@@ -100,7 +101,8 @@ mod tests {
         assert!(LOW.window(85.0).0 < LOW.window(85.0).1);
     }
 
-    /// Straight with the temperature but for the curve of the divider; whole below, none at the limit.
+    /// The share falls linearly with the temperature except for the curve of the divider: all of the current below, none at the
+    /// limit.
     #[test]
     fn the_current_falls_between_the_two_temperatures() {
         for ntc in [Ntc::default(), LOW] {

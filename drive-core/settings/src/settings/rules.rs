@@ -1,9 +1,9 @@
 //! The rules: settings that follow from the nameplate, the motor, the sensors' range and the dc link, unless they are
 //! set.
 //!
-//! Each rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it
-//! depends on. On that motor the rules give these numbers back. With `sequence.flux` high, current limit and direct current follow
-//! the torque instead: [`Settings::current_limit_a`], [`Settings::i_d`].
+//! Each rule scales a number that was tried on the dissertation's motor and board in proportion to the quantity on which it
+//! depends. For that motor the rules return these numbers. With `sequence.flux` high, the current limit and the d-axis current
+//! follow from the torque instead: [`Settings::current_limit_a`], [`Settings::i_d`].
 //!
 //! | setting | on the dissertation's motor | in proportion to |
 //! |---|---|---|
@@ -25,8 +25,8 @@
 //! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
-//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range, and what the power stage stands |
-//! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the voltages that trip |
+//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range, and the board's limit |
+//! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the trip voltages |
 //! | `braking.flux_a` | 1 A | rated current; at most 0.998 of `limits.current_a` |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
 //! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
@@ -44,58 +44,59 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{AngleSource, CONVERTER_CODES, FirstOrder, Line, Motor, PERIOD_S, SQRT_3};
 
-/// Carrier current per direct current.
+/// Injection current per d-axis current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
-/// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
-/// overshoot.
+/// Largest injection current, as a share of the difference between the trip and the current limit. The rest is for
+/// noise and overshoot.
 const CARRIER_OF_ROOM: f32 = 0.75;
-/// With high flux: torque at the current limit, as a share of the rated one. 150 % for a minute is what frequency converters give;
-/// the rest is for the angle's error and a warmer motor.
+/// Torque at the current limit with high flux, as a share of the rated torque. Frequency converters give 150 % for a minute; the
+/// rest is for the angle error and a warmer motor.
 const OVERLOAD: f32 = 1.55;
-/// The same: current limit at most, in rated currents, so that a circuit that needs more does not ask too much of motor and inverter.
+/// Largest current limit with high flux, in rated currents, so that a circuit that needs more does not overload motor and inverter.
 const LIMIT_OF_RATED: f32 = 1.6;
-/// The same: current limit per trip. What it leaves bears the carrier, whose current grows by 14 % and more as the leakage
-/// saturates (0.814 tripped in 27 of 36 learnings with iron), the noise, and overshoot of a step.
+/// Current limit per trip current with high flux. The rest is for the injection, whose current grows by 14 % and more as
+/// the leakage saturates, for the noise, and for the overshoot of a step. (0.814 tripped in 27 of 36 self-commissionings
+/// of motors that saturate.)
 const LIMIT_OF_TRIP: f32 = 0.76;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
-/// Frequency of the carrier, Hz.
+/// Injection frequency, Hz.
 pub const CARRIER_HZ: f32 = 600.0;
 
-/// Quantities that the rules are in proportion to.
+/// Quantities to which the rules are proportional.
 impl Settings {
-    /// Rated current, A peak.
+    /// Returns the rated current, A peak.
     pub fn rated_a(&self) -> f32 {
         SQRT_2 * self.nameplate.current_a
     }
 
-    /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
+    /// Returns a current in proportion to the rated current, which is `on_reference`, A, for the dissertation's motor.
     pub fn share_of_rated(&self, on_reference: f32) -> f32 {
         on_reference / RATED_A * self.rated_a()
     }
 
-    /// A current that is `on_reference`, A, with the dissertation's sensors, in proportion to the sensors' range: for
-    /// thresholds above noise and steps of the converter.
+    /// Returns a current in proportion to the sensors' range, which is `on_reference`, A, with the dissertation's
+    /// sensors. It is meant for thresholds above noise and ADC steps.
     pub fn share_of_range(&self, on_reference: f32) -> f32 {
         on_reference / -Line::CHANNEL_A.offset * self.sensor_range_a()
     }
 
-    /// A voltage that is `on_reference`, V, with the dissertation's inverter, in proportion to the dc link: for what
-    /// dead time and drop of the inverter cause.
+    /// Returns a voltage in proportion to the dc link, which is `on_reference`, V, with the dissertation's inverter.
+    /// It is meant for effects of the inverter voltage error.
     pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
         on_reference / Inverter::DEFAULT.dc_link_v * self.inverter.dc_link_v
     }
 
-    /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
+    /// Returns the mechanical speed at the same electrical frequency as `on_reference` with the dissertation's pole pairs.
     pub(super) fn share_of_poles(&self, on_reference: f32) -> f32 {
         on_reference * f32::from(Motor::DEFAULT.pole_pairs) / f32::from(self.motor.pole_pairs)
     }
 
-    /// Largest phase current that all sensors can measure in both directions, A.
+    /// Returns the largest phase current that all sensors can measure in both directions, A.
     pub fn sensor_range_a(&self) -> f32 {
         let s = &self.scales;
         let end = |line: Line| {
-            // A negative gain has the positive end at code 0.
+            // With a negative gain, the positive end is at 0 ADC counts.
             let (zero, full) = (line.offset, line.at(s.full_scale));
             if line.gain < 0.0 { f32::min(zero, -full) } else { f32::min(-zero, full) }
         };
@@ -106,20 +107,20 @@ impl Settings {
         }
     }
 
-    /// Largest dc link that the converter can measure, V.
+    /// Returns the largest dc link that the ADC can measure, V.
     pub fn dc_link_range_v(&self) -> f32 {
         self.scales.dc_link.at(CONVERTER_CODES)
     }
 
-    /// Speed above which the drive trips, rpm: that of the shaft's limit, or of the range in which the injection alone tracks
-    /// the angle.
+    /// Returns the speed above which the drive trips, rpm: the limit of the shaft, or the end of the range in which the
+    /// injection alone tracks the angle.
     pub fn highest_rpm(&self) -> f32 {
         let alone = self.tracks_synchronously() && !self.uses_observer();
         let tracked = if alone { self.tracked_rpm() } else { f32::INFINITY };
         f32::min(tracked, self.speed_trip_rpm())
     }
 
-    /// A mechanical speed, rpm, in electrical turns per control period.
+    /// Converts a mechanical speed, rpm, to electrical turns per control period.
     pub(crate) fn freq_of_rpm(&self, rpm: f32) -> f32 {
         rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
     }
@@ -135,33 +136,34 @@ impl Settings {
         self.tracks_synchronously() && self.injection.synchronous.monitor
     }
 
-    /// Whether the observer takes the angle over from the injection at speed.
+    /// Whether the back-EMF observer takes over from the injection at speed.
     pub(crate) fn uses_observer(&self) -> bool {
         self.tracks_synchronously() && self.observer.enabled
     }
 }
 
 impl Nameplate {
-    /// Rated torque, Nm: power over speed.
+    /// Returns the rated torque, Nm: power over speed.
     pub fn torque_nm(&self) -> f32 {
         self.power_w / (self.speed_rpm * TAU / 60.0)
     }
 
-    /// Base impedance of a phase, ohm.
+    /// Returns the base impedance of a phase, ohm.
     pub fn base_impedance(&self) -> f32 {
         self.voltage_v / (SQRT_3 * self.current_a)
     }
 }
 
-/// Rules and ranges that take more than a line.
+/// Rules and ranges that are longer than a line.
 impl Settings {
-    /// Currents of both signs are measured: zero current lies between 5 % and 95 % of the codes.
+    /// Returns the range of the offset. Zero current lies between 5 % and 95 % of the ADC counts, so that currents of both signs
+    /// can be measured.
     pub(super) fn offset_range(&self, line: Line) -> (f32, f32) {
         let full = line.gain.abs() * f32::from(self.scales.full_scale);
         either_sign(-line.gain, 0.05 * full, 0.95 * full)
     }
 
-    /// Rule of `sequence.i_d`.
+    /// Returns `sequence.i_d` by its rule.
     pub(super) fn i_d_rule(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
@@ -169,20 +171,22 @@ impl Settings {
         }
     }
 
-    /// The most useful direct current beside a current limit, A: that of the rated flux, at most that of the largest torque per
-    /// rated current, and per limit. Torque is proportional to i_d i_q, which is largest where both are equal.
+    /// Returns the best d-axis current with a current limit, A: the current of the rated flux, at most the current of the
+    /// largest torque at the rated current and at the limit. Torque is proportional to i_d i_q, which is largest if both are
+    /// equal.
     fn useful_i_d(&self, limit_a: f32) -> f32 {
         let plate = &self.nameplate;
         let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
         f32::min(rated_flux / self.motor.l_m, self.largest_i_d(limit_a))
     }
 
-    /// Largest magnetising current beside a current limit, A: that of the largest torque per rated current, and per limit.
+    /// Returns the largest magnetising current with a current limit, A: the current of the largest torque at the rated current and
+    /// at the limit.
     pub fn largest_i_d(&self, limit_a: f32) -> f32 {
         FRAC_1_SQRT_2 * self.rated_a().min(limit_a)
     }
 
-    /// Current limit per trip.
+    /// Returns the current limit per trip current.
     pub(super) fn limit_of_trip(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => 0.814,
@@ -190,8 +194,8 @@ impl Settings {
         }
     }
 
-    /// The current limit by rule, A, where the trip allows it: the rated current at least, which the tests of the commissioning need
-    /// while the motor is not known.
+    /// Returns the current limit by rule, A, if the trip allows it. It is at least the rated current, which the tests of the
+    /// commissioning need while the motor is unknown.
     pub(super) fn wanted_limit_a(&self) -> f32 {
         match self.sequence.flux {
             Flux::Low => self.share_of_rated(3.5),
@@ -203,14 +207,15 @@ impl Settings {
         }
     }
 
-    /// Torque at rest, % of the rated one, of a direct current, A, and what a current limit, A, leaves beside it.
+    /// Returns the torque at rest, % of the rated torque, for a d-axis current, A, and the q-axis current that a current limit, A,
+    /// leaves.
     pub fn torque_pct(&self, i_d: f32, limit_a: f32) -> f32 {
         let i_q = libm::sqrtf((limit_a * limit_a - i_d * i_d).max(0.0));
         100.0 * self.motor.torque_per_ampere(i_d) * i_q / self.nameplate.torque_nm()
     }
 
-    /// The range of current sensors, A, that would not bind, and the torque at rest that it allows, % of the rated one, where the present
-    /// range limits the current.
+    /// Returns the range of current sensors, A, that would not be the limiting factor, and the torque at rest that it allows, % of the
+    /// rated torque; none if the present range does not limit the current.
     pub fn better_sensors(&self) -> Option<(f32, f32)> {
         let (limits, wanted) = (&self.limits, self.wanted_limit_a());
         let by_rule = limits.current_a.is_none() && limits.trip_a.is_none();
@@ -223,8 +228,8 @@ impl Settings {
             .then(|| (range_a, self.torque_pct(i_d, wanted)))
     }
 
-    /// Torque currents of the tables: up to the current limit with the dissertation's flux, else up to what it leaves beside the direct
-    /// current, so that the last point is the largest torque.
+    /// Returns the q-axis currents of the tables. With the dissertation's flux they go up to the current limit; otherwise up to the
+    /// current that the limit leaves beside the d-axis current, so that the last point is the largest torque.
     pub fn grid(&self) -> Grid {
         let (limit, i_d) = (self.current_limit_a(), self.i_d());
         Grid::for_current(match self.sequence.flux {
@@ -233,7 +238,7 @@ impl Settings {
         })
     }
 
-    /// Rule of `injection.amplitude_v`; the setting says why.
+    /// Returns `injection.amplitude_v` by its rule, which the setting explains.
     pub(super) fn carrier_rule(&self) -> f32 {
         let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
         let of_i_d = CARRIER_OF_I_D * self.i_d();
@@ -245,14 +250,14 @@ impl Settings {
         f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
     }
 
-    /// Plant of the direct axis for the design of its current controller. The rule is the plant that was identified on the
-    /// dissertation's motor (Eq. 3.41), its gain and its distance from 1 in proportion to those of the plants computed
-    /// from the parameters.
+    /// Returns the plant of the d axis for the design of its current controller. The rule is the plant that was identified
+    /// on the dissertation's motor (Eq. 3.41). The gain and the distance of the pole from 1 are scaled in proportion to
+    /// those of the plants computed from the parameters.
     pub fn identified_d(&self) -> FirstOrder {
         self.identified(&self.current_plant.d, FirstOrder { k: 0.002_837, p: 0.9511 })
     }
 
-    /// The same of the quadrature axis (Eq. 3.42).
+    /// Returns the plant of the q axis by the same rule (Eq. 3.42).
     pub fn identified_q(&self) -> FirstOrder {
         self.identified(&self.current_plant.q, FirstOrder { k: 0.003_721, p: 0.9503 })
     }
@@ -262,28 +267,28 @@ impl Settings {
         let rule = match (computed(&self.motor), computed(&Motor::DEFAULT)) {
             (Ok(own), Ok(reference)) => {
                 let p = 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p));
-                // A leakage too short for a pole is refused by its time constant, in the design of the controllers.
+                // If the leakage is too small for a pole, the design of the controllers refuses its time constant.
                 FirstOrder { k: on_reference.k * (own.k / reference.k), p: p.max(f64::EPSILON) }
             }
-            // The parameters are out of their ranges, which is reported of them.
+            // The parameters are outside their ranges, which the check of the settings reports.
             _ => on_reference,
         };
         FirstOrder { k: set.k.map_or(rule.k, f64::from), p: set.p.map_or(rule.p, f64::from) }
     }
 
-    /// Reference of the saliency over the torque current.
+    /// Returns the saliency offset over the q-axis current.
     pub fn reference(&self) -> ReferenceTable {
         let guess = || ReferenceTable::guessed(self.grid());
         self.injection.synchronous.reference.unwrap_or_else(guess)
     }
 
-    /// Slope of the saliency until it is learned: that of a saliency fixed to the flux alone.
+    /// Returns the saliency sensitivity that is used until it is learned, which is that of a saliency fixed to the flux alone.
     pub fn slope(&self) -> SlopeTable {
         let grid = self.reference().grid();
         SlopeTable::of_flux_saliency(grid, self.injection.synchronous.flux_saliency)
     }
 
-    /// Carrier current over the torque current.
+    /// Returns the injection current over the q-axis current.
     pub fn carrier(&self) -> CarrierTable {
         let guess = || CarrierTable::guessed(self.grid());
         self.injection.synchronous.carrier.unwrap_or_else(guess)
@@ -298,7 +303,7 @@ mod tests {
         assert!((value / expected - 1.0).abs() < 1e-3, "{value}, not {expected}");
     }
 
-    /// The numbers that the drive had before it had rules.
+    /// The rules return the numbers that the drive had before it had rules.
     #[test]
     fn the_rules_give_the_numbers_of_the_dissertations_motor() {
         let s = Settings::default();
@@ -326,8 +331,8 @@ mod tests {
         near(s.magnetise_s(), 5.0 * 0.186_09);
     }
 
-    /// A motor of twice the voltage and half the current, and one of the same voltage and twice the current, have the
-    /// thresholds of the reference in proportion.
+    /// For a motor of twice the voltage and half the current, and for a motor of the same voltage and twice the
+    /// current, the thresholds are in proportion to those of the reference.
     #[test]
     fn the_rules_scale_with_the_motor() {
         let mut s = Settings::default();
@@ -356,7 +361,7 @@ mod tests {
         assert!(s.check().is_ok());
     }
 
-    /// A limit that is set leaves room for the rules that follow from it, with any number of digits.
+    /// Rules that follow from a limit that is set stay within it, with any number of digits.
     #[test]
     fn rules_stay_within_the_limits_that_are_set() {
         for amperes in [0.9, 0.123_456, 0.123_444] {
@@ -380,8 +385,8 @@ mod tests {
         assert_eq!(s.check(), Ok(()));
     }
 
-    /// 1.5 kW at 1435 rpm are 9.982 Nm; with 3/2 P L_m^2/L_r = 0.951 H the 3.15 A of the rated flux need 5.164 A for 155 % of it. Sensors of
-    /// 6 A trip at 5.768 A and leave 0.76 of it, of which each current has 0.707: 0.951 * 3.1^2 Nm.
+    /// 1.5 kW at 1435 rpm are 9.982 Nm. With 3/2 P L_m^2/L_r = 0.951 H and the 3.15 A of the rated flux, 155 % of that torque needs 5.164
+    /// A. Sensors of 6 A trip at 5.768 A. The current limit is 0.76 of that, and each axis has 0.707 of the limit: 0.951 * 3.1^2 Nm.
     #[test]
     fn with_high_flux_the_torque_decides() {
         let mut s = Settings::default();
@@ -419,9 +424,10 @@ mod tests {
         let (range_a, pct) = small.better_sensors().unwrap();
         near(range_a, 8.279);
         near(pct, 155.0);
-        // Sensors of that range do not bind.
+        // Sensors of that range are not the limiting factor.
         near(sensors(range_a).current_limit_a(), 6.049);
-        // The dissertation's circuit has no direct current for its torque: the largest torque of the rated current is that of equal ones.
+        // No d-axis current gives the rated torque with the dissertation's circuit: at the rated current, equal currents of both
+        // axes give the largest torque.
         let mut own = Settings::default();
         own.sequence.flux = Flux::High;
         near(own.i_d(), core::f32::consts::FRAC_1_SQRT_2 * own.current_limit_a());

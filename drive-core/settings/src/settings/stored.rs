@@ -1,5 +1,6 @@
-//! Settings as a host stores them, with the feature `serde`: a map from the names of those that were set to their values, the names
-//! and words of the console. What a map does not name has its default; learned tables are no settings and not in it.
+//! Settings as a host stores them, with the feature `serde`: a map from the names of the settings that were set to their values,
+//! with the names and words of the console. Settings that a map does not name have their defaults. Learned tables are not settings
+//! and not in the map.
 
 extern crate alloc;
 

@@ -1,4 +1,4 @@
-//! The torque that a drive tracks with the result of a learning.
+//! Torque range in which a drive tracks the angle with a learned result.
 
 use core::fmt;
 
@@ -6,10 +6,10 @@ use super::Settings;
 use drive_core::learned::Learned;
 
 impl Settings {
-    /// Range of torque, Nm, and of torque current, A peak, that a drive with these settings tracks with a result, and what limits
-    /// it, in words: the slope, where it is lost beyond, the range of the sensors with the one that would not bind, or the current
-    /// limit; with the share of the rated torque, the rotor flux L_m i_d, Wb peak, and its direct current, A. `None` if the result is
-    /// not accepted, or has no slope.
+    /// Returns a text with the range of torque, Nm, and of q-axis current, A peak, in which a drive with these settings and a learned
+    /// result tracks the angle. The text also contains the share of the rated torque, the rotor flux L_m i_d, Wb peak, its d-axis
+    /// current, A, and the limiting factor: the saliency sensitivity, if it is too small beyond; the range of the sensors, with the
+    /// range that would not limit; or the current limit. `None` if the result is not accepted, or has no saliency sensitivity.
     pub fn tracked(&self, learned: &Learned) -> Option<impl fmt::Display + use<>> {
         learned.slope.filter(|_| learned.verdict.is_accepted())?;
         let (i_d, i_q) = (self.i_d(), learned.limit_a.min(self.i_q_limit_a()));
@@ -23,7 +23,7 @@ impl Settings {
                  the limit is "
             )?;
             match better {
-                _ if lost => f.write_str("the slope, which is lost beyond"),
+                _ if lost => f.write_str("the saliency sensitivity, too small beyond"),
                 Some((a, pct)) => {
                     write!(f, "the range of the sensors: {a:.1} A would allow {pct:.0} %")
                 }

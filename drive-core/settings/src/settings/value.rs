@@ -51,7 +51,7 @@ pub enum ValueError {
     Word(&'static [&'static str]),
 }
 
-/// The finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
+/// Returns the finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
 pub fn number(text: &str) -> Option<f32> {
     f32::from_lexical(text.as_bytes()).ok().filter(|value| value.is_finite())
 }
@@ -63,23 +63,23 @@ pub trait Words: Copy + PartialEq + 'static {
     /// The values, in the order of their words.
     const VALUES: &'static [Self];
 
-    /// The place of this value among them.
+    /// Returns the position of this value among the words.
     fn place(self) -> usize {
         Self::VALUES.iter().position(|value| *value == self).unwrap_or(0)
     }
 
-    /// The value at a place; the first behind their end.
+    /// Returns the value at a position; the first value if the position is too large.
     fn at(place: usize) -> Self {
         Self::VALUES.get(place).copied().unwrap_or(Self::VALUES[0])
     }
 
-    /// The word of this value.
+    /// Returns the word of this value.
     fn word(self) -> &'static str {
         Self::WORDS[self.place()]
     }
 }
 
-/// Declares an enumeration and its [`Words`], which must be in scope; or the words of one that stands elsewhere.
+/// Declares an enumeration and its [`Words`], which must be in scope; or the words of an enumeration that is declared elsewhere.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! words {
@@ -96,7 +96,7 @@ macro_rules! words {
             const VALUES: &'static [Self] = &[$(Self::$variant),+];
         }
 
-        // None is missing.
+        // Fails to compile if a variant is missing.
         const _: fn($type) = |value| match value { $($type::$variant => {})+ };
     };
 }

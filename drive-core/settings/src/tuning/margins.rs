@@ -12,7 +12,7 @@ pub struct Margins {
     /// Phase margin, degrees: smallest angle to -180° of all crossovers; negative if the closed loop is
     /// unstable.
     pub phase_margin_deg: f64,
-    /// Frequency of that crossover, Hz.
+    /// Frequency of the crossover with that margin, Hz.
     pub crossover_hz: f64,
     /// Sensitivity peak, max |1/(1 + L)|: the inverse of the smallest distance to -1.
     pub ms: f64,
@@ -174,13 +174,13 @@ mod tests {
         assert!((grid(LOW) / SPLIT - 1.0).abs() < 1e-12 && (grid(0) / START - 1.0).abs() < 1e-12);
     }
 
-    /// The closed form against a bisection over the gain, where the peak binds and where the phase
-    /// margin does.
+    /// Compares the closed form with a bisection over the gain, for cases limited by the peak and
+    /// by the phase margin.
     #[test]
     fn gain_limit_agrees_with_a_search() {
         let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
         let open_loop = |w: f64| {
-            // The filter as its delay of 1.53 samples, and one period.
+            // The filter is represented by its delay of 1.53 samples, to which one period is added.
             pi_response(1.0, 0.9538, w) * plant.response(w) * Complex64::cis(-2.53 * w)
         };
         for (phase_margin_deg, ms) in

@@ -2,8 +2,8 @@
 //! loop.
 //!
 //! The design uses `f64` with `libm` and runs when settings are converted to coefficients, never in the
-//! control step. The design of a current loop evaluates the loop at some 1200 frequencies, 3500 where it
-//! lowers the gain; a core without `f64` arithmetic should do it once, at start.
+//! control step. The design of a current loop evaluates the loop at about 1200 frequencies, or 3500 if
+//! it lowers the gain. A core without `f64` arithmetic should do it once, at start.
 //!
 //! # The rule of section 3.8
 //! For an identified plant G = k/(z - p) ([`rule_3_8`]):
@@ -14,8 +14,8 @@
 //!    z_c follows from Eq. 2.17 with w = -v/4 (Eq. 3.38 prints +, which puts the zero at 1.055);
 //! 3. k_c makes the gain 1 there; the pole of the reference filter is p_f = z_c (3.40).
 //!
-//! The zero contributes atan 4 only: the source omits the atan(vT/2) of Eq. 2.27, so the actual phase is
-//! some -94° at the crossover. With 76.0° (as Eq. 3.37 prints it) for atan 4, k_c is 0.12 % to 0.14 %
+//! The zero contributes atan 4 only: the source omits the atan(vT/2) of Eq. 2.27, so the actual phase at
+//! the crossover is about -94°. With 76.0° (as Eq. 3.37 prints it) for atan 4, k_c is 0.12 % to 0.14 %
 //! larger.
 //!
 //! | plant | crossover v | z_c | k_c | printed |
@@ -101,7 +101,7 @@ pub struct CurrentLoopDesign {
 }
 
 /// Reason why a controller could not be designed: a value is NaN or not strictly between its bounds.
-// Settings are f32: their digits, not those of the f64 they became.
+// Settings are f32, so the error shows the digits of f32.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {}: must be above {} and below {}", *.value as f32, *.min as f32, *.max as f32)]
 pub struct TuningError {
@@ -121,11 +121,11 @@ fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), Tunin
     holds.then_some(()).ok_or(TuningError { name, value, min, max })
 }
 
-/// The error of a loop that crosses unit gain on the motor's plant below the zero of its controller, where the rule does not
-/// apply, or nowhere (not a number): the identified plant does not belong to this motor, or the time constant of its leakage is
-/// below some 4.5 periods.
+/// Returns the error of a loop whose crossover on the motor's plant lies below the zero of its controller, where the rule does
+/// not apply, or does not exist (NaN). Either the identified plant does not belong to this motor, or the time constant of the
+/// leakage is below about 4.5 periods.
 fn no_crossover(crossover_hz: f64, z_c: f64, period_s: f64) -> TuningError {
-    // Fictitious frequency of the zero.
+    // This is the fictitious frequency of the zero.
     let zero_hz = 2.0 / period_s * (1.0 - z_c) / (1.0 + z_c) / TAU;
     let name = "crossover in Hz on the motor's plant (sigma L_s/(r_s + r_r) is too short for this control rate, or the identified plant \
                 is another motor's)";
@@ -141,8 +141,8 @@ fn check_plant(k: f64, p: f64) -> Result<(), TuningError> {
     check("pole p of the plant", p, 0.0, 1.0)
 }
 
-/// Current response of the motor, A/V, computed from its equivalent circuit: Eq. 3.14 with a zero-order
-/// hold, k = (1 - p)/R', p = exp(-T R'/(σ L_s)), R' = r_s + r_r (L_m/L_r)².
+/// Returns the current response of the motor, A/V, computed from its equivalent circuit: Eq. 3.14 with
+/// a zero-order hold, k = (1 - p)/R', p = exp(-T R'/(σ L_s)), R' = r_s + r_r (L_m/L_r)².
 ///
 /// Table 5 at 6 kHz: k = 0.0032052 A/V, p = 0.980053. (Eq. 3.33 prints 0.003237 and 0.8359: Eq. 3.20
 /// to 3.22 contain an error of a factor 8.14, and Eq. 3.25 is the forward difference.)
@@ -174,7 +174,7 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
     let wanted = 100.0 * (PI / 180.0) + libm::atan2(4.0, 1.0);
-    // The lag of G/(z - 1) grows from 90° at dc to 360° at half the sampling rate: one solution.
+    // The lag of G/(z - 1) grows from 90° at dc to 360° at half the sampling rate, so there is one solution.
     let lag = |omega_t: f64| {
         let z = Complex64::cis(omega_t);
         (z - Complex64::new(plant.p, 0.0)).arg() + (0.5 * PI + 0.5 * omega_t)
@@ -187,7 +187,7 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
     Ok(RuleDesign { k_c, z_c, v: 2.0 / period_s * half_v_t })
 }
 
-/// The interval that is left of one after `steps` bisections; `is_below` holds below the value that is sought.
+/// Returns the interval after `steps` bisections; `is_below` is true below the value that is sought.
 pub fn bisected(
     (mut low, mut high): (f64, f64),
     steps: u32,

@@ -1,9 +1,9 @@
-//! The selected one of the demodulators that are compared.
+//! Selection among the compared demodulators.
 
 use super::{Demodulate, Envelope, Literal, Rectified, RmsImpedance};
 use crate::carrier::{CarrierSample, DemodulatorKind};
 
-/// The selected demodulator. The synchronous one is always present beside it, in the estimator.
+/// The selected demodulator. The synchronous demodulator is always present in addition, in the estimator.
 // The drive has a single instance, so the size of the small variants does not matter.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
@@ -20,8 +20,8 @@ pub enum Demodulator {
 
 impl Demodulator {
     /// Starts the selected demodulator at rest; `rms_samples` is the length of the rms filters of
-    /// [`RmsImpedance`]. In place, because a move of the large state takes longer than its
-    /// initialisation.
+    /// [`RmsImpedance`]. The state is initialised in place, because a move of the large state takes
+    /// longer.
     pub fn start(&mut self, tracking: DemodulatorKind, rms_samples: u8) {
         use DemodulatorKind as Kind;
         match tracking {
@@ -32,7 +32,7 @@ impl Demodulator {
         }
     }
 
-    /// Whether it rotates the output of the band-pass.
+    /// Whether the demodulator rotates the output of the band-pass.
     pub fn rotates_output(&self) -> bool {
         match self {
             Self::Literal(_) | Self::Rectified(_) => true,
@@ -40,7 +40,7 @@ impl Demodulator {
         }
     }
 
-    /// Demodulates one sample, A; an impedance difference counts by `ampere_per_ohm`.
+    /// Demodulates one sample, A; an impedance difference is converted by `ampere_per_ohm`.
     pub fn step(&mut self, sample: &CarrierSample, ampere_per_ohm: f32) -> f32 {
         match self {
             Self::Literal(d) => d.step(sample),

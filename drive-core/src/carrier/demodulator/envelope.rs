@@ -1,18 +1,18 @@
 //! Envelope detection after C. Fritsch, A. Ibanez and M. Parrilla, "A digital envelope detection filter
 //! for real-time operation", IEEE Trans. Instrum. Meas. 48(6), 1999.
 //!
-//! Two samples of a sinusoid a known phase `x` apart determine its amplitude and phase. The amplitude,
-//! that of the analytic signal, is
+//! Two samples of a sinusoid with a known phase difference `x` determine its amplitude and phase. The
+//! amplitude of the analytic signal is
 //!
 //! ```text
 //! E^2 = ( u[k]^2 + u[k-m]^2 - 2 u[k] u[k-m] cos x ) / sin^2 x
 //! ```
 //!
-//! The source takes neighbouring samples. Here they are two samples apart, 72°: closest to the 90° at
-//! which the noise is lowest. Both currents pass the band-pass first, and the difference of their
-//! envelopes is averaged over one carrier period. The residual leakage of the fundamental is ripple at
-//! 600 Hz and 1200 Hz (the "spurious oscillations" of section 5.2), where this average has zeros. No
-//! post-processing filter is needed, which saves its delay of 24 samples.
+//! The source takes neighbouring samples. Here they are two samples apart, 72°, which is closest to
+//! the 90° with the lowest noise. Both currents pass the band-pass first, and the difference of their
+//! envelopes is averaged over one injection period. The residual leakage of the fundamental is ripple
+//! at 600 Hz and 1200 Hz (the "spurious oscillations" of section 5.2), where this average has zeros.
+//! No post-processing filter is needed, which saves its delay of 24 samples.
 
 use super::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
@@ -46,7 +46,7 @@ impl Demodulate for Envelope {
     }
 }
 
-/// Amplitude of a sinusoid at the carrier frequency from two samples [`APART`] apart.
+/// Returns the amplitude of a sinusoid at the injection frequency from two samples [`APART`] apart.
 fn envelope(now: f32, before: f32) -> f32 {
     let square = now * now + before * before - 2.0 * CARRIER_COS[APART] * (now * before);
     fpu_sqrt::sqrtf(square) * (1.0 / CARRIER_SIN[APART])

@@ -7,15 +7,15 @@ use crate::filter::dissertation::{BpfState, PpState};
 use crate::filter::{BPF, PP};
 
 /// Demodulator with output `i_dm - i_qm`, A, as printed. The post-processing filter removes the 600 Hz
-/// (-76 dB); the rest is the fundamental that leaks through the band-pass (-40 dB at dc) and carries no
-/// information on the flux. Kept to demonstrate this (Figure 19); it cannot track.
+/// (-76 dB). The rest is the fundamental that leaks through the band-pass (-40 dB at dc) and carries no
+/// information on the flux. The chain is kept to demonstrate this (Figure 19) and cannot track.
 pub type Literal = PrintedChain<false>;
 
-/// Demodulator with output `|i_dm| - |i_qm|`, A, which contains the saliency. Biased by the same leakage,
-/// and at speed by the group delay of the band-pass.
+/// Demodulator with output `|i_dm| - |i_qm|`, A, which contains the saliency. It is biased by the same
+/// leakage, and at speed by the group delay of the band-pass.
 pub type Rectified = PrintedChain<true>;
 
-/// The chain with or without the rectifier.
+/// The printed chain with or without the rectifier.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PrintedChain<const RECTIFIED: bool> {
     band_pass: BpfState,

@@ -1,19 +1,19 @@
 //! Impedance estimator of J.-I. Ha and S.-K. Sul (1997) as the dissertation describes it (section 2.4,
 //! Figure 10).
 //!
-//! The carrier lies along the flux (`theta = phi`, Eq. 2.12). Rms values of injected voltage and carrier
-//! current over the last `n` samples give the impedances of the two channels. Their difference is zero
-//! when the carrier lies on an axis of the saliency:
+//! The injection lies along the flux (`theta = phi`, Eq. 2.12). Rms values of injected voltage and
+//! injection current over the last `n` samples give the impedances of the two channels. Their difference
+//! is zero when the injection lies on an axis of the saliency:
 //!
 //! ```text
 //! Z_dm = rms(v_dm) / rms(i_dm)     Z_qm = rms(v_qm) / rms(i_qm)     error = F3 (Z_dm - Z_qm)
 //! ```
 //!
-//! No source gives F3 or the length of the rms filters. Here F3 is the post-processing filter of
-//! section 3.10, applied once to the difference, which equals applying it to both impedances. Lengths of
-//! whole half carrier periods (5 samples) cause no ripple. A step of the angle changes the inverse of an
-//! rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum of
-//! band-pass, rms filter, (n - 1)/2, and F3.
+//! No source gives F3 or the length of the rms filters. Here F3 is the post-processing filter of section
+//! 3.10, applied once to the difference, which equals applying it to both impedances. Lengths of whole
+//! half periods of the injection (5 samples) cause no ripple. A step of the angle changes the inverse of
+//! an rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum
+//! of band-pass, rms filter, (n - 1)/2, and F3.
 
 use crate::carrier::DemodulatorKind;
 
@@ -32,7 +32,7 @@ const VOLTS: f32 = 32.0;
 /// Minimum mean square of the current for a valid impedance, in units: 3 mA rms.
 const LEAST: i32 = 5;
 
-/// Demodulator with output F3 (Z_dm - Z_qm), ohm; the difference counts as 0 without carrier current.
+/// Demodulator with output F3 (Z_dm - Z_qm), ohm; the difference counts as 0 without injection current.
 #[derive(Clone, Copy, Debug)]
 pub struct RmsImpedance {
     band_pass: RotatedBandPass,
@@ -43,7 +43,7 @@ pub struct RmsImpedance {
 }
 
 impl RmsImpedance {
-    /// At rest, with rms filters of `samples`, clamped to [`DemodulatorKind::RMS_SAMPLES`].
+    /// Creates a demodulator at rest, with rms filters of `samples`, clamped to [`DemodulatorKind::RMS_SAMPLES`].
     pub fn new(samples: u8) -> Self {
         Self {
             band_pass: RotatedBandPass::default(),
@@ -58,7 +58,7 @@ impl RmsImpedance {
 impl Demodulate for RmsImpedance {
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let i = rotated_carrier(&mut self.band_pass, sample);
-        // The carrier voltage lies on the bisector: equal components in both channels.
+        // The injected voltage lies on the bisector, so both channels have equal components.
         let v = sample.carrier.voltage * (core::f32::consts::FRAC_1_SQRT_2 / VOLTS);
         let squares = [i.dm, i.qm, v].map(|x| {
             let square = x * x;

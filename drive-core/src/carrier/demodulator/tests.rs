@@ -1,4 +1,4 @@
-//! Each demodulation against what it must give, computed in f64 from the definition.
+//! Tests of each demodulation against the exact result, computed in f64 from the definition.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use core::f64::consts::{SQRT_2, TAU};
@@ -13,8 +13,8 @@ const BPF_GAIN: f64 = 0.9452;
 const BPF_PHASE: f64 = -3.86 / 360.0 * TAU;
 const PP_DC: f64 = 0.944_061;
 
-/// A carrier current of the given amplitudes, A, in the dm and the qm channel, each with a phase of its
-/// own, rad, on top of a fundamental of 3 A; 50 V injected.
+/// An injection current of the given amplitudes, A, in the dm and the qm channel, each with its own
+/// phase, rad, on top of a fundamental of 3 A, with 50 V injected.
 #[derive(Clone, Copy)]
 struct Carried {
     dm: f64,
@@ -49,8 +49,8 @@ impl Carried {
         }
     }
 
-    /// What `demodulator` gives after a second, averaged over a carrier period, and how far it moves
-    /// in it.
+    /// Returns the output of `demodulator` after a second, averaged over an injection period, and
+    /// its ripple in that period.
     fn steady(&self, demodulator: &mut impl Demodulate) -> (f64, f64) {
         let mut out = [0.0_f64; 10];
         for k in 0..6000 {
@@ -63,7 +63,7 @@ impl Carried {
 
 #[test]
 fn literal_is_the_leak_of_the_fundamental() {
-    // 0.01 and 0.944 are the gains of the filters at dc; the carrier is not in it.
+    // 0.01 and 0.944 are the gains of the filters at dc. The output does not contain the injection.
     let expected = 0.01 * PP_DC * 4.2;
     for c in [CARRIED, Carried { dm: 0.0, qm: 0.0, ..CARRIED }] {
         let (mean, _) = c.steady(&mut Literal::default());
@@ -75,7 +75,7 @@ fn literal_is_the_leak_of_the_fundamental() {
 fn rectified_is_the_difference_of_the_mean_magnitudes() {
     for phase in [0.0, 0.3, 1.0, 2.2] {
         let c = Carried { phases: [phase; 2], fundamental: [0.0; 2], ..CARRIED };
-        // Ten samples a period: between 0.616 and 0.647 by the phase, 2/pi on average.
+        // With ten samples a period, the value lies between 0.616 and 0.647, depending on the phase, and is 2/pi on average.
         let magnitude = |k: i32| (TAU * f64::from(k) / 10.0 + phase + BPF_PHASE).cos().abs();
         let mean_magnitude = (0..10).map(magnitude).sum::<f64>() / 10.0;
         let expected = mean_magnitude * BPF_GAIN * PP_DC * 0.03;
@@ -90,7 +90,7 @@ fn envelope_is_the_difference_of_the_amplitudes_whatever_the_phase() {
         for fundamental in [[0.0, 0.0], [2.1, -2.1]] {
             let c = Carried { phases, fundamental, ..CARRIED };
             let (mean, ripple) = c.steady(&mut Envelope::default());
-            // The leak, 21 mA at dc, adds at right angles: its square over the amplitude, in both.
+            // The leakage, 21 mA at dc, adds at right angles: its square over the amplitude, in both channels.
             assert!((mean / (BPF_GAIN * 0.03) - 1.0).abs() < 0.02, "{phases:?}: {mean}");
             assert!(ripple < 2e-5, "{phases:?}: ripple {ripple} A");
         }
@@ -106,7 +106,7 @@ fn rms_impedance_is_the_difference_of_voltage_over_current() {
         assert!((mean / expected - 1.0).abs() < 2e-3, "{samples}: {mean} {expected} ohm");
         assert!(ripple < 0.01, "{samples}: ripple {ripple} ohm");
     }
-    // Where the rms filters do not hold whole half periods there is ripple; F3 takes most of it.
+    // If the rms filters do not contain whole half periods, there is ripple, most of which F3 removes.
     let (mean, ripple) = CARRIED.steady(&mut RmsImpedance::new(13));
     assert!((mean / expected - 1.0).abs() < 0.05, "{mean}");
     assert!(ripple < 0.02 * expected.abs(), "{ripple}");
@@ -136,7 +136,7 @@ fn all_see_nothing_where_the_channels_are_alike() {
     }
 }
 
-/// Mean delay of a small change of one carrier current, samples: the area above the step response.
+/// Returns the mean delay of a small change of one injection current, samples: the area above the step response.
 fn delay<D: Demodulate>(mut demodulator: D) -> f64 {
     let before = Carried { fundamental: [0.0; 2], ..CARRIED };
     let after = Carried { dm: before.dm + 0.002, ..before };
@@ -149,14 +149,15 @@ fn delay<D: Demodulate>(mut demodulator: D) -> f64 {
 
 #[test]
 fn delays_are_those_of_the_filters() {
-    // Group delays: band-pass 8.83 at 600 Hz, post-processing filter 24.46 at dc; half their length
-    // for the averages; half the distance of its two samples for the envelope.
+    // The group delays are 8.83 for the band-pass at 600 Hz, 24.46 for the post-processing filter
+    // at dc, half their length for the averages, and half the distance of its two samples for the
+    // envelope.
     let found = [
         ("rectified", delay(Rectified::default()), 8.83 + 24.46),
         ("rms 20", delay(RmsImpedance::new(20)), 8.83 + 9.5 + 24.46),
         ("rms 60", delay(RmsImpedance::new(60)), 8.83 + 29.5 + 24.46),
         ("envelope", delay(Envelope::default()), 8.83 + 1.0 + 4.5),
-        // 4.5 for being looked at once a carrier period, and 1 for being there in the first of the next.
+        // 4.5 samples are due to the evaluation once an injection period, and 1 to the use in the first sample of the next period.
         ("synchronous", delay(InTurn::default()), 19.0 + 4.5 + 1.0),
     ];
     for (name, found, expected) in found {

@@ -1,9 +1,9 @@
-//! The PI controller against Appendix B and section 3.8.
+//! Tests of the PI controller against Appendix B and section 3.8.
 
 use super::*;
 use proptest::prelude::*;
 
-/// Figure 40: an integrator y += sat(u, 0.15) under K_c = 0.25, z_c = 0.1, unit step.
+/// The loop of Figure 40: an integrator y += sat(u, 0.15) with K_c = 0.25, z_c = 0.1, and a unit step.
 struct Figure40 {
     y_max: f32,
     u_max: f32,
@@ -48,8 +48,8 @@ fn anti_windup_of_figure_40() {
     assert!((with.y_max - 1.301).abs() < 1e-3 && with.saturated == 7);
 }
 
-/// Unit step of Eq. 3.39 on k/(z - p): overshoot in %, and the sample from which on the response
-/// stays within 2 %.
+/// Runs the unit step of Eq. 3.39 on k/(z - p). Returns the overshoot in %, and the sample from
+/// which on the response stays within 2 %.
 fn step_of_3_39(p: f32, filtered: bool) -> (f32, usize) {
     let pi = Pi { k_c: 52.48, z_c: 0.94786 };
     let (mut state, mut reference) = (PiState::default(), ReferenceState::default());
@@ -119,7 +119,7 @@ proptest! {
             d.back_calculate(applied.d - u_d);
             q.back_calculate(applied.q - u_q);
             prop_assert_eq!(Dq::new(both.d.output, both.q.output), Dq::new(d.output, q.output));
-            // Never wound up beyond the limit, but for rounding.
+            // The output never winds up beyond the limit, except for rounding.
             prop_assert!(d.output.abs() <= limit * 1.000_001 + 1e-4);
         }
     }
@@ -134,7 +134,7 @@ proptest! {
             prop_assert_eq!(u.to_bits(), pi.step(&mut untold, e).to_bits());
             prop_assert_eq!(told, untold);
         }
-        // And with no error it holds its output for ever.
+        // Without error the output stays constant.
         pi.step(&mut told, 0.0);
         let held = told.output;
         for _ in 0..10_000 {

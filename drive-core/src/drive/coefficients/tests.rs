@@ -1,4 +1,4 @@
-//! Coefficients against independent computations.
+//! Tests of the coefficients against independent computations.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 use core::f32::consts::TAU;
 
@@ -17,7 +17,7 @@ fn built(source: AngleSource) -> Coefficients {
 #[test]
 fn limits_and_times_are_those_of_the_settings_in_periods() {
     let c = built(AngleSource::Encoder);
-    // Two pole pairs and 6 kHz; with the injection alone 700 rpm, and with the observer beside it any.
+    // With two pole pairs and 6 kHz, the injection alone tracks up to 700 rpm; with the observer there is no limit.
     let (any, tracked) = (2000.0 / 60.0 * 2.0 / 6000.0, 700.0 / 60.0 * 2.0 / 6000.0);
     near(c.protection.rotor_freq, any);
     near(built(AngleSource::Injection).protection.rotor_freq, any);
@@ -55,7 +55,7 @@ fn only_the_sensorless_drive_watches_the_saliency() {
     assert!(!encoder.demodulate && injection.demodulate);
 }
 
-/// The voltage acts 1.5 periods ahead of the sample; the current is seen behind filter and sensor.
+/// The voltage acts 1.5 periods after the sample; the measured current is delayed by filter and sensor.
 #[test]
 fn the_axes_lead_and_lag_by_the_delays() {
     let c = built(AngleSource::Injection);

@@ -1,4 +1,4 @@
-//! The limits against the power of the model, over speeds, limits and errors of the model.
+//! Tests of the limits against the power of the model, over speeds, limits and errors of the model.
 
 use core::f32::consts::TAU;
 use std::sync::LazyLock;
@@ -10,11 +10,11 @@ use crate::{Dq, Motor};
 const DC_LINK: f32 = 300.0;
 const MAGNETISING: f32 = 1.4;
 const ASKED: f32 = 50.0;
-/// Those of the default motor; to compute them takes longer than a test of the limits.
+/// Coefficients of the default motor. Their computation takes longer than a test of the limits.
 static COEFFICIENTS: LazyLock<Coefficients> =
     LazyLock::new(|| Settings::default().build().unwrap());
 
-/// Least and largest torque current at this speed, Hz electrical, where the model leaves `error` W.
+/// Returns the least and largest q-axis current at this speed, Hz electrical, if the model does not explain `error` W.
 fn limits(hz: f32, motoring: DcLimit, generating: DcLimit, error: f32) -> (f32, f32) {
     let (c, limit) = (&*COEFFICIENTS, PowerLimit { motoring, generating });
     let mut seen =
@@ -35,7 +35,7 @@ fn watts(power_w: f32) -> DcLimit {
     DcLimit { current_a: 1000.0, power_w }
 }
 
-/// Power at a torque current, W.
+/// Returns the power at a q-axis current, W.
 fn power(hz: f32, i_q: f32, error: f32) -> f32 {
     let m = Motor::DEFAULT;
     let rotor = m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r());
@@ -43,8 +43,8 @@ fn power(hz: f32, i_q: f32, error: f32) -> f32 {
     1.5 * (m.r_s * (MAGNETISING * MAGNETISING + i_q * i_q) + rotor * i_q * i_q + emf * i_q + error)
 }
 
-/// Every torque current between the limits keeps both; one beyond does not, but where the copper takes all that a larger
-/// generating one gives; and no torque is reversed.
+/// Every q-axis current between the limits keeps both power limits. A current beyond does not, except where the copper
+/// losses absorb the power of a larger generating current. No torque is reversed.
 #[test]
 fn what_is_allowed_keeps_the_limits_and_no_torque_is_reversed() {
     for hz in (-600..=600).map(|n| n as f32 * 0.25) {
@@ -74,7 +74,7 @@ fn what_is_allowed_keeps_the_limits_and_no_torque_is_reversed() {
     }
 }
 
-/// A dc current counts as the power at the present voltage, and the smaller of both holds.
+/// A dc current limit counts as a power at the present voltage, and the smaller of both limits is valid.
 #[test]
 fn current_and_power_hold_together() {
     let both = |current_a, power_w| limits(50.0, DcLimit { current_a, power_w }, watts(1e6), 0.0).1;
@@ -85,7 +85,7 @@ fn current_and_power_hold_together() {
     assert_eq!(both(0.2, 30.0), both(1000.0, 30.0));
 }
 
-/// Over the speed a limit has no step: 0.25 Hz change it by a quarter or 0.6 A at most.
+/// A limit has no step over the speed: 0.25 Hz change it by a quarter or 0.6 A at most.
 #[test]
 fn the_torque_comes_and_goes_smoothly() {
     for (most, least) in [(60.0, 0.0), (60.0, 20.0), (300.0, 100.0)] {
@@ -101,7 +101,7 @@ fn the_torque_comes_and_goes_smoothly() {
     }
 }
 
-/// A link that the shaft feeds is fed.
+/// Kinetic buffering has priority.
 #[test]
 fn ride_through_comes_first() {
     let c = Settings::default().build().unwrap();

@@ -1,4 +1,4 @@
-//! The drive on a salient motor with ideal sensors and an ideal inverter, in `f64`.
+//! Tests of the drive on a salient motor with ideal sensors and an ideal inverter, in `f64`.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use num_complex::Complex64;
@@ -12,23 +12,23 @@ use crate::io::PERIOD_S;
 
 const J: Complex64 = Complex64::I;
 
-/// The motor of the settings. Its saliency is that of the settings as well: L x = sigma L_s (x - s x*) with
-/// s = a e^(2j phi) + b i²/|i|.
+/// The motor of the settings, with the saliency of the settings: L x = sigma L_s (x - s x*) with s = a
+/// e^(2j phi) + b i²/|i|.
 #[derive(Clone)]
 struct Motor {
     settings: Settings,
     current: Complex64,
-    /// (L_m / L_r) psi_r, V s.
+    /// Flux (L_m / L_r) psi_r, V s.
     flux: Complex64,
     /// Electrical angle of the rotor, rad, and its speed, rad/s.
     theta: f64,
     omega: f64,
-    /// Torque of the load, Nm; none where the shaft is locked.
+    /// Torque of the load, Nm; none if the shaft is locked.
     load: Option<f64>,
     flux_saliency: f64,
     /// Gain of current sensor a.
     gain_a: f64,
-    /// Voltage that each leg loses in its dead time, V.
+    /// Voltage error of each leg by the dead time, V.
     dead_v: f64,
     pending: Compare,
 }
@@ -65,7 +65,7 @@ impl Motor {
         }
     }
 
-    /// A period with the compare values of the one before.
+    /// Runs a period with the compare values of the period before.
     fn advance(&mut self, compare: Compare) {
         let p = core::mem::replace(&mut self.pending, compare);
         let [a, b, c] = [p.a, p.b, p.c].map(|c| f64::from(c) / 14_167.0 * V_DC);
@@ -110,7 +110,7 @@ impl Motor {
     }
 }
 
-/// Settings for this motor: no dead time, no delay of the sensors.
+/// Returns settings for this motor: no dead time, no delay of the sensors.
 fn motor_settings(source: AngleSource) -> Settings {
     let mut settings = settings();
     settings.angle_source = source;
@@ -157,16 +157,16 @@ impl Bench {
         })
     }
 
-    /// Error of the flux angle that the drive believes in, degrees.
+    /// Returns the error of the estimated flux angle, degrees.
     fn angle_error(&self) -> f64 {
         let phi = f64::from(self.drive.telemetry().phi.to_radians());
-        // Telemetry is of the sample; the motor is one period further.
+        // The telemetry belongs to the sample; the motor is one period ahead.
         let slip = self.drive.telemetry().flux_freq;
         let now = phi + f64::from(slip) * core::f64::consts::TAU;
         (self.motor.flux * (-J * now).exp()).arg().to_degrees()
     }
 
-    /// The largest error of the angle while it runs, degrees.
+    /// Runs for `seconds` and returns the largest error of the angle, degrees.
     fn worst(&mut self, seconds: f64) -> f64 {
         (0..(seconds * 6000.0) as u32)
             .map(|_| {
@@ -187,7 +187,7 @@ fn without_a_sensor_speed_and_position_are_those_of_the_rotor() {
         assert!(worst < 15.0, "{rpm} rpm: {worst} degrees on the way");
         let settled = bench.worst(0.2);
         assert!(settled < 4.0, "{rpm} rpm: {settled} degrees");
-        // A degree of angle makes the flux, and so the slip, another than believed: 2 rpm each.
+        // An angle error of a degree changes the flux, and therefore the slip: 2 rpm per degree.
         assert!((bench.motor.rpm() - f64::from(rpm)).abs() < 12.0, "{}", bench.motor.rpm());
         let t = bench.drive.telemetry();
         let seen = f64::from(t.rotor_freq) * 6000.0 / 2.0 * 60.0;
@@ -210,11 +210,11 @@ fn without_a_sensor_speed_and_position_are_those_of_the_rotor() {
     assert!(bench.drive.command(&Command::Home(f32::NAN)).is_err());
     bench.run(0.5);
     assert!((bench.motor.turns() + 2.0).abs() < 0.02, "refused commands change nothing");
-    // It turns on at the speed until a position is given.
+    // The shaft turns at that speed until a position is given.
     bench.drive.command(&Command::Press(60.0, 1.0)).unwrap();
     bench.run(2.0);
     assert!((bench.motor.rpm() - 60.0).abs() < 12.0, "{}", bench.motor.rpm());
-    // A turn further on than where position 0 was.
+    // The shaft goes one turn beyond the former position 0.
     bench.drive.command(&Command::Home(1.0)).unwrap();
     bench.run(3.0);
     assert!((bench.motor.turns() - 1.0).abs() < 0.03, "{}", bench.motor.turns());
@@ -234,7 +234,7 @@ fn with_the_encoder_the_flux_is_known_and_the_torque_is_what_was_asked() {
         let before = bench.motor.omega;
         let worst = bench.worst(0.5);
         assert!(worst < 2.0, "{i_q} A: {worst} degrees");
-        // 3/2 P L_m^2 / L_r i_d i_q on the inertia; the current takes some 10 ms.
+        // The torque 3/2 P L_m^2 / L_r i_d i_q accelerates the inertia; the current takes about 10 ms.
         let torque = 0.459_664 * 0.7 * f64::from(i_q);
         let gained = (bench.motor.omega - before) / (2.0 * torque / 0.012 * 0.5);
         assert!((gained - 1.0).abs() < 0.03, "{gained}");
@@ -277,7 +277,7 @@ fn a_motor_without_saliency_does_not_start_and_one_that_loses_it_stops() {
 
 #[test]
 fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
-    // With the injection alone.
+    // The injection alone gives the angle.
     let mut settings = motor_settings(AngleSource::Injection);
     settings.observer.enabled = false;
     let mut bench = Bench::started(&settings, Mode::Torque);
@@ -286,8 +286,8 @@ fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
     assert!((bench.motor.rpm() - 700.0).abs() < 15.0, "{}", bench.motor.rpm());
 }
 
-/// A frame that turns by several hertz more or less than the rotor has no flux: the whole back-emf is missing, and the drive does
-/// not begin to regulate, unless it is pulled in. One that errs by a hertz is.
+/// A frame that rotates several hertz faster or slower than the rotor has no flux. The whole back-EMF is missing, and the drive
+/// does not begin to regulate unless the frame is pulled in. A frame that is off by one hertz is pulled in.
 #[test]
 fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
     let mut settings = motor_settings(AngleSource::Injection);
@@ -323,7 +323,7 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
                 builds = now;
             }
         }
-        // A flux that has been pulled in settles.
+        // The flux settles after it has been pulled in.
         bench.run(0.3);
         let state = bench.drive.state();
         let is_right = state == State::Torque && bench.worst(0.1) < 6.0;
@@ -334,7 +334,7 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
     assert!(refused >= 2, "{refused}");
 }
 
-/// With the shaft locked, learning finds the parameters of the simulated motor.
+/// With the shaft locked, the self-commissioning finds the parameters of the simulated motor.
 #[test]
 fn learning_finds_the_saliencies_and_the_mismatch() {
     let mut settings = motor_settings(AngleSource::Injection);
@@ -353,20 +353,21 @@ fn learning_finds_the_saliencies_and_the_mismatch() {
     assert_eq!(bench.drive.changes, changes + 1);
     let learned = *bench.drive.learned().unwrap();
     assert!(learned.verdict == Verdict::Sound && learned.points == 13, "{learned:?}");
-    // Twice the saliency fixed to the flux, and what the smaller flux behind and the larger flux ahead add.
+    // The sensitivity is twice the saliency fixed to the flux, plus the effect of the smaller flux behind and the larger flux
+    // ahead.
     assert!((learned.slope_at_rest / -0.07 - 1.0).abs() < 0.12, "{learned:?}");
     assert!((learned.gain_mismatch.value - 0.02).abs() < 0.002, "{learned:?}");
     assert!((learned.current_saliency.value / 0.0338 - 1.0).abs() < 0.12, "{learned:?}");
-    // The saliency of this motor does not fall with the flux, as the check takes it to: 0.866 of it is seen, not 0.540.
+    // The saliency of this motor does not fall with the flux, as the check assumes: 0.866 of it is measured, not 0.540.
     let seen = -0.035 * 0.866 / 0.540;
     assert!((learned.flux_saliency / seen - 1.0).abs() < 0.1, "{learned:?}");
     for i_q in [0.5_f32, 1.0, 2.0, -3.0] {
-        // 2 b i_d i_q / |i|
+        // The expected value is 2 b i_d i_q / |i|.
         let expected = 2.0 * 0.0338 * 0.7 * i_q / i_q.hypot(0.7);
         let found = learned.reference.at(i_q);
         assert!((found / expected - 1.0).abs() < 0.2, "{i_q} A: {found} {expected}");
     }
-    // It holds until the next learning, which the free shaft ends.
+    // The result is valid until the next self-commissioning, which the free shaft ends.
     bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
     assert_eq!(bench.drive.learned(), Some(&learned));
     bench.drive.command(&Command::Stop(Stop::Coast)).unwrap();
@@ -379,8 +380,9 @@ fn learning_finds_the_saliencies_and_the_mismatch() {
     }));
 }
 
-/// The carrier changes the signs of the phase currents within its period: the dead time is made up for as they
-/// change, and what is left of the carrier behind the filter is not in the current that is regulated.
+/// The injection changes the signs of the phase currents within its period. The dead time is compensated as
+/// the signs change, and the regulated current does not contain the rest of the injection current after the
+/// filter.
 #[test]
 fn the_carrier_is_what_was_asked_for_and_stays_out_of_the_current_loop() {
     let mut settings = motor_settings(AngleSource::Encoder);
@@ -402,8 +404,8 @@ fn the_carrier_is_what_was_asked_for_and_stays_out_of_the_current_loop() {
             ripple.push((t.current.q - t.reference.q).abs());
             sum += t.carrier_squared.sqrt();
         }
-        // The median: a count of the encoder more or less moves the speed loop once in a while, and the direct share of
-        // the reference then leaves the current behind by 80 mA for a moment.
+        // The median is used, because now and then an encoder count more or less moves the speed loop, and the current
+        // then lags behind the direct share of the reference by 80 mA for a moment.
         ripple.sort_by(f32::total_cmp);
         let most = if dead_v > 0.0 { 0.006 } else { 0.002 };
         assert!(ripple[300] < most, "{dead_v} V: {} A", ripple[300]);

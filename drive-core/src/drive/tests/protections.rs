@@ -1,4 +1,4 @@
-//! The protections of a running drive.
+//! Tests of the protections of a running drive.
 
 use super::*;
 use crate::dc_link::Limiting;
@@ -30,7 +30,7 @@ fn every_protection_switches_off_in_the_same_step() {
         change(&mut sample);
         assert_eq!(load.step_with(&mut drive, &sample), Compare::OFF, "{fault}");
         assert_eq!(drive.state(), State::Fault(fault));
-        // It stays latched, names itself, and a clear and a start bring the drive back.
+        // The fault stays latched and names itself, and after a clear and a start the drive runs again.
         assert_eq!(load.step(&mut drive), Compare::OFF);
         assert_eq!(drive.command(&Command::Start(Mode::Torque)), Err(Refused::Fault(fault)));
         drive.command(&Command::Clear).unwrap();
@@ -58,7 +58,7 @@ fn a_chopper_that_is_off_is_a_fault_where_there_is_a_resistor() {
 
 #[test]
 fn over_speed_trips() {
-    // This load has no back-emf: with the check that would miss it out of the way.
+    // This load has no back-EMF, so the check that would miss it is disabled.
     let mut settings = settings();
     settings.limits.unexplained_v = Some(1000.0);
     let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
@@ -66,7 +66,7 @@ fn over_speed_trips() {
     assert!(run_to(&mut drive, &mut load, State::Torque));
     let mut sample = load.sample();
     for _ in 0..3000 {
-        // 70 counts a period: 2520 rpm
+        // 70 counts per period are 2520 rpm.
         sample.encoder = sample.encoder.wrapping_add(70);
         let now = load.sample();
         sample = Sample { encoder: sample.encoder, ..now };
@@ -100,12 +100,12 @@ fn a_silent_channel_is_found_by_its_carrier() {
     for (channel, fault) in [(0, Fault::CarrierMissingA), (1, Fault::CarrierMissingB)] {
         let mut settings = settings();
         settings.injection.beside_encoder = true;
-        // With the other check out of the way.
+        // The other check is disabled.
         settings.limits.unexplained_v = Some(1000.0);
         let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
-        // The injection at 60°: 0.5 along phase a, 0.5 along phase b.
+        // The injection is at 60°: 0.5 along phase a, 0.5 along phase b.
         drive.command(&Command::TurnInjection(-30.0)).unwrap();
         let zero = Load::new().sample();
         let mut periods = 0;
@@ -121,14 +121,15 @@ fn a_silent_channel_is_found_by_its_carrier() {
             periods += 1;
         }
         assert_eq!(drive.state(), State::Fault(fault), "channel {channel}");
-        // Three carrier periods, and up to one to the end of the running one.
+        // Detection takes three injection periods, and up to one more to the end of the present one.
         assert!((120..=150).contains(&periods), "{periods}");
     }
 }
 
 #[test]
 fn an_open_phase_does_not_get_past_the_start() {
-    // Open a: across phase a; open b, c: along the other two in series; all open: nowhere.
+    // If a is open, the current is across phase a; if b or c is open, it is along the other two in series; if all are open, there
+    // is none.
     let axis = |degrees: f32| Some(Angle::from_degrees(degrees).unit_vector());
     let nothing = Some(UnitVector { cos: 0.0, sin: 0.0 });
     for (name, only) in [("a", axis(90.0)), ("b", axis(30.0)), ("c", axis(-30.0)), ("all", nothing)]
@@ -152,7 +153,7 @@ fn an_open_phase_does_not_get_past_the_start() {
 
 #[test]
 fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
-    // 206 V leave 119 V in every direction: 100 V of carrier fit beside little, 150 V never.
+    // 206 V allow 119 V in every direction, so 100 V of injection fit beside a small fundamental, and 150 V never fit.
     for (amplitude, shares) in [(100.0, (0.8, 0.99)), (150.0, (0.5, 0.7))] {
         let mut settings = settings();
         settings.injection.beside_encoder = true;
@@ -161,7 +162,7 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
         load.v_dc = 206.0;
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
-        // 6.2 ohm times 3.2 A are 20 V.
+        // 6.2 ohm times 3.2 A are 20 V of fundamental.
         drive.command(&Command::Torque(3.1)).unwrap();
         let mut current = 0.0;
         for _ in 0..1200 {
@@ -172,7 +173,7 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
         assert_eq!(drive.state(), State::Torque);
         assert!(share > shares.0 && share < shares.1, "{amplitude} V: {share}");
         assert!((current - 3.1).abs() < 0.05, "{current}");
-        // All of it comes back with the room.
+        // The full injection returns when there is enough voltage.
         load.v_dc = 311.0;
         (0..1200).for_each(|_| period(&mut drive, &mut load));
         assert_eq!(drive.telemetry().carrier_share, 1.0);
@@ -188,8 +189,8 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
     assert_eq!(drive.state(), State::Fault(Fault::CarrierNoRoom));
 }
 
-/// Half of 3.5 A is left half-way between the limits of the heat sink: 1.6 A beside 0.7 A of direct current. It comes back
-/// as the heat sink cools.
+/// Half-way between the limits of the heat sink, half of 3.5 A is left: 1.6 A beside 0.7 A of d-axis current. The current
+/// rises again as the heat sink cools.
 #[test]
 fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
     let (mut drive, mut load) = running();
@@ -206,7 +207,7 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
     let (whole, why) = at(&mut drive, 60.0);
     assert!((whole - 3.0).abs() < 0.02 && why == Limiting::None, "{whole} {why}");
     let (half, why) = at(&mut drive, 77.5);
-    // 4 % of 3.5 A for the curve of the thermistor, which moves i_q by i/i_q of that.
+    // The tolerance is 4 % of 3.5 A for the curve of the thermistor, multiplied by i/i_q for i_q.
     assert!((half - libm::sqrtf(1.75 * 1.75 - 0.7 * 0.7)).abs() < 0.16, "{half}");
     assert_eq!(why, Limiting::HeatSink);
     let (nothing, why) = at(&mut drive, 84.9);
@@ -215,15 +216,15 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
     assert!((whole - 3.0).abs() < 0.02 && why == Limiting::None, "{whole} {why}");
 }
 
-/// In each phase the load of the motor goes to the square of the current vector relative to that which it carries for ever, with its
-/// time constant; without outputs it decays.
+/// In each phase of the drive the load of the motor approaches the square of the current vector relative to its continuous current,
+/// with its time constant. Without outputs the load decays.
 #[test]
 fn the_load_of_the_motor_follows_the_current_in_every_phase() {
     let mut s = settings();
     (s.limits.motor_s, s.limits.motor_a) = (10.0, Some(2.0));
     let c = s.build().unwrap();
     let excite = standstill_test::current(1.5, AlphaBeta::ZERO);
-    // The least square of the current that flows, A^2.
+    // The last column is the least square of the current, A^2.
     let cases: [(Option<Command>, State, f32); 5] = [
         (None, State::Off, 0.0),
         (Some(Command::Start(Mode::Torque)), State::Calibrating, 0.0),
@@ -241,7 +242,7 @@ fn the_load_of_the_motor_follows_the_current_in_every_phase() {
             (0..3000).for_each(|_| period(&mut drive, &mut load));
         }
         drive.kept.thermal.motor = 0.5;
-        // Less than a start calibrates for.
+        // The time is shorter than the calibration of a start.
         let periods = 3 * crate::protect::Thermal::EVERY;
         let mut squares = 0.0;
         for _ in 0..periods {
@@ -259,7 +260,7 @@ fn the_load_of_the_motor_follows_the_current_in_every_phase() {
     }
 }
 
-/// With a relay the drive starts once the link has been steady, and not below the voltage at which it trips.
+/// With a relay the drive starts only after the link has been steady, and not below the trip voltage.
 #[test]
 fn a_link_that_is_not_charged_refuses_a_start() {
     let mut s = settings();
@@ -277,8 +278,8 @@ fn a_link_that_is_not_charged_refuses_a_start() {
     assert_eq!(drive.command(&start), Err(Refused::NotCharged));
 }
 
-/// Amplifiers of shunts whose offset changes when the low sides go on: 0.3 A are within the 0.4 A of the first measurement and beyond
-/// half of them.
+/// The offset of the shunt amplifiers changes when the low sides are switched on: 0.3 A are within the 0.4 A of the first
+/// measurement, and beyond half of it.
 #[test]
 fn an_offset_that_comes_with_the_low_sides_is_found_behind_shunts() {
     let start = |amperes: f32, sensors| {

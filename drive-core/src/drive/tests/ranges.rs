@@ -1,4 +1,4 @@
-//! Ranges of commands, and small functions of the machine against independent computations.
+//! Tests of the ranges of commands, and of small functions of the drive against independent computations.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
 use super::*;
@@ -6,7 +6,7 @@ use crate::drive::flying_start::Residual;
 use crate::drive::standstill_test::next_bit;
 use crate::drive::{Regulator, TestSignal};
 
-/// A regulated drive in this mode, with the encoder.
+/// Returns a drive that regulates in this mode, with the encoder.
 fn in_mode(mode: Mode) -> Drive {
     let (mut drive, mut load) = (drive(), Load::new());
     drive.command(&Command::Start(mode)).unwrap();
@@ -22,7 +22,7 @@ fn excitation(amperes: f32, regulator: Regulator, carrier: AlphaBeta) -> Command
     Command::Test(TestSignal::Current { amperes, regulator, carrier, binary: false })
 }
 
-/// Each command at the ends of its range, and just beyond.
+/// Tests each command at the ends of its range, and just beyond.
 #[test]
 fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
     let c = settings().build().unwrap();
@@ -62,7 +62,7 @@ fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
             assert_eq!(drive.state(), before.state());
         }
     }
-    // The direct current has a least value that is refused, and a largest that is taken instead: what the torque leaves of the limit.
+    // A d-axis current below the range is refused; a larger one is limited to the current that the torque leaves.
     let mut drive = torque.clone();
     drive.command(&Command::Torque(2.0)).unwrap();
     let left = (3.5_f32 * 3.5 - 2.0 * 2.0).sqrt();
@@ -70,7 +70,7 @@ fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
     assert!(drive.command(&Command::Magnetising(0.999 * least)).is_err());
     let Ok(Accepted::Limited(most)) = drive.command(&Command::Magnetising(9.0)) else { panic!() };
     assert!((most - left).abs() < 1e-5, "{most}, not {left}");
-    // An excitation has more numbers that are to be finite.
+    // A test signal has more numbers that must be finite.
     for bad in [f32::NAN, f32::INFINITY] {
         let none = AlphaBeta::ZERO;
         let bad = [
@@ -87,7 +87,8 @@ fn the_ends_of_a_range_are_accepted_and_what_lies_beyond_is_refused() {
     }
 }
 
-/// Register of eight bits: each of its 255 values but zero once; 128 ones; another 254 shifts away it has nothing in common with itself.
+/// The register of eight bits takes each of its 255 values except zero once, with 128 ones. The sequence is uncorrelated with
+/// itself at each of the other 254 shifts.
 #[test]
 fn the_binary_sequence_has_the_largest_length() {
     let mut register = 0;
@@ -100,7 +101,8 @@ fn the_binary_sequence_has_the_largest_length() {
     assert_eq!(bits[..255].iter().sum::<f32>(), 1.0);
 }
 
-/// The flux of a rotor decays with its time constant. A start waits until its voltage has, and never for less.
+/// The flux of a rotor decays with its time constant. A start waits until the voltage of the flux has decayed, and not if it is
+/// small enough.
 #[test]
 fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
     let c = sensorless().build().unwrap();
@@ -116,7 +118,7 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
             "{volts}: {ends}, decayed at {decayed}"
         );
         assert!(!waits(ends + 100) && (ends == 0 || waits(ends - 1)));
-        // It makes no difference when the time has passed.
+        // It makes no difference whether the time has passed before or after the start.
         assert!(!residual.after(ends).waits(&c, 0) && residual.after(ends - 1).waits(&c, 0));
     }
     assert!(
@@ -126,7 +128,7 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
     let residual = Residual::of(50.0);
     assert!(residual.after(flying_start.flux_decay - 1).is_recent(&c));
     assert!(!residual.after(flying_start.flux_decay).is_recent(&c));
-    // The voltage of a flux of 0.5 V s at 50 Hz.
+    // This is the voltage of a flux of 0.5 V s at 50 Hz.
     let turning = Residual::turning(-50.0 / 6000.0, 0.5);
     let volts = core::f32::consts::TAU * 50.0 * 0.5;
     assert!(turning.waits(&c, 0) && !turning.waits(&c, u32::MAX));
@@ -134,7 +136,7 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
     assert!((0..50_000).all(|n| n % 500 != 0 || same.waits(&c, n) == turning.waits(&c, n)));
 }
 
-/// A number that is none, in each place where the coefficients are checked.
+/// Tests NaN in each place where the coefficients are checked.
 #[test]
 fn coefficients_that_are_no_numbers_are_found() {
     let sound = settings().build().unwrap();

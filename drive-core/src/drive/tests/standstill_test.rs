@@ -1,17 +1,17 @@
-//! The excitation of a motor at rest: a sequence of its own, and the same protections.
+//! Tests of the test signals to a motor at rest, with their own sequence and the usual protections.
 
 use super::*;
 use crate::drive::{Regulator, TestSignal};
 use crate::protect::wiring_check::WiringSettings;
 
-/// A regulated direct current and a carrier on top of it.
+/// Returns the command for a regulated dc current with an injection on top of it.
 pub(super) fn current(amperes: f32, carrier: AlphaBeta) -> Command {
     let regulator =
         Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
     Command::Test(TestSignal::Current { amperes, regulator, carrier, binary: false })
 }
 
-/// A drive that excites, and its load.
+/// Returns a drive that applies a test signal, and its load.
 fn exciting(command: &Command) -> (Drive, Load) {
     let mut drive = Drive::new(settings().build().unwrap());
     let mut load = Load::new();
@@ -41,11 +41,11 @@ fn run(drive: &mut Drive, load: &mut Load, periods: u32, mut seen: impl FnMut(&D
 fn the_current_along_phase_a_is_the_reference_and_a_carrier_comes_on_top() {
     let (mut drive, mut load) = exciting(&current(1.0, AlphaBeta::ZERO));
     run(&mut drive, &mut load, 1200, |_| {});
-    // Steps of the converter are 2.2 mA.
+    // Steps of the ADC are 2.2 mA.
     assert!((load.current.alpha - 1.0).abs() < 0.005, "{}", load.current.alpha);
     assert!(load.current.beta.abs() < 0.005, "{}", load.current.beta);
-    // 50 V at 600 Hz across 51.5 mH and 6.2 ohm: 0.257 A peak, and nothing of it along the axis.
-    // It rises in 200 periods: half of it after 100.
+    // 50 V at 600 Hz across 51.5 mH and 6.2 ohm make 0.257 A peak, of which nothing is along the
+    // axis. The injection rises in 200 periods, so half of it is reached after 100.
     drive.command(&current(1.0, AlphaBeta::new(0.0, 50.0))).unwrap();
     run(&mut drive, &mut load, 95, |_| {});
     let mut half = 0.0_f32;
@@ -109,7 +109,7 @@ fn an_excitation_beyond_the_trip_or_not_finite_is_refused() {
 
 #[test]
 fn a_pulse_train_answers_and_then_rests() {
-    // 50 V for two periods: 16.7 mVs, 0.32 A of 51.5 mH.
+    // 50 V for two periods are 16.7 mVs, which make 0.32 A in 51.5 mH.
     let pulses =
         WiringSettings { sigma_ls: 0.0515, expected_a: 0.32, noise_a: 0.3, highest_v: 60.0 };
     let mut drive = Drive::new(settings().build().unwrap());

@@ -1,4 +1,4 @@
-//! The table of [`Trust`] in every phase of the flux and for every source of the angle.
+//! Test of the table of [`Trust`] in every phase of the flux and for every source of the angle.
 
 use super::*;
 use crate::carrier::at_start::AtStartState;
@@ -6,15 +6,15 @@ use crate::drive::trust::{Check, Lock, Trust};
 use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;
 
-/// A row of the table, but for its name.
+/// Returns a row of the table without its name.
 fn row(trust: &Trust) -> String {
     let source = match trust.source {
         Source::Slip => "slip, shaft locked",
-        Source::Nothing => "nothing, carrier off",
+        Source::Nothing => "nothing, injection off",
         Source::Injection => "injection",
         Source::Both => "injection and voltage",
     };
-    let frame = if trust.rotates { "turns" } else { "stands" };
+    let frame = if trust.rotates { "rotating" } else { "fixed" };
     let lock = match trust.lock {
         Lock::Off => "off",
         Lock::Baseline => "baseline",
@@ -28,7 +28,7 @@ fn row(trust: &Trust) -> String {
     let mean = if trust.mean_voltage { "judged" } else { "begins anew" };
     let resistance = match (trust.resistance, trust.measures_drop) {
         (true, false) => "by flux or injection",
-        (false, true) => "with the drop of the inverter",
+        (false, true) => "with the inverter voltage error",
         (false, false) => "kept",
         (true, true) => panic!("two ways to the resistance"),
     };

@@ -1,4 +1,4 @@
-//! From the sums of a learning to its result.
+//! Evaluation of the sums of a self-commissioning.
 
 use super::{Fitted, Learned, Learning, LearningState};
 use crate::UnitVector;
@@ -9,27 +9,27 @@ use crate::learned::{
 use crate::protect::SaliencyCheck;
 use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
-/// Limit of the asymmetry that a gain mismatch does not explain, for a mismatch to be corrected as one: absolute part, and
-/// share of the mismatch.
+/// Limit of the asymmetry that a gain mismatch does not explain, above which the mismatch is not corrected: absolute part,
+/// and share of the mismatch.
 const UNEXPLAINED: (f32, f32) = (0.001, 0.25);
-/// Least slope up to the torque limit: share of that without torque current, and magnitude, 1/rad.
+/// Least saliency sensitivity up to the torque limit: share of the sensitivity without q-axis current, and magnitude, 1/rad.
 const LEAST_SLOPE_UNDER_LOAD: (f32, f32) = (0.3, 0.016);
 
-/// Measurements of the drive while it magnetised, before the learning.
+/// Measurements of the drive during magnetisation, before the points.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
-    /// Mean saliency that the saliency check saw along its axis; none without the check.
+    /// Mean saliency that the saliency check has measured along its axis; none without the check.
     pub looked: Option<f32>,
-    /// Flux-fixed saliency per mean saliency that it sees.
+    /// Flux-fixed saliency per mean saliency of the check.
     pub per_looked: f32,
-    /// Squared carrier current without torque current, A^2.
+    /// Squared injection current without q-axis current, A^2.
     pub baseline: f32,
-    /// Asymmetry before there was current or flux.
+    /// Asymmetry that was measured before there was current or flux.
     pub at_start: Option<Asymmetry>,
 }
 
 impl Learning {
-    /// Evaluates all points. `start` is what the drive saw before.
+    /// Evaluates all points. `start` has the measurements before them.
     pub fn result(&self, state: &LearningState, start: &Start) -> Learned {
         let (asymmetry, gain_mismatch, spread) = self.asymmetry(state);
         let (reference, current_saliency) = self.reference(state);
@@ -38,7 +38,7 @@ impl Learning {
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
         } else if self.normalised && !Verdict::of_slope(slope_at_rest).is_accepted() {
-            // A better lock of the shaft does not raise the slope.
+            // This verdict comes first, because a better lock of the shaft does not raise the sensitivity.
             Verdict::SlopeTooSmall
         } else if !(spread <= SPREAD && self.points > 0) {
             Verdict::Uneven
@@ -51,7 +51,7 @@ impl Learning {
         } else {
             Verdict::of_slope(slope_at_rest)
         };
-        // The check and the baseline were taken with the asymmetry, with the flux along phase a.
+        // The check and the baseline were measured with the asymmetry and with the flux along phase a.
         let all = gain_mismatch.with(&asymmetry);
         let seen = |q: f32, carrier_squared: f32, axis| {
             let mut saliency = Saliency { q, carrier_squared, i_q: 0.0 };
@@ -80,7 +80,7 @@ impl Learning {
         }
     }
 
-    /// The asymmetry beyond the gain mismatch, the gain mismatch, and the spread of the even part.
+    /// Returns the asymmetry beyond the gain mismatch, the gain mismatch, and the spread of the even part.
     fn asymmetry(&self, state: &LearningState) -> (Asymmetry, Fitted, f32) {
         let per_point = 1.0 / self.points().max(1) as f32;
         let (sum, least, largest) = state.even;
@@ -102,7 +102,7 @@ impl Learning {
         (asymmetry, Fitted { value, misfit, accepted }, spread)
     }
 
-    /// The reference, and the saliency per ampere of stator current that fits it.
+    /// Returns the saliency offset, and the saliency per ampere of stator current that fits it.
     fn reference(&self, state: &LearningState) -> (Option<ReferenceTable>, Fitted) {
         let [odd, ..] = &state.odd;
         let q = Self::held_beyond(odd, self.points);
@@ -123,18 +123,19 @@ impl Learning {
         (ReferenceTable::from_points(self.grid, q), Fitted { value, misfit, accepted })
     }
 
-    /// The slope over the torque current, that without it, 1/rad, and the largest current that it allows, A.
+    /// Returns the sensitivity over the q-axis current, the sensitivity without q-axis current, 1/rad, and the largest current that
+    /// it allows, A.
     fn slope(&self, state: &LearningState) -> (Option<SlopeTable>, f32, f32) {
         if !self.normalised {
             return (None, 0.0, self.grid.current(self.points));
         }
         let [without, ahead, behind] = &state.odd;
         let per_lead = 1.0 / self.lead;
-        // Without torque current the other lead is the mirrored one.
+        // Without q-axis current the other lead is the mirrored one.
         let at_rest = ahead[0] * per_lead;
         let mut k = [at_rest; POINTS];
         let mut last = 0;
-        // The slopes on both sides at a current with leads.
+        // These are the sensitivities on both sides at a current with leads.
         let sides = |n: usize| match (ahead.get(n), without.get(n), behind.get(n)) {
             (Some(ahead), Some(without), Some(behind)) if n > 0 => {
                 [ahead - without, without - behind].map(|q| q * per_lead)
@@ -159,14 +160,14 @@ impl Learning {
         (table, at_rest, self.grid.current(last))
     }
 
-    /// The carrier current over the torque current.
+    /// Returns the injection current over the q-axis current.
     fn carrier(&self, state: &LearningState, baseline: f32) -> Option<CarrierTable> {
         let mut ratio = state.carrier.map(|square| fpu_sqrt::sqrtf(square / baseline));
         ratio[0] = 1.0;
         CarrierTable::from_points(self.grid, Self::held_beyond(&ratio, self.points))
     }
 
-    /// Values at the points, held beyond the point `last`.
+    /// Returns the values at the points, constant beyond the point `last`.
     fn held_beyond(values: &[f32; POINTS], last: usize) -> [f32; POINTS] {
         core::array::from_fn(|n| values[n.min(last)])
     }

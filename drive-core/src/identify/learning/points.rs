@@ -1,57 +1,58 @@
-//! The points of a learning, and their order.
+//! The points of the self-commissioning, and their order.
 
 use core::f32::consts::PI;
 
 use super::{Learning, LearningState, TURNING};
 
 /// Settling time of the q-axis current and the averages at every point, s, and of slip and flux, in rotor time constants. If the
-/// q-axis current changes, the iron saturates in another way; if it changes its sign, the flux turns in the frame. (With 0.2, motors
+/// q-axis current changes, the saturation changes; if the current changes its sign, the flux turns in the frame. (With 0.2, motors
 /// whose rotor time constant is above 0.45 s had an even part of the signal that spread by up to 0.007.)
 const SETTLE_S: f32 = 0.1;
 pub(super) const SETTLE_T: f32 = 1.0;
-/// Settling time at the first point, in rotor time constants, and what may be left of a change of the flux at any other,
-/// relative to the flux.
+/// Settling time at the first point, in rotor time constants, and allowed rest of a change of the flux at any other
+/// point, relative to the flux.
 const FIRST_T: f32 = 2.0;
 pub(super) const LEFT: f32 = 0.02;
-/// Averaging time at a point of the reference, and of the slope under load, s. One second reduces sensor noise of 5 mA to 0.2°.
+/// Averaging time at a point of the offset, and at a point of the sensitivity under load, s. One second reduces sensor noise of 5
+/// mA to 0.2°.
 pub(super) const AVERAGE_S: f32 = 1.0;
 const SLOPE_S: f32 = 0.5;
 
-/// A point of the learning.
+/// A point of the self-commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
-    /// Index of its current in the table.
+    /// Index of the current in the table.
     pub n: usize,
-    /// Index of its lead in [`LEADS`].
+    /// Index of the lead in [`LEADS`].
     pub lead: usize,
-    /// Whether it is the second of its pair, with torque current and lead of the opposite sign.
+    /// Whether the point is the second of its pair, with q-axis current and lead of the opposite sign.
     pub mirrored: bool,
     /// Settling time, s, and least averaging time, s.
     pub settle_s: f32,
     pub average_s: f32,
-    /// Whether it lasts for whole half turns of the flux.
+    /// Whether the point lasts for whole half turns of the flux.
     pub turns: bool,
 }
 
 impl Learning {
-    /// Number of points of a learning: two for every current, and two for every other one with either lead of the flux and for
-    /// a lead without current.
+    /// Returns the number of points: two for every current, two for every other current with either lead of the flux, and two
+    /// for a lead without current.
     pub fn points(&self) -> usize {
         let led = if self.normalised { 2 * self.led() + 1 } else { 0 };
         2 * (self.points + led)
     }
 
-    /// Number of currents with a lead: the last, and every other one below it.
+    /// Returns the number of currents with a lead: the last, and every other one below it.
     fn led(&self) -> usize {
         self.points.div_ceil(2)
     }
 
-    /// The point that is being measured, from 1 on, and the number of points.
+    /// Returns the number of the point that is being measured, from 1, and the number of points.
     pub fn progress(&self, state: &LearningState) -> (usize, usize) {
         (self.points().min(state.point + 1), self.points())
     }
 
-    /// Expected time, s, from the beginning of a point, from 1 on, to the end of the learning.
+    /// Returns the expected time, s, from the beginning of a point, numbered from 1, to the end of the self-commissioning.
     pub fn seconds_left(&self, point: usize) -> f32 {
         let seconds = |number| {
             let Point { n, settle_s, average_s, turns, .. } = self.point(number);
@@ -62,8 +63,9 @@ impl Learning {
         (point.max(1) - 1..self.points()).map(seconds).sum()
     }
 
-    /// The point with this number. Pairs without lead come first, from the first current down, then from the largest down; then
-    /// those in which the flux is ahead, from no current up, and those in which it is behind, down again.
+    /// Returns the point with this number. Pairs without lead come first, from the first current down, then from the largest
+    /// current down. Then follow the pairs in which the flux is ahead, from zero current up, and the pairs in which it is
+    /// behind, down again.
     #[cold]
     pub(super) fn point(&self, number: usize) -> Point {
         let (pair, mirrored) = (number / 2, !number.is_multiple_of(2));
@@ -81,7 +83,7 @@ impl Learning {
                 (self.points - 2 * below, 2, flux_t, SLOPE_S)
             }
         };
-        // The mirrored point has the flux of the first.
+        // The mirrored point has the same flux as the first.
         let flux_t = if mirrored { SETTLE_T } else { flux_t.max(SETTLE_T) };
         let settle_s = SETTLE_S.max(flux_t * self.tau_r);
         Point {

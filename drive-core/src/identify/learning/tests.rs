@@ -1,14 +1,14 @@
-//! The learning on signals and voltages of given motors and sensors.
+//! Tests of the self-commissioning on signals and voltages of given motors and sensors.
 #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
 use super::*;
 use crate::carrier::Asymmetry;
 use crate::table::{ReferenceTable, SlopeTable};
 use core::f64::consts::TAU as TURN;
 
-/// Carrier current at no torque current, A.
+/// Injection current without q-axis current, A.
 const CARRIER: f32 = 0.26;
 
-/// Square of the carrier current, 5 % larger for every ampere.
+/// Returns the square of the injection current, which is 5 % larger for every ampere.
 fn carrier(i_q: f32) -> f32 {
     (CARRIER * (1.0 + 0.05 * i_q.abs())).powi(2)
 }
@@ -17,13 +17,13 @@ fn learning() -> Learning {
     Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, true)
 }
 
-/// Measurements before the learning: no check, and the carrier without torque current.
+/// Returns the measurements before the points: no check, and the injection current without q-axis current.
 fn start() -> Start {
     Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER, at_start: None }
 }
 
-/// Goes through all points with the signal that `q(i_q, lead, theta)` gives and the voltage `v(i_q)`. One that ends has lasted as
-/// long as was expected at each of its points.
+/// Runs through all points with the signal `q(i_q, lead, theta)` and the voltage `v(i_q)`. If the self-commissioning ends, each
+/// point must have lasted as long as expected.
 fn learn(
     q: impl Fn(f64, f64, f64) -> f64,
     v: impl Fn(f32) -> Dq,
@@ -71,17 +71,17 @@ fn reference(i_q: f64) -> f64 {
     2.0 * 0.034 * 0.7 * i_q / i_q.hypot(0.7)
 }
 
-/// Slope that falls by a tenth for every ampere.
+/// Returns a sensitivity that falls by a tenth for every ampere.
 fn slope(i_q: f64) -> f64 {
     -0.07 * (1.0 - 0.1 * i_q.abs())
 }
 
-/// Signal of a motor with that reference and slope.
+/// Returns the signal of a motor with that offset and sensitivity.
 fn sound(i_q: f64, lead: f64, _: f64) -> f64 {
     reference(i_q) + slope(i_q) * lead
 }
 
-/// Signal that a gain difference of `mismatch` adds.
+/// Returns the signal that a gain difference of `mismatch` adds.
 fn negative_sequence(mismatch: f64, theta: f64) -> f64 {
     let d = 0.5 * mismatch;
     d / 0.75_f64.sqrt() * ((2.0 * theta - TURN / 12.0).sin() - 0.5)
@@ -93,12 +93,12 @@ fn splits_the_reference_from_slope_and_mismatch() {
         let q = |i_q, lead, theta| sound(i_q, lead, theta) + negative_sequence(mismatch, theta);
         let (next, state) = learn(q, locked);
         assert_eq!(next, Ok(()));
-        // With the axis at 90° the carrier current of a is seen smaller.
+        // With the axis at 90° the measured injection current of a is smaller.
         let baseline = CARRIER * CARRIER * (1.0 - mismatch as f32);
         let learned = learning().result(&state, &Start { baseline, ..start() });
         assert_eq!(learned.verdict, Verdict::Sound);
         assert!(learned.gain_mismatch.accepted, "{learned:?}");
-        // A half turn ends within a period: 1/800 at the highest slip.
+        // A half turn ends within a period, which is 1/800 at the highest slip.
         assert!((f64::from(learned.gain_mismatch.value) - mismatch).abs() < 2e-4, "{learned:?}");
         assert!(learned.asymmetry.size() < 2e-4, "{learned:?}");
         assert!((learned.current_saliency.value - 0.034).abs() < 1e-4);
@@ -121,16 +121,16 @@ fn an_asymmetry_that_no_gain_makes_is_taken_out_as_what_it_is() {
         let q = |i_q, lead, theta| sound(i_q, lead, theta) + q(theta);
         learning().result(&learn(q, locked).1, &start())
     };
-    // Cross-talk of 2 % from b to a turns everything by 0.66°, which the carrier sees as 0.0115; see the asymmetry.
+    // Cross-talk of 2 % from b to a turns everything by 0.66°, which appears as 0.0115 in the signal; see the asymmetry.
     let found = learned(&|theta: f64| 0.0115 + 0.0115 * (2.0 * theta + 1.05).sin());
     assert!(found.verdict == Verdict::Sound && !found.gain_mismatch.accepted, "{found:?}");
     let [sin, cos] = [1.05_f32.cos(), 1.05_f32.sin()].map(|x| 0.0115 * x);
     let difference = Asymmetry { constant: 0.0115, sin, cos }.plus(&found.asymmetry, -1.0);
     assert!(difference.size() < 2e-4, "{found:?}");
-    // A mismatch that no sensor has.
+    // No sensor has such a large mismatch.
     let found = learned(&|theta| negative_sequence(0.2, theta));
     assert!(!found.gain_mismatch.accepted, "{found:?}");
-    // Larger than sensors have.
+    // The constant is larger than sensors can cause.
     assert_eq!(learned(&|_| 0.11).verdict, Verdict::OutOfRange);
 }
 
@@ -154,7 +154,7 @@ fn the_slope_decides_what_is_accepted_and_how_far() {
         assert_eq!(found.verdict, verdict, "{k}");
         assert_eq!(found.slope.is_some(), verdict.is_accepted(), "{k}");
     }
-    // Gone above a current, on one side only.
+    // The sensitivity vanishes above a current, on one side only.
     let lost = |from: f64| {
         move |i_q: f64, lead: f64| {
             if i_q.abs() > from && i_q * lead > 0.0 { 0.0 } else { -0.05 * lead }
@@ -163,7 +163,7 @@ fn the_slope_decides_what_is_accepted_and_how_far() {
     let found = learned(&lost(1.6));
     assert_eq!((found.verdict, found.limit_a), (Verdict::Sound, 1.5));
     let k = *found.slope.unwrap().points();
-    // Interpolated: half of one side is lost between 1.25 and 1.75 A.
+    // The value is interpolated: half of one side has vanished between 1.25 and 1.75 A.
     assert!(k[6..].iter().all(|k| (k + 0.0375).abs() < 1e-3), "held beyond the limit: {k:?}");
     let found = learned(&lost(0.6));
     assert_eq!((found.verdict, found.limit_a), (Verdict::LimitTooLow, 0.5));
@@ -177,16 +177,17 @@ fn what_does_not_fit_is_not_accepted() {
         let q = |i_q, lead, _| q(i_q) + slope(i_q) * lead;
         learning().result(&learn(q, locked).1, &start())
     };
-    // A reference that is too large, or not a number, or even by more at some currents than at others.
+    // These offsets are too large, NaN, or even by a part that differs between the currents.
     assert_eq!(result(&|i_q| 0.2 * i_q).verdict, Verdict::OutOfRange);
     assert!(!result(&|_| f64::NAN).verdict.is_accepted());
     let uneven = result(&|i_q| reference(i_q) + 0.002 * i_q * i_q);
     assert_eq!(uneven.verdict, Verdict::Uneven, "{uneven:?}");
-    // An uneven reference and too small a slope: the verdict is the slope, which a better lock of the shaft does not raise.
+    // The offset is uneven and the sensitivity too small. The verdict is the sensitivity, which a better lock of the shaft does not
+    // raise.
     let q = |i_q, lead, _| reference(i_q) + 0.002 * i_q * i_q + 0.1 * slope(i_q) * lead;
     let both = learning().result(&learn(q, locked).1, &start());
     assert_eq!(both.verdict, Verdict::SlopeTooSmall, "{both:?}");
-    // A sensor that is not linear: the signal repeats four times in a turn, here at large currents.
+    // With a sensor that is not linear, the signal repeats four times in a turn, here at large currents.
     let bent = |size: f64| {
         let q = |i_q: f64, lead: f64, theta: f64| {
             let at = if i_q > 2.0 { size } else { 0.0 };
@@ -200,15 +201,16 @@ fn what_does_not_fit_is_not_accepted() {
     assert!((f64::from(found.ripple) / (0.16 * k) - 1.0).abs() < 0.01, "{}", found.ripple);
     let text = found.to_string();
     assert!(text.contains("four times") && text.contains("not linear"), "{text}");
-    // Less is accepted, and told from a third of it on.
+    // A smaller part is accepted, and reported above a third of the limit.
     let told = |size: f64| bent(size * k).to_string().contains("not quite linear");
     assert!(told(0.055) && !told(0.045));
-    // A saliency that does not follow the law of the current.
+    // This saliency does not follow the law of the current.
     let learned = result(&|i_q: f64| 0.02 * (4.0 * i_q).sin());
     assert!(learned.verdict.is_accepted() && !learned.current_saliency.accepted, "{learned:?}");
 }
 
-/// The lead is such that the flux slips at every point, by half a step of the table at least. A grid up to the largest torque current has all its points.
+/// The lead is chosen so that the flux slips at every point, by at least half a step of the table. A grid up to the largest q-axis
+/// current has all its points.
 #[test]
 fn the_flux_turns_at_every_point() {
     let currents =
@@ -233,7 +235,7 @@ fn the_flux_turns_at_every_point() {
                 assert_eq!((i_q, lead), first, "{point:?}");
             }
             previous = Some((-i_q, -lead));
-            // What is left of the change of the flux after the settling.
+            // This is the rest of the change of the flux after the settling.
             let now = i_d * lead.cos() + i_q * lead.sin();
             let left = (now - magnetising) * (-point.settle_s / learning.tau_r).exp();
             assert!(left.abs() < 0.021 * i_d, "{point:?}: {left}");
@@ -246,7 +248,7 @@ fn the_flux_turns_at_every_point() {
         assert!(of(2).eq(led.iter().rev().copied()), "every other: {seen:?}");
         assert!(of(1).eq([0].into_iter().chain(led.into_iter().rev())), "{seen:?}");
     }
-    // A current difference has no slope.
+    // A current difference has no sensitivity.
     let learning = Learning::new(&Motor::default(), 0.7, 3.5, Grid::REFERENCE, false);
     assert_eq!(learning.points(), 26);
 }
@@ -254,7 +256,7 @@ fn the_flux_turns_at_every_point() {
 #[test]
 fn a_moving_shaft_is_noticed() {
     let q = sound;
-    // 0.5 V is the limit, and half of the voltage of a free shaft.
+    // The limits are 0.5 V, and half of the voltage of a free shaft.
     let turned = |v: f32| move |i_q| locked(i_q) + Dq::new(0.0, v);
     let free = |share: f32| {
         move |i_q: f32| locked(i_q) - Dq::new(share * 0.153 * i_q * i_q / (0.7 * 0.186), 0.0)
@@ -264,7 +266,7 @@ fn a_moving_shaft_is_noticed() {
     }
     for (ended, state) in [learn(q, turned(-0.52)), learn(q, turned(0.52)), learn(q, free(0.55))] {
         assert_eq!(ended, Err(Fault::ShaftNotLocked));
-        // A point was evaluated: it was not its length that ended it.
+        // A point was evaluated, so the run did not end because of its length.
         assert_eq!(state.sums.count, 0);
     }
 }
@@ -311,16 +313,17 @@ fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
     second.gain_mismatch.value = -0.002;
     second.current_saliency.accepted = false;
     second.asymmetry = Asymmetry { constant: 0.002, sin: -0.004, cos: 0.0 };
-    // What the second finds is what the correction by the first leaves: half of it counts.
+    // The second result is the rest after the correction by the first, and half of it counts.
     let both = second.on_top_of(&first);
     assert!((both.gain_mismatch.value - 0.009).abs() < 1e-6);
     let off = both.asymmetry.plus(&Asymmetry { constant: 0.002, sin: 0.0, cos: -0.003 }, -1.0);
     assert!(off.size() < 1e-7 && both.positions == 2, "{both:?}");
-    // Its start saw 0.001 each of constant and cosine beyond all that it found, and half of that is not taken out.
+    // At its start, 0.001 each of constant and cosine were measured beyond the whole result, and half of the result is not
+    // subtracted.
     let seen = second.gain_mismatch.with(&second.asymmetry).plus(&both.at_start.unwrap(), -2.0);
     let off = seen.plus(&Asymmetry { constant: 0.001, sin: 0.0, cos: 0.001 }, 2.0);
     assert!(off.size() < 1e-7, "{both:?}");
-    // A third that finds nothing changes nothing.
+    // A third result of zero changes nothing.
     second.gain_mismatch.value = 0.0;
     second.asymmetry = Asymmetry::default();
     let third = second.on_top_of(&both);

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Nominal 0.26 A of carrier, 120 ms, with the slope of a saliency `a` that is fixed to the flux.
+/// Returns a monitor with a nominal injection current of 0.26 A, 120 ms, and the sensitivity of a saliency `a` that is fixed to the
+/// flux.
 fn monitor_of(a: f32) -> LockMonitor {
     LockMonitor::new(
         &CarrierTable::default(),
@@ -24,7 +25,7 @@ fn seen(carrier_a: f32, i_q: f32) -> Saliency {
     Saliency { q: 0.0, carrier_squared: carrier_a * carrier_a, i_q }
 }
 
-/// A state with the baseline taken at 0.27 A.
+/// Returns a state with the baseline measured at 0.27 A.
 fn ready(monitor: &LockMonitor) -> LockMonitorState {
     let mut state = LockMonitorState::default();
     for _ in 0..600 {
@@ -33,7 +34,7 @@ fn ready(monitor: &LockMonitor) -> LockMonitorState {
     state
 }
 
-/// Steps until the fault: how many, and which.
+/// Runs steps until the fault. Returns their number and the fault.
 fn until(monitor: &LockMonitor, state: &mut LockMonitorState, seen: Saliency) -> (u32, Fault) {
     for n in 1..=6000 {
         if let Err(fault) = monitor.step(state, &seen, 1.0, false) {
@@ -54,17 +55,18 @@ fn a_lost_flux_is_seen_in_the_time_the_mean_takes() {
             monitor.step(&mut state, &seen(0.27 * ratio, i_q), 1.0, false).unwrap();
         }
         assert!(state.loss.abs() < 0.02, "{i_q}: {}", state.loss);
-        // Without flux: 120 ms ln(1 / 0.45) = 96 ms.
+        // Without flux the time is 120 ms ln(1 / 0.45) = 96 ms.
         let gone = seen(0.27 * ratio * (1.0 - 0.035), i_q);
         let (n, fault) = until(&monitor, &mut state, gone);
         assert_eq!(fault, Fault::LostLock);
-        assert!((55..=61).contains(&n), "{i_q}: {n} carrier periods");
+        assert!((55..=61).contains(&n), "{i_q}: {n} injection periods");
     }
 }
 
 #[test]
 fn too_much_flux_is_wrong_as_well_and_the_limit_depends_on_the_sign() {
-    // Loss that lasts, the saliency, and after how many carrier periods of 1/600 s with 120 ms: 72 ln(1 / (1 - limit/loss)).
+    // The cases have a saliency, a lasting deficit, and the injection periods of 1/600 s until the fault with 120 ms: 72 ln(1 /
+    // (1 - limit/deficit)).
     for (a, loss, periods) in [
         (-0.035, -1.0, Some(66.0)),
         (-0.035, -0.55, None),
@@ -90,12 +92,12 @@ fn too_much_flux_is_wrong_as_well_and_the_limit_depends_on_the_sign() {
 #[test]
 fn it_rests_while_the_current_moves_but_not_for_long() {
     let monitor = monitor();
-    // Without flux from a step of 1 A on: 12 carrier periods later than at rest.
+    // If the flux is missing from a step of 1 A on, the fault comes 12 injection periods later than at rest.
     let mut state = ready(&monitor);
     let gone = |i_q| seen(0.27 * (1.0 - 0.035) * if i_q == 0.0 { 1.0 } else { 1.04167 }, i_q);
     let (n, _) = until(&monitor, &mut state, gone(1.0));
-    assert!((67..=73).contains(&n), "{n} carrier periods");
-    // A command that never rests: judged 60 % of the time at least.
+    assert!((67..=73).contains(&n), "{n} injection periods");
+    // With a command that always changes, the deficit is judged at least 60 % of the time.
     let mut state = ready(&monitor);
     let n = (0..6000_u16)
         .find(|n| {
@@ -103,7 +105,7 @@ fn it_rests_while_the_current_moves_but_not_for_long() {
             monitor.step(&mut state, &gone(i_q), 1.0, false).is_err()
         })
         .unwrap();
-    assert!((92..=130).contains(&n), "{n} carrier periods");
+    assert!((92..=130).contains(&n), "{n} injection periods");
 }
 
 #[test]
@@ -126,7 +128,7 @@ fn no_carrier_and_no_number_are_faults() {
         result = monitor.step(&mut state, &seen(0.12, 0.0), 1.0, true);
     }
     assert_eq!(result, Err(Fault::CarrierWeak));
-    // A number that is not finite, and a baseline that was never taken.
+    // The cases are a number that is not finite, and a baseline that was never measured.
     for (mut state, carrier) in [
         (ready(&monitor), f32::NAN),
         (ready(&monitor), f32::INFINITY),
@@ -137,7 +139,7 @@ fn no_carrier_and_no_number_are_faults() {
     }
 }
 
-/// The baseline is the mean of the first 0.05 s, and that of the last 0.05 s from then on: what was before is forgotten.
+/// The baseline is the mean of the first 0.05 s, and after that the mean of the last 0.05 s.
 #[test]
 fn the_baseline_is_a_mean_of_the_last_carrier_periods() {
     let monitor = monitor();
@@ -170,7 +172,7 @@ fn the_carrier_of_a_lost_flux_ends_the_lock() {
     for _ in 0..600 {
         monitor.step(&mut state, &carrier(0.26), 1.0, true).unwrap(); // baseline while magnetising
     }
-    // Without flux the carrier current falls by the saliency: 3.5 %.
+    // Without flux the injection current falls by the saliency: 3.5 %.
     let gone = carrier(0.26 * (1.0 - 0.035));
     assert!(monitor.step(&mut state, &gone, 1.0, false).is_ok());
     let mut after = (0..90).map(|_| monitor.step(&mut state, &gone, 1.0, false));

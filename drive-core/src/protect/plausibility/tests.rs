@@ -3,7 +3,7 @@
 use super::*;
 use crate::{Abc, Angle};
 
-/// Carrier of 0.26 A, 30° behind its voltage, as sensors of these gains see it on the axis.
+/// Returns an injection current of 0.26 A, 30° behind its voltage, as sensors with these gains measure it on the axis.
 fn seen(axis: UnitVector, gain_a: f32, gain_b: f32) -> CarrierCurrent {
     let component = |amplitude: f32| {
         let Abc { a, b, .. } = AlphaBeta::along(axis, amplitude).to_abc();
@@ -13,7 +13,7 @@ fn seen(axis: UnitVector, gain_a: f32, gain_b: f32) -> CarrierCurrent {
     CarrierCurrent { along: (re.0, im.0), across: (re.1, im.1) }
 }
 
-/// The carrier period in which a fault shows, and the fault.
+/// Returns the injection period in which a fault is reported, and the fault.
 fn watched(degrees: f32, gain_a: f32, gain_b: f32) -> Option<(usize, Fault)> {
     let axis = Angle::from_degrees(degrees).unit_vector();
     let mut watch = CarrierWatch::default();
@@ -24,7 +24,7 @@ fn watched(degrees: f32, gain_a: f32, gain_b: f32) -> Option<(usize, Fault)> {
 
 #[test]
 fn a_channel_below_a_quarter_of_its_carrier_is_silent() {
-    // Two periods to settle, and three.
+    // Two periods are for settling, and three until the fault.
     let (a, b) = (Some((5, Fault::CarrierMissingA)), Some((5, Fault::CarrierMissingB)));
     for degrees in [60.0, -120.0, 64.0] {
         assert_eq!(watched(degrees, 1.0, 1.0), None);
@@ -33,7 +33,7 @@ fn a_channel_below_a_quarter_of_its_carrier_is_silent() {
         assert_eq!(watched(degrees, 1.0, 0.24), b, "{degrees}");
         assert_eq!(watched(degrees, 0.0, 0.0), a, "{degrees}");
     }
-    // Across its phase there is no carrier to be missed: 0.4 of it at 66.4°.
+    // Across the phase of a sensor no injection current is expected; 0.4 of it is reached at 66.4°.
     for (degrees, judged) in [(90.0, false), (67.0, false), (66.0, true), (113.0, false)] {
         assert_eq!(watched(degrees, 0.0, 1.0).is_some(), judged, "{degrees}");
         assert_eq!(watched(120.0 - degrees, 1.0, 0.0).is_some(), judged, "{degrees}");
@@ -52,23 +52,23 @@ fn a_channel_must_be_silent_in_a_row() {
 }
 
 const PLANT: FirstOrder = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
-/// Electrical turns per period: 600 and 630 rpm with two pole pairs.
+/// Speeds, electrical turns per period: 600 and 630 rpm with two pole pairs.
 const ROTOR: f32 = 20.0 / 6000.0;
 const FLUX: f32 = 21.0 / 6000.0;
 
-/// Unexplained voltage, V, of the motor with its rotor at [`ROTOR`], an applied voltage that turns, and
-/// `more` volts along phase a that nobody knows of; and when the fault came. The drive believes
-/// `believed` of the speed of the rotor.
+/// Returns the unexplained voltage, V, of the motor with its rotor at [`ROTOR`], a rotating applied
+/// voltage, and `more` unknown volts along phase a; and the time of the fault. The drive estimates the
+/// share `believed` of the speed of the rotor.
 fn unexplained(more: f32, believed: f32) -> (AlphaBeta, Option<u32>) {
     let motor = Motor::default();
-    // The mean in the frame of the flux is not judged.
+    // The mean in the flux frame is not judged.
     let prediction = Prediction::new(&motor, PLANT, 15.0, [1e3; 2]);
     let (rest, fault) = run(&prediction, more, believed, 1.0);
     assert!(fault.is_none_or(|(_, fault)| fault == Fault::CurrentNotAsPredicted));
     (rest, fault.map(|(n, _)| n))
 }
 
-/// As [`unexplained`], with the fault; the motor has the share `flux` of the rotor flux that is believed.
+/// Runs as [`unexplained`] and returns the fault too. The motor has the share `flux` of the estimated rotor flux.
 fn run(
     prediction: &Prediction,
     more: f32,
@@ -113,7 +113,7 @@ fn run(
     (state.unexplained, None)
 }
 
-/// Back-emf of the rotor flux, V.
+/// Returns the back-EMF of the rotor flux, V.
 fn emf() -> f32 {
     Motor::default().coupled_inductance() * 0.7 * TAU * 20.0
 }
@@ -129,13 +129,13 @@ fn applied_voltage_and_rotor_explain_the_current() {
 
 #[test]
 fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
-    // The dissertation's motor: 12 V, and 6 V in the mean beside half of the back-emf of 13 V.
+    // The dissertation's motor has 12 V, and in the mean 6 V beside half of the back-EMF of 13 V.
     let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
     for (flux, seen) in [(1.0, false), (0.5, false), (0.0, true), (-1.0, true), (2.2, true)] {
         let (_, fault) = run(&prediction, 0.0, 1.0, flux);
         assert_eq!(fault.is_some(), seen, "{flux}: {fault:?} of {}", emf());
     }
-    // 50 ms ln(1 / (1 - share)) with what is allowed as a share of the back-emf.
+    // The time is 50 ms ln(1 / (1 - share)) with the allowed voltage as a share of the back-EMF.
     let (_, fault) = run(&prediction, 0.0, 1.0, -0.05);
     let (n, fault) = fault.unwrap();
     assert_eq!(fault, Fault::FluxNotAsPredicted);
@@ -144,7 +144,7 @@ fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
     assert!((n as f32 / expected - 1.0).abs() < 0.2, "{n} for {expected}");
 }
 
-/// A flux that has built up without torque may miss a quarter of the back-emf and a tenth of the allowed mean.
+/// When the flux has built up without torque, a quarter of the back-EMF and a tenth of the allowed mean may be missing.
 #[test]
 fn a_back_emf_that_is_missing_is_seen_with_either_sign() {
     let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
@@ -160,14 +160,14 @@ fn a_back_emf_that_is_missing_is_seen_with_either_sign() {
     }
 }
 
-/// A warm stator is believed to be cold: 30 % of 5.4 ohm at 2 A are 3.2 V, beyond what a tracked resistance allows.
+/// A warm stator is assumed to be cold: 30 % of 5.4 ohm at 2 A are 3.2 V, more than the limit with a tracked resistance.
 #[test]
 fn the_resistance_that_is_tracked_is_reckoned_with() {
     let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
     let current = AlphaBeta::new(2.0, 0.0);
     let judged = |known: Uncertainty| {
         let mut state = PredictionState { last: current, ..PredictionState::default() };
-        // The voltage that the model of the cold motor needs, and that of the warm motor.
+        // These are the voltages of the cold motor's model and of the warm motor.
         let cold = current * ((1.0 - PLANT.p) / PLANT.k) as f32;
         let warm = cold + current * (0.3 * Motor::default().r_s);
         (0..600).try_for_each(|_| {
@@ -184,14 +184,14 @@ fn the_resistance_that_is_tracked_is_reckoned_with() {
 
 #[test]
 fn voltage_beyond_the_allowed_one_and_the_back_emf_is_a_fault() {
-    // The squares add: 15 V, and half of the back-emf.
+    // The squares of 15 V and of half of the back-EMF add.
     let most = (15.0 * 15.0 + 0.25 * emf() * emf()).sqrt();
     assert_eq!(unexplained(0.98 * most, 1.0).1, None);
     assert!(unexplained(1.02 * most, 1.0).1.is_some());
-    // A speed believed at standstill leaves the back-emf unexplained, and does not widen the bound.
+    // If the estimated speed is zero, the back-EMF is unexplained and does not widen the bound.
     let (rest, fault) = unexplained(0.0, 0.0);
     assert_eq!(fault.is_some(), emf() > 15.0);
-    // A mean of 2.6 ms leaves 95 % of what turns at 21 Hz.
+    // A mean of 2.6 ms passes 95 % of a voltage that rotates at 21 Hz.
     assert!((rest.length_squared().sqrt() / emf() - 0.947).abs() < 0.01, "{rest:?}");
     assert!(unexplained(f32::NAN, 1.0).1.is_some());
 }

@@ -1,4 +1,4 @@
-//! The coefficients of the estimator of the flux angle.
+//! Coefficients of the estimator of the flux angle.
 
 use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -11,34 +11,35 @@ use drive_core::flux::{
 };
 use drive_core::{FirstOrder, PERIOD_S};
 
-/// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
-/// lags.
+/// Group delay of the band-pass at 600 Hz, samples, which is the lag of the envelope of the
+/// injection current.
 const BPF_GROUP_DELAY: f32 = 8.83;
 
 /// Noise of a current sensor with the dissertation's sensors, A.
 const NOISE_A: f32 = 0.005;
-/// Deviation of the saliency relative to that noise over the carrier current, with the correlation of the averages.
+/// Standard deviation of the saliency relative to that noise over the injection current, with the correlation of the averages.
 const AVERAGED_NOISE: f32 = 0.68;
-/// Deviation of the seen speed relative to that which the noise of one sample makes in a carrier period.
+/// Standard deviation of the observed speed, relative to the deviation that the noise of one sample makes in an injection period.
 const SEEN_NOISE: f32 = 2.8;
-/// Change of the load that comes once in a second, relative to the rated torque.
+/// Change of the load that is assumed once a second, relative to the rated torque.
 const LOAD_STEP: f32 = 0.16;
-/// Share of a step of the torque current by which its reference of the saliency lags, in angle of the stator current.
+/// Lag of the saliency offset after a step of the q-axis current, as a share of that step, in angle of the stator current.
 const REFERENCE_LAG: f32 = 0.14;
-/// Share of the change of the flux by an angle error that the filter reckons with, see `flux_by_angle`.
+/// Share of the flux change due to an angle error that the filter takes into account, see `flux_by_angle`.
 const FLUX_SHARE: f32 = 0.5;
-/// Time constant of the slow error of the seen speed, in rotor time constants, and its upper limit, s: the flux forgets within a
-/// rotor time constant what an angle error brings into that error, and an error that lasts far longer would be seen many times too
-/// large.
+/// Time constant of the slow error of the observed speed, in rotor time constants, and its upper limit, s. The part of that error
+/// that is due to an angle error decays with the rotor time constant, and with a far longer time constant the filter would
+/// estimate it many times too large.
 const SLOW_OF_TAU_R: f32 = 10.75;
 const SLOW_S: f32 = 2.0;
-/// Error of the leakage inductance.
+/// Assumed relative error of the leakage inductance.
 const LEAKAGE_ERROR: f32 = 0.1;
 
-/// Delay, samples, of the envelope of the carrier current behind that of its voltage: the group delay
-/// of the plant k / (z - p) at the carrier, less the half sample by which the voltage is held. The
-/// angle of the voltage is that of the middle of its period already. 0.053 for the motor of Table 5:
-/// left out, it is 0.9° at 600 rpm.
+/// Returns the delay, samples, of the envelope of the injection current behind the envelope of its
+/// voltage. It is the group delay of the plant k / (z - p) at the injection frequency, less the half
+/// sample by which the voltage is held, because the angle of the voltage is already taken in the
+/// middle of its period. The motor of Table 5 has 0.053 samples, which would be an error of 0.9° at
+/// 600 rpm.
 pub(super) fn carrier_lag(plant: FirstOrder) -> f32 {
     let turn = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
     let Complex64 { re: c, im: s } = Complex64::cis(turn);
@@ -47,8 +48,9 @@ pub(super) fn carrier_lag(plant: FirstOrder) -> f32 {
 }
 
 impl Settings {
-    /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
-    /// `carrier_v`, V, and `carrier_a`, A, the amplitudes of the injected voltage and of that current.
+    /// Returns the estimator. `carrier_lag` is the delay, samples, from the injection axis to the
+    /// sampled injection current; `carrier_v`, V, and `carrier_a`, A, are the amplitudes of the
+    /// injected voltage and of that current.
     pub(super) fn estimator(
         &self,
         lag_share: f32,
@@ -82,7 +84,7 @@ impl Settings {
         Estimator {
             demodulator: inj.demodulator,
             rms_samples: p.rms_samples,
-            // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
+            // A saliency s makes a current difference of sqrt2 I s and an impedance difference of 2 Z s, with Z = V/I.
             ampere_per_ohm: carrier_a * carrier_a / some_v * FRAC_1_SQRT_2,
             angle_loop,
             lag: lag_share * carrier_lag,
@@ -90,12 +92,13 @@ impl Settings {
         }
     }
 
-    /// The variances of the filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the carrier current, A.
+    /// Returns the variances of the angle filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the injection
+    /// current, A.
     fn angle_filter(&self, carrier_a: f32) -> AngleFilter {
         const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
         let (m, i_d, noise_a) = (&self.motor, self.i_d(), self.share_of_range(NOISE_A));
         let flux = m.coupled_inductance() * i_d;
-        // Speed that the observer sees for a change of the current.
+        // This is the speed error of the observer per change of the current.
         let per_a = m.sigma_l_s() / (flux * CARRIER_S);
         let saliency = AVERAGED_NOISE * noise_a / carrier_a;
         let rate = if self.uses_observer() {
@@ -125,10 +128,10 @@ mod tests {
 
     #[test]
     fn the_carrier_lags_by_the_plant() {
-        // 0.053 samples, 0.9° at 600 rpm, for the motor of Table 5.
+        // The motor of Table 5 has 0.053 samples, 0.9° at 600 rpm.
         let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
         assert!((carrier_lag(plant) - 0.053).abs() < 5e-4, "{}", carrier_lag(plant));
-        // -d arg(1/(z - p)) / d omega, less the half sample of the hold.
+        // The expected delay is -d arg(1/(z - p)) / d omega, less the half sample of the hold.
         let arg = |omega: f64| -(Complex64::cis(omega) - plant.p).arg();
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
         let lag = -(arg(w + 1e-5) - arg(w - 1e-5)) / 2e-5 - 0.5;

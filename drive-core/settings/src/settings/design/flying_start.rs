@@ -1,21 +1,21 @@
-//! The coefficients of a start on a turning shaft.
+//! Coefficients of the flying start.
 
 use crate::settings::Settings;
 use drive_core::flux::Path;
 use drive_core::{FlyingStart, PERIOD_S, periods};
 
-/// Current that the rotor is looked for with, as a share of the current limit.
+/// Current of the speed search, as a share of the current limit.
 const SEARCH_SHARE: f32 = 0.714;
-/// Share of the current that trips up to which both together may come.
+/// Share of the trip current up to which the search current and the current of a residual flux may add up.
 const SHARE_OF_TRIP: f32 = 0.7;
-/// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
+/// Time in which the flux of a rotating rotor builds up, and until which the injection alone corrects the angle, s.
 const BUILD_UP_S: f32 = 0.5;
 const INJECTION_ONLY_S: f32 = 0.2;
-/// Rotor time constants after which no flux is left in a motor that was switched off.
+/// Number of rotor time constants after which no flux is left in a motor that was switched off.
 const FLUX_DECAY_T: f32 = 4.0;
 
 impl Settings {
-    /// The start on a turning shaft, where the observer can follow it.
+    /// Returns the flying start; none if there is no observer that can follow the shaft.
     pub(super) fn flying_start(&self, k_c: [f32; 2]) -> Option<FlyingStart> {
         let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
         let current = f32::max(SEARCH_SHARE * self.current_limit_a(), i_d);

@@ -1,16 +1,16 @@
-//! The coefficients of the mode without identification.
+//! Coefficients of V/f control, for a motor that was not identified.
 
 use crate::settings::Settings;
 use crate::settings::rules::PEAK_OF_PHASE;
 use drive_core::flux::{VoltsPerHertz, VoltsPerHertzSettings};
 
-/// Voltage that the inverter loses at most, with 311 V.
+/// Largest voltage error of the inverter, with 311 V.
 const LOST_V: f32 = 15.0;
-/// Largest rated slip that is believed.
+/// Largest plausible rated slip.
 const LARGEST_SLIP: f32 = 0.15;
 
 impl Settings {
-    /// The mode without identification, where the pairs of poles fit the nameplate.
+    /// Returns the V/f control; none if the pole pairs do not fit the nameplate.
     pub(super) fn volts_per_hertz(&self) -> Option<VoltsPerHertz> {
         let plate = &self.nameplate;
         let pole_pairs = f32::from(self.motor.pole_pairs);

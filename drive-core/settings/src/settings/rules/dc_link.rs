@@ -1,53 +1,53 @@
-//! The rules for the voltages of the dc link.
+//! Rules for the voltages of the dc link.
 
 use crate::settings::Settings;
 use crate::settings::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN};
 use drive_core::{ChopperSettings, DcLimit, DcLinkSettings, PowerLimit, Relay, periods};
 
-/// Highest dc link above which a drive trips, in relation to the highest in operation.
+/// Highest trip voltage of the dc link, relative to the maximum operating voltage.
 pub const OVER_OF_HIGHEST: f32 = 1.05;
-/// Highest dc link in operation, in relation to the highest nominal one: generating torque has a band between them.
+/// Maximum operating voltage, relative to the highest nominal voltage. Generating torque is limited in a band between them.
 pub const HIGHEST_OF_NOMINAL: f32 = 1.06;
-/// Band in which generating torque is limited, in relation to the distance from the nominal voltage: widened by 1.4 at
-/// speed it stays clear of that.
+/// Band in which generating torque is limited, relative to the distance from the nominal voltage. At speed the band is
+/// 1.4 times as wide and still above the nominal voltage.
 const BAND: f32 = 0.64;
-/// Largest change of a dc link that counts as steady, with 311 V.
+/// Largest change of the voltage for which a dc link of 311 V counts as steady.
 const STEADY_V: f32 = 5.0;
 
 impl Settings {
-    /// Highest dc link that the power stage stands in operation, V.
+    /// Returns the maximum operating voltage of the dc link, V.
     pub fn highest_dc_link_v(&self) -> f32 {
         self.scales.dc_link.at(self.scales.dc_link_highest)
     }
 
-    /// Largest nominal dc link, V.
+    /// Returns the largest nominal dc link, V.
     pub(in crate::settings) fn dc_link_max_v(&self) -> f32 {
         f32::min(self.highest_dc_link_v() / HIGHEST_OF_NOMINAL, 1000.0)
     }
 
-    /// Largest dc link above which the drive may trip, V.
+    /// Returns the largest trip voltage of the dc link, V.
     pub(in crate::settings) fn dc_over_max_v(&self) -> f32 {
         f32::min(OVER_OF_HIGHEST * self.highest_dc_link_v(), self.dc_link_range_v())
     }
 
-    /// Range of `limits.dc_over_v`: it leaves room for `braking.high_v`, which follows from it or is set.
+    /// Returns the range of `limits.dc_over_v`. It leaves room for `braking.high_v`, which follows from it or is set.
     pub(in crate::settings) fn dc_over_range(&self) -> (f32, f32) {
         let high = self.braking.high_v.map_or(HIGH_OF_TRIP, |_| 1.0);
         ((1.0 + MARGIN) / high * self.inverter.dc_link_v, self.dc_over_max_v())
     }
 
-    /// Range of `limits.dc_under_v`: it leaves room for `braking.low_v`, likewise.
+    /// Returns the range of `limits.dc_under_v`. It leaves room for `braking.low_v`, which follows from it or is set.
     pub(in crate::settings) fn dc_under_range(&self) -> (f32, f32) {
         let low = self.braking.low_v.map_or(LOW_OF_TRIP, |_| 1.0 + MARGIN);
         (5.0, f32::min((1.0 - MARGIN) / low * self.inverter.dc_link_v, self.dc_over_v()))
     }
 
-    /// Power that the copper takes of the direct current, W.
+    /// Returns the copper loss of the d-axis current, W.
     pub(in crate::settings) fn magnetising_w(&self) -> f32 {
         1.5 * self.motor.r_s * self.i_d() * self.i_d()
     }
 
-    /// The limits of dc current and power.
+    /// Returns the limits of dc current and power.
     pub(crate) fn power_limit(&self) -> PowerLimit {
         let s = &self.limits;
         PowerLimit {
@@ -56,14 +56,14 @@ impl Settings {
         }
     }
 
-    /// The precharge relay, which opens where the drive trips.
+    /// Returns the precharge relay, which opens at the trip voltage.
     pub(crate) fn relay(&self) -> Option<Relay> {
         let band_v = self.share_of_dc_link(STEADY_V);
         Relay::new(self.dc_under_v(), band_v, periods(self.supply.relay_s))
     }
 
-    /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and
-    /// throughout from 0.5 % below.
+    /// Returns the limits by the dc link. The chopper begins to conduct 3 % below the braking limit, and conducts
+    /// all the time from 0.5 % below it.
     pub(crate) fn dc_link_limits(&self) -> DcLinkSettings {
         let (high_v, low_v) = (self.dc_high_v(), self.dc_low_v());
         let s = &self.braking;

@@ -1,4 +1,4 @@
-//! Every command in every state, and the commands that once did harm where they do not belong.
+//! Tests of every command in every state, and of the commands that once did harm in a wrong state.
 
 use core::mem::discriminant;
 use std::collections::{BTreeMap, HashSet};
@@ -7,7 +7,7 @@ use super::*;
 use crate::drive::test_signal::{Regulator, TestSignal};
 use crate::protect::wiring_check::WiringSettings;
 
-/// The states of a start.
+/// States of a start.
 const STARTING: [State; 6] = [
     State::Calibrating,
     State::Precharge,
@@ -63,12 +63,12 @@ fn pulses() -> TestSignal {
     })
 }
 
-/// A drive in this state that was started in this mode; none where no start of the mode comes by.
+/// Returns a drive in this state that was started in this mode; none if no start of the mode passes through the state.
 fn bench(state: State, mode: Mode) -> Option<Bench> {
     bench_of(&motor_settings(AngleSource::Injection), state, mode)
 }
 
-/// The same with these settings.
+/// Returns a drive in this state with these settings.
 fn bench_of(settings: &Settings, state: State, mode: Mode) -> Option<Bench> {
     let mut bench = Bench::new(settings);
     if mode == Mode::Learning {
@@ -88,7 +88,7 @@ fn bench_of(settings: &Settings, state: State, mode: Mode) -> Option<Bench> {
         if now == state {
             return Some(bench);
         }
-        // The run has begun without it.
+        // The run has begun without passing through the state.
         if now == State::of_mode(mode) {
             return None;
         }
@@ -101,10 +101,10 @@ fn running(mode: Mode) -> Bench {
     bench(State::of_mode(mode), mode).unwrap()
 }
 
-/// Runs at 300 rpm.
+/// Returns a drive that runs at 300 rpm.
 fn turning(mode: Mode) -> Bench {
     let mut bench = running(mode);
-    // The boost of a drive that turns by voltage and frequency takes a second.
+    // The boost of V/f control takes a second.
     bench.run(1.5);
     bench.drive.command(&Command::Speed(300.0)).unwrap();
     bench.run(1.8);
@@ -112,7 +112,7 @@ fn turning(mode: Mode) -> Bench {
     bench
 }
 
-/// The rows of the table, and the drives that must all agree with them.
+/// Returns the rows of the table, and the drives that must all agree with them.
 fn rows() -> Vec<(&'static str, Vec<Bench>)> {
     let starting =
         |mode| -> Vec<Bench> { STARTING.iter().filter_map(|state| bench(*state, mode)).collect() };
@@ -152,8 +152,8 @@ fn rows() -> Vec<(&'static str, Vec<Bench>)> {
     ]
 }
 
-/// The table of docs/control-law.md, cell by cell. A command that is refused changes nothing, and is refused by the state or
-/// the fault; one that is taken leads to no fault.
+/// Checks the table of docs/control-law.md, cell by cell. A refused command changes nothing, and is refused because of the
+/// state or the fault. An accepted command leads to no fault.
 #[test]
 fn every_command_is_taken_or_refused_in_every_state() {
     let columns = columns();
@@ -199,14 +199,14 @@ fn every_command_is_taken_or_refused_in_every_state() {
         }
         table.push('\n');
     }
-    // Each of the 17 states and of the 6 modes was there.
+    // Each of the 17 states and each of the 6 modes was tested.
     let states: HashSet<_> = seen.iter().map(|(state, _)| state).collect();
     let modes: HashSet<_> = seen.iter().map(|(_, mode)| mode).collect();
     assert_eq!((states.len(), modes.len()), (17, MODES.len()));
     generated::check("control-law.md", "commands", &table);
 }
 
-/// The other table: the state behind a stop, a clear, a start and a relock, and behind a fault.
+/// Checks the other table: the state after a stop, a clear, a start and a relock, and after a fault.
 #[test]
 fn every_event_leads_to_the_state_of_the_table() {
     use super::Stop::{Coast, Now, Quick, Ramp};
@@ -230,7 +230,7 @@ fn every_event_leads_to_the_state_of_the_table() {
                 if now == state { "stays".into() } else { now.to_string() }
             })
             .collect();
-        // A fault of the hardware.
+        // The hardware reports a fault.
         let mut after = bench.clone();
         let broken = Measured { hardware: Hardware::BREAK, ..Measured::default() };
         let output = after.drive.step(&broken);
@@ -252,8 +252,9 @@ fn every_event_leads_to_the_state_of_the_table() {
     );
 }
 
-/// The table says where a command is taken whatever its value. Those of the last column need the encoder, a rotor time constant that
-/// is tracked, or a flux without tables: with these each is taken and done in each state where the table says yes.
+/// The table says in which state a command is accepted, independent of its value. The commands of the last column need the encoder,
+/// a tracked rotor time constant, or a flux without tables. With these, each command is accepted and executed in each state for
+/// which the table says yes.
 #[test]
 fn commands_that_need_the_encoder_are_taken_where_the_table_says() {
     let mut settings = motor_settings(AngleSource::Encoder);
@@ -263,7 +264,7 @@ fn commands_that_need_the_encoder_are_taken_where_the_table_says() {
     for mode in [Mode::Torque, Mode::Speed, Mode::Position] {
         let states = STARTING.into_iter().chain([State::of_mode(mode)]);
         let benches: Vec<_> = states.filter_map(|state| bench_of(&settings, state, mode)).collect();
-        // With the encoder no start looks for a turning shaft or verifies a lock.
+        // With the encoder no start includes a flying start or the verification of a lock.
         assert_eq!(benches.len(), 5, "{mode:?}");
         for (bench, command) in
             benches.iter().flat_map(|bench| commands.iter().map(move |command| (bench, command)))
@@ -278,7 +279,7 @@ fn commands_that_need_the_encoder_are_taken_where_the_table_says() {
     }
 }
 
-/// A frame that is held on a turning shaft is a fault, and so are the pulses of the wiring check.
+/// A fixed frame on a rotating shaft is a fault, and so are the pulses of the wiring check.
 #[test]
 fn a_relock_is_refused_while_the_shaft_turns_and_the_drive_runs_on() {
     for (mode, refused) in [
@@ -291,7 +292,7 @@ fn a_relock_is_refused_while_the_shaft_turns_and_the_drive_runs_on() {
         assert_eq!(bench.drive.state(), State::of_mode(mode));
         assert!((bench.motor.rpm() - 300.0).abs() < 30.0, "{}", bench.motor.rpm());
     }
-    // At rest it goes on with the run: a second later it holds the shaft.
+    // At rest the run continues: a second later the drive holds the shaft.
     let mut bench = running(Mode::Speed);
     assert_eq!(bench.drive.command(&Command::Relock), Ok(Accepted::AsGiven));
     assert!(bench.run_to(State::Speed), "{}", bench.drive.state());
@@ -303,8 +304,8 @@ fn a_relock_is_refused_while_the_shaft_turns_and_the_drive_runs_on() {
     assert_eq!(learning.drive.command(&Command::Relock), refused);
 }
 
-/// By voltage and frequency: a quick stop is quicker than one by the ramp, also in the midst of that, and the shaft is at rest
-/// but for the slip when the outputs go off. No observer runs that would track a resistance.
+/// In V/f control a quick stop is quicker than a stop by the ramp, also when it begins during such a stop, and the shaft is at
+/// rest except for the slip when the outputs are switched off. No observer runs that would track a resistance.
 #[test]
 fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
     let from_300 = turning(Mode::VoltsPerHertz);
@@ -327,7 +328,7 @@ fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
     let harder = seconds(&[(0.2, Stop::Ramp), (9.0, Stop::Quick)]);
     let no_softer = seconds(&[(0.1, Stop::Quick), (9.0, Stop::Ramp)]);
     println!("{ramp:.3?} {quick:.3?} {harder:.3?} {no_softer:.3?}");
-    // 300 rpm/s, and the rated speed in 2 s: 750 rpm/s.
+    // The ramp is 300 rpm/s; the quick stop from the rated speed in 2 s is 750 rpm/s.
     assert!((0.9..1.1).contains(&ramp.0), "{ramp:?}");
     assert!((0.3..0.55).contains(&quick.0), "{quick:?}");
     assert!((quick.0 + 0.05..ramp.0 - 0.3).contains(&harder.0), "{harder:?}");
@@ -339,7 +340,7 @@ fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
     assert!(coast.0 == 0.0 && coast.1 > 270.0, "{coast:?}");
 }
 
-/// 300 rpm of two pairs of poles are 10 Hz.
+/// 300 rpm with two pole pairs are 10 Hz.
 #[test]
 fn a_frequency_above_the_limit_of_the_speed_trips_by_voltage_and_frequency() {
     for (hertz, state) in [(9.0, State::Fault(Fault::OverSpeed)), (11.0, State::VoltsPerHertz)] {

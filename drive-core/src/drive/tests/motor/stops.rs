@@ -1,11 +1,11 @@
-//! The ways to stop.
+//! Tests of the ways to stop.
 
 use super::*;
 
-/// From every mode, with and without an encoder, by either ramp: the speed follows the ramp from where it is, within what the
-/// loop knows of the load (0.3 Nm are 240 rpm/s on the inertia), without a jump of the torque current beyond that of the ramp,
-/// and the outputs go off with the shaft at rest.
-/// A torque that was asked for while the drive starts does not come with a stop.
+/// From every mode, with and without an encoder, by either ramp: the speed follows the ramp from its present value, within the
+/// error due to the unknown load (0.3 Nm are 240 rpm/s on the inertia). The q-axis current jumps by no more than the current
+/// of the ramp, and the outputs are switched off with the shaft at rest. A torque that was commanded while the drive starts is
+/// not applied by a stop.
 #[test]
 fn a_stop_before_the_run_puts_out_no_torque() {
     for state in [State::FlyingStart, State::Magnetising, State::Verifying] {
@@ -48,7 +48,7 @@ fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
             let refused = bench.drive.command(&Command::Speed(10.0));
             assert!(refused.is_err(), "{refused:?}");
             bench.run(0.005);
-            // The reference goes on from where it was: the ramp's own current is 1 A for 260 rpm/s.
+            // The reference continues from its present value: the current of the ramp is 1 A for 260 rpm/s.
             let jump = f64::from(bench.drive.telemetry().reference.q - before).abs();
             let had = if mode == Mode::Torque { 0.0 } else { 300.0 };
             assert!(jump < (ramp + had) / 256.0 + 0.3, "{source:?} {mode:?} {stop:?}: {jump} A");
@@ -73,7 +73,7 @@ fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
     }
 }
 
-/// A jog goes on while it is repeated, and ends 0.5 s after the last one, by the ramp, or by another speed.
+/// A jog continues while it is repeated, and ends by the ramp 0.5 s after the last one, or by another speed.
 #[test]
 fn a_jog_lasts_as_long_as_it_is_repeated() {
     let mut bench = Bench::new(&motor_settings(AngleSource::Encoder));
@@ -89,7 +89,7 @@ fn a_jog_lasts_as_long_as_it_is_repeated() {
     bench.drive.command(&Command::Jog(90.0)).unwrap();
     bench.run(0.49);
     assert!((bench.motor.rpm() - 90.0).abs() < 2.0, "{}", bench.motor.rpm());
-    // 0.3 s by the ramp, and the loop settles.
+    // The ramp takes 0.3 s, and the loop settles.
     bench.run(0.31);
     assert!(bench.motor.rpm() < 30.0, "{}", bench.motor.rpm());
     bench.run(0.5);
@@ -104,7 +104,8 @@ fn a_jog_lasts_as_long_as_it_is_repeated() {
     assert!(torque.drive.command(&Command::Jog(90.0)).is_err());
 }
 
-/// A stop by ramp becomes quick or coasts, but not slower again; one that is not running yet ends at once.
+/// A stop by ramp can be changed to a quick stop or a coast, but not to a slower one. A drive that is not running yet stops at
+/// once.
 #[test]
 fn a_stop_can_be_made_harder() {
     let braking = |stops: &[Stop]| {
@@ -117,7 +118,7 @@ fn a_stop_can_be_made_harder() {
         }
         bench
     };
-    // 0.1 s at 300 rpm/s and 0.1 s at the 780 that 3 A can do, or 0.2 s at those.
+    // The speed falls for 0.1 s at 300 rpm/s and for 0.1 s at the 780 rpm/s that 3 A allow, or for 0.2 s at 780 rpm/s.
     for (stops, rpm) in [([Stop::Ramp, Stop::Quick], 190.0), ([Stop::Quick, Stop::Ramp], 145.0)] {
         let bench = braking(&stops);
         assert_eq!(bench.drive.state(), State::Braking);
