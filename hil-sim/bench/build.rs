@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// The folder in the repository, and in a package of this crate, where the link `motors` becomes the folder itself. A clone may hold
-/// a text in place of the link, so the repository's own folder comes first.
+/// Candidate folders: the one in the repository, and the one in a package of this crate, where the link `motors`
+/// becomes the folder itself. A clone of the repository may hold a text file in place of the link, so the repository's
+/// own folder comes first.
 const FOLDERS: [&str; 2] = ["../../motors", "motors"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,7 +1,7 @@
 //! `cargo sim board`: the flashed image on the virtual board, with a serial port.
 //!
 //! The virtual board is a separate program, because its emulator is GPL-2.0 and must not be linked here.
-//! This module parses the options, builds image and program, and replaces this process by that program.
+//! This module parses the options, builds image and program, and replaces this process with that program.
 
 mod build;
 
@@ -20,48 +20,48 @@ pub struct Options {
     /// Motor, seed and duration.
     #[command(flatten)]
     pub input: Input,
-    /// Board that the image is built for, with its power stage
+    /// Board for which the image is built, with its power stage
     #[arg(long, value_name = "NAME", default_value = "reference")]
     pub board: String,
     /// Load on the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
     #[arg(long, value_names = ["LOAD", "RPM"], num_args = 1..=2, allow_negative_numbers = true)]
     pub load: Option<Vec<String>>,
     /// Types the lines of a file (`at SECONDS: LINE`, `wait SECONDS: LINE`) and checks the answers (`wait for TEXT`,
-    /// `expect [SECONDSs] TEXT`, `expect not [SECONDSs] TEXT`); ends after it. Exit code 1 for an answer `error:` that is
-    /// not expected, a text that does not come, or a fault at the end
+    /// `expect [SECONDSs] TEXT`, `expect not [SECONDSs] TEXT`); ends after the file. Exit code 1 for an unexpected
+    /// answer `error:`, a text that does not come, or a fault at the end
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
-    /// Unexpected errors and faults during a script are shown, and the exit code stays 0
+    /// Shows unexpected errors and faults during a script, but keeps the exit code 0
     #[arg(long, requires = "script")]
     pub lenient: bool,
-    /// Keeps the contents of the flash in a file, so that `save` outlasts the session; created if missing
+    /// Keeps the contents of the flash in a file, so that `save` outlasts the session; creates the file if it is missing
     #[arg(long, value_name = "FILE")]
     pub flash: Option<PathBuf>,
-    /// Least urgent lines of the log that are shown; `log LEVEL` at the console changes it
+    /// Least urgent lines of the log to show; `log LEVEL` at the console changes it
     #[arg(long, value_name = "LEVEL", default_value = "warn")]
     pub log: LogLevel,
-    /// As fast as possible instead of in real time
+    /// Runs as fast as possible instead of in real time
     #[arg(long)]
     pub fast: bool,
     /// Folder of the page
     #[arg(long, value_name = "DIR", default_value = OUT)]
     pub out: PathBuf,
-    /// The firmware's ELF [default: the image that `cargo firmware` builds]
+    /// ELF file of the firmware [default: the image that `cargo firmware` builds]
     #[arg(long, value_name = "FILE")]
     pub elf: Option<PathBuf>,
-    /// Shows the commands of the firmware's build
+    /// Shows the commands of the firmware build
     #[arg(long)]
     pub verbose: bool,
-    /// For a program that starts the board: ends with its standard input, and prints the drive's flux angle, the motor's
-    /// (turns) and the motor's flux (Wb) in lines `flux ...`
+    /// For a program that starts the board: ends with its standard input, and prints the drive's flux angle, the
+    /// motor's flux angle (turns) and the motor's flux (Wb) in lines `flux ...`
     #[arg(long, hide = true)]
     pub attached: bool,
 }
 
-/// Level of a line of the log, the most urgent first.
+/// Level of a log line, most urgent first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum LogLevel {
-    /// No line has this level: nothing is shown.
+    /// No line has this level, so nothing is shown.
     Off,
     /// Faults.
     Error,
@@ -74,17 +74,17 @@ pub enum LogLevel {
 }
 
 impl LogLevel {
-    /// The level of a name, in any case.
+    /// Returns the level of a name, in any case.
     pub fn named(name: &str) -> Option<Self> {
         Self::from_str(name, true).ok()
     }
 }
 
 impl Options {
-    /// The configuration of motor, inverter, measurement and load.
+    /// Returns the configuration of motor, inverter, measurement and load.
     ///
     /// # Errors
-    /// As [`Input::config`]; [`Error::Refused`] when `--load` is not one of its forms.
+    /// As [`Input::config`]; [`Error::Refused`] if `--load` has none of its forms.
     pub fn config(&self) -> Result<Config, Error> {
         let mut config = self.input.config()?;
         let words: Vec<&str> = self.load.iter().flatten().map(String::as_str).collect();
@@ -102,7 +102,7 @@ impl Options {
         Ok(config)
     }
 
-    /// The command line that repeats this session with this configuration.
+    /// Returns the command line that repeats this session with this configuration.
     pub fn command(&self, config: &Config) -> String {
         let file = |option: &str, file: &Option<PathBuf>| {
             file.as_ref().map(|file| format!(" --{option} {}", file.display()))
@@ -120,17 +120,17 @@ impl Options {
     }
 }
 
-/// Builds the image, unless one is named, and replaces this process by the virtual board, which gets the
-/// arguments behind `board`. Returns on failure only.
+/// Builds the image, unless one is given, and replaces this process with the virtual board, which gets the arguments
+/// after `board`. Returns only on failure.
 ///
 /// # Errors
-/// As [`Options::config`]; [`Error::Internal`] when a build fails or cargo does not run.
+/// As [`Options::config`]; [`Error::Internal`] if a build fails or cargo does not run.
 pub fn become_board(options: &Options) -> Result<(), Error> {
     let arguments = std::env::args_os().skip_while(|argument| argument != "board").skip(1);
     Err(replaced_by(built(options, arguments)?))
 }
 
-/// The command that runs the virtual board with these arguments and the image.
+/// Builds what is needed; returns the command that runs the virtual board with these arguments and the image.
 fn built(options: &Options, arguments: impl Iterator<Item = OsString>) -> Result<Command, Error> {
     // Wrong options are reported before the builds, which take minutes.
     options.config()?;
@@ -144,7 +144,7 @@ fn built(options: &Options, arguments: impl Iterator<Item = OsString>) -> Result
     Ok(command)
 }
 
-/// Builds the same and starts the board as a child of this process; its standard input and output are pipes.
+/// Builds like [`become_board`] and starts the board as a child of this process; its standard input and output are pipes.
 ///
 /// # Errors
 /// As [`become_board`].
@@ -155,7 +155,7 @@ pub fn attach(options: &Options, arguments: &[String]) -> Result<Child, Error> {
     child.map_err(|error| Error::Internal(format!("cannot run the virtual board: {error}")))
 }
 
-/// Replaces this process, so that one process gets the terminal and its Ctrl-C. Returns on failure only.
+/// Replaces this process, so that a single process gets the terminal and its Ctrl-C. Returns only on failure.
 #[cfg(unix)]
 fn replaced_by(mut command: Command) -> Error {
     let error = std::os::unix::process::CommandExt::exec(&mut command);

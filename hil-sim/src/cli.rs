@@ -34,26 +34,26 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// The experiments of every day, with the figure or table each stands for
+    /// List the most used experiments, with the figure or table that each reproduces
     List {
         /// The other experiments: figures and tables of the two sources, and special questions
         #[arg(long)]
         lab: bool,
-        /// Print a JSON list of all, with the keys that each experiment uses
+        /// Print a JSON list of all experiments, with the keys that each one uses
         #[arg(long, conflicts_with = "lab")]
         json: bool,
     },
-    /// Every key that --set and a configuration file take, with value, unit and range
+    /// List every key of --set and of a configuration file, with value, unit and range
     Keys {
-        /// Only keys that begin so: `motor`, `injection.`
+        /// Only keys that begin with this text: `motor`, `injection.`
         prefix: Option<String>,
-        /// Print the configuration as TOML, which --config reads
+        /// Print the configuration as TOML, for --config
         #[arg(long)]
         toml: bool,
         #[command(flatten)]
         input: Input,
     },
-    /// Every motor that --motor takes; with a name: its numbers, their sources, and the lines for the console
+    /// List every motor of --motor; with a name: its numbers, their sources, and the lines for the console
     Motors {
         /// Name of the motor, or a file that ends in .toml or .json
         name: Option<String>,
@@ -63,26 +63,26 @@ enum Command {
     },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run(Request),
-    /// Merge the shards of a run: prints the JSON object of the whole run
+    /// Merge the shards of a run: print the JSON object of the whole run
     ///
-    /// The shards are what `run NAME --shard I/N` printed, in any order. Exit code 2 when one is missing, there twice, torn,
-    /// or of another run.
+    /// The shards are the outputs of `run NAME --shard I/N`, in any order. Exit code 2 if one is missing, present
+    /// twice, torn, or from another run.
     Merge {
-        /// The files
+        /// Files with the shards
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Folder of the page [default: no page]
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Folder of CSV files, one a figure and one a table [default: none]
+        /// Folder of CSV files, one per figure and one per table [default: none]
         #[arg(long, value_name = "DIR")]
         csv: Option<PathBuf>,
     },
     /// Run all experiments into one page
     ///
-    /// An experiment that is refused is named there and on standard error; the others run.
+    /// The page and standard error name an experiment that is refused; the others still run.
     Report {
-        /// Which experiments: all, after the printed values of both sources; or those values alone
+        /// Experiments of the page: all, after the printed values of both sources; or those values alone
         #[arg(long, value_enum, default_value = "all")]
         of: report::Of,
         #[command(flatten)]
@@ -93,7 +93,7 @@ enum Command {
     },
     /// Identify the motor from a recorded trace: a CSV file with voltages, currents and speed
     ///
-    /// --motor, --config and --set describe the motor that the result is compared with.
+    /// --motor, --config and --set describe the motor with which the result is compared.
     IdentifyTrace {
         #[command(flatten)]
         trace: Trace,
@@ -102,7 +102,7 @@ enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Print the completion of a shell, for a command that runs this program
+    /// Print the shell completion for a command that runs this program
     Completion {
         /// The shell
         shell: clap_complete::Shell,
@@ -110,34 +110,37 @@ enum Command {
         #[arg(long, value_name = "NAME", default_value = "hil-sim")]
         command: String,
     },
-    /// Run the image that is flashed on an emulated controller, with a serial port to talk to it
+    /// Run the flashed image on an emulated controller, with a serial port to talk to it
     ///
-    /// Builds the image, prints the path of a pseudo-terminal that is its console, and its log. `!help` lists the
-    /// commands of the board itself: reset button, power, end. The end, Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
-    /// count; those of the drive do not, for the image has settings of its own: `set` at the console.
+    /// Builds the image, prints the path of a pseudo-terminal that is its console, and prints its log. `!help` lists
+    /// the commands of the board itself: reset button, power, end. The page is written at the end, by Ctrl-C or when
+    /// the time is over. Keys of the motor, inverter, measurement and load take effect. Keys of the drive do not,
+    /// because the image has its own settings: use `set` at the console.
     Board(board::Options),
-    /// The passport of a motor, from what the drive measures and learns of it with the shaft locked: one JSON file and one page
+    /// Write the passport of a motor from the drive's measurements with the shaft locked: one JSON file and one page
     ///
-    /// --motor FILE.json then loads a twin of the motor. Exit code 2 when the drive or the record does not give it whole.
+    /// --motor FILE.json then loads a simulation model of the motor. Exit code 2 if the drive or the record does not give all values.
     Passport(passport::Options),
     /// Talk to a drive at a serial port: line editor, backup and restore of settings, plots of traces
     ///
-    /// For a board and for the pseudo-terminal of `cargo sim board` alike. `!help` lists the commands of this program;
-    /// other lines go to the drive. Exit code 1 when the drive refuses a line of --command or of standard input.
+    /// For a real board and for the pseudo-terminal of `cargo sim board`. `!help` lists the commands of this program;
+    /// other lines go to the drive. Exit code 1 if the drive refuses a line of --command or of standard input.
     Console(console::Options),
     /// Write another image to a board over the serial port of its console, through ST's loader; settings are kept
     ///
-    /// The drive must be off, its dc link below 20 V, and the supply of the gate drivers off. Builds the image, erases and
-    /// writes its pages, reads them back, starts it and compares its check sum. Exit code 2 when file, port or drive refuse.
+    /// The drive must be off, its dc link below 20 V, and the supply of the gate drivers off. Builds the image, erases
+    /// and writes its pages, reads them back, starts it and compares its check sum. Exit code 2 if file, port or drive
+    /// are refused.
     Update(console::update::Options),
-    /// First power-up of a board, step by step: says what to do and measure, talks to the drive, judges, and stops on doubt
+    /// Power up a board for the first time, step by step: tells you what to do and measure, talks to the drive, judges,
+    /// and stops on doubt
     ///
-    /// Ends in one file of evidence, with which a later run goes on. Exit code 1 for a step that was not passed.
+    /// Writes one test record, from which a later run continues. Exit code 1 if a step was not passed.
     FirstLight(first_light::Options),
 }
 
-/// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
-/// has to be changed.
+/// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed, 2 the request has to be
+/// changed.
 pub fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|error| {
         if !error.use_stderr() {
@@ -182,7 +185,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Prints on standard output, without the control characters that a text of the user may have. A closed pipe, as behind `head`, is no error.
+/// Prints on standard output, without control characters from texts of the user. A closed pipe, as with `head`, is no error.
 fn say(text: impl AsRef<str>) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
     match out.write_all(printable(text.as_ref()).as_bytes()).and_then(|()| out.flush()) {

@@ -1,8 +1,8 @@
-//! `cargo sim console`: talks to a drive at a serial port, that of a board or a pseudo-terminal of the virtual board.
+//! `cargo sim console`: talks to a drive at a serial port, of a board or a pseudo-terminal of the virtual board.
 //!
 //! Lines that begin with `!` are commands of this program ([`own`]); all others go to the drive. The protocol is in
-//! [`answer`] (the lines that answer a command), [`catalogue`] (commands and settings, for the completion), [`transfer`]
-//! (backup and restore) and [`trace`] (plots). [`link`] moves lines, `editor` edits them.
+//! [`answer`] (the lines that answer a command), [`catalogue`] (commands and settings, for the completion),
+//! [`transfer`] (backup and restore) and [`trace`] (plots). [`link`] moves lines, `editor` edits them.
 
 pub mod answer;
 pub mod catalogue;
@@ -23,33 +23,32 @@ use session::Session;
 /// Options of the console.
 #[derive(Args)]
 pub struct Options {
-    /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` names
+    /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` prints
     #[arg(long, value_name = "PATH")]
     pub port: String,
     /// Bits per second
     #[arg(long, value_name = "N", default_value_t = 115_200)]
     pub baud: u32,
-    /// Sends a line, prints the answer and ends; can be given many times. Stops at the first answer `error:`, with exit
-    /// code 1
+    /// Sends a line, prints the answer and ends; can be repeated. Stops at the first answer `error:`, with exit code 1
     #[arg(long = "command", value_name = "LINE")]
     pub commands: Vec<String>,
 }
 
-/// Longest wait for a byte before the reader looks whether it is still wanted.
+/// Longest wait for a byte before the reader checks whether it should end.
 const READ: Duration = Duration::from_millis(100);
 
-/// Opens the port and talks to the drive: with the commands of the options, with the lines of standard input if that is no
-/// terminal, or with a person.
+/// Opens the port and talks to the drive: with the commands of the options, with the lines of standard input if that is
+/// not a terminal, or with a person.
 ///
 /// # Errors
-/// [`Error::Refused`] when the port cannot be opened; [`Error::Internal`] when the drive does not answer or, without a
+/// [`Error::Refused`] if the port cannot be opened; [`Error::Internal`] if the drive does not answer or, without a
 /// person, answers with an error.
 pub fn run(options: &Options) -> Result<(), Error> {
     let (reader, writer) = open(&options.port, options.baud)?;
     if options.commands.is_empty() && std::io::stdin().is_terminal() {
         return editor::run(&options.port, |show| Link::new(reader, writer, show));
     }
-    // Only answers on standard output.
+    // Standard output gets only answers.
     let link = Link::new(reader, writer, |line: &str| eprintln!("{line}"));
     let mut session = Session::new(link);
     if options.commands.is_empty() {
@@ -63,10 +62,10 @@ pub fn run(options: &Options) -> Result<(), Error> {
 /// A serial port.
 pub type Port = Box<dyn serialport::SerialPort>;
 
-/// Both directions of a port.
+/// Opens both directions of a port.
 ///
 /// # Errors
-/// [`Error::Refused`] when it cannot be opened.
+/// [`Error::Refused`] if it cannot be opened.
 pub fn open(path: &str, baud: u32) -> Result<(Port, Port), Error> {
     let refused = |why: serialport::Error| {
         let ports = serialport::available_ports().unwrap_or_default();
@@ -78,7 +77,7 @@ pub fn open(path: &str, baud: u32) -> Result<(Port, Port), Error> {
         Error::Refused(format!("--port {path}: {why}; {known}"))
     };
     let builder = serialport::new(path, baud).timeout(READ);
-    // A pseudo-terminal that was opened exclusively stays so when this program is killed.
+    // A pseudo-terminal that was opened exclusively stays exclusive if this program is killed.
     let port = builder.exclusive(false).open().map_err(refused)?;
     let other = port.try_clone().map_err(refused)?;
     Ok((port, other))

@@ -89,7 +89,7 @@ pub const SOURCES: [&str; 20] = [
     "identify-machine", "motor-tests",
 ];
 
-/// The experiments that need an input file; they are no part of the report.
+/// The experiments that need an input file; they are not part of the report.
 pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE, measured_start::EXPERIMENT];
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
@@ -112,10 +112,10 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<foreign_motors::ForeignMotors>(),
 ];
 
-/// The runs of the experiment with this name.
+/// Returns the entry of the statistical experiment with this name.
 ///
 /// # Errors
-/// [`Error::Refused`] when it is not a statistical one.
+/// [`Error::Refused`] if it is not a statistical experiment.
 pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     let found = STATISTICAL.iter().find(|statistical| statistical.experiment.name == name);
     found.ok_or_else(|| {
@@ -127,7 +127,7 @@ pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
     })
 }
 
-/// Experiments that are gone, and what does the same.
+/// Removed experiments, and their replacements.
 const REPLACED: &[(&str, &str)] = &[
     ("tracking", "`run record`, `run torque-steps` and `run perturbation`"),
     ("torque-drift", "`run record --set record.minutes=1`"),
@@ -154,8 +154,8 @@ pub fn check_file(experiment: &Experiment, file: Option<&Path>) -> Result<(), Er
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";
 
-/// The experiments that a name on the command line means: one, or a group of all whose names begin with
-/// it and a hyphen, as `identify`. An unknown name is returned as it is.
+/// Returns the experiments for a name on the command line: one, or a group of all whose names begin with it and a
+/// hyphen, as `identify`. An unknown name is returned unchanged.
 pub fn named(name: &str) -> Vec<&str> {
     let known = || EXPERIMENTS.iter().map(|experiment| experiment.name);
     let begins = format!("{name}-");
@@ -163,10 +163,10 @@ pub fn named(name: &str) -> Vec<&str> {
     if group.len() < 2 || known().any(|known| known == name) { vec![name] } else { group }
 }
 
-/// The experiment with this name.
+/// Returns the experiment with this name.
 ///
 /// # Errors
-/// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with what took the place of an experiment that is gone.
+/// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with the replacement of a removed experiment.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
     let found = all().find(|experiment| experiment.name == name);
@@ -176,7 +176,7 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     })
 }
 
-/// Runs the experiment with this name for its own time, and shows no progress.
+/// Runs the experiment with this name for its own time, without progress bars.
 ///
 /// # Errors
 /// As [`find`], and the errors of the experiment.
@@ -201,7 +201,7 @@ mod tests {
         );
         let outcome = amplitude::EXPERIMENT.outcome(&Config::default(), 1).unwrap();
         let rms = |volts: u32| outcome.metrics.get(&format!("rms_at_{volts}_v_deg")).unwrap();
-        assert!((0.1..5.0).contains(&rms(80)) && rms(80) < rms(40), "more carrier, less noise");
+        assert!((0.1..5.0).contains(&rms(80)) && rms(80) < rms(40), "more injection, less noise");
     }
 
     #[test]

@@ -10,26 +10,26 @@ use crate::config::Value;
 /// The options that describe a simulation.
 #[derive(Args, Clone, Default)]
 pub struct Input {
-    /// Motor with the inverter and the sensors that suit it: a name that `motors` shows, or a file that ends in .toml, or
-    /// a passport that ends in .json
+    /// Motor, with inverter and sensors that suit it: a name from `motors`, a file that ends in .toml, or a passport
+    /// that ends in .json
     #[arg(long, value_name = "NAME")]
     pub motor: Option<String>,
     /// Configuration file, TOML
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Model of the motor: a, or a family of iron whose saliency emerges; the same as --set plant=NAME
+    /// Model of the motor: a, or a saturation model from which saliency emerges; the same as --set plant=NAME
     #[arg(long, value_name = "NAME")]
     pub plant: Option<String>,
-    /// Sets one key, after the configuration file; can be given many times
+    /// Sets one key, after the configuration file; can be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub assignments: Vec<String>,
-    /// Seed of all that is random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     pub seed: u64,
     /// Simulated time, s; the same as --set seconds=S
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub seconds: Option<f64>,
-    /// No progress: nothing but errors and the result
+    /// No progress bars: nothing but errors and the result
     #[arg(long, short)]
     pub quiet: bool,
 }
@@ -38,7 +38,7 @@ pub struct Input {
 pub const OUT: &str = "out";
 
 impl Input {
-    /// The configuration that these options describe.
+    /// Returns the configuration that these options describe.
     ///
     /// # Errors
     /// As [`Config::load`] and [`Config::set`].
@@ -54,12 +54,12 @@ impl Input {
         Ok(config)
     }
 
-    /// Progress bars, unless they are not wanted.
+    /// Returns progress bars, unless they are switched off.
     pub fn progress(&self) -> Progress {
         if self.quiet { Progress::hidden() } else { Progress::default() }
     }
 
-    /// The command line that repeats `cargo sim WHAT` with this configuration.
+    /// Returns the command line that repeats `cargo sim WHAT` with this configuration.
     pub fn command(&self, what: &str, config: &Config) -> String {
         let mut command = format!("cargo sim {what} --seed {}", self.seed);
         let mut base = Config::default();

@@ -1,6 +1,6 @@
 //! The drive connected to a simulated motor: experiments, reports and the command line.
 //!
-//! The test rig below the experiments is the crate `sim-bench`, the laboratory `sim-lab`; both are re-exported here.
+//! The test rig below the experiments is the crate `sim-bench`, the laboratory is `sim-lab`; both are re-exported here.
 
 pub mod board;
 pub mod cli;

@@ -1,4 +1,4 @@
-//! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from what `commission` and `learn` tell at the console.
+//! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from the answers to `commission` and `learn` at the console.
 
 use serde_json::Value;
 
@@ -10,9 +10,9 @@ use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
 use crate::prelude::*;
 
-/// What the twin takes from the settings of the drive beside what every motor file must say; `auto` is left to its rule.
+/// Settings of the drive that the simulation model takes besides those of every motor file; a setting `auto` is left to its rule.
 const ALSO: &str = "motor.inertia inverter.drop_v current_plant sequence.flux sequence.i_d limits.current_a observer.leakage_share observer.leakage_slope";
-/// The lines that are sent, each with the news that ends it.
+/// The lines that are sent, each with the unsolicited line that ends it.
 const LINES: [(&str, Option<&str>); 6] = [
     ("commission", Some("* commissioning: ended")),
     ("accept", None),
@@ -21,9 +21,9 @@ const LINES: [(&str, Option<&str>); 6] = [
     ("describe", None),
     ("learned", None),
 ];
-/// News that end the session.
+/// Beginnings of unsolicited lines that end the session.
 const STOPS: [&str; 3] = ["* fault ", "* refused: ", "* commissioning: ended; the settings are"];
-/// Time between two looks for news, s, and most looks.
+/// Time between two checks for such lines, s, and the largest number of checks.
 const LOOK: (f64, u32) = (0.2, 3000);
 
 /// Options of a passport.
@@ -33,13 +33,13 @@ pub struct Options {
     /// Serial port: commissions, accepts, learns and asks, with the shaft locked
     #[arg(long, value_name = "PATH", required_unless_present = "from", conflicts_with = "from")]
     port: Option<String>,
-    /// Recorded console instead, with commission, accept, learn, version, describe and learned
+    /// Recorded console instead of a port, with commission, accept, learn, version, describe and learned
     #[arg(long, value_name = "FILE")]
     from: Option<PathBuf>,
     /// Bits per second
     #[arg(long, value_name = "N", default_value_t = 115_200)]
     baud: u32,
-    /// The passport; its page (.txt) and the record of the console (.log) stand beside it
+    /// File of the passport; its page (.txt) and the record of the console (.log) go beside it
     #[arg(long, value_name = "FILE", default_value = "out/passport.json")]
     out: PathBuf,
 }
@@ -47,7 +47,7 @@ pub struct Options {
 /// Makes a passport and its page; returns the page.
 ///
 /// # Errors
-/// [`Error::Refused`] with what the console lacks, or when the drive refuses; [`Error::Write`].
+/// [`Error::Refused`] with the data that the console lacks, or if the drive refuses; [`Error::Write`].
 pub fn run(options: &Options) -> Result<String, Error> {
     let text = match (&options.port, &options.from) {
         (Some(port), _) => session(port, options.baud)?,
@@ -74,7 +74,7 @@ pub fn write(passport: &Passport, path: &Path) -> Result<String, Error> {
         let deviation = if *deviation > 0.0 { format!(" ± {deviation}") } else { String::new() };
         page.push_str(&format!("{step}: {name} {value}{deviation} {unit}\n"));
     }
-    page.push_str("\nTorque current (A), reference, slope (/rad), carrier current (A)\n");
+    page.push_str("\nq-axis current (A), saliency offset, saliency sensitivity (/rad), injection current (A)\n");
     for row in &passport.over_torque_current {
         let cell = |cell: &Option<f64>| cell.map_or("-".to_owned(), |cell| cell.to_string());
         page.push_str(&(row.each_ref().map(cell).join(", ") + "\n"));
@@ -83,7 +83,7 @@ pub fn write(passport: &Passport, path: &Path) -> Result<String, Error> {
     Ok(page)
 }
 
-/// Plays the session at a port, up to a line that fails; its record.
+/// Runs the session at a port, up to a line that fails; returns its record.
 fn session(port: &str, baud: u32) -> Result<String, Error> {
     let (mut wire, mut text) = (Port::new(port, baud, interruptible()?)?, String::new());
     for (line, end) in LINES {
@@ -105,10 +105,10 @@ fn session(port: &str, baud: u32) -> Result<String, Error> {
     Ok(text)
 }
 
-/// The passport of the last commissioning and learning in a recorded console.
+/// Returns the passport of the last commissioning and saliency self-commissioning in a recorded console.
 ///
 /// # Errors
-/// What is missing, refused or no number.
+/// The data that are missing, refused or not a number.
 pub fn of_console(text: &str) -> Result<Passport, String> {
     let (mut measured, mut table, mut learned) = (Vec::new(), Vec::new(), Vec::new());
     let (mut image, mut refused, mut settings) = (None, None, BTreeMap::new());
@@ -126,7 +126,7 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
                 false => measured.extend(quantity(step, rest)),
             }
         } else if line.contains("; spread ") {
-            // A weak slope says how weak.
+            // A refusal of a small saliency sensitivity states its value.
             let line = line
                 .replace("weak: ", "")
                 .replace(" is less than", " (")
@@ -168,8 +168,9 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
             None => drop(twin.insert(name.to_owned(), number(name)?.into())),
         }
     }
-    // Model A: of a saliency s fixed to the flux the slope is 2 s, and s = a 2r/(1 + r) with r = (psi/psi_n)^2. Only the flux of
-    // the learning was seen: psi_n, and with it the law over the flux, is that of the model.
+    // Model A: for a saliency s fixed to the flux the sensitivity is 2 s, and s = a 2r/(1 + r) with r = (psi/psi_n)^2.
+    // Only the flux of the saliency self-commissioning was measured: psi_n, and with it the law over the flux, come
+    // from the model.
     let model = Config::default();
     let rated = number("nameplate.current_a")? / f64::from(model.drive.nameplate.current_a);
     let r = (number("sequence.i_d")? / (0.7 * rated)).powi(2);
@@ -189,7 +190,7 @@ pub fn of_console(text: &str) -> Result<Passport, String> {
     Ok(Passport { schema: SCHEMA, image, measured, over_torque_current: table, twin })
 }
 
-/// The value of a text such as `r_s 5.398 +-0.001 ohm (allowed: 0.429 to 21.425)`.
+/// Parses the value of a text such as `r_s 5.398 +-0.001 ohm (allowed: 0.429 to 21.425)`.
 fn quantity(step: &str, text: &str) -> Option<Measured> {
     let words: Vec<&str> = text.split(" (").next()?.split(' ').collect();
     let at = words.iter().rposition(|word| word.parse::<f64>().is_ok())?;
@@ -199,7 +200,7 @@ fn quantity(step: &str, text: &str) -> Option<Measured> {
     Some(Measured { step, name, value, deviation: deviation.unwrap_or(0.0), unit })
 }
 
-/// The passport of a motor that `identify-trace` has found; nameplate and dc link are those of the configuration.
+/// Returns the passport of a motor that `identify-trace` has identified; nameplate and dc link come from the configuration.
 pub fn of_trace(outcome: &Outcome, config: &Config, file: &Path) -> Passport {
     let measured = outcome.metrics.iter().map(|(name, value)| {
         let [step, name, unit] = ["trace", name, ""].map(str::to_owned);

@@ -1,14 +1,14 @@
-//! What is drawn at random.
+//! Random numbers.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The generator of a seed.
+/// Returns the generator of a seed.
 pub fn seeded(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// 1 or -1.
+/// Returns 1 or -1 at random.
 pub fn sign(random: &mut impl Rng) -> f64 {
     if random.random::<bool>() { 1.0 } else { -1.0 }
 }

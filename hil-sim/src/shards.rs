@@ -1,8 +1,8 @@
-//! Shards: the runs of a statistical experiment shared between processes or machines, kept one by one, and merged.
+//! Shards: the runs of a statistical experiment are shared between processes or machines, stored one by one, and merged.
 //!
-//! Run `k`, counted from 0, belongs to shard `1 + k mod n` of `n`. What a run is depends on its number, the seed and
-//! the settings, not on the shard. A shard is a [`Header`] and the records of its runs, a line each; merging
-//! puts the records of all shards in their order and computes the outcome of them, as the whole run does.
+//! Run `k`, counted from 0, belongs to shard `1 + k mod n` of `n`. A run depends on its number, the seed and the
+//! settings, not on the shard. A shard is a [`Header`] and the records of its runs, one per line. Merging puts the
+//! records of all shards in their order and computes their outcome, as the whole run does.
 
 mod header;
 mod journal;
@@ -26,29 +26,29 @@ use crate::prelude::*;
 /// One of the parts into which the runs are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// From 1 to `count`.
+    /// Number of this shard, from 1 to `count`.
     index: u32,
     /// Number of shards.
     count: u32,
 }
 
 impl Shard {
-    /// All runs.
+    /// The shard with all runs.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
-    /// Most shards.
+    /// Largest number of shards.
     pub const MOST: u32 = 100_000;
 
-    /// A shard, if there is one with these numbers.
+    /// Returns a shard, if there is one with these numbers.
     pub fn new(index: u32, count: u32) -> Option<Self> {
         Some(Self { index, count }).filter(Self::exists)
     }
 
-    /// Whether its numbers are possible; those of a file need not be.
+    /// Whether its numbers are possible; those from a file may not be.
     pub fn exists(&self) -> bool {
         (1..=Self::MOST).contains(&self.count) && (1..=self.count).contains(&self.index)
     }
 
-    /// The shard of this process in an array of jobs, by the variables of the scheduler.
+    /// Returns the shard of this process in a job array, from the variables of the scheduler.
     fn of_array(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let found = ARRAYS.iter().find(|(index, ..)| variable(index).is_some());
         let Some((index, count, first)) = found else {
@@ -65,17 +65,17 @@ impl Shard {
         shard.ok_or_else(|| format!("job {job} of {jobs} from {from} on is no shard"))
     }
 
-    /// The numbers of its runs.
+    /// Returns the numbers of its runs.
     pub fn numbers(self, runs: usize) -> impl Iterator<Item = usize> {
         (self.index as usize - 1..runs).step_by(self.count as usize)
     }
 
-    /// Whether a run belongs to it.
+    /// Whether a run belongs to the shard.
     pub fn has(self, run: usize) -> bool {
         run % self.count as usize == self.index as usize - 1
     }
 
-    /// The numbers as part of the name of a file.
+    /// Returns the numbers as part of a file name.
     pub fn file_name(self) -> String {
         format!("{}-of-{}", self.index, self.count)
     }
@@ -104,15 +104,15 @@ impl FromStr for Shard {
     }
 }
 
-/// Variables of Slurm, Kubernetes and AWS Batch: index of a job of an array, number of jobs, and the first index if it is not 0.
-/// Kubernetes does not give the number: the job sets it.
+/// Variables of Slurm, Kubernetes and AWS Batch: index of a job in the array, number of jobs, and the first index if it
+/// is not 0. Kubernetes does not give the number of jobs: the job sets it.
 const ARRAYS: [(&str, &str, &str); 3] = [
     ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
     ("JOB_COMPLETION_INDEX", "JOB_COMPLETIONS", ""),
     ("AWS_BATCH_JOB_ARRAY_INDEX", "AWS_BATCH_JOB_ARRAY_SIZE", ""),
 ];
 
-/// A run and what it left.
+/// A run and its record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
@@ -125,7 +125,7 @@ pub struct Run {
 /// Does the runs of a shard that the journal does not have yet, and returns all of them in their order.
 ///
 /// # Errors
-/// Those of the experiment; [`Error::Write`] when the journal cannot be written.
+/// The errors of the experiment; [`Error::Write`] if the journal cannot be written.
 pub fn runs(
     statistical: &Statistical,
     context: &Context<'_>,
@@ -147,10 +147,10 @@ pub fn runs(
     Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
 }
 
-/// A shard as text, JSON Lines.
+/// Writes a shard as text, JSON Lines.
 ///
 /// # Errors
-/// [`Error::Internal`] when JSON cannot be made.
+/// [`Error::Internal`] if JSON cannot be made.
 pub fn text(header: &Header, runs: &[Run]) -> Result<String, Error> {
     let mut bytes = journal::line(header)?;
     for run in runs {
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    /// Indices of Slurm begin where the user lets them, those of the others at 0.
+    /// Indices of Slurm begin at the user's choice, those of the other schedulers at 0.
     #[test]
     fn a_job_of_an_array_knows_its_shard() {
         let shard = |set: &[(&str, &str)]| {

@@ -1,10 +1,10 @@
-//! No experiment forgets a part of the drive: a heat sink near its limit lowers the torque in all of them.
+//! Every experiment includes all parts of the drive: a heat sink near its limit lowers the torque in all of them.
 
 use hil_sim::outcome::Metrics;
 use hil_sim::{Config, experiments};
 
-/// Between 70 °C, from which on the current limit falls, and 85 °C, where it ends: a fifth to a third of the square of the current
-/// is left.
+/// Temperature between 70 °C, at which the current limit starts to decrease, and 85 °C, where it ends: a fifth to a
+/// third of the square of the current remains.
 const HOT: &str = "measurement.heat_sink_c=77";
 
 fn metrics(name: &str, set: &[&str]) -> Metrics {
@@ -12,8 +12,8 @@ fn metrics(name: &str, set: &[&str]) -> Metrics {
     experiments::run(name, &config, 1).expect("an outcome").metrics
 }
 
-/// With an encoder the torque is that of the current. Cold it is what was asked for; on a hot heat sink it is lower, and
-/// so is the largest current.
+/// With an encoder the torque corresponds to the current. A cold heat sink gives the commanded torque; a hot one gives
+/// a lower torque and a lower largest current.
 #[test]
 fn a_hot_heat_sink_lowers_the_torque_in_every_experiment() {
     let encoder = "angle_source=encoder";
@@ -24,7 +24,7 @@ fn a_hot_heat_sink_lowers_the_torque_in_every_experiment() {
         };
         (value(&[encoder]), value(&[encoder, HOT]))
     };
-    // In % of the torque at the limit, mean over constant torque currents of 0.5 to 3 A, of which 1.5 A and more are lowered.
+    // In % of the torque at the limit, mean over constant q-axis currents of 0.5 to 3 A, of which 1.5 A and more are reduced.
     let (cold, hot) = of("battery", &["runs=6"], "torque_error_mean_pct");
     assert!(cold.abs() < 0.5 && hot < -2.0, "battery: {cold} and {hot}");
     let constant = ["full_range.kind=constant", "runs=2"];

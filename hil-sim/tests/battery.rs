@@ -1,5 +1,5 @@
-//! The battery: its cross-check on the motor that the drive is made for, and each of its verdicts on a motor that
-//! deserves it.
+//! Tests of the stress test (battery): its cross-check on the drive's own motor, and each of its verdicts on a motor
+//! that causes it.
 
 use hil_sim::outcome::Metrics;
 use hil_sim::{Config, experiments};
@@ -14,8 +14,9 @@ fn get(metrics: &Metrics, name: &str) -> f64 {
     metrics.get(name).unwrap_or(0.0)
 }
 
-/// The tracking loop before the filter had 1.86° rms and 10.1° at most on this motor, in 480 runs, with default tables and 1.88° and
-/// 10.6° with learned ones. Forty-eight runs of the filter have 1.14° and 7.5°, 1.16° and 6.9°; the largest error depends on the profiles.
+/// The tracking loop that preceded the filter had 1.86° rms and 10.1° at most on this motor, in 480 runs, with default
+/// tables, and 1.88° and 10.6° with learned ones. Forty-eight runs of the filter give 1.14° and 7.5°, and 1.16° and
+/// 6.9°; the largest error depends on the profiles.
 #[test]
 fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     for learn in ["no", "yes"] {
@@ -24,9 +25,9 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
         assert!((rms - 1.15).abs() < 0.12, "{rms}");
         assert!((3.0..4.2).contains(&get(&metrics, "angle_error_p99_deg")));
         assert!(get(&metrics, "angle_error_max_deg") < 10.0);
-        // Torque of sound runs: angle errors of 2° rms cost little at the mean.
+        // Torque of healthy runs: angle errors of 2° rms hardly reduce the mean.
         assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
-        // At 0.7 A the slope allows a learned drive 2.25 A to 2.75 A of 3 A.
+        // At 0.7 A the saliency sensitivity allows a drive that has learned 2.25 A to 2.75 A of 3 A.
         let limited = if learn == "yes" { 48.0 } else { 0.0 };
         assert_eq!(get(&metrics, "limited_runs"), limited);
         assert!(learn == "no" || get(&metrics, "limit_pct") > 70.0, "{metrics:?}");
@@ -38,8 +39,8 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     }
 }
 
-/// At a torque current of three times the direct one an angle error changes the flux, and with that the speed that the voltage shows. Near the
-/// hand-over that oscillated until the angle was lost, in four of these runs.
+/// At a q-axis current of three times the d-axis current, an angle error changes the flux, and with it the speed that
+/// the voltage shows. Near the hand-over this once oscillated until the angle was lost, in four of these runs.
 #[test]
 fn a_torque_current_of_three_times_the_direct_one_is_held_up_to_600_rpm() {
     let config =
@@ -49,7 +50,7 @@ fn a_torque_current_of_three_times_the_direct_one_is_held_up_to_600_rpm() {
     assert!(get(&metrics, "angle_error_rms_deg") < 1.1, "{metrics:?}");
 }
 
-/// Without saliency there is nothing to track: each start is refused by fault 25, and there is no error to show.
+/// Without saliency there is nothing to track: fault 25 refuses each start, and there is no error to report.
 #[test]
 fn a_motor_without_saliency_is_refused() {
     let (metrics, faults) = battery(&["saliency.a_psi=0", "runs=12"]);
@@ -59,7 +60,7 @@ fn a_motor_without_saliency_is_refused() {
     assert_eq!((get(&metrics, "lost_runs"), faults), (0.0, 12));
 }
 
-/// The same motor with a drive that neither checks nor watches: lost, and wrong for long.
+/// The same motor with a drive without check and monitor: lost, and wrong for a long time.
 #[test]
 fn a_drive_that_does_not_watch_is_wrong_for_long() {
     let unwatched = ["saliency.a_psi=0", "injection.check=no", "injection.monitor=no", "runs=12"];
@@ -68,9 +69,9 @@ fn a_drive_that_does_not_watch_is_wrong_for_long() {
     assert!(get(&metrics, "wrong_longest_s") > 1.0, "{metrics:?}");
 }
 
-/// With an encoder the slip decides on the flux. Believed `k` times too large, the current of 0.7 A and `i_q` stands at
-/// `atan(k i_q/0.7)` from the flux, which is then `sqrt(0.49 + i_q^2)/0.7 / sqrt(1 + (k i_q/0.7)^2)` of its nominal
-/// value: at 2 A and more 0.26 for k = 4, and 2.2 for k = 0.3.
+/// With an encoder the slip determines the flux. If the drive assumes a slip `k` times too large, the current of 0.7 A
+/// and `i_q` lies at `atan(k i_q/0.7)` from the flux, which is then `sqrt(0.49 + i_q^2)/0.7 / sqrt(1 + (k i_q/0.7)^2)`
+/// of its nominal value: at 2 A and more 0.26 for k = 4, and 2.2 for k = 0.3.
 #[test]
 fn a_flux_that_is_too_small_or_too_large_is_counted() {
     let of_ratio = |k: f64| {
@@ -85,9 +86,9 @@ fn a_flux_that_is_too_small_or_too_large_is_counted() {
     assert_eq!(get(&of_ratio(1.0), "flux_off_runs"), 0.0);
 }
 
-/// With an encoder and a rotor resistance believed `k` times too large, torque over command is
-/// `k (1 + x^2)/(1 + (k x)^2)`, `x = i_q/i_d` (indirect field orientation, steady). The battery draws i_q evenly between
-/// 0.5 and 3 A beside 0.7 A; the mean of 48 such runs has a standard error of 3 % of the torque at 3 A.
+/// With an encoder and an assumed rotor resistance `k` times too large, torque divided by command is `k (1 + x^2)/(1 +
+/// (k x)^2)`, `x = i_q/i_d` (indirect field orientation, steady state). The stress test draws i_q evenly between 0.5
+/// and 3 A at 0.7 A; the mean of 48 such runs has a standard error of 3 % of the torque at 3 A.
 #[test]
 fn the_torque_error_is_that_of_the_equations() {
     for k in [0.5_f64, 2.0] {
@@ -106,8 +107,8 @@ fn the_torque_error_is_that_of_the_equations() {
     }
 }
 
-/// Values after the learning act on the runs alone: the drive learns a saliency that has gone when it starts, and each start
-/// is refused by fault 25. Without saliency from the beginning the learning is refused before.
+/// Values after the saliency self-commissioning act only on the runs: the drive learns a saliency that is absent at its
+/// start, and fault 25 refuses each start. Without saliency from the beginning the self-commissioning is refused.
 #[test]
 fn values_after_the_learning_do_not_act_while_it_lasts() {
     let learn = |set: &str| battery(&["prepare.learn=yes", set, "runs=3"]).0;
@@ -122,8 +123,8 @@ fn values_after_the_learning_do_not_act_while_it_lasts() {
     assert_eq!(error.to_string(), text);
 }
 
-/// A drive without observer that may track up to 100 rpm only stops the runs at more, at a sound angle; one without
-/// saliency stops runs whose angle is wrong.
+/// A drive without observer that may track only up to 100 rpm stops the runs at higher speeds, at a right angle. A
+/// drive without saliency stops runs whose angle is wrong.
 #[test]
 fn sound_runs_that_are_stopped_are_told_from_others() {
     let (sound, _) = battery(&["observer.enabled=no", "injection.tracked_rpm=100", "runs=12"]);
@@ -134,13 +135,13 @@ fn sound_runs_that_are_stopped_are_told_from_others() {
     assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
 }
 
-/// The flux turned at once: the drive finds it again or stops. Without saliency, lock monitor and observer it stays wrong for
-/// a second.
+/// If the flux is suddenly rotated, the drive finds it again or stops. Without saliency, lock monitor and observer it
+/// stays wrong for a second.
 #[test]
 fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     let (watched, faults) = battery(&["battery.runs=forced", "runs=27"]);
     assert_eq!((get(&watched, "silent_runs"), faults), (0.0, 0), "{watched:?}");
-    // Turned: an angle error of 60° and more for longer than a period.
+    // The flux was rotated: an angle error of 60° and more for longer than a period.
     assert!(get(&watched, "wrong_longest_s") > 0.01, "{watched:?}");
     let blind = [
         "battery.runs=forced",
@@ -155,15 +156,15 @@ fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     assert!(get(&blind, "silent_runs") >= 9.0 && longest > 1.0, "{blind:?}");
 }
 
-/// Commands that never rest neither hide a turned flux nor stop a sound drive: half of the runs turn it, and none of
-/// the others stops.
+/// Dithered torque commands neither hide a rotated flux nor stop a healthy drive: half of the runs rotate it, and none
+/// of the others stops.
 #[test]
 fn commands_that_never_rest_are_borne() {
     let (metrics, faults) = battery(&["battery.runs=restless", "runs=12", "prepare.learn=yes"]);
     assert_eq!((get(&metrics, "silent_runs"), faults), (0.0, 0), "{metrics:?}");
 }
 
-/// Drawn disturbances are those of the seed, whatever the order of the runs, and cost accuracy.
+/// Random disturbances depend on the seed alone, in any order of the runs, and reduce the accuracy.
 #[test]
 fn drawn_disturbances_cost_accuracy() {
     let motor = ["plant=r", "flux_level=high", "sequence.flux=high"];

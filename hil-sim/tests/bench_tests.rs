@@ -14,7 +14,7 @@ fn nothing_neglected_gives_the_motor_back() {
         let found = readings(&machine, &SaliencySettings::NONE, Shaft::Driven).exact();
         let array = |m: MachineSettings| [m.rs, m.rr, m.lls, m.llr, m.lm];
         for (found, truth) in array(found).iter().zip(array(machine)) {
-            // 400 steps a period, and what is left of the transient.
+            // The tolerance covers 400 steps a period and the rest of the transient.
             assert!((found / truth - 1.0).abs() < 1e-3, "{found} {truth}");
         }
     }
@@ -24,8 +24,8 @@ fn nothing_neglected_gives_the_motor_back() {
 fn the_formulas_of_section_3_6_neglect_the_magnetising_branch() {
     let machine = MachineSettings::default();
     let found = readings(&machine, &SaliencySettings::NONE, Shaft::Driven).as_printed();
-    // Independent: z = r_s + j w L_l1 + j w L_m (r_r + j w L_l2) / (r_r + j w L_r) at 15 Hz by hand:
-    // r_r is seen as r_r (w L_m)^2 / (r_r^2 + (w L_r)^2) = 0.8211.
+    // Independent check: z = r_s + j w L_l1 + j w L_m (r_r + j w L_l2) / (r_r + j w L_r) at 15 Hz by hand: r_r appears
+    // as r_r (w L_m)^2 / (r_r^2 + (w L_r)^2) = 0.8211.
     let (w, l_r) = (94.2478, 0.2047);
     let seen = 1.1 * (w * 0.1771f64).powi(2) / (1.1f64.powi(2) + (w * l_r).powi(2));
     assert!((found.rr / seen - 1.0).abs() < 2e-3, "{} {seen}", found.rr);

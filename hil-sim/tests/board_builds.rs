@@ -1,5 +1,5 @@
-//! `cargo sim board`: what is said while image and emulator are built, and how the built program is called. A script
-//! stands in for cargo.
+//! `cargo sim board`: the messages while image and emulator are built, and the call of the built program. A script
+//! replaces cargo.
 #![cfg(unix)]
 
 use std::fs;
@@ -18,7 +18,7 @@ fn program(path: &Path, text: &str) {
     fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-/// `cargo sim board` with a cargo that runs this.
+/// Runs `cargo sim board` with a cargo that runs this script.
 fn board(folder: &Path, cargo: &str, arguments: &[&str]) -> Output {
     let path = folder.join("cargo");
     program(&path, cargo);
@@ -48,7 +48,7 @@ fn builds_are_announced_and_the_board_gets_image_and_options() {
         assert_eq!(output.status.code(), Some(0), "{err}");
         let given = arguments.join(" ");
         assert_eq!(out, format!("board {given} --elf /some/image\n"));
-        assert!(err.contains("firmware: built where its source has changed"), "{err}");
+        assert!(err.contains("firmware: rebuilt where its source has changed"), "{err}");
         assert_eq!(err.contains("a long command"), verbose, "{err}");
     }
 }

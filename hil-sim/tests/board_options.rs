@@ -1,10 +1,10 @@
-//! `cargo sim board`: what is wrong with its options is said before anything is built.
+//! `cargo sim board`: errors in its options are reported before anything is built.
 
 use std::process::{Command, Output};
 
 fn board(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
-    // Nothing is built: there is no cargo.
+    // There is no cargo, so nothing is built.
     command.env("CARGO", "/nonexistent/cargo").arg("board").args(arguments);
     command.output().expect("the binary runs")
 }

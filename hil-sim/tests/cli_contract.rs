@@ -1,4 +1,4 @@
-//! What the command line promises: exit codes, messages, one JSON object, no half-written files.
+//! Guarantees of the command line: exit codes, messages, one JSON object, no half-written files.
 
 use crate::cli_common::{files, folder, hil_sim, text};
 use hil_sim::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
@@ -68,7 +68,7 @@ fn csv_has_a_file_for_every_figure_and_table() {
     let heads = lines.next().expect("heads");
     assert!(heads.contains(&"time_s") && heads.contains(&"torque_motor_nm"), "{heads:?}");
     assert!(lines.all(|row| row.len() == heads.len()));
-    assert_eq!(figure.lines().count(), 601, "a mean every carrier period of 1/600 s");
+    assert_eq!(figure.lines().count(), 601, "a mean every injection period of 1/600 s");
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn a_page_names_itself_its_origin_and_its_settings() {
     }
 }
 
-/// A load of 2 Nm, more than the torque limit, runs away with a light rotor.
+/// A load of 2 Nm, more than the torque limit, accelerates a light rotor without bound.
 #[test]
 fn a_lost_run_names_its_fault_and_prints_no_nan() {
     let folder = folder("lost");
@@ -101,7 +101,7 @@ fn a_lost_run_names_its_fault_and_prints_no_nan() {
     assert!(printed.contains(fault), "{fault}");
     let events = object["events"]["profile"].as_array().expect("events");
     assert_eq!(events.last().expect("an event")[1], fault, "{events:?}");
-    // It comes with the load, at 3 s, not at the end of the part of the profile, at 5 s.
+    // The event comes with the load, at 3 s, not at the end of the part of the profile, at 5 s.
     let stop = events.last().and_then(|event| event[0].as_f64()).expect("a time");
     assert!((3.0..3.5).contains(&stop), "{events:?}");
 }

@@ -1,4 +1,4 @@
-//! The commissioning: what it finds on machines and boards drawn at random, and what it refuses.
+//! The commissioning: its results on random machines and boards, and its refusals.
 
 use hil_sim::config::{FluxLevel, LoadMode, PlantModel};
 use hil_sim::{Config, experiments};
@@ -9,7 +9,7 @@ fn config(runs: u32) -> Config {
     config
 }
 
-/// Half of the bounds that hold over thousands of machines (1.5 %): a defect of any part shows beyond them.
+/// Half of the bounds that hold over thousands of machines (1.5 %), so that a defect of any part exceeds them.
 #[test]
 fn random_machines_are_accepted_and_right() {
     for seed in [1, 2] {
@@ -20,13 +20,13 @@ fn random_machines_are_accepted_and_right() {
             let error = get(&format!("error_q95_pct.{name}"));
             assert!(error < 0.9, "seed {seed}: {name} {error} %");
         }
-        // Free shafts; the nameplate's peak; 12 s for all but the check of the current loop.
+        // Free shafts; currents below the nameplate's peak; 12 s for all steps but the check of the current loop.
         assert!(get("shaft_deg_max") < 0.5 && get("current_max_of_peak") < 1.0);
         assert!(get("seconds_max") < 13.0 && get("margin_deg_min") > 45.0);
     }
 }
 
-/// Phases, legs and sensors that differ as those of sound motors and boards do, all at once.
+/// Phases, legs and sensors that differ as they do in healthy motors and boards, all at once.
 #[test]
 fn small_differences_of_the_phases_are_no_refusal() {
     let mut config = config(20);
@@ -39,7 +39,7 @@ fn small_differences_of_the_phases_are_no_refusal() {
     }
 }
 
-/// Resistances that differ are told from the gains of the sensors, which `accept` scales, whatever those are.
+/// Different resistances are distinguished from the gains of the sensors, which `accept` scales, for any gains.
 #[test]
 fn a_resistance_is_no_gain() {
     let with = |percent: f64, gain: f64| {
@@ -57,7 +57,7 @@ fn a_resistance_is_no_gain() {
             [a / config.drive.scales.current_a.gain, b / config.drive.scales.current_b.gain];
         let scaled = f64::from(b / a) - 1.0;
         assert!((scaled - gain).abs() < 0.002, "{percent} %, gain {gain}: scaled by {scaled}");
-        // A gain error of sensor a is half a common one, which the resistance carries.
+        // A gain error of sensor a is half a common one, which appears in the resistance.
         let r_s = f64::from(settings.motor.r_s) / config.motor.r_s - 1.0 + 0.5 * gain;
         assert!(r_s.abs() < 0.003, "{percent} %, gain {gain}: r_s by {r_s}");
     }
@@ -67,7 +67,7 @@ fn a_resistance_is_no_gain() {
     assert!(text.contains("r_b over r_c") && text.contains("cable"), "{text}");
     let text = refusal(&with(0.0, 0.06));
     assert!(text.contains("gain mismatch = 0.06"), "{text}");
-    // A leg that is late by 0.8 us, whose current across is constant; a shaft at 10 rpm.
+    // A leg that is late by 0.8 us, with a constant current across it; a shaft at 10 rpm.
     let mut config = Config::default();
     config.inverter.more_dead_time_b_us = 0.8;
     let text = refusal(&config);
@@ -79,7 +79,7 @@ fn a_resistance_is_no_gain() {
     assert!(text.contains("the shaft turns"), "{text}");
 }
 
-/// Nodes of 50 to 140 pF lie where a threshold would decide.
+/// Node capacitances of 50 to 140 pF lie near the threshold of the decision.
 #[test]
 fn the_capacitance_of_the_nodes_is_no_resistance() {
     for picofarad in [0.0, 50.0, 100.0, 140.0, 200.0, 500.0, 1000.0] {
@@ -94,7 +94,7 @@ fn the_capacitance_of_the_nodes_is_no_resistance() {
     }
 }
 
-/// The chord of the main flux, with iron that saturates by a fifth: 6 % in 95 of 100.
+/// The chord of the main flux, with iron that saturates by a fifth: 6 % in 95 of 100 runs.
 #[test]
 fn iron_is_found_by_the_staircase() {
     let mut config = config(20);

@@ -26,7 +26,7 @@ fn every_default_is_allowed_and_every_key_round_trips() {
         assert_eq!(key.set(&mut config, &value), Ok(()), "{name}");
         assert_eq!(config, Config::default(), "{name}");
         assert!(!key.help().is_empty(), "{name}");
-        // Through text, as --set has it, with a value that is not the default.
+        // The value passes through text, as with --set, and is not the default.
         let text = match key.allowed() {
             Allowed::Range { max, .. } => max.to_string(),
             Allowed::Words(words) => words[0].to_owned(),
@@ -37,7 +37,7 @@ fn every_default_is_allowed_and_every_key_round_trips() {
         let same = found == text
             || found.parse::<f64>().unwrap() as f32 == text.parse::<f64>().unwrap() as f32;
         assert!(same, "{name}: {found}, not {text}");
-        // The changes make the same configuration again.
+        // The changes give the same configuration again.
         let again = Config::load(None, None, &config.changes());
         assert_eq!(again.expect(name), config, "{name}");
     }
@@ -105,7 +105,7 @@ fn toml_and_assignments_say_the_same() {
     let changes = from_toml.changes();
     assert_eq!(changes, ["motor.r_s=6", "load.mode=speed", "runs=3", "drive.motor.r_r=1.3"]);
     assert_eq!(Config::load(None, None, &changes).unwrap(), from_toml);
-    // The drive knows its motor, but for what it is told.
+    // The drive knows its motor, except for the value that it is given.
     assert_eq!((from_toml.drive.motor.r_s, from_toml.drive.motor.r_r), (6.0, 1.3));
     assert_eq!((from_toml.motor.r_s, from_toml.motor.r_r), (6.0, 1.1));
 }

@@ -1,4 +1,4 @@
-//! `cargo sim console` against a pseudo-terminal, behind which a thread plays the firmware.
+//! `cargo sim console` at a pseudo-terminal, with a thread in place of the firmware.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -72,7 +72,7 @@ fn serve(mut port: impl Read + Write, firmware: &Shared) {
         let text = String::from_utf8(std::mem::take(&mut line)).unwrap();
         let mut firmware = firmware.lock().unwrap();
         let echo = if firmware.echo { format!("{text}\r\n") } else { String::new() };
-        // A sign of life has no answer; all else has a tag, which the last line repeats.
+        // A sign of life has no answer; every other line has a tag, which the last line of the answer repeats.
         let (tag, request) = text.split_once(' ').unwrap_or_default();
         let answer = firmware.answer(request);
         let (before, last) = answer.trim_end().rsplit_once('\n').unwrap_or(("", answer.trim_end()));
@@ -85,7 +85,7 @@ fn serve(mut port: impl Read + Write, firmware: &Shared) {
     }
 }
 
-/// A pseudo-terminal with a firmware behind it. The second end stays open, as that of the virtual board does.
+/// Opens a pseudo-terminal with a firmware behind it. The second end stays open, as with the virtual board.
 fn port(firmware: &Shared) -> (TTYPort, String) {
     let (ours, theirs) = TTYPort::pair().expect("a pseudo-terminal");
     let firmware = firmware.clone();
@@ -135,7 +135,7 @@ fn the_first_error_ends_it_with_exit_code_1() {
     assert_eq!((code, out.as_str()), (Some(1), "error: motor.r_s 99: allowed 0.1 to 9\n"));
     assert!(err.contains("the drive refuses `set motor.r_s 99`: motor.r_s 99: allowed"), "{err}");
     assert!(!firmware.lock().unwrap().heard.contains(&"status".to_owned()));
-    // A command of this program that does not exist never reaches the drive.
+    // A command of this program that does not exist is never sent to the drive.
     let (code, _, err) = texts(&console(&port, &["!backupp x"]));
     assert_eq!(code, Some(2));
     assert!(err.contains("`!backupp x`: no such command") && err.contains("!backup FILE"), "{err}");

@@ -1,7 +1,7 @@
 //! The pages in `docs/`: tables of the results of long runs, of motors and of experiments; links and anchors.
 //!
-//! A file `results/NAME.json` holds the figures of one table with the commit that was measured and the commands. The ignored test
-//! `measure` runs the commands of a file again and writes it.
+//! A file `results/NAME.json` holds the numbers of one table with the measured commit and the commands. The ignored
+//! test `measure` runs the commands of a file again and writes it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -16,24 +16,24 @@ use serde_json::Value;
 
 use crate::generated;
 
-/// A table of measured figures.
+/// A table of measured numbers.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Results {
-    /// The command that repeats it, as the page prints it.
+    /// The command that repeats it, as the page shows it.
     command: String,
-    /// Commit of the program that was measured.
+    /// The measured commit of the program.
     commit: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     seed: Option<u64>,
-    /// Title of the table in the command's JSON that the rows are taken from.
+    /// Title of the table in the command's JSON from which the rows are taken.
     #[serde(skip_serializing_if = "Option::is_none")]
     table: Option<String>,
     columns: Vec<Column>,
     /// Words that replace `{}` in the commands and the metrics of a row.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     keys: Vec<String>,
-    /// Texts, numbers, lists of numbers, or nothing.
+    /// Cells: texts, numbers, lists of numbers, or nothing.
     rows: Vec<Vec<Value>>,
 }
 
@@ -41,13 +41,13 @@ struct Results {
 #[serde(deny_unknown_fields)]
 struct Column {
     name: String,
-    /// Printed digits behind the point, one for each number of a cell.
+    /// Number of printed decimals, one for each number of a cell.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     digits: Vec<usize>,
-    /// Its command, if it is not that of the table.
+    /// Its command, if it differs from the table's.
     #[serde(skip_serializing_if = "Option::is_none")]
     command: Option<String>,
-    /// Metrics of the run, or the column of its table, that a cell is taken from.
+    /// Metrics of the run, or the column of its table, from which a cell is taken.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     from: Vec<String>,
 }
@@ -59,7 +59,7 @@ impl Results {
         serde_json::from_str(&text).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
     }
 
-    /// A column or a row a line.
+    /// Returns the file, with one line for each column and each row.
     fn text(&self) -> String {
         let mut head = serde_json::to_value(self).unwrap();
         for list in ["columns", "keys", "rows"] {
@@ -83,7 +83,7 @@ impl Results {
         text + "\n}\n"
     }
 
-    /// The table of the page, and below it where it comes from.
+    /// Returns the table for the page, with its origin below.
     fn block(&self) -> String {
         let names: Vec<_> = self.columns.iter().map(|column| column.name.as_str()).collect();
         let mut text = format!("| {} |\n|{}\n", names.join(" | "), "---|".repeat(names.len()));
@@ -97,7 +97,7 @@ impl Results {
         text + &format!("\n*Commit {}{seed}: `{}`*\n", self.commit, self.command)
     }
 
-    /// Runs the commands and takes the figures from what they print.
+    /// Runs the commands and takes the numbers from their output.
     fn measure(&mut self) {
         let measured = self.columns.iter().any(|column| !column.from.is_empty());
         assert!(measured, "no column says what it is from: TABLE=FILE gives the rows");
@@ -142,7 +142,7 @@ impl Results {
 }
 
 impl Column {
-    /// A number to the printed digits; all of them where the file does not say.
+    /// Returns a number with the printed decimals; with all of them if the file does not state them.
     fn text(&self, n: usize, number: f64) -> String {
         match self.digits.get(n) {
             Some(&digits) => format!("{number:.digits$}"),
@@ -164,7 +164,7 @@ impl Column {
         }
     }
 
-    /// To the printed digits; one number instead of a list of one; nothing where the run has no such number.
+    /// Rounds to the printed decimals; returns a single number instead of a list of one, and nothing if the run has no such number.
     fn rounded(&self, cell: &Value) -> Value {
         let round = |(n, number): (usize, &Value)| match number.as_f64() {
             Some(number) => self.text(n, number).parse::<f64>().unwrap().into(),
@@ -179,7 +179,7 @@ impl Column {
     }
 }
 
-/// The JSON that `cargo sim ...` prints.
+/// Returns the JSON that `cargo sim ...` prints.
 fn printed_json(command: &str) -> Value {
     let arguments = command.strip_prefix("cargo sim ").expect("a command of the simulator");
     println!("{command}");
@@ -201,7 +201,7 @@ fn results() -> Vec<(String, PathBuf)> {
         .collect()
 }
 
-/// The pages of the book and the README, by their path from the folder of the repository.
+/// Returns the pages of the book and the README, by their path from the folder of the repository.
 fn pages() -> BTreeMap<String, String> {
     let docs = fs::read_dir(generated::root().join("docs")).expect("the pages");
     let names = docs.map(|file| format!("docs/{}", file.unwrap().file_name().to_string_lossy()));
@@ -214,7 +214,7 @@ fn pages() -> BTreeMap<String, String> {
         .collect()
 }
 
-/// A table of results is that of its file, if a page shows it; the lists are those of the program.
+/// A table of results equals that of its file, if a page shows it; the lists equal those of the program.
 #[test]
 fn tables_of_the_pages_are_those_of_results_and_program() {
     let mine = |text: &String| {
@@ -262,8 +262,8 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
     generated::check("cycles.md", "budgets", &list);
 }
 
-/// `RESULT=NAME cargo test --release -p hil-sim documents::measure -- --ignored --nocapture`. With `TABLE=FILE` the rows
-/// are those of a Markdown table that another program has printed.
+/// Run with `RESULT=NAME cargo test --release -p hil-sim documents::measure -- --ignored --nocapture`. With
+/// `TABLE=FILE` the rows are those of a Markdown table that another program has printed.
 #[test]
 #[ignore = "runs the commands of a file in results/; hours for some"]
 fn measure() {
@@ -277,7 +277,7 @@ fn measure() {
     fs::write(path, results.text()).unwrap();
 }
 
-/// The rows of the first table in a text; numbers as numbers.
+/// Returns the rows of the first table in a text, with numbers as numbers.
 fn rows_of(text: &str) -> Vec<Vec<Value>> {
     let lines = text.lines().skip_while(|line| !line.contains("---|"));
     let rows = lines.skip(1).take_while(|line| line.contains('|'));
@@ -286,7 +286,7 @@ fn rows_of(text: &str) -> Vec<Vec<Value>> {
     rows.map(|row| row.trim().trim_matches('|').split('|').map(cell).collect()).collect()
 }
 
-/// The anchor that a heading gets, on GitHub and by mdbook alike.
+/// Returns the anchor of a heading, which is the same on GitHub and with mdbook.
 fn anchor(heading: &str) -> String {
     let kept = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.collect::<String>().trim().to_lowercase().replace(' ', "-")
@@ -354,7 +354,7 @@ fn links_lead_somewhere() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Every developer task that a page or CONTRIBUTING names is one of `xtask`.
+/// Every developer task that a page or CONTRIBUTING names exists in `xtask`.
 #[test]
 fn tasks_of_the_pages_exist() {
     let root = generated::root();

@@ -1,5 +1,5 @@
-//! The table of first power-up: its page, and the rule that nothing switches the stage on too early; and the contributed evidence, replayed
-//! against the plant.
+//! The table of first power-up: its page, and the rule that nothing switches the power stage on too early; and the
+//! contributed test records, replayed against the plant.
 
 use std::fmt::Write as _;
 
@@ -94,8 +94,8 @@ fn evidence(steps: Vec<Record>) -> Evidence {
     Evidence { schema: SCHEMA, bench, board, build, steps }
 }
 
-/// Over all prefixes of the table, and with every verdict on every one of the steps that judge: no step that can switch a gate
-/// on is handed out unless all of them were passed.
+/// Over all prefixes of the table, and with every verdict on every step that judges: a step that can switch a gate on
+/// is handed out only after all of the judging steps were passed.
 #[test]
 fn nothing_switches_the_stage_on_before_gates_and_fault_input_were_judged() {
     let table = Table::read().unwrap();
@@ -126,7 +126,7 @@ fn nothing_switches_the_stage_on_before_gates_and_fault_input_were_judged() {
         }
     }
     assert!(energised > 0);
-    // A step that switches on and stands too early is refused, not walked through.
+    // A step that switches on and comes too early is refused, not walked through.
     let mut early = table.clone();
     let part = early.parts.pop().unwrap();
     early.parts.insert(0, part);
@@ -134,7 +134,7 @@ fn nothing_switches_the_stage_on_before_gates_and_fault_input_were_judged() {
     assert!(why.contains("commission switches the stage on before"), "{why}");
 }
 
-/// A step that switches on ends with the outputs off: a later step, or a later run, finds them so.
+/// A step that switches on ends with the outputs off, so that a later step, or a later run, finds them off.
 #[test]
 fn a_step_that_switches_on_ends_off() {
     let table = Table::read().unwrap();
@@ -148,7 +148,7 @@ fn a_step_that_switches_on_ends_off() {
     }
 }
 
-/// The names that steps use are those that every board has, and every line of the table is understood: see the virtual board.
+/// Every board has all names that steps use. The test of the virtual board checks that every line of the table is understood.
 #[test]
 fn every_limit_is_a_number_on_every_board() {
     let table = Table::read().unwrap();
@@ -166,7 +166,7 @@ fn every_limit_is_a_number_on_every_board() {
     }
 }
 
-/// A trace of contributed evidence, by the names of its columns.
+/// A trace of a contributed test record, by the names of its columns.
 struct Traced {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
@@ -184,14 +184,14 @@ impl Traced {
         self.rows[row][self.names.iter().position(|known| known == name).expect(name)]
     }
 
-    /// A vector of the estimated flux frame, in the stator frame.
+    /// Returns a vector of the estimated flux frame, in the stator frame.
     fn vector(&self, row: usize, d: &str, q: &str) -> Complex {
         let phi = self.at(row, "phi_deg").to_radians();
         Complex::new(self.at(row, d), self.at(row, q)) * Complex::new(phi.cos(), phi.sin())
     }
 }
 
-/// The motor of the settings that the drive listed, with these factors of stator resistance and magnetising inductance.
+/// Returns the motor of the settings that the drive listed, with these factors of stator resistance and magnetising inductance.
 fn motor(listed: &str, factors: [f64; 2]) -> (MotorModel<Machine>, f64) {
     let setting = |key: &str| -> f64 {
         let (_, rest) = listed.split_once(&format!("motor.{key} = ")).expect(key);
@@ -210,7 +210,7 @@ fn motor(listed: &str, factors: [f64; 2]) -> (MotorModel<Machine>, f64) {
     (MotorModel::new(machine, Mechanics::new(&shaft).unwrap()), settings.lm)
 }
 
-/// Differences of the replayed and the recorded current, rms and largest, as shares of the largest recorded current.
+/// Returns the differences of the replayed and the recorded current, rms and largest, as shares of the largest recorded current.
 fn replayed(evidence: &Evidence, factors: [f64; 2]) -> [f64; 2] {
     let console = |name: &str| {
         let record = evidence.steps.iter().rfind(|record| record.name == name);
@@ -239,7 +239,7 @@ fn replayed(evidence: &Evidence, factors: [f64; 2]) -> [f64; 2] {
     [rms / largest, most / largest]
 }
 
-/// Every file of `docs/evidence/`: whole, and its trace is that of the motor that its commissioning has found.
+/// Every file of `docs/evidence/` is complete, and its trace fits the motor that its commissioning has identified.
 #[test]
 fn contributed_evidence_is_whole_and_its_trace_is_that_of_its_motor() {
     let table = Table::read().unwrap();
@@ -258,7 +258,7 @@ fn contributed_evidence_is_whole_and_its_trace_is_that_of_its_motor() {
         let errors = replayed(&evidence, [1.0, 1.0]);
         println!("{path:?}: rms, largest {errors:.4?}");
         assert!(errors[0] < 0.05 && errors[1] < 0.15, "{path:?}: {errors:?}");
-        // The bounds tell another motor from this one.
+        // The bounds distinguish another motor from this one.
         for factors in [[1.3, 1.0], [0.7, 1.0]] {
             let wrong = replayed(&evidence, factors);
             println!("{factors:?}: {wrong:.4?}");

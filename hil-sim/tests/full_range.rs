@@ -1,4 +1,4 @@
-//! The runs over the whole speed range: with the encoder, whose angle and torque follow from equations, and without one.
+//! The runs over the full speed range: with the encoder, for which angle and torque follow from equations, and without one.
 
 use hil_sim::outcome::Outcome;
 use hil_sim::{Config, experiments};
@@ -22,8 +22,8 @@ fn get(outcome: &Outcome, name: &str) -> f64 {
     outcome.metrics.get(name).unwrap_or_else(|| panic!("{name}: {:?}", outcome.metrics))
 }
 
-/// With an encoder and exact parameters nothing is left but sampling and noise, in every region; where the field is weakened a reversal
-/// changes the flux, of which the slip knows nothing.
+/// With an encoder and exact parameters only errors of sampling and noise remain, in every region. In field weakening a
+/// reversal changes the flux, which the slip does not take into account.
 #[test]
 fn with_an_encoder_torque_is_regulated_in_all_regions() {
     for (kind, rms, max) in [("constant", 0.06, 0.2), ("reversals", 0.25, 2.5), ("sag", 0.2, 0.6)] {
@@ -40,8 +40,8 @@ fn with_an_encoder_torque_is_regulated_in_all_regions() {
     }
 }
 
-/// A rotor that is 30 % warmer than the drive believes: with an encoder the angle is wrong by `atan(x) - atan(x/1.3)`,
-/// `x = i_q/i_d`, 7.5° at the most, a little more while the flux follows. A cold one shows none of it.
+/// A rotor that is 30 % warmer than the drive assumes: with an encoder the angle is wrong by `atan(x) - atan(x/1.3)`,
+/// `x = i_q/i_d`, at most 7.5°, slightly more while the flux follows. A cold rotor shows no such error.
 #[test]
 fn a_hot_rotor_turns_the_angle_of_an_encoder() {
     let cold = full_range("ramps", &[ENCODER]);
@@ -52,9 +52,9 @@ fn a_hot_rotor_turns_the_angle_of_an_encoder() {
     assert_eq!(get(&hot, "lost_runs"), 0.0);
 }
 
-/// The link of the stop and of the outage is one that takes no energy back: a stop charges it, and the drive brakes no more
-/// than it bears; an outage empties it, and the shaft holds it. Five times the inertia,
-/// braked by the losses alone, takes 18 s; with a resistor of 100 ohm it follows its ramp, 6 s.
+/// The link of the stop and of the outage cannot feed energy back. A stop charges it, and the drive brakes no more than
+/// it withstands. An outage discharges it, and kinetic buffering holds its voltage. Five times the inertia, braked by
+/// the losses alone, takes 18 s to stop; with a resistor of 100 ohm it follows its ramp, 6 s.
 #[test]
 fn the_dc_link_stays_between_the_trips() {
     let took = |more: &[&str]| {
@@ -72,8 +72,8 @@ fn the_dc_link_stays_between_the_trips() {
     assert_eq!(get(&outage, "lost_runs"), 0.0);
 }
 
-/// A flux that is turned under an encoder is seen: the drive stops, or turns it back within half a second, and the run
-/// counts neither as lost nor with its error.
+/// A drive with an encoder detects a rotated flux: it stops, or rotates the flux back within half a second. The run
+/// does not count as lost, nor does its error count.
 #[test]
 fn a_turned_flux_is_no_loss() {
     let outcome = full_range("turned-flux", &[ENCODER]);
@@ -82,18 +82,18 @@ fn a_turned_flux_is_no_loss() {
     assert!(get(&outcome, "turned_flux_1200_1800_angle_error_max_deg") < 1.0);
 }
 
-/// A dynamometer turns the shaft before the start: with an encoder the drive starts as ever, in 1.04 s.
+/// A dynamometer turns the shaft before the start: with an encoder the drive starts as usual, in 1.04 s.
 #[test]
 fn a_turning_shaft_is_there_before_the_start() {
     let outcome = full_range("turning-start", &[ENCODER]);
     let took = get(&outcome, "turning_start_550_750_took_s");
     assert!((0.5..1.5).contains(&took), "{took}");
-    // The direct current, the torque current beside it, and what the speed adds.
+    // The d-axis current, the q-axis current beside it, and the effect of the speed.
     let peak = get(&outcome, "turning_start_550_750_current_peak_a");
     assert!((2.0..3.5).contains(&peak), "{peak}");
 }
 
-/// Without an encoder the injection holds up to its range, and a motor without saliency is refused while the drive learns.
+/// Without an encoder the injection works up to its range, and a motor without saliency is refused by the saliency self-commissioning.
 #[test]
 fn without_an_encoder_the_low_regions_are_those_of_the_injection() {
     let outcome = full_range("constant", &[]);
@@ -107,7 +107,7 @@ fn without_an_encoder_the_low_regions_are_those_of_the_injection() {
     assert!(refused.faults.iter().all(|fault| fault.contains("while it learned")));
 }
 
-/// One run by its number is the same as among all, with a record of it.
+/// A run that is selected by its number equals the same run among all, and has curves.
 #[test]
 fn one_run_is_repeated_and_recorded() {
     let name = "reversals_750_1200_angle_error_rms_deg";
@@ -120,8 +120,9 @@ fn one_run_is_repeated_and_recorded() {
     assert_eq!((all.figures.len(), one.figures[0].panels.len()), (0, 6));
 }
 
-/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.06 Nm at 1.4 A and the 3.21 A that 3.5 A leave beside it, motoring and
-/// generating, while the dc link allows it; at the top the link decides. The limit in Nm and that in percent are one.
+/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.06 Nm at 1.4 A and the 3.21 A that 3.5 A leave beside it,
+/// motoring and generating, as long as the dc link allows it; at the highest speeds the link is the limiting factor.
+/// The limits in Nm and in percent agree.
 #[test]
 fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     let outcome = outcome("torque-envelope", &[ENCODER]);
@@ -141,12 +142,13 @@ fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     }
 }
 
-/// Iron, whose leakage falls with the current: with that change the angle is right to half a degree where the voltage gives it; without,
-/// it errs by the share of the leakage times `sigma L_s i_q/psi`, some 4 degrees.
+/// With saturation the leakage falls with the current. If the drive knows that change, the angle from the voltage is
+/// right to half a degree; without it, the error is the share of the leakage times `sigma L_s i_q/psi`, about 4
+/// degrees.
 #[test]
 fn the_change_of_the_leakage_with_the_current_makes_the_angle_right_on_iron() {
     let found = ["drive.motor.l_ls=0.02445", "drive.motor.l_lr=0.02445"];
-    // Those of the motor at 1.34 A.
+    // The values of the motor at 1.34 A.
     let change = ["observer.leakage_slope=-0.0677", "observer.leakage_share=1.090718"];
     let with = full_range("constant", &[&["plant=r"][..], &found, &change].concat());
     let without = full_range("constant", &[&["plant=r"][..], &found].concat());
@@ -158,23 +160,24 @@ fn the_change_of_the_leakage_with_the_current_makes_the_angle_right_on_iron() {
     assert_eq!((get(&with, "lost_runs"), get(&with, "silent_runs")), (0.0, 0.0));
 }
 
-/// With the current loop that `accept` designs, the flux that a start looks for is half as large, and turns 2 % slower than the rotor:
-/// all shafts up to 2700 rpm are caught, and faster ones are refused as such.
+/// With the current loop that `accept` designs, the flux that a flying start looks for is half as large, and rotates 2
+/// % slower than the rotor. All starts up to 2700 rpm succeed, and faster shafts are refused as too fast.
 #[test]
 fn a_turning_shaft_is_caught_with_the_current_loop_of_a_commissioned_drive() {
     let outcome = full_range("turning-start", &["current_plant=motor", "runs=25"]);
     for region in ["550_750", "750_1200", "1200_1800", "1800_2700"] {
         assert_eq!(get(&outcome, &format!("turning_start_{region}_refused_runs")), 0.0, "{region}");
     }
-    // A shaft that is too fast is a number of the table, and no failure.
+    // A shaft that is too fast counts in the table, and is no failure.
     assert!(get(&outcome, "turning_start_2700_3600_refused_runs") > 20.0);
     assert_eq!(outcome.faults, [""; 0]);
     assert_eq!((get(&outcome, "lost_runs"), get(&outcome, "silent_runs")), (0.0, 0.0));
 }
 
-/// Iron: a drive that has measured its motor is right to a degree where the voltage gives the angle, also where the main flux
-/// saturates (`m4b`), which the mean leakage along and across the flux mistakes for a leakage that falls with the current:
-/// with that, 7 of 16 reversals above 2700 rpm were lost, and constant torque erred by 3 degrees.
+/// Saturation: a drive that has measured its motor is right to a degree where the angle comes from the voltage. This
+/// also holds if the main flux saturates (`m4b`), which the mean leakage along and across the flux mistakes for a
+/// leakage that falls with the current: with that, 7 of 16 reversals above 2700 rpm were lost, and constant torque had
+/// an error of 3 degrees.
 fn measured_on_iron(runs: &str) {
     for family in ["m4b", "g7"] {
         let plant = format!("plant={family}");
@@ -202,8 +205,9 @@ fn a_drive_that_measured_its_motor_is_right_on_iron_in_two_runs() {
     measured_on_iron("runs=2");
 }
 
-/// Parameters that changed after the learning by 5 % of the leakage, 30 % of the stator resistance and 10 % of the main
-/// inductance: no start is refused, and none is lost. The leakage alone makes 1.5 to 2 degrees.
+/// Parameters that have changed after the saliency self-commissioning by 5 % of the leakage, 30 % of the stator
+/// resistance and 10 % of the main inductance: no start is refused, and none is lost. The leakage alone causes 1.5 to 2
+/// degrees.
 #[test]
 fn wrong_parameters_are_borne() {
     let outcome = full_range("wrong-parameters", &[]);
@@ -216,9 +220,10 @@ fn wrong_parameters_are_borne() {
     }
 }
 
-/// Large motors, commissioned by their drives: reversals of the whole torque, and starts on a turning shaft, with and without flux, up to
-/// 2700 rpm (on four poles). Where flux was left the start waits until it drives no more current than is borne. (With the whole
-/// current and no limit of the flux, and a feed-forward that changes in steps, these were over-current trips.)
+/// Large motors, commissioned by their drives: reversals of the full torque, and flying starts with and without flux,
+/// up to 2700 rpm (on four poles). If there is residual flux, the start waits until it causes no more current than
+/// permitted. (With the full current, no limit of the flux and a feed-forward that changes in steps, these were
+/// over-current trips.)
 fn large_motors(motors: &[&str], runs: &str) {
     for &motor in motors {
         for kind in ["reversals", "turning-start", "residual-start"] {
@@ -248,9 +253,10 @@ fn large_motors_reverse_and_start_while_they_turn_in_four_runs() {
     large_motors(&["krause-3hp", "buildings-7kw5", "modelica-18kw5"], "runs=4");
 }
 
-/// A leakage that is believed 5 % too small at the largest torque of the highest speed is near the point from which on more torque current
-/// gives less torque: there the flux went down to a third although a fifth of the voltage was left, and the angle was more
-/// than 45 degrees wrong without a fault (`g7`), or the drive stopped (model A). Run 1591 is the one of 21 000 in which it was.
+/// A leakage that the drive assumes 5 % too small, at the largest torque of the highest speed, is near the point above
+/// which more q-axis current gives less torque. There the flux once fell to a third although a fifth of the voltage was
+/// left, and the angle was more than 45 degrees wrong without a fault (`g7`), or the drive stopped (model A). Run 1591
+/// is the one of 21 000 in which this happened.
 #[test]
 fn the_largest_torque_keeps_its_flux_with_a_leakage_that_is_off() {
     for plant in [&[][..], &["plant=g7", "prepare.commission=yes"]] {

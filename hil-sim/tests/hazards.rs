@@ -1,4 +1,4 @@
-//! The page of the hazards: its tables, of `hazards.toml`, and that each proof and file they name is there.
+//! The page of the hazards: its tables, made from `hazards.toml`, and the existence of each proof and file that they name.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -30,7 +30,7 @@ struct Group {
 struct Row {
     hazard: String,
     by: String,
-    /// Instead of the times of the classes, or before them.
+    /// Reaction that replaces the times of the classes, or precedes them.
     reaction: Option<String>,
     #[serde(default)]
     classes: Vec<String>,
@@ -65,13 +65,13 @@ enum State {
     Absent,
 }
 
-/// The table of the fault campaign: a row a class.
+/// Returns the table of the fault campaign, with one row for each class.
 fn campaign() -> Vec<Vec<Value>> {
     let text = fs::read_to_string(generated::root().join("results/campaign.json")).unwrap();
     serde_json::from_value(serde_json::from_str::<Value>(&text).unwrap()["rows"].clone()).unwrap()
 }
 
-/// The bound, the longest time under wrong control and the latest off of these classes, ms.
+/// Returns the bound, the longest time under wrong control and the latest switch-off of these classes, ms.
 fn times(classes: &[String], campaign: &[Vec<Value>]) -> String {
     let mut worst = [0.0_f64; 3];
     for class in classes {
@@ -88,7 +88,7 @@ fn times(classes: &[String], campaign: &[Vec<Value>]) -> String {
     if classes.is_empty() { String::new() } else { worst.map(text).join(" / ") }
 }
 
-/// The names of all functions of the tests and of the modules with tests.
+/// Collects the names of all functions of the tests and of the modules with tests.
 fn functions(folder: &Path, found: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let (path, name) = (entry.path(), entry.file_name());

@@ -1,4 +1,4 @@
-//! The tables of the paper: what can be reproduced (T1), and which machine they were made with (T2).
+//! The tables of the paper: their reproduction (T1), and the machine with which they were made (T2).
 
 use std::sync::LazyLock;
 
@@ -86,8 +86,8 @@ fn t1_orderings() {
             }
         }
         if noise == Noise::HALF {
-            // At low speed and 50 us C is no better than B; r_s is the worst of Model C at 50 and
-            // 100 us, sigma_l_s the best at high speed.
+            // At low speed and 50 us, C is no better than B. r_s is the worst parameter of Model C at 50 and 100 us,
+            // and sigma_l_s the best at high speed.
             for k in [0, 1, 3, 4] {
                 let ratio = at(false, 1, 0, C, k) / at(false, 1, 0, B, k);
                 assert!((0.5..2.0).contains(&ratio), "{k}: {ratio}");
@@ -106,7 +106,7 @@ fn t1_orderings() {
                     assert!(at(true, signal, period, C, 2) < at(true, signal, period, C, k));
                 }
             }
-            // Model S is below half a percent in the speed with S_s, and better than C in the mean.
+            // Model S has less than half a percent of speed error with S_s, and is better than C in the mean.
             for k in 0..5 {
                 let mean =
                     |model: usize| errors.iter().map(|e| e.continuous[model][k]).sum::<f64>();
@@ -150,7 +150,7 @@ fn the_json_table_has_one_row_for_every_number() {
     assert_eq!(object["table"][0]["title"], "Mean of both signals, speeds and all periods");
     let discrete = outcome("identify-discrete", 1);
     assert_eq!(discrete.compared.len(), 96);
-    // The seed is what makes the difference.
+    // Only the seed makes a difference.
     let ours = |outcome: &Outcome| outcome.compared[0].simulated;
     assert_eq!(ours(&discrete), ours(&outcome("identify-discrete", 1)));
     assert_ne!(ours(&discrete), ours(&outcome("identify-discrete", 2)));
@@ -177,8 +177,8 @@ fn estimated_parameters_give_the_current_better_than_the_classical_ones() {
     let (estimated, rbv) = (metric("current_error_estimated_pct"), metric("current_error_rbv_pct"));
     println!("{estimated} {rbv}");
     assert!(estimated < 5.0 && rbv > 4.0 * estimated);
-    // The noise of section 5 does not explain the 73 % between tau_r with S_s and the classical
-    // tests; with S_g it nearly would.
+    // The noise of section 5 does not explain the 73 % between tau_r with S_s and the classical tests; with S_g it
+    // nearly would.
     let [sg, ss] =
         ["sg", "ss"].map(|s| metric(&format!("tau_r_error_of_rbv_{s}_printed_noise_pct")));
     println!("{sg} {ss}");

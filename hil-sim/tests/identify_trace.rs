@@ -1,4 +1,4 @@
-//! The motor from records of the plant: of a motor on the mains, measured at its terminals, and of one behind an inverter.
+//! Identification of the motor from records of the plant: of a motor on the mains, measured at its terminals, and of one at an inverter.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use hil_sim::plant::{
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Of about 4 kW.
+/// A motor of about 4 kW.
 const MOTOR: MachineSettings = MachineSettings {
     rs: 1.267,
     rr: 1.287,
@@ -26,20 +26,21 @@ const MOTOR: MachineSettings = MachineSettings {
     lm: 0.1289,
     ..MachineSettings::DEFAULT
 };
-/// The leakage of the circuit above, H.
+/// The transient inductance of the circuit above, H.
 const SIGMA_L_S: f64 = 0.01598;
 const RATES: [f64; 4] = [2000.0, 5000.0, 10_000.0, 20_000.0];
 
 /// A row: time, voltage, current, speed in rpm.
 type Row = (f64, Complex, Complex, f64);
 
-/// Normal, but for its tails.
+/// Noise with a normal distribution except for its tails.
 fn noise(random: &mut impl Rng, size: f64) -> Complex {
     let mut one = || size * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
     Complex::new(one(), one())
 }
 
-/// On 400 V, 50 Hz, sampled: 0.3 s after the run-up, and 0.5 s after a load step at 0.3 s. Current with 30 mA of noise.
+/// Simulates a motor on 400 V, 50 Hz, sampled: 0.3 s after the run-up, and 0.5 s after a load step at 0.3 s. The
+/// current has 30 mA of noise.
 fn on_the_mains(iron: &IronSettings, rate: f64, load: [Load; 2], seed: u64) -> Vec<Row> {
     let machine = EnergyMachine::new(&MOTOR, iron).expect("a machine");
     let shaft = MechanicsSettings { inertia: 0.05, load: load[0], ..Default::default() };
@@ -66,7 +67,8 @@ fn on_the_mains(iron: &IronSettings, rate: f64, load: [Load; 2], seed: u64) -> V
     rows
 }
 
-/// Behind an inverter that loses 4 V, at steps of frequency, flux and load; the voltage is the one asked for.
+/// Simulates a motor at an inverter with a voltage error of 4 V, at steps of frequency, flux and load; the recorded
+/// voltage is the commanded one.
 fn behind_an_inverter(rate: f64, seed: u64) -> Vec<Row> {
     let inverter = InverterSettings { vdc: 560.0, residual_v: 4.0, ..InverterSettings::IDEAL };
     let mut settings =
@@ -160,7 +162,7 @@ fn a_record_that_does_not_tell_the_motor_is_refused_by_name() {
         (
             "idle.csv",
             mains([steps()[0]; 2]),
-            "no load: the slip is too small to tell the time constant",
+            "no load: the slip is too small to determine the rotor time constant",
         ),
     ] {
         let path = written(&folder, name, &rows);
@@ -169,7 +171,7 @@ fn a_record_that_does_not_tell_the_motor_is_refused_by_name() {
     }
 }
 
-/// The same motor from phases; what they have in common is left out, and said.
+/// The same motor from phase values; their common-mode part is ignored, and a remark says so.
 #[test]
 fn rows_are_chosen_and_phases_need_not_sum_to_zero() {
     let folder = folder("identify-phases");
@@ -207,7 +209,7 @@ fn rows_are_chosen_and_phases_need_not_sum_to_zero() {
     }
 }
 
-/// Of a voltage from which more than the drop has been taken.
+/// A record whose voltage was reduced by more than the inverter voltage error.
 #[test]
 fn a_drop_is_not_negative() {
     let folder = folder("identify-drop");
@@ -219,7 +221,7 @@ fn a_drop_is_not_negative() {
     let reading = Reading { delay: Some(0.0), ..reading(Voltages::Commanded) };
     let outcome = identified(&path, &reading).expect("a motor");
     assert_eq!(outcome.metrics.get("drop_v"), Some(0.0));
-    assert!(outcome.remarks[0].contains("would come out negative"), "{:?}", outcome.remarks);
+    assert!(outcome.remarks[0].contains("would be negative"), "{:?}", outcome.remarks);
 }
 
 #[test]
@@ -242,7 +244,7 @@ fn deviations_are_the_scatter_of_the_result_and_grow_when_the_model_is_wrong() {
         println!("{scatter:.2e}, stated {stated:.2e}");
         assert!((0.4..2.5).contains(&(stated / scatter)), "{stated} for {scatter}");
     }
-    // Leakages that saturate: parts of one record differ by far more than its noise.
+    // With saturating leakage inductances, parts of one record differ by far more than its noise.
     let saturating = IronSettings {
         leakage_saturation: 0.05,
         rotor_leakage_saturation: 0.05,
@@ -257,7 +259,7 @@ fn deviations_are_the_scatter_of_the_result_and_grow_when_the_model_is_wrong() {
     }
 }
 
-/// A start of the plant itself is repeated to its noise; with unsaturated leakages it is not.
+/// A start of the plant itself is reproduced to within its noise; with unsaturated leakage inductances it is not.
 #[test]
 fn a_recorded_start_is_compared() {
     let folder = folder("measured-start");

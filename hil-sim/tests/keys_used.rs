@@ -1,11 +1,11 @@
-//! Which keys an experiment uses, found by changing each of them.
+//! Determines the keys that an experiment uses by changing each of them.
 
 use hil_sim::config::{Allowed, Config, Key, RangeKind, Value};
 use hil_sim::experiments::{Context, EXPERIMENTS, Experiment};
 use hil_sim::outcome::Origin;
 use hil_sim::progress::Progress;
 
-/// Numbers of a run without its texts; or the refusal.
+/// Returns the numbers of a run without its texts, or the refusal.
 fn result(experiment: &Experiment, config: &Config) -> Result<serde_json::Value, String> {
     let seconds = config.extent.seconds;
     let context = Context { config, seed: 1, seconds, progress: Progress::hidden(), file: None };
@@ -32,7 +32,7 @@ const SAMPLES: [(&str, f64); 12] = [
     ("seconds", 0.5),
 ];
 
-/// Other values that a key allows.
+/// Returns other values that a key allows.
 fn others(key: Key, config: &Config) -> Vec<Value> {
     let set = match key.get(config) {
         Value::Number(value) if value != 0.0 => value,
@@ -69,7 +69,7 @@ fn others(key: Key, config: &Config) -> Vec<Value> {
 
 fn short(name: &str) -> Config {
     let mut config = Config::default();
-    // The battery needs a run of each of its kinds.
+    // The stress test needs a run of each of its kinds.
     config.extent.runs = Some(match name {
         "battery" => 12,
         "full-range" => 1,
@@ -86,7 +86,7 @@ fn short(name: &str) -> Config {
     config
 }
 
-/// Settings beside which a key has an effect that has none beside the defaults.
+/// Settings with which a key has an effect that it does not have with the defaults.
 const BESIDE: [&[&str]; 11] = [
     &[],
     &["load.mode=free"],
@@ -145,7 +145,7 @@ fn is_quiet(name: &str) -> bool {
     QUIET.iter().flat_map(|(names, _)| names.iter()).any(|quiet| name.starts_with(quiet))
 }
 
-/// Keys whose change has changed a result, beside some of [`BESIDE`].
+/// Returns keys whose change has changed a result, also with one of [`BESIDE`].
 fn observed(experiment: &Experiment) -> Vec<Key> {
     let mut used: Vec<Key> = Vec::new();
     for beside in BESIDE {
@@ -160,7 +160,7 @@ fn observed(experiment: &Experiment) -> Vec<Key> {
         let default = result(experiment, &base);
         for key in Key::all() {
             let pending = !used.iter().any(|known| known.name() == key.name() && known.assigned_name() == key.assigned_name())
-                // Beside other settings only what is still missing.
+                // With other settings, only the keys that are still missing.
                 && (beside.is_empty() || (experiment.uses_key(key) && !is_quiet(key.name())));
             let changes = |value: Value| {
                 let mut config = base.clone();
@@ -175,10 +175,10 @@ fn observed(experiment: &Experiment) -> Vec<Key> {
     used
 }
 
-/// The keys of this one are those of the battery, of which it consists; it takes longer than all others.
+/// An experiment that consists of the stress test and uses the same keys; it takes longer than all others.
 const LONG: &str = "smallest-slope";
 
-/// Experiments of which `ONLY` names some; all but one without it.
+/// Returns the experiments that `ONLY` selects; all but [`LONG`] without it.
 fn chosen() -> impl Iterator<Item = &'static Experiment> {
     let only = std::env::var("ONLY").unwrap_or_default();
     EXPERIMENTS.iter().filter(move |experiment| {

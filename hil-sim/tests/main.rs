@@ -1,4 +1,4 @@
-//! The tests of the simulator: one program, a module a subject.
+//! The tests of the simulator: one program, with one module for each subject.
 
 mod after_step;
 mod battery;

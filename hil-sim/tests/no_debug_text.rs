@@ -1,4 +1,4 @@
-//! No Debug text reaches a user: clippy's `use_debug` sees `print!` and `write!`, but not `format!`.
+//! No Debug text reaches a user. Clippy's `use_debug` checks `print!` and `write!`, but not `format!`.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ fn texts_for_people_are_made_without_debug_formatting() {
     assert!(files.len() > 50, "{}", files.len());
     for file in files {
         let source = std::fs::read_to_string(&file).expect("a source");
-        // Messages of assertions, before the unit tests too, are for developers.
+        // Messages of assertions are for developers, also those outside of unit tests.
         let shipped = source.split("#[cfg(test)]").next().unwrap_or_default();
         for line in shipped.lines().filter(|line| !line.contains("assert")) {
             assert!(!line.contains(":?}") && !line.contains(":#?}"), "{}: {line}", file.display());

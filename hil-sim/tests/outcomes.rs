@@ -147,7 +147,7 @@ fn of_a_few_values() {
     assert!((s.deviation() - s.rms()).abs() < 1e-12);
 }
 
-/// As the fields of [`Stats`].
+/// A structure with fields like those of [`Stats`].
 #[derive(Serialize, Deserialize)]
 struct Exact {
     #[serde(with = "hil_sim::stats::exact")]
@@ -158,7 +158,7 @@ struct Exact {
     largest: f64,
 }
 
-/// Numbers whose shortest decimal form a careless parser reads one bit off, and numbers that JSON does not have.
+/// Numbers whose shortest decimal form an inexact parser reads with an error of one bit, and numbers that JSON does not have.
 #[test]
 fn statistics_are_read_back_to_the_bit() {
     let hard = [0.1 + 0.2, 1.0 / 3.0, 5e-324, 1.797_693_134_862_315_7e308, -0.0, 2.5e-310];

@@ -1,4 +1,4 @@
-//! A motor of one's own, of which a file says the nameplate, the circuit and the dc link: it works the first time.
+//! A user's motor, for which a file states nameplate, circuit and dc link: it works at the first attempt.
 
 use std::path::Path;
 
@@ -51,7 +51,7 @@ fn written(folder: &Path, name: &str, text: &str) -> String {
     path.to_str().expect("a path of letters").to_owned()
 }
 
-/// Neither is lost nor stopped.
+/// Neither motor is lost or stopped.
 fn nameplate_and_circuit(seeds: u64) {
     let folder = folder("own-motor");
     for (name, text) in [("large.toml", LARGE), ("small.toml", SMALL)] {
@@ -81,8 +81,8 @@ fn nameplate_and_circuit_are_enough_with_eight_seeds() {
     nameplate_and_circuit(8);
 }
 
-/// The sensors of the dissertation's bench reach 1.24 times the rated current of its motor, and so do those of a motor of
-/// one's own; the drive has learned it, at high flux; and its current limit is not that of the sensors.
+/// The sensors of the dissertation's bench reach 1.24 times the rated current of its motor, and so do those of a user's
+/// motor. The drive has learned the motor, at high flux, and its current limit is not set by the sensors.
 #[test]
 fn sensors_and_flux_follow_the_nameplate() {
     let folder = folder("own-motor-rules");
@@ -98,18 +98,18 @@ fn sensors_and_flux_follow_the_nameplate() {
     // The inertia of 0.012 kg m2 belongs to 6.1 Nm.
     let inertia = 0.012 * 9.982 / 6.107;
     assert!((config.motor.inertia / inertia - 1.0).abs() < 2e-3, "{}", config.motor.inertia);
-    // A file that says them is followed.
+    // Values in the file take precedence.
     let more = "[sequence]\ni_d = 1.0\n[measurement]\nrange_a = 20.0\n[prepare]\nlearn = false\n";
     let said = written(&folder, "said.toml", &format!("{LARGE}{more}"));
     let config = Config::of_motor(Some(&said)).unwrap();
     assert_eq!((config.measurement.range_a, config.drive.i_d()), (20.0, 1.0));
     assert!(!config.prepare.learn);
-    // The other experiments of the whole range take the same motor as it is.
+    // The other experiments of the full range use the same motor unchanged.
     let envelope = hil_sim(&folder, &["run", "torque-envelope", "--motor", "m.toml", "--json"]);
     assert_eq!(envelope.status.code(), Some(0), "{}", text(&envelope.stderr));
 }
 
-/// All that a file lacks is told at once, and a value that nobody set is told as such.
+/// All missing keys of a file are reported at once, and a value that nobody set is reported as such.
 #[test]
 fn errors_name_what_was_set_and_all_that_is_missing() {
     let folder = folder("own-motor-errors");
@@ -125,7 +125,7 @@ fn errors_name_what_was_set_and_all_that_is_missing() {
         assert!(missing.contains(key), "{key}: {missing}");
     }
     assert!(missing.contains("inverter.dc_link_v") && !missing.contains("motor.l_m"), "{missing}");
-    // A rule whose value has no room.
+    // A rule whose value is not in its range.
     let rule = told("m.toml", LARGE, &["--set", "motor.r_r=0.01"]);
     assert!(rule.contains("sequence.magnetise_s") && rule.contains("was not set"), "{rule}");
     let low = told("m.toml", LARGE, &["--set", "limits.dc_under_v=594"]);
@@ -134,7 +134,7 @@ fn errors_name_what_was_set_and_all_that_is_missing() {
     assert!(set.contains("sequence.i_d = 9") && !set.contains("not set"), "{set}");
 }
 
-/// The example of the page is a whole file.
+/// The example of the page is a complete file.
 #[test]
 fn the_example_of_the_page_is_a_motor() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/motors.md");
@@ -145,7 +145,8 @@ fn the_example_of_the_page_is_a_motor() {
     let file = written(&folder, "example.toml", example.expect("an example"));
     let config = Config::of_motor(Some(&file)).expect("a motor");
     assert!(config.drive.build().is_ok());
-    // It says all that a motor of the program says: the rules add the current loop and the flux alone, and every number has its source.
+    // It states everything that a motor of the program states: the rules add only the current loop and the flux, and
+    // every number has its source.
     let motor = Motor::find(&file).expect("a motor");
     let implied: Vec<&str> = motor.implied(&config).iter().map(|(key, ..)| *key).collect();
     assert_eq!(implied, ["current_plant", "sequence.flux"]);

@@ -1,4 +1,4 @@
-//! Numbers that the first pages print are those of the run that they name.
+//! The numbers on the first pages equal those of the run that they name.
 
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
@@ -7,18 +7,18 @@ use sim_bench::rig::Rig;
 
 use crate::cli_common::{folder, hil_sim, text};
 
-/// Numbers of an experiment.
+/// Returns numbers of an experiment.
 fn numbers<const N: usize>(experiment: &str, seed: u64, names: [&str; N]) -> [f64; N] {
     let metrics = run(experiment, &Config::default(), seed).unwrap().metrics;
     names.map(|name| metrics.get(name).unwrap())
 }
 
-/// Angle error of the torque steps with a seed: rms and largest, degrees.
+/// Returns the angle error of the torque steps with a seed: rms and largest, degrees.
 fn error(seed: u64) -> (f64, f64) {
     numbers(DEFAULT, seed, ["angle_error_rms_deg", "angle_error_max_deg"]).into()
 }
 
-/// A page on one line.
+/// Returns a page as one line.
 fn page(name: &str) -> String {
     let path = format!("{}/../{name}", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(path).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
@@ -42,7 +42,7 @@ fn the_angle_error_of_the_first_command_is_the_printed_one() {
     assert!(figures.contains(&row), "{row}");
 }
 
-/// The README shows what its first command prints.
+/// The README shows the output of its first command.
 #[test]
 fn the_readme_shows_what_the_first_command_prints() {
     let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md"));
@@ -52,7 +52,8 @@ fn the_readme_shows_what_the_first_command_prints() {
     assert_eq!(shown.expect("a block `text`").trim(), text(&output.stdout).trim());
 }
 
-/// Largest deviation of the torque from its mean at rest without load, in percent of the rated torque: the injection's.
+/// Largest deviation of the torque from its mean at standstill without load, in percent of the rated torque, which is
+/// caused by the injection.
 fn ripple_pct(motor: &str, set: &[&str]) -> f64 {
     let config = Config::load(Some(motor), None, set).unwrap();
     let mut rig = Rig::oriented(&config, 1, 0.0, 1.0).unwrap();

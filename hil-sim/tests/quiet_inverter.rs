@@ -1,4 +1,4 @@
-//! The carrier of the inverter: what 12 and 18 kHz change, against 6 kHz. `docs/noise.md` has the table.
+//! The switching frequency of the inverter: the effect of 12 and 18 kHz, compared with 6 kHz. `docs/noise.md` has the table.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use hil_sim::plant::{Complex, clarke};
 use hil_sim::rig::Rig;
 use hil_sim::{Config, Error};
 
-/// The dissertation's motor with this carrier, every edge simulated.
+/// Returns the dissertation's motor with this switching frequency; every edge is simulated.
 fn config(carrier: Carrier) -> Config {
     let mut config = Config::default();
     config.drive.inverter.carrier_khz = carrier;
@@ -23,8 +23,8 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// What the samples show of a run at a speed, by the encoder and without injection: rms of the current beside the fundamental, %
-/// of it, and of the torque beside its mean, % of that.
+/// Measures, from the samples of a run at a speed with the encoder and without injection, the rms of the current
+/// without its fundamental, in % of the fundamental, and of the torque without its mean, in % of the mean.
 fn turning(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     let mut config = config(carrier);
     config.drive.angle_source = AngleSource::Encoder;
@@ -47,7 +47,7 @@ fn turning(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     ])
 }
 
-/// Error of the angle of a learned drive at standstill, degrees rms around the mean, and the mean.
+/// Measures the angle error of a drive that has learned, at standstill: degrees rms around the mean, and the mean.
 fn standing(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     let mut config = config(carrier);
     config.load.mode = LoadMode::Locked;
@@ -61,8 +61,8 @@ fn standing(carrier: Carrier, seed: u64) -> Result<[f64; 2], Error> {
     Ok([rms(errors.iter().map(|error| error - mean)), mean])
 }
 
-/// Ripple of the pulses between the samples, A rms: the voltage of ideal legs beside its mean over a pulse, on the leakage, around a
-/// turn of 50 V.
+/// Ripple of the pulses between the samples, A rms: the voltage of ideal legs minus its mean over a pulse, applied to
+/// the leakage inductance, over one revolution of 50 V.
 fn ripple(carrier: Carrier) -> f64 {
     let settings = config(carrier).drive;
     let (period, vdc) = (f64::from(settings.inverter.carrier_s()), 311.0);
@@ -76,7 +76,7 @@ fn ripple(carrier: Carrier) -> f64 {
         let mean = clarke(duties.map(|duty| vdc * f64::from(duty)));
         let mut i = Complex::ZERO;
         for step in 0..STEPS {
-            // From the top of the counter: low sides on.
+            // From the top of the counter, where the low sides are on.
             let count = (f64::from(2 * step + 1) / f64::from(STEPS) - 1.0).abs();
             let v = clarke(duties.map(|duty| if count < f64::from(duty) { vdc } else { 0.0 }));
             i += (v - mean) * (period / f64::from(STEPS) / f64::from(settings.motor.sigma_l_s()));
@@ -86,12 +86,12 @@ fn ripple(carrier: Carrier) -> f64 {
     rms(squares.into_iter())
 }
 
-/// Each pulse has its own dead time, of which the drive knows; so faster legs cost little at the samples, and between them the
-/// ripple falls as their rate.
+/// Each pulse has its own dead time, which the drive knows. Faster legs therefore have little effect on the samples,
+/// and the ripple between the samples falls in proportion to the frequency.
 #[test]
 fn faster_legs_have_less_ripple_and_the_drive_stands_their_dead_time() {
     let slow = ripple(Carrier::Khz6);
-    // Current, torque, angle: a fifth above what three seeds give.
+    // Limits for current, torque, angle: a fifth above the values of three seeds.
     for (carrier, most_current, most_torque, most_deg) in [
         (Carrier::Khz6, 0.3, 0.23, 1.8),
         (Carrier::Khz12, 0.4, 0.28, 2.1),

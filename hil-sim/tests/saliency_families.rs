@@ -1,4 +1,4 @@
-//! The saliency that emerges at 600 Hz against the figures of an independent plant, which shares no code with this one.
+//! The saliency that emerges at 600 Hz, compared with the results of an independent plant, which shares no code with this one.
 
 use hil_sim::config::motors::Motor;
 use hil_sim::config::{Config, Value, plant_settings};
@@ -15,7 +15,7 @@ fn probe(assignments: &[(&str, &str)]) -> Probe {
     Probe::new(&config).expect("a motor")
 }
 
-/// Saliency without load, percent, and the inductance, H.
+/// Returns the saliency without load, percent, and the inductance, H.
 fn at_rest(assignments: &[(&str, &str)], i_d: f64) -> (f64, f64) {
     let (saliency, inductance) = probe(assignments).at_rest(i_d).expect("a steady state");
     (100.0 * saliency, inductance)
@@ -26,13 +26,13 @@ fn close(found: f64, printed: f64, tolerance: f64, what: &str) {
     assert!((found - printed).abs() <= tolerance, "{what}: {found}, printed {printed}");
 }
 
-/// Half of the last printed digit, and the frequency response against the exact rotor flux.
+/// Half of the last printed digit, and the difference between the frequency response and the exact rotor flux.
 const PRINTED: f64 = 0.0125;
 
 #[test]
 fn main_flux_alone() {
-    // Saturation factor at the nominal flux 0.124 Wb; n = 2, 4, 6, 8; n = 6 with bars of 3.5 times the resistance
-    // and 10 mH less leakage at high frequency.
+    // Saturation factor at the nominal flux 0.124 Wb; n = 2, 4, 6, 8; n = 6 with bars of 3.5 times the resistance and
+    // 10 mH less leakage at high frequency.
     let table = [
         ("1.1", [0.56, 1.10, 1.61, 2.11], 0.87),
         ("1.2", [1.01, 1.95, 2.83, 3.66], 1.55),
@@ -96,24 +96,24 @@ fn with_the_knee_at_rated_flux_there_is_nothing_at_small_flux() {
 
 #[test]
 fn maps_of_the_families_at_2_a() {
-    // q, percent, over the angle error.
+    // Saliency signal q, percent, over the angle error.
     let degrees = [-10.0, 0.0, 10.0, 20.0, 40.0, 60.0, 70.0];
     let table = [
         ("r", [3.02, 2.83, 1.97, 0.94, -0.46, -0.31, 0.33], 0.21),
         ("g", [1.68, 1.24, 0.90, 0.66, 0.45, 0.70, 1.02], 0.10),
-        // Four of its parameters are not printed; they are chosen for this map.
+        // Four of its parameters are not printed; they are chosen to fit this map.
         ("f", [f64::NAN, 0.51, 0.96, 2.07, 4.51, 5.42, 5.00], 0.70),
     ];
     for (name, printed, tolerance) in table {
         let probe = probe(&[("plant", name)]);
         for (degrees, printed) in degrees.into_iter().zip(printed).filter(|p| !p.1.is_nan()) {
             let q = 100.0 * probe.q(0.7, 2.0, f64::to_radians(degrees)).expect("a flux");
-            // The printed figures were read through a drive's demodulation; they are up to 7 % larger
-            // where the slip is large.
+            // The printed values were read through a drive's demodulation; they are up to 7 % larger where the slip is
+            // large.
             close(q, printed, tolerance, &format!("{name} at {degrees}°"));
         }
     }
-    // F cannot be tracked at 0.7 A: the slope is reversed above 1 to 2 A.
+    // F cannot be tracked at 0.7 A: the sensitivity reverses above 1 to 2 A.
     let f = probe(&[("plant", "f")]);
     let (light, loaded) = (f.slope(0.7, 0.0), f.q(0.7, 2.0, 0.3).zip(f.q(0.7, 2.0, 0.1)));
     assert!(light.is_some_and(|k| k < -0.02) && loaded.is_some_and(|(far, near)| far > near));
@@ -121,7 +121,7 @@ fn maps_of_the_families_at_2_a() {
 
 #[test]
 fn slopes_at_high_flux() {
-    // Family, printed slope dq/de without load at 1.4, 2.0 and 2.5 A, the knee moved along. M: a range is printed.
+    // Model, printed sensitivity dq/de without load at 1.4, 2.0 and 2.5 A, with the knee moved accordingly. For M a range is printed.
     let table = [
         ("r", [-0.038, -0.034, -0.031]),
         ("r5", [-0.054, -0.048, f64::NAN]),
@@ -136,7 +136,7 @@ fn slopes_at_high_flux() {
         for (i_d, printed) in [1.4, 2.0, 2.5].into_iter().zip(row).filter(|p| !p.1.is_nan()) {
             let psi_n = (0.1771 * i_d).to_string();
             let slope = probe(&[("plant", name), ("iron.psi_n", &psi_n)]).slope(i_d, 0.0);
-            // The printed ones were learned by a drive through noise, over 8.5 to 15 degrees.
+            // The printed values were learned by a drive with noise, over 8.5 to 15 degrees.
             let slope = slope.expect("a steady state");
             close(slope, printed, 0.08 * printed.abs(), &format!("{name} at {i_d} A"));
         }
@@ -147,7 +147,7 @@ fn slopes_at_high_flux() {
 fn the_flux_level_is_a_key() {
     let high = probe(&[("plant", "m6"), ("flux_level", "high")]);
     // 0.55 of the peak of 2.56 A.
-    close(high.i_d, 1.99, 0.005, "direct current");
+    close(high.i_d, 1.99, 0.005, "d-axis current");
     assert_eq!(probe(&[("plant", "m6")]).i_d, 0.7);
     let large = {
         let mut config = Config::of_motor(Some("modelica-18kw5")).expect("a motor");
@@ -161,7 +161,7 @@ fn the_flux_level_is_a_key() {
 
 #[test]
 fn the_axis_of_the_teeth_can_be_turned() {
-    // Teeth alone: q = a sin(2 (e + turn)) is zero where the frame is turned as far.
+    // Teeth alone: q = a sin(2 (e + turn)) is zero if the frame is rotated by the same angle.
     let teeth = [("plant", "linear"), ("iron.teeth", "-0.035")];
     let zero = |more: &[(&str, &str)], i_q: f64| {
         let probe = probe(&[&teeth, more].concat());
@@ -176,12 +176,12 @@ fn the_axis_of_the_teeth_can_be_turned() {
     let rotor = ("iron.teeth_gap", "0");
     close(zero(&[rotor], 0.0), 0.0, 0.01, "rotor flux");
     close(zero(&[rotor, ("iron.teeth_turn_deg", "10")], 0.0), -10.0, 0.05, "turned by 10°");
-    // 5 degrees per ampere of the current across the flux, which is that of the turned frame.
+    // 5 degrees per ampere of the current across the flux, in the rotated frame.
     let turned = zero(&[rotor, ("iron.teeth_turn_deg_per_a", "5")], 1.0).to_radians();
     let across = 1.0 * turned.cos() - 1.5 * turned.sin();
     close(turned.to_degrees(), -5.0 * across, 0.05, "turned by load");
-    // From the rotor flux towards the air-gap flux, which leads it under load. The lead of the zero is more than that of the
-    // flux, atan(L' i_q/(L_m i_d)) = 9 degrees: the carrier moves the air-gap flux too.
+    // From the rotor flux towards the air-gap flux, which leads it under load. The zero leads by more than the flux,
+    // atan(L' i_q/(L_m i_d)) = 9 degrees, because the injection moves the air-gap flux as well.
     let lead = |gap: &str| -zero(&[("iron.teeth_gap", gap)], 1.0);
     let (half, whole) = (lead("0.5"), lead("0.999999"));
     println!("half way {half}°, the whole way {whole}°");
@@ -204,8 +204,8 @@ fn keys_that_do_nothing_are_refused() {
     }
 }
 
-/// Chord inductance of the leakage of the stator, 0, or the rotor, 1, H, at its own current `i`, A, and a rotor flux of zero:
-/// but for the little of the main flux, the current is in both windings.
+/// Chord inductance of the leakage of the stator, 0, or the rotor, 1, H, at its own current `i`, A, and a rotor flux of
+/// zero. Except for the small current of the main flux, the current flows in both windings.
 fn leakage(machine: &EnergyMachine, side: usize, i: Complex) -> f64 {
     let mut rest = EnergyState::default();
     machine.settle(&mut rest);
@@ -242,14 +242,14 @@ fn both_leakages_saturate_as_measured_on_every_motor() {
             };
             let what = format!("{}, {family}, side {side}", motor.name);
             let own = [config.motor.l_ls, config.motor.l_lr][side];
-            // Measured: 10 to 15, 7.8, 5.4, 3.7 to 4.2 and 2.8 to 3.8 mH at 2, 13, 30, 60 and 90 A, 1 to 7 times the rated.
+            // Measured: 10 to 15, 7.8, 5.4, 3.7 to 4.2 and 2.8 to 3.8 mH at 2, 13, 30, 60 and 90 A, 1 to 7 times the rated current.
             close(at(1.0, 0.0) / own, 1.0, 1e-6, &format!("{what}, rated"));
             close(at(1.0, 0.0) / at(4.7, 0.0), 2.0, 0.1, &format!("{what}, 1 to 4.7 times"));
             close(at(1.0, 0.0) / at(5.0, 0.0), 2.0, 1e-6, &format!("{what}, 1 to 5 times"));
             close(7.8 * at(0.157, 0.0) / own, 12.5, 2.5, &format!("{what}, mH at 2 A"));
             close(7.8 * at(2.36, 0.0) / own, 5.4, 0.2, &format!("{what}, mH at 30 A"));
             close(7.8 * at(7.07, 0.0) / own, 3.3, 0.5, &format!("{what}, mH at 90 A"));
-            // Iron has no direction of its own.
+            // Saturation has no direction of its own.
             for degrees in [70.0, 180.0, -140.0] {
                 close(at(1.0, degrees) / own, 1.0, 1e-6, &format!("{what}, turned"));
             }

@@ -1,12 +1,12 @@
-//! Every experiment prints the same JSON as another build of the program, to the last digit: the yardstick of a change that moves
-//! experiments and is to change no figure.
+//! Every experiment prints the same JSON as another build of the program, to the last digit. This is the check for a
+//! change that moves experiments and must not change a number.
 //!
 //! ```text
 //! OLD=PATH cargo test --release -p hil-sim same_json -- --ignored --nocapture
 //! ```
 //!
-//! `OLD` is the program as built before the change, `ONLY` a part of the names of the experiments. Experiments and keys that got another
-//! name are in the tables below; an experiment that is not in `OLD` is not compared.
+//! `OLD` is the program as built before the change, `ONLY` a part of the names of the experiments. The tables below
+//! list experiments and keys that got another name; an experiment that is not in `OLD` is not compared.
 
 use std::env;
 use std::path::Path;
@@ -14,12 +14,12 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Experiments that have another name now, or none: the old name, and the new one.
+/// Renamed or removed experiments: the old name, and the new one.
 const RENAMED: &[(&str, Option<&str>)] = &[];
-/// Keys of the results that have another name now: the experiment, the old name, and the new one.
+/// Renamed keys of the results: the experiment, the old name, and the new one.
 const KEYS: &[(&str, &str, &str)] = &[];
 
-/// Settings with which an experiment is short.
+/// Settings that make an experiment short.
 const SHORT: &[(&str, &[&str])] = &[
     ("battery", &["runs=12"]),
     ("commission", &["runs=4"]),
@@ -32,7 +32,7 @@ const SHORT: &[(&str, &[&str])] = &[
     ("smallest-slope", &["runs=2"]),
 ];
 
-/// The result of an experiment of this name by a program.
+/// Returns the result of an experiment of this name from a program.
 fn result(program: &Path, name: &str) -> Value {
     let short = SHORT.iter().find(|(known, _)| *known == name).map_or(&[][..], |(_, set)| set);
     let mut command = Command::new(program);
@@ -40,7 +40,7 @@ fn result(program: &Path, name: &str) -> Value {
     for set in short {
         command.args(["--set", set]);
     }
-    // The input of a reader's own.
+    // Experiments with a user's input file get one.
     if name == "profile" {
         command.args(["--input", &format!("{}/examples/profile.csv", env!("CARGO_MANIFEST_DIR"))]);
     }
@@ -49,7 +49,7 @@ fn result(program: &Path, name: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{name}: {error}: {text}"))
 }
 
-/// Names of the experiments of a program.
+/// Returns the names of the experiments of a program.
 fn names(program: &Path) -> Vec<String> {
     let output = Command::new(program).args(["list", "--json"]).output().expect("it runs");
     let list: Vec<Value> = serde_json::from_slice(&output.stdout).expect("a JSON list");
@@ -57,7 +57,7 @@ fn names(program: &Path) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// Where two values differ, and what they are there.
+/// Returns the first difference of two values, with both values.
 fn difference(at: &str, now: &Value, then: &Value) -> Option<String> {
     match (now, then) {
         (Value::Object(now), Value::Object(then)) => {
@@ -78,7 +78,7 @@ fn difference(at: &str, now: &Value, then: &Value) -> Option<String> {
     }
 }
 
-/// The old result with the keys of today.
+/// Returns the old result with the present keys.
 fn renamed(name: &str, value: Value) -> Value {
     match value {
         Value::Object(map) => map

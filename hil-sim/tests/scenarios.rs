@@ -1,9 +1,9 @@
-//! Scenarios: the files of the program as files of a user, an own one, and what is refused with file and line.
+//! Scenarios: the files of the program used as files of a user, a user's own scenario, and refusals with file and line.
 
 use crate::cli_common::{files, folder, hil_sim, object, text};
 use hil_sim::experiments::scenario::QUANTITIES;
 
-/// A file of the program gives, as a file of a user, what the experiment of its name gives.
+/// A file of the program, used as a file of a user, gives the result of the experiment of its name.
 #[test]
 fn a_shipped_file_runs_as_its_experiment() {
     let folder = folder("scenario-shipped");
@@ -18,8 +18,9 @@ fn a_shipped_file_runs_as_its_experiment() {
     assert!(files(&folder).is_empty());
 }
 
-/// A spindle passes 300 Hz, where the rotor is counted and the currents are looked at twice a turn, and comes back. The rotor follows:
-/// by its true speed, not by that of the drive. Learned on iron, too: nothing holds the rotor while it starts.
+/// A spindle passes 300 Hz, where the rotor is counted and the currents are sampled twice per revolution, and returns.
+/// The rotor follows, judged by its true speed, not by the drive's estimate. This also holds after a saliency
+/// self-commissioning with saturation, because nothing holds the rotor while it starts.
 #[test]
 fn a_spindle_runs_to_its_rated_speed_and_back() {
     let folder = folder("scenario-spindle");
@@ -38,8 +39,8 @@ fn a_spindle_runs_to_its_rated_speed_and_back() {
     }
 }
 
-/// Speed regulated with a ramp, a load that comes slowly, and a stop: the drive follows, is off at the end, and only the columns that
-/// are asked for are shown.
+/// Speed regulated with a ramp, a slowly rising load, and a stop: the drive follows, is off at the end, and only the
+/// requested columns are shown.
 const OWN: &str = r#"
 columns = ["speed_rpm", "torque_nm"]
 metrics = [
@@ -94,7 +95,7 @@ fn an_own_scenario_follows_its_parts_and_stops() {
     assert!(csv.starts_with("time_s,speed_rpm,torque_nm\n"), "{}", &csv[..80]);
 }
 
-/// With the locked shaft of the default a torque beyond a bound of its judge is lost; the bound is the only difference.
+/// With the locked shaft of the default, a torque beyond a bound of the judgement is lost; the bound is the only difference.
 #[test]
 fn a_judge_decides_what_is_lost() {
     let folder = folder("scenario-judge");

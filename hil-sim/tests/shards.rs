@@ -1,4 +1,4 @@
-//! Statistics on many machines: shards that merge to the whole, byte for byte; runs that are continued; what is refused.
+//! Statistics on many machines: shards that merge to the whole, byte for byte; continued runs; refusals.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
@@ -66,7 +66,7 @@ fn merge(folder: &Path, names: &[&str]) -> std::process::Output {
 fn every_statistical_experiment_is_in_the_list() {
     let known = hil_sim::experiments::STATISTICAL.iter().map(|known| known.experiment.name);
     assert!(known.eq(SMALL.map(|(name, _)| name)));
-    // All that take a number of runs can be shared.
+    // All experiments with a number of runs can be shared.
     for experiment in hil_sim::experiments::EXPERIMENTS {
         let takes_runs = experiment.uses.concat().contains(&"runs");
         let is_shared = SMALL.iter().any(|(name, _)| *name == experiment.name);
@@ -79,7 +79,7 @@ fn is_long(name: &str) -> bool {
     ["smallest-slope", "foreign-motors"].contains(&name)
 }
 
-/// Three shards, merged in another order, against one run: percentiles, tables, figures and all.
+/// Merges three shards in another order and compares them with one run: percentiles, tables, figures and all.
 fn merged_shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
     for (name, options) in SMALL.into_iter().filter(|(name, _)| which(name)) {
         let folder = folder(&format!("shards-{name}"));
@@ -94,7 +94,7 @@ fn merged_shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
 #[test]
 fn merged_shards_are_the_whole_run_byte_for_byte() {
     merged_shards_are_the_whole_run(|name| !is_long(name));
-    // A single shard, of a cheap one.
+    // A single shard, of an experiment that takes little time.
     let folder = folder("shards-one");
     let whole = run(&folder, "monte-carlo", &MONTE_CARLO[2..6], &["--json"]);
     let one = shards(&folder, MONTE_CARLO, 1);
@@ -117,7 +117,7 @@ fn the_shards_of_a_run_have_its_runs_and_their_seeds() {
             let run: serde_json::Value = serde_json::from_str(line).unwrap();
             (run["run"].as_u64().unwrap(), run["record"]["case"]["seed"].as_u64().unwrap())
         };
-        // Behind the head.
+        // After the head.
         text.lines().skip(1).map(pair).collect::<Vec<_>>()
     };
     assert_eq!(seeds("1.json"), [(0, 1_000_003), (4, 1_000_007)]);
@@ -212,7 +212,7 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
     assert!(files(&folder).is_empty(), "{:?}", files(&folder));
 }
 
-/// The records of the file count: a changed one shows in the outcome, so its run was not done again; a torn one is.
+/// The records of the file count: a changed record appears in the outcome, so its run was not done again; a torn one is.
 #[test]
 fn finished_runs_are_not_done_again_and_a_torn_line_is() {
     let folder = folder("shards-resume");
@@ -246,14 +246,14 @@ fn finished_runs_are_not_done_again_and_a_torn_line_is() {
     );
 }
 
-/// The recipe of the documentation, with GNU parallel where it is installed and with xargs.
+/// The recipe of the documentation, with GNU parallel if it is installed and with xargs.
 #[test]
 fn the_recipe_for_many_machines_gives_the_whole_run() {
     let folder = folder("shards-recipe");
     let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shards.sh");
-    // Two machines behind a secure shell that notes the machine and stays here. As `sshd` does, it sets SHELL, without which
-    // the command that parallel sends does nothing and says that all is well.
+    // Two machines behind a secure shell that notes the machine and runs locally. Like `sshd` it sets SHELL, without
+    // which the command that parallel sends does nothing and still reports success.
     let shell = folder.join("ssh");
     let text_of_shell = "#!/bin/sh\necho $1 >> hosts; shift; [ $1 = -- ] && shift; export SHELL=/bin/sh; exec sh -c \"$*\"\n";
     std::fs::write(&shell, text_of_shell).unwrap();
@@ -273,10 +273,10 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
         assert_eq!(recipe(None, "with-parallel"), whole);
         let hosts = std::fs::read_to_string(folder.join("hosts")).unwrap();
         assert!(hosts.contains("alpha") && hosts.contains("beta"), "{hosts}");
-        // Again: all runs are there.
+        // Once more: all runs are there.
         assert_eq!(recipe(None, "with-parallel"), whole);
     }
-    // A path with all that the script needs, but without GNU parallel.
+    // A path with everything that the script needs, but without GNU parallel.
     let tools = folder.join("tools");
     std::fs::create_dir_all(&tools).unwrap();
     let all = std::env::var_os("PATH").unwrap_or_default();
@@ -288,7 +288,7 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
     assert_eq!(recipe(Some(&tools), "with-xargs"), whole);
 }
 
-/// A row a run, with what was drawn and what came out; the rows of a shard are those of its runs.
+/// One row per run, with its random values and its results; the rows of a shard are those of its runs.
 #[test]
 fn rows_of_runs_can_be_analysed() {
     let folder = folder("shards-rows");

@@ -1,11 +1,11 @@
-//! Every command that a document shows runs, or stands in a list with the reason why not.
+//! Every command that a document shows either runs, or is in a list with the reason why it does not.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::cli_common::{folder, hil_sim, text};
 
-/// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
+/// Commands that are not run here, by their beginning, and the reason. The longest matching beginning applies.
 const ELSEWHERE: [(&str, &str); 38] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
@@ -32,7 +32,7 @@ const ELSEWHERE: [(&str, &str); 38] = [
     ("cargo sim run machines --set", "long proof"),
     (
         "cargo sim run battery --plant r --set flux_level=high --set sequence.flux=high --set prepare.learn=yes --set battery.runs=dragged",
-        "long; fails for the runs that the drive does not notice",
+        "long; fails for the runs with undetected errors",
     ),
     ("cargo sim run commission --set runs", "a file of results/; minutes"),
     ("cargo sim run foreign-motors", "a file of results/; minutes"),
@@ -50,7 +50,7 @@ const ELSEWHERE: [(&str, &str); 38] = [
     ("cargo build", "named to be avoided: `cargo firmware` puts the check sum in"),
 ];
 
-/// Documents whose Rust is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
+/// Documents whose Rust code is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
 const RUST: [&str; 5] = [
     "drive-core/README.md",
     "drive-core/settings/README.md",
@@ -59,7 +59,7 @@ const RUST: [&str; 5] = [
     "docs/add-an-experiment.md",
 ];
 
-/// The documents for readers of today; the change log speaks of the past.
+/// Collects the documents about the present state; the change log describes the past.
 fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -95,7 +95,7 @@ fn commands_of_the_documents_run() {
         if elsewhere(command).is_some() {
             left += 1;
         } else if let Some(arguments) = command.strip_prefix("cargo sim") {
-            // A file of the repository, wherever it is run.
+            // A file of the repository, independent of the folder in which the command runs.
             let here =
                 |word: &str| match Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(word) {
                     path if word.contains('/') && path.is_file() => path.display().to_string(),
@@ -125,7 +125,7 @@ fn elsewhere(command: &str) -> Option<&'static (&'static str, &'static str)> {
     ELSEWHERE.iter().filter(|(begin, _)| fits(begin)).max_by_key(|(begin, _)| begin.len())
 }
 
-/// The commands of a document: lines of code blocks and inline code that begin with `cargo`.
+/// Returns the commands of a document: lines of code blocks and inline code that begin with `cargo`.
 fn commands_of(text: &str) -> Vec<String> {
     let mut commands = Vec::new();
     let mut in_block = false;

@@ -1,4 +1,4 @@
-//! The printed values of both sources beside ours: every one has a verdict, and the errata are what the runs give.
+//! The printed values of both sources beside ours: every one has a verdict, and the errata agree with the runs.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use hil_sim::outcome::Compared;
 
 use crate::generated;
 
-/// All experiments that report printed values, with the settings as they are and seed 1.
+/// All experiments that report printed values, with the default settings and seed 1.
 static EVIDENCE: LazyLock<Evidence> = LazyLock::new(|| {
     let mut evidence = Evidence::default();
     for name in SOURCES {
@@ -31,7 +31,7 @@ fn every_printed_value_has_a_verdict_and_the_errata_hold() {
     assert_eq!(place_of("S1", "Eq. 3.20", "k_FT").map(|k| EVIDENCE.verdict(k).number()), Some(2));
 }
 
-/// Typed from the sources once more, by hand.
+/// Values that were typed from the sources a second time, by hand.
 #[test]
 fn the_list_is_what_the_sources_print() {
     #[rustfmt::skip] // a value a line
@@ -62,7 +62,7 @@ fn the_list_is_what_the_sources_print() {
     assert!(keys.windows(2).all(|pair| pair[0] != pair[1]), "a value stands twice");
 }
 
-/// A constant of the program or of the list that is off by a percent costs a verdict.
+/// A constant of the program or of the list that is off by a percent changes a verdict.
 #[test]
 fn a_wrong_constant_is_seen() {
     let compared = |place: &str, quantity: &str| {

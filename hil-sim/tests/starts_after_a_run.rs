@@ -118,8 +118,9 @@ fn a_start_that_measures_no_resistance_keeps_what_was_measured() {
     }
 }
 
-/// A start on a rotating shaft measures no resistance. If the winding has had the time to warm by 30 % since the last measurement, the drive
-/// finds most of that from the torque. (If it took the measured one for certain: 12.7 degrees rms at -85 rpm, and the lock was lost at -40.)
+/// A start on a rotating shaft measures no resistance. If the winding has had the time to warm by 30 % since the last
+/// measurement, the drive finds most of that change from the torque. (If the drive took the measured resistance for
+/// certain, the error was 12.7 degrees rms at -85 rpm, and the lock was lost at -40.)
 #[test]
 fn a_start_on_a_rotating_shaft_finds_a_resistance_that_has_changed() {
     let config = Config::load(None, None, &["plant=r", "prepare.learn=yes"]).expect("settings");

@@ -1,4 +1,4 @@
-//! The largest torque of each motor in percent of its rated one, as the page of the motors prints it.
+//! The largest torque of each motor in percent of its rated torque, as the page of the motors prints it.
 
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
@@ -18,7 +18,7 @@ fn learned(motor: &str, set: &[&str]) -> (Config, Result<TorqueLimit, Error>) {
     (config, limit)
 }
 
-/// The current that binds, in a word.
+/// Names the limiting factor in a word.
 fn word(limit: &TorqueLimit) -> &'static str {
     if limit.binds.contains("slope") {
         "slope"
@@ -31,7 +31,7 @@ fn word(limit: &TorqueLimit) -> &'static str {
     }
 }
 
-/// The table of the page is that of drives that have learned, on model A and on the families of teeth.
+/// The table of the page is made from drives that have learned, on model A and on the saturation models with teeth.
 #[test]
 #[ignore = "a table of the documents: cargo xtask test"]
 fn the_page_prints_the_torque_limits() {
@@ -78,9 +78,10 @@ fn the_page_prints_the_torque_limits() {
     generated::check("motors.md", "torque", &table);
 }
 
-/// 3/2 P L_m^2/L_r i_d i_q over power and speed of the nameplate: the default motor takes 2.25 A beside 0.7 A with the learned
-/// limit, 0.724 Nm of 6.107 Nm. A larger direct current is the first remedy while it is below that of rated flux and current,
-/// and what binds is named: here the learned slope, at 2 A of direct current the current limit.
+/// 3/2 P L_m^2/L_r i_d i_q, compared with power and speed of the nameplate: the default motor takes 2.25 A at 0.7 A
+/// with the learned limit, 0.724 Nm of 6.107 Nm. A larger magnetising current is the first remedy while it is below
+/// that of rated flux and current. The limiting factor is named: here the learned saliency sensitivity, at 2 A of
+/// magnetising current the current limit.
 #[test]
 fn a_limit_says_what_binds_and_what_raises_it() {
     let (config, low) = limit("dissertation", &[]);
@@ -89,7 +90,7 @@ fn a_limit_says_what_binds_and_what_raises_it() {
     assert!((low.percent - 100.0 * nm / 6.107).abs() < 0.05, "{low:?}");
     assert!(low.more.contains("sequence.flux=high"), "{low:?}");
     let text = low.text(&config);
-    for part in ["Nm", "% of the rated torque of 6.1 Nm", "Binds: ", "More: "] {
+    for part in ["Nm", "% of the rated torque of 6.1 Nm", "Limited by: ", "More: "] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let sensors = TorqueLimit::new(&config, (3.5_f64.powi(2) - 0.7 * 0.7).sqrt());
@@ -99,8 +100,8 @@ fn a_limit_says_what_binds_and_what_raises_it() {
     let limit_a = f64::from(small.drive.current_limit_a());
     let by_range = TorqueLimit::new(&small, (limit_a * limit_a - 0.49).sqrt());
     assert!(by_range.binds.contains("`measurement.range_a`"), "{by_range:?}");
-    // The limit of the speed loop limits no torque command: with a third of it the drive takes as much,
-    // where the slope allows all of it.
+    // The limit of the speed loop does not limit torque commands: with a third of it the drive accepts the same
+    // current, if the saliency sensitivity allows all of it.
     let (_, last) = limit("rewound-48v", &[]);
     let (_, third) = limit("rewound-48v", &["speed.i_q_limit_a=3"]);
     assert!(last.binds.contains("`limits.current_a`"), "{last:?}");

@@ -7,8 +7,8 @@ use drive_core::{Command, Mode};
 use hil_sim::config::{Config, Value};
 use hil_sim::rig::Rig;
 
-/// A second of a drive with an encoder on a dynamometer that changes speed, while torque and flux change; as the console
-/// traces it, each period.
+/// Returns the trace of one second of a drive with an encoder on a dynamometer that changes speed, while torque and
+/// flux change; it is as the console records it, each period.
 fn recorded_trace(changes: &[(&str, &str)]) -> String {
     let mut config = Config::default();
     let set = [
@@ -41,8 +41,8 @@ fn recorded_trace(changes: &[(&str, &str)]) -> String {
     trace
 }
 
-/// True parameters are found within 2 % from 6000 noisy samples of the default inverter: for the
-/// motor of the settings, and for another one.
+/// True parameters are found within 2 % from 6000 noisy samples of the default inverter, for the motor of the settings
+/// and for another one.
 #[test]
 fn a_simulated_trace_is_identified() {
     let folder = folder("trace");
@@ -68,10 +68,10 @@ fn a_simulated_trace_is_identified() {
             let found = metrics[metric].as_f64().expect(metric);
             assert!((found / truth - 1.0).abs() < share, "{name} {metric}: {found}, true {truth}");
         }
-        // The drive has taken its own drop off.
+        // The drive has already subtracted its own inverter voltage error.
         assert!(metrics["drop_v"].as_f64().unwrap() < 0.5);
     }
-    // The columns of other tools, by their names; the settings are those of the second motor now.
+    // The columns of other tools, by their names; the settings are now those of the second motor.
     let trace = std::fs::read_to_string(folder.join("b.csv")).unwrap();
     let renamed = trace.replacen("speed_rpm", "n", 1).replacen("u_alpha_v", "ua", 1);
     std::fs::write(folder.join("c.csv"), renamed).unwrap();
@@ -104,7 +104,7 @@ fn the_example_profile_runs_and_is_followed() {
     assert!(files(&folder).is_empty());
 }
 
-/// Torque is held by the dynamometer; a shaft driven far beyond the speed at which the saliency is tracked is lost.
+/// The dynamometer holds torque; a shaft driven far above the speed range of the saliency tracking loses the lock.
 #[test]
 fn a_lost_profile_names_its_fault_and_exits_with_1() {
     let folder = folder("lost-profile");
@@ -133,7 +133,7 @@ fn the_example_configuration_is_read_and_a_written_one_comes_back() {
     let output = hil_sim(&folder, &["run", "torque-steps", "--config", "all.toml", "--json"]);
     assert_eq!(object(&output)["settings"], settings);
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
-    // A file may hold more than an experiment uses; it says so unless it is to be quiet.
+    // A file may contain more than an experiment uses; a note says so, except in quiet mode.
     let arguments = ["run", "adc-calibration", "--json", "--config", example];
     let note = hil_sim(&folder, &arguments);
     assert!(text(&note.stderr).contains("note: adc-calibration does not use "));

@@ -1,4 +1,4 @@
-//! The workflows: whatever builds runs build scripts of others, and gets no token that may write.
+//! The workflows: a job that builds also runs build scripts of others, so it gets no token with write permission.
 
 use std::path::Path;
 

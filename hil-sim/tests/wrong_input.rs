@@ -1,4 +1,4 @@
-//! Fifty wrong inputs of the command line: each message names the thing, the value and what is allowed; nothing is
+//! Fifty wrong inputs of the command line: each message names the subject, the value and the allowed values; nothing is
 //! written.
 
 use crate::cli_common::{files, folder, hil_sim, text};
@@ -130,7 +130,7 @@ fn each_message_names_the_thing_the_value_and_what_is_allowed() {
     }
 }
 
-/// A file that somebody sends can bring control characters, which a terminal obeys, and lines without end.
+/// A file from another person can contain control characters, which a terminal would execute, and lines without end.
 #[test]
 fn quoted_input_is_escaped_and_cut() {
     let folder = folder("quoted-input");
@@ -181,7 +181,7 @@ fn quoted_input_is_escaped_and_cut() {
     }
 }
 
-/// The likely mistake is a table in milliseconds; a device has no end.
+/// A likely mistake is a table in milliseconds; a device file has no end.
 #[test]
 fn endless_times_and_files_are_refused_by_name() {
     let folder = folder("endless");

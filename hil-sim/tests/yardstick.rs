@@ -1,12 +1,13 @@
-//! Statistics of the drive as recorded: the same JSON as ever, to the last digit.
+//! Recorded statistics of the drive: the JSON must stay the same, to the last digit.
 //!
-//! A change that keeps the control keeps these. They are those of one mathematics library, so only who changes the control asks for them:
+//! A change that keeps the control keeps these statistics. They depend on the mathematics library, so they are checked
+//! only after a change of the control:
 //!
 //! ```text
 //! cargo test --release -p hil-sim yardstick -- --ignored
 //! ```
 //!
-//! `YARDSTICK=write` records them anew; the commit that does so says why.
+//! `YARDSTICK=write` records them again; the commit that does so states why.
 
 use std::path::Path;
 use std::process::Command;
@@ -15,7 +16,7 @@ use std::{env, fs};
 const HIGH_FLUX: [&str; 6] =
     ["--set", "flux_level=high", "--set", "sequence.flux=high", "--set", "prepare.learn=yes"];
 
-/// The recorded file, and the arguments of the run.
+/// Returns the recorded file, and the arguments of the run.
 fn runs() -> Vec<(String, Vec<String>)> {
     let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
     let mut runs = Vec::new();
@@ -46,7 +47,7 @@ fn statistics_are_as_recorded() {
         if writes {
             fs::write(&file, &text).unwrap();
         }
-        // Not `assert_eq`: the texts are long.
+        // Not `assert_eq`, because the texts are long.
         let recorded = fs::read_to_string(&file).unwrap();
         let differs = text.bytes().zip(recorded.bytes()).position(|(now, then)| now != then);
         let near = |text: &str, at: usize| {

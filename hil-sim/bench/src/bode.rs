@@ -5,30 +5,30 @@ use crate::prelude::*;
 /// Control rate, Hz.
 pub const RATE: f64 = 6000.0;
 
-/// rad/sample at the control rate.
+/// Returns the angle per sample at the control rate, rad/sample, of a frequency.
 pub fn omega_t(hz: f64) -> f64 {
     TAU * hz / RATE
 }
 
-/// `count` frequencies from `low` to `high`, evenly spaced in the logarithm.
+/// Returns `count` frequencies from `low` to `high`, evenly spaced in the logarithm.
 pub fn frequencies(low: f64, high: f64, count: usize) -> Vec<f64> {
     let step = (high / low).ln() / (count - 1) as f64;
     (0..count).map(|k| low * (k as f64 * step).exp()).collect()
 }
 
-/// Gain and phase (without jumps of 360°) of some responses, functions of rad/sample, over the
-/// frequencies in Hz that `shown` makes of those in `hz`.
+/// Axes of a Bode plot. The responses are functions of rad/sample. Gain and phase (without jumps of 360°) are drawn
+/// over the frequencies in Hz that `shown` computes from those in `hz`.
 pub struct Bode<'a> {
     /// Real frequencies, Hz.
     pub hz: &'a [f64],
     /// Label of the frequency axis.
     pub label: &'a str,
-    /// From a real frequency to the one on the axis.
+    /// Conversion from a real frequency to the one on the axis.
     pub shown: fn(f64) -> f64,
 }
 
 impl Bode<'_> {
-    /// The panels of gain and phase.
+    /// Returns the panels of gain and phase.
     pub fn panels<N: AsRef<str>, F: Fn(f64) -> Complex64>(
         &self,
         responses: impl IntoIterator<Item = (N, F)>,
@@ -54,7 +54,7 @@ pub fn decibels(response: Complex64) -> f64 {
     20.0 * response.norm().log10()
 }
 
-/// Phases in degrees, each within 180° of the one before.
+/// Returns phases in degrees, each within 180° of the phase before.
 pub fn unwrapped(values: &[Complex64]) -> Vec<f64> {
     let mut before = 0.0;
     let mut phases = Vec::with_capacity(values.len());
@@ -66,7 +66,7 @@ pub fn unwrapped(values: &[Complex64]) -> Vec<f64> {
     phases
 }
 
-/// Fictitious frequency of the w plane (Eq. 2.18), Hz, of a real one.
+/// Returns the fictitious frequency of the w plane (Eq. 2.18), Hz, for a real frequency.
 pub fn fictitious(hz: f64) -> f64 {
     RATE / (0.5 * TAU) * (0.5 * omega_t(hz)).tan()
 }

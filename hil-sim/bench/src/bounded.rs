@@ -1,4 +1,4 @@
-//! Files of the user, up to a bound: a device has no end.
+//! Reading of the user's files up to a largest size: a device file would never end.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,10 +11,10 @@ pub const TABLE_MIB: u64 = 64;
 /// Largest shard or file of `--resume`, MiB.
 pub const RUNS_MIB: u64 = 256;
 
-/// Reads to the end, or fails behind this many MiB.
+/// Reads to the end, or fails after this many MiB.
 ///
 /// # Errors
-/// Those of the reader; one that names the bound.
+/// The errors of the reader, and an error that names the largest size.
 pub fn read(from: impl Read, most_mib: u64) -> io::Result<Vec<u8>> {
     let (mut bytes, most) = (Vec::new(), most_mib << 20);
     from.take(most + 1).read_to_end(&mut bytes)?;
@@ -26,7 +26,7 @@ pub fn read(from: impl Read, most_mib: u64) -> io::Result<Vec<u8>> {
     )))
 }
 
-/// The bytes of a file.
+/// Returns the bytes of a file.
 ///
 /// # Errors
 /// As [`read`].
@@ -34,10 +34,10 @@ pub fn bytes(path: &Path, most_mib: u64) -> io::Result<Vec<u8>> {
     read(File::open(path)?, most_mib)
 }
 
-/// The text of a file of at most [`TEXT_MIB`].
+/// Returns the text of a file of at most [`TEXT_MIB`].
 ///
 /// # Errors
-/// As [`read`]; when it is no UTF-8.
+/// As [`read`]; also if the text is not UTF-8.
 pub fn text(path: &Path) -> io::Result<String> {
     String::from_utf8(bytes(path, TEXT_MIB)?).map_err(io::Error::other)
 }

@@ -11,7 +11,7 @@ use crate::error::{Error, cut, unknown};
 pub struct Columns {
     path: PathBuf,
     names: Vec<String>,
-    /// Row by row, with the line of each.
+    /// The rows, each with its line number.
     rows: Vec<(u64, Vec<f64>)>,
 }
 
@@ -73,16 +73,16 @@ impl Columns {
         self.rows.is_empty()
     }
 
-    /// A column, if there is one of this name.
+    /// Returns the column of this name, if there is one.
     pub fn get(&self, name: &str) -> Option<Vec<f64>> {
         let place = self.names.iter().position(|known| known == name)?;
         Some(self.rows.iter().map(|(_, row)| row[place]).collect())
     }
 
-    /// A column that must be there.
+    /// Returns a column that the caller requires.
     ///
     /// # Errors
-    /// [`Error::Data`] with the columns there are.
+    /// [`Error::Data`] with the names of the columns of the file.
     pub fn need(&self, name: &str) -> Result<Vec<f64>, Error> {
         self.get(name).ok_or_else(|| {
             let (name, names) = (cut(name), cut(&self.names.join(", ")));
@@ -90,22 +90,22 @@ impl Columns {
         })
     }
 
-    /// Checks that every column is one of these.
+    /// Checks that every column has one of these names.
     ///
     /// # Errors
-    /// [`Error::Data`] with the name of the other column, and the allowed ones.
+    /// [`Error::Data`] with the name of the column that is not allowed, and the allowed names.
     pub fn only(&self, allowed: &[&str]) -> Result<(), Error> {
         let other = self.names.iter().find(|name| !allowed.contains(&name.as_str()));
         let Some(other) = other else { return Ok(()) };
         Err(self.at(0, unknown("column", other, allowed)))
     }
 
-    /// An error of the file as a whole.
+    /// Returns an error of the file as a whole.
     pub fn error(&self, problem: String) -> Error {
         Error::data(&self.path, None, problem)
     }
 
-    /// An error of a row, counted from 1; 0 for the header.
+    /// Returns an error of a row, counted from 1; 0 is the header.
     pub fn at(&self, row: usize, problem: String) -> Error {
         let line = match row {
             0 => Some(1),

@@ -1,9 +1,10 @@
-//! The configuration of an experiment: plain numbers under dotted names, those of the console of the drive.
+//! The configuration of an experiment: numbers under dotted names, the names that the console of the drive uses.
 //!
-//! A key is one of the bench ([`BENCH`]: the simulated motor, inverter, sensors and load) or one of the drive
-//! ([`drive_settings::SETTINGS`]). A name that both have sets both: the drive knows its bench. `drive.NAME` sets
-//! the drive alone, which is then wrong about the bench. Assignments count in their order; in a file, those of `drive.`
-//! come last. `after.NAME` is a key of the plant whose value changes after the learning.
+//! A key belongs to the bench ([`BENCH`]: the simulated motor, inverter, sensors and load) or to the drive
+//! ([`drive_settings::SETTINGS`]). If both tables have a name, an assignment to it sets both keys, so that the drive
+//! knows its bench. `drive.NAME` sets the key of the drive alone, whose value then differs from the bench. Assignments
+//! take effect in their order; in a file, those to `drive.` keys come last. `after.NAME` is a key of the plant whose
+//! value changes after the saliency self-commissioning.
 
 mod alias;
 pub mod file;
@@ -33,12 +34,12 @@ use motors::Motor;
 const DRIVE: &str = "drive.";
 
 impl Config {
-    /// The defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
+    /// Returns the defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
-    /// As [`Config::of_motor`] and [`file::read`], [`Error::Data`] for an assignment of the file that [`Config::set`]
-    /// refuses, [`Error::Refused`] for an assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
-    /// other: they are checked when the drive is built.
+    /// As [`Config::of_motor`], [`file::read`] and [`Config::set`]. [`Error::Data`] for an assignment of the file that
+    /// [`Config::set`] refuses; [`Error::Refused`] for an assignment without an equals sign. The ranges of the drive's
+    /// settings depend on each other, so they are checked when the drive is built.
     pub fn load(
         motor: Option<&str>,
         file: Option<&Path>,
@@ -58,7 +59,7 @@ impl Config {
         Ok(config)
     }
 
-    /// The defaults with a motor; see [`Motor::find`].
+    /// Returns the defaults with a motor; see [`Motor::find`].
     ///
     /// # Errors
     /// As [`Motor::find`] and [`Motor::apply`].
@@ -70,7 +71,7 @@ impl Config {
         Ok(config)
     }
 
-    /// Sets one key; on an error nothing changes.
+    /// Sets one key. If it returns an error, nothing has changed.
     ///
     /// # Errors
     /// [`Error::Unknown`]; [`Error::Value`] with the key, the value and the allowed values.
@@ -92,12 +93,12 @@ impl Config {
         Ok(())
     }
 
-    /// The torque current of experiments that do not bring their own, A peak.
+    /// The q-axis current of experiments that do not bring their own, A peak.
     pub fn iq_a(&self) -> f64 {
         self.reference.iq_a.unwrap_or_else(|| self.amperes(1.0))
     }
 
-    /// The simulated motor in words.
+    /// Describes the simulated motor in words.
     pub fn motor_text(&self) -> String {
         let m = &self.motor;
         if *m == MotorConfig::default() {
@@ -108,14 +109,14 @@ impl Config {
         format!("r_s {r_s} ohm, r_r {r_r} ohm, {inductances}, {pole_pairs} pole pairs")
     }
 
-    /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
+    /// Scales a current in proportion to the rated current; `on_reference`, A, is its value on the dissertation's motor.
     pub fn amperes(&self, on_reference: f64) -> f64 {
         on_reference * self.relative(Settings::rated_a)
     }
 
-    /// A load torque that is `on_reference`, Nm, on the dissertation's motor. A step of it accelerates the shaft as there,
-    /// electrically, because the tracking of the angle follows a limited acceleration; and it is not a larger share of
-    /// the torque at the current limit.
+    /// Scales a load torque; `on_reference`, Nm, is its value on the dissertation's motor. A load step of the result
+    /// causes the same electrical acceleration as on that motor, because the angle tracking follows only a limited
+    /// acceleration. The result is not a larger share of the torque at the current limit either.
     pub fn newton_metres(&self, on_reference: f64) -> f64 {
         let torque = self.relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
         let inertia = self.relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
@@ -127,18 +128,18 @@ impl Config {
         self.drive.nameplate.torque_nm().into()
     }
 
-    /// A quantity of the drive's settings relative to that of the dissertation's drive.
+    /// A quantity of the drive's settings, divided by its value in the dissertation's drive.
     fn relative(&self, of: fn(&Settings) -> f32) -> f64 {
         f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
     }
 
-    /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
+    /// The mechanical speed, rpm, that has the same electrical frequency as `on_reference`, rpm, on four poles.
     pub fn rpm(&self, on_reference: f64) -> f64 {
         on_reference * (2.0 / f64::from(self.motor.pole_pairs))
     }
 
-    /// Sets the scales of the drive to those of the sensors, without their errors; after a direct change of
-    /// `measurement` or of the dc link.
+    /// Sets the scales of the drive to those of the sensors, without the sensors' errors. Call it after code has
+    /// changed `measurement` or the dc link directly.
     pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
         let scales = &mut self.drive.scales;
@@ -151,19 +152,19 @@ impl Config {
         scales.both_zero_vectors = self.measurement.both_zero_vectors;
     }
 
-    /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
+    /// Returns the keys whose value is not the default, as `KEY=VALUE` for `--set`.
     pub fn changes(&self) -> Vec<String> {
         self.changes_from(&Self::default())
     }
 
-    /// The assignments that make this configuration of `base`.
+    /// Returns the assignments that change `base` into this configuration.
     pub fn changes_from(&self, base: &Self) -> Vec<String> {
         let (mut rebuilt, mut changes) = (base.clone(), Vec::new());
         for key in Key::all().chain(Key::after()) {
             let value = key.get(self);
             if value != key.get(&rebuilt) {
                 let change = (key.assigned_name(), value);
-                // A value that is in the configuration is allowed.
+                // Every value in the configuration is an allowed one.
                 let _ = rebuilt.set(&change.0, &change.1);
                 changes.push(format!("{}={}", change.0, change.1));
             }
@@ -172,10 +173,10 @@ impl Config {
     }
 }
 
-/// The coefficients of a drive with these settings.
+/// Computes the coefficients of a drive with these settings.
 ///
 /// # Errors
-/// [`Error::Refused`] with the setting; where it is one that nobody set, with what its rule depends on.
+/// [`Error::Refused`] with the setting. If nobody set it, the message adds what its rule depends on.
 pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
     settings.build().map_err(|error| {
         let by_rule = match error {
@@ -189,17 +190,17 @@ pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
     })
 }
 
-/// Name and value of an assignment `KEY=VALUE`.
+/// Splits an assignment `KEY=VALUE` into name and value.
 ///
 /// # Errors
-/// [`Error::Refused`] without an equals sign.
+/// [`Error::Refused`] if there is no equals sign.
 pub fn assigned(assignment: &str) -> Result<(&str, &str), Error> {
     let refused = |given| format!("`{given}`: write KEY=VALUE, for example --set motor.r_s=5.4");
     let pair = assignment.split_once('=').ok_or_else(|| Error::Refused(refused(cut(assignment))));
     pair.map(|(name, value)| (name.trim(), value))
 }
 
-/// The keys that an assignment to `name` sets; the name may be an old one.
+/// Returns the keys that an assignment to `name` sets; the name may be an old one.
 ///
 /// # Errors
 /// As [`Key::named`].
@@ -207,7 +208,7 @@ pub fn keys_of(name: &str) -> Result<Vec<Key>, Error> {
     Key::named(&alias::today(name, &Value::Unset).0)
 }
 
-/// The assignments of a table, those of the drive alone last.
+/// Returns the assignments of a table; those for the drive alone come last.
 pub fn flattened(table: &toml::Table) -> Vec<(String, Value)> {
     let mut assignments = Vec::new();
     flatten("", table, &mut assignments);

@@ -6,41 +6,41 @@ use std::path::{Path, PathBuf};
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Nothing has this name.
+    /// A name that nothing has.
     #[error("there is no {what} `{}`{}; {list}", cut(.name), did_you_mean(.nearest))]
     Unknown {
-        /// The kind of thing that it should name.
+        /// Kind of the thing with that name.
         what: &'static str,
-        /// The name that was given.
+        /// The given name.
         name: String,
         /// The most similar name.
         nearest: Option<String>,
-        /// Where the names are.
+        /// Command or place that lists the names.
         list: &'static str,
     },
-    /// A key cannot have this value.
+    /// A value that a key cannot have.
     #[error("{} = {}: {problem}; allowed: {allowed}", cut(.key), cut(.value))]
     Value {
         /// The key.
         key: String,
-        /// The value that was given.
+        /// The given value.
         value: String,
         /// The reason why it is refused.
         problem: &'static str,
         /// The values that are allowed, with their unit.
         allowed: String,
     },
-    /// A file cannot be read, or is not used as it stands.
+    /// A file that cannot be read, or whose content is not accepted.
     #[error("{}{}: {problem}", .path.display(), line_text(.line))]
     Data {
         /// The file.
         path: PathBuf,
-        /// The line, counted from 1; none where the file as a whole is meant.
+        /// The line, counted from 1; none if the error concerns the whole file.
         line: Option<u64>,
         /// The reason.
         problem: String,
     },
-    /// A run was lost: its results are written, its end was not as wanted.
+    /// A run that did not end as it should; its results are written.
     #[error("{name}: {reason}")]
     Lost {
         /// The experiment.
@@ -48,23 +48,23 @@ pub enum Error {
         /// The fault, or the other reason.
         reason: String,
     },
-    /// Some experiments of a report were refused or lost; the others are in it.
+    /// Some experiments of a report were refused or failed; the others are in the report.
     #[error("{} of {all} experiments failed: {}", .names.len(), .names.join(", "))]
     Incomplete {
-        /// How many there are.
+        /// Number of all experiments.
         all: usize,
-        /// The names of those that failed.
+        /// Names of the failed experiments.
         names: Vec<String>,
     },
-    /// Each value is in its range, but a model, a filter or a design rule refuses their combination.
+    /// Each value is in its range, but a model, a filter or a design rule refuses the combination.
     #[error("{0}")]
     Refused(String),
-    /// A file or folder cannot be written.
+    /// A file or folder that cannot be written.
     #[error("cannot write {}: {source}", .path.display())]
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// The error of the system.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A failure that no input should be able to cause.
@@ -73,12 +73,12 @@ pub enum Error {
 }
 
 impl Error {
-    /// The error of a part that refuses its settings.
+    /// Returns the error of a part that refuses its settings.
     pub fn refused(reason: impl std::fmt::Display) -> Self {
         Self::Refused(reason.to_string())
     }
 
-    /// The error of a name that is none of the known ones: that of a key, an experiment or a motor.
+    /// Returns the error of an unknown name of a key, an experiment or a motor.
     pub fn unknown<'a>(
         what: &'static str,
         name: &str,
@@ -93,17 +93,17 @@ impl Error {
         Self::Unknown { what, name: name.to_owned(), nearest, list }
     }
 
-    /// The error of data in a file, on a line or as a whole.
+    /// Returns the error of data in a file, on a line or as a whole.
     pub fn data(path: &Path, line: Option<u64>, problem: impl Into<String>) -> Self {
         Self::Data { path: path.to_owned(), line, problem: problem.into() }
     }
 
-    /// The error of a failure to write `path`.
+    /// Returns the error of a failure to write `path`.
     pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { path: path.to_owned(), source }
     }
 
-    /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
+    /// Returns the exit code of the process: 2 if the user has to change the request, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         use Error::{Incomplete, Internal, Lost, Write};
         let failed = matches!(self, Write { .. } | Internal(_) | Lost { .. } | Incomplete { .. });
@@ -111,11 +111,11 @@ impl Error {
     }
 }
 
-/// Most characters of an input that a message quotes, and most of a message.
+/// Largest number of characters of an input that a message quotes, and of a message.
 const QUOTED: usize = 120;
 const MESSAGE: usize = 4000;
 
-/// The beginning of an input, for a message that quotes it.
+/// Returns the beginning of an input, for a message that quotes it.
 pub fn cut(text: &str) -> String {
     cut_at(text, QUOTED)
 }
@@ -127,13 +127,13 @@ fn cut_at(text: &str, most: usize) -> String {
     }
 }
 
-/// A parser's words about an input. They quote it somewhere: a line that is longer than the words of any parser is cut.
+/// Returns a parser's message about an input. Parsers quote the input: a line longer than any parser's own words is cut.
 pub fn parser_text(error: impl std::fmt::Display) -> String {
     let line = |line: &str| if line.len() > 3 * QUOTED { cut(line) } else { line.to_owned() };
     error.to_string().trim_end().lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A text as a terminal may get it: control characters, which an input can bring, are escaped.
+/// Returns a text that is safe for a terminal: control characters, which an input may contain, are escaped.
 pub fn printable(text: &str) -> String {
     let shown = |c: char| !c.is_control() || matches!(c, '\n' | '\t');
     let mut printable = String::with_capacity(text.len());
@@ -143,7 +143,7 @@ pub fn printable(text: &str) -> String {
     printable
 }
 
-/// A message for a terminal: [`printable`], and not longer than a page.
+/// Returns a message for a terminal: [`printable`], and not longer than a page.
 pub fn message(error: impl std::fmt::Display) -> String {
     printable(&cut_at(&error.to_string(), MESSAGE))
 }
@@ -156,16 +156,16 @@ fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
-/// The message about a name that is none of those which are allowed.
+/// Returns the message about a name that is not among the allowed ones.
 pub fn unknown(what: &str, name: &str, allowed: &[&str]) -> String {
     let guess = nearest(name, allowed.iter().copied()).map(str::to_owned);
     let (name, allowed) = (cut(name), allowed.join(", "));
     format!("unknown {what} `{name}`{}; allowed: {allowed}", did_you_mean(&guess))
 }
 
-/// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.
+/// Returns the name most similar to `name`, regardless of case, if it is similar enough for a misspelling.
 pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    // A longer one is no misspelling, and would take its time.
+    // A longer name is no misspelling, and the comparison would take long.
     known
         .filter(|_| name.len() <= QUOTED)
         .map(|candidate| (strsim::levenshtein(&name.to_lowercase(), candidate), candidate))

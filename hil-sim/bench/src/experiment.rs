@@ -11,26 +11,26 @@ use std::path::Path;
 pub struct Context<'a> {
     /// The configuration.
     pub config: &'a Config,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Simulated time, s; unset: the experiment's own.
+    /// Simulated time, s; unset: the experiment's own time.
     pub seconds: Option<f64>,
-    /// Progress bars.
+    /// The progress bars.
     pub progress: Progress,
-    /// File of an experiment that takes one.
+    /// File for an experiment that takes one.
     pub file: Option<&'a Path>,
 }
 
 impl<'a> Context<'a> {
-    /// Without a file, as long as the configuration says.
+    /// Makes an input without a file, for as long as the configuration says.
     pub fn new(config: &'a Config, seed: u64, progress: Progress) -> Self {
         Self { config, seed, seconds: config.extent.seconds, progress, file: None }
     }
 
-    /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
+    /// Runs `run` with number and value of every job on all cores, with a progress bar.
     ///
     /// # Errors
-    /// The error of a job that failed.
+    /// The error of a failed job.
     pub fn in_parallel<J: Sync, T: Send>(
         &self,
         label: &str,
@@ -55,44 +55,44 @@ pub struct Experiment {
     pub stands_for: &'static str,
     /// Description in one sentence.
     pub about: &'static str,
-    /// The keys that it uses: names, and beginnings of names that end in a full stop.
+    /// The keys that the experiment uses: names, and beginnings of names that end in a full stop.
     pub uses: &'static [&'static [&'static str]],
-    /// Exceptions from `uses`, likewise: keys that the experiment sets itself, or that do nothing in it.
+    /// Exceptions from `uses`, written alike: keys that the experiment sets itself, or that have no effect in it.
     pub not: &'static [&'static [&'static str]],
-    /// Runs it.
+    /// Runs the experiment.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
 }
 
 impl Experiment {
-    /// One that uses no key, by its name and its function.
+    /// Makes an experiment that uses no key, from its name and its function.
     pub const fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
         Self { name, stands_for: "", about: "", uses: &[], not: &[], run }
     }
 
-    /// With the part of the source that it reproduces.
+    /// Sets the part of the source that it reproduces.
     pub const fn stands_for(self, stands_for: &'static str) -> Self {
         Self { stands_for, ..self }
     }
 
-    /// With its description.
+    /// Sets its description.
     pub const fn about(self, about: &'static str) -> Self {
         Self { about, ..self }
     }
 
-    /// With the keys that it uses.
+    /// Sets the keys that it uses.
     pub const fn uses(self, uses: &'static [&'static [&'static str]]) -> Self {
         Self { uses, ..self }
     }
 
-    /// With the exceptions from these keys.
+    /// Sets exceptions from these keys.
     pub const fn not(self, not: &'static [&'static [&'static str]]) -> Self {
         Self { not, ..self }
     }
 
-    /// Runs it for its own time, and shows no progress.
+    /// Runs the experiment for its own time, without progress bars.
     ///
     /// # Errors
-    /// Those of the experiment.
+    /// The errors of the experiment.
     pub fn outcome(&self, config: &Config, seed: u64) -> Result<Outcome, Error> {
         (self.run)(&Context::new(config, seed, Progress::hidden()))
     }
@@ -107,7 +107,7 @@ impl Experiment {
             && !self.not.iter().copied().flatten().any(is_in)
     }
 
-    /// The keys that it uses, in words.
+    /// Describes the keys that it uses in words.
     pub fn uses_text(&self) -> String {
         let words = |names: &[&str]| {
             let shown = names.iter().map(|name| match name.strip_suffix('.') {
@@ -124,8 +124,8 @@ impl Experiment {
     }
 }
 
-/// An error beyond this, degrees, is a lost angle: half way to where the saliency, which repeats
-/// every 180°, has the wrong sign.
+/// Angle error beyond which the lock counts as lost, degrees: half way to the angle at which the saliency, which
+/// repeats every 180°, has the wrong sign.
 pub const LOST_DEG: f64 = 45.0;
 
 /// Keys of the simulated motor, inverter and sensors.
@@ -146,16 +146,16 @@ pub const SPEED_LOOP: &[&str] = &[
     "speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.quick_rpm_per_s", "speed.s_ramp_s", "speed.phase_margin_deg",
     "drive.motor.inertia",
 ];
-/// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
+/// Keys that have no effect while the shaft is locked or a dynamometer holds its speed.
 pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
-/// Keys of the tracking of the saliency, which a drive with an encoder does not use.
+/// Keys of the saliency tracking, which a drive with an encoder does not use.
 pub const TRACKING: &[&str] =
     &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
-/// Keys that do nothing while the shaft is locked.
+/// Keys that have no effect while the shaft is locked.
 pub const TURNING: &[&str] =
     &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
-/// Assumptions of the simulated plant, for the remarks of an outcome.
+/// Returns the assumptions of the simulated plant, for the remarks of an outcome.
 pub fn assumptions(config: &Config) -> Vec<String> {
     let (s, motor) = (plant_settings(config).saliency, config.motor_text());
     vec![format!(

@@ -1,11 +1,11 @@
-//! A drive that learns its tracking reference on a simulated motor with the shaft locked.
+//! Saliency self-commissioning of a drive on a simulated motor with the shaft locked.
 
 use drive_core::learned::Learned;
 use drive_core::table::{Grid, POINTS, ReferenceTable};
 
 use crate::prelude::*;
 
-/// The values that the drive of the configuration learns.
+/// Returns the values that the drive of the configuration learns.
 ///
 /// # Errors
 /// As [`Rig::from_config`] and [`Rig::learn`].
@@ -16,18 +16,19 @@ pub fn learned(config: &Config, seed: u64) -> Result<Learned, Error> {
     Rig::from_config(&config, seed)?.learn()
 }
 
-/// Last point of [`reference_of`]: 3.25 A, the largest torque current that the drive allows beside the magnetising current.
+/// Last point of [`reference_of`]: 3.25 A, the largest q-axis current that the drive allows beside the magnetising current.
 const LAST: usize = 13;
-/// Time for flux and averages to settle at each point, and to average, s.
+/// Time for flux and averages to settle at each point, s; the averaging takes the same time.
 const SETTLE_S: f64 = 0.6;
 const AVERAGE_S: f64 = 0.5;
 
-/// The signal of a demodulation over the torque current at the true flux angle, as a reference table:
-/// shaft locked, field orientation by the slip alone (a locked encoder counts nothing), injection beside
-/// it. It covers the literal demodulation too, for which the drive does not learn.
+/// Measures the signal of a demodulation over the q-axis current at the true flux angle, as a table of the saliency
+/// offset. The shaft is locked and an encoder orients the drive by the slip alone, because a locked encoder counts
+/// nothing; the injection is on. The function also covers the literal demodulation, for which the drive has no saliency
+/// self-commissioning.
 ///
 /// # Errors
-/// [`Error::Refused`] when the configuration or a value of the table is refused, or the drive stops.
+/// [`Error::Refused`] if the configuration or a value of the table is refused, or if the drive stops.
 pub fn reference_of(
     demodulator: DemodulatorKind,
     config: &Config,
@@ -36,7 +37,7 @@ pub fn reference_of(
     let mut config = config.clone();
     config.drive.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed, 0.0, 0.0)?;
-    // The table is odd.
+    // The table is an odd function of the current.
     let mut values = [0.0; POINTS];
     for n in 0..=LAST {
         rig.settle(&Command::Torque(Grid::REFERENCE.current(n)), SETTLE_S)?;

@@ -1,5 +1,5 @@
-//! The test rig of the simulator: the drive on its simulated motor, the configuration, and the form of experiments and their
-//! results. The experiments themselves are in `sim-lab` and `hil-sim`.
+//! The test rig of the simulator: the drive on its simulated motor, the configuration, and the form of experiments and
+//! their results. The experiments themselves are in `sim-lab` and `hil-sim`.
 #![deny(clippy::use_debug)]
 
 pub mod bode;

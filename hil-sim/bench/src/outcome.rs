@@ -15,26 +15,26 @@ pub use table::{Cell, Column, Table};
 pub struct Outcome {
     /// Numbers by name; a name ends in its unit, like `angle_error_rms_deg`.
     pub metrics: Metrics,
-    /// The levels of a torque experiment.
+    /// The current levels of a torque experiment.
     pub steps: Option<Vec<Step>>,
-    /// Tables, in the order in which they are to be read.
+    /// Tables, in reading order.
     pub tables: Vec<Table>,
-    /// Printed values of the sources, and ours.
+    /// Printed values of the sources beside our values.
     pub compared: Vec<Compared>,
-    /// Figures, likewise.
+    /// Figures, in reading order.
     pub figures: Vec<Figure>,
-    /// Texts to be read as they are, line by line, with their titles.
+    /// Texts that are shown line by line as they are, with their titles.
     pub texts: Vec<(String, String)>,
     /// Remarks for the reader: differences from the source, assumptions, limits.
     pub remarks: Vec<String>,
-    /// Texts of the faults with which the drive stopped itself when it should have gone on; none for a run
-    /// that ended as it should.
+    /// Texts of the faults with which the drive stopped itself although it should have continued; empty for a run that
+    /// ended as it should.
     pub faults: Vec<String>,
-    /// The reason why the experiment was refused; there are no results then.
+    /// The reason why the experiment was refused; it has no results then.
     pub refusal: Option<String>,
 }
 
-/// Faults that are named where one reads of a lost run; the JSON has all.
+/// Largest number of faults in the text about a failed run; the JSON has all.
 const MOST_FAULTS: usize = 10;
 
 /// Numbers by name, in the order in which they were added.
@@ -42,7 +42,7 @@ const MOST_FAULTS: usize = 10;
 pub struct Metrics(#[serde(serialize_with = "json::as_map")] Vec<(String, f64)>);
 
 impl Metrics {
-    /// Adds a number, or replaces the one of this name.
+    /// Adds a number, or replaces the number of this name.
     pub fn set(&mut self, name: impl Into<String>, value: f64) {
         let name = name.into();
         match self.0.iter_mut().find(|(known, _)| *known == name) {
@@ -51,17 +51,17 @@ impl Metrics {
         }
     }
 
-    /// The number of this name.
+    /// Returns the number of this name.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
 
-    /// All names and numbers.
+    /// Returns all names and numbers.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().map(|(name, value)| (name.as_str(), *value))
     }
 
-    /// A number for the reader: `yes` or `no` for a metric that is called `lost`, four digits otherwise.
+    /// Formats a number for the reader: `yes` or `no` for a metric that is called `lost`, four digits otherwise.
     pub fn cell(name: &str, value: f64) -> Cell {
         match value {
             0.0 if is_flag(name) => Cell::from("no"),
@@ -71,7 +71,7 @@ impl Metrics {
         }
     }
 
-    /// The number that stands for all: the angle error, or the first that counts no runs.
+    /// Returns the most important number: the angle error, or otherwise the first number that is not a count of runs.
     pub fn main(&self) -> Option<(&str, f64)> {
         let is = |wanted: &str| self.iter().find(|(name, _)| *name == wanted);
         let counts = |name: &str| is_flag(name) || name.ends_with("runs") || name == "machines";
@@ -79,7 +79,7 @@ impl Metrics {
         is("angle_error_rms_deg").or_else(|| self.iter().find(numbers))
     }
 
-    /// Whether anything was lost: of how many runs, if they are counted. Empty where nothing could be.
+    /// Returns whether anything was lost, and of how many runs if they are counted. Empty if nothing could be lost.
     pub fn lost(&self) -> String {
         match (self.get("lost_runs").or(self.get("lost")), self.get("runs")) {
             (None, _) => String::new(),
@@ -98,12 +98,12 @@ fn is_flag(name: &str) -> bool {
     name == "lost" || name.ends_with("_lost")
 }
 
-/// One level of a torque experiment, averaged over its settled part.
+/// One current level of a torque experiment, averaged over its settled part.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Step {
-    /// Reference of the quadrature-axis current, A peak.
+    /// Reference of the q-axis current, A peak.
     pub iq_ref_a: f64,
-    /// Quadrature-axis current, A peak.
+    /// q-axis current, A peak.
     pub iq_a: f64,
     /// Torque of the motor, Nm.
     pub torque_nm: f64,
@@ -120,22 +120,22 @@ pub struct Compared {
     pub place: String,
     /// Its symbol or name.
     pub quantity: String,
-    /// From the source's own numbers.
+    /// Value computed from the source's own numbers.
     pub recomputed: Option<f64>,
-    /// From the drive, or the method of the source, on the simulated motor.
+    /// Value from the drive, or from the method of the source, on the simulated motor.
     pub simulated: Option<f64>,
-    /// The least and the largest over seeds, of a mean over random runs.
+    /// Smallest and largest value over seeds, of a mean over random runs.
     pub seeds: Option<[f64; 2]>,
     /// The constant that the program uses for it.
     pub used: Option<f64>,
-    /// A reason for a relative difference, and the largest of it.
+    /// A reason for a relative difference, and its largest permitted amount.
     pub but: Option<(&'static str, f64)>,
-    /// The quantity that the source does not state, where the value cannot be known without it.
+    /// The quantity that the source does not state, if the value cannot be known without it.
     pub unknown: Option<&'static str>,
 }
 
 impl Compared {
-    /// A value of a source, with nothing beside it.
+    /// Makes a printed value of a source, with no value of ours yet.
     pub fn with(
         source: &'static str,
         place: impl Into<String>,
@@ -144,43 +144,43 @@ impl Compared {
         Self { source, place: place.into(), quantity: quantity.into(), ..Self::default() }
     }
 
-    /// With what the source does not state and the value depends on.
+    /// Adds the quantity that the source does not state and on which the value depends.
     pub fn unknown(self, what: &'static str) -> Self {
         Self { unknown: Some(what), ..self }
     }
 
-    /// With the value from the source's own numbers, or whether a claim holds by them.
+    /// Adds the value from the source's own numbers, or whether a claim holds by them.
     pub fn recomputed(self, value: impl Into<f64>) -> Self {
         Self { recomputed: Some(value.into()), ..self }
     }
 
-    /// With what the program takes for it.
+    /// Adds the constant that the program uses.
     pub fn used(self, value: f64) -> Self {
         Self { used: Some(value), ..self }
     }
 
-    /// With the value from the simulated motor, or whether a claim holds for it.
+    /// Adds the value from the simulated motor, or whether a claim holds for it.
     pub fn simulated(self, value: impl Into<f64>) -> Self {
         Self { simulated: Some(value.into()), ..self }
     }
 
-    /// The value to be judged: the recomputed one, the simulated one, or what the program takes.
+    /// Returns the value to be judged: the recomputed one, otherwise the simulated one, otherwise the constant of the program.
     pub fn value(&self) -> Option<f64> {
         self.recomputed.or(self.simulated).or(self.used)
     }
 }
 
-/// Seed and settings that an outcome comes from.
+/// Seed and settings that led to an outcome.
 #[derive(Clone, Debug, Default)]
 pub struct Origin {
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Names and values of the settings that were changed.
+    /// Names and values of the changed settings.
     pub settings: Vec<(String, String)>,
 }
 
 impl Origin {
-    /// With the settings that were changed, each `NAME=VALUE`.
+    /// Makes an origin from the seed and the changed settings, each `NAME=VALUE`.
     pub fn new(seed: u64, changes: &[String]) -> Self {
         let pairs = changes.iter().filter_map(|change| change.split_once('='));
         let settings = pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
@@ -194,13 +194,13 @@ impl Outcome {
         self.remarks.push(text.into());
     }
 
-    /// The outcome of an experiment that was refused.
+    /// Returns the outcome of an experiment that was refused.
     pub fn refused(reason: &impl std::fmt::Display) -> Self {
         Self { refusal: Some(reason.to_string()), ..Self::default() }
     }
 
-    /// Whether the experiment was refused, or the drive was lost or stopped itself, in words with its faults; nothing for
-    /// a run that ended as it should.
+    /// Returns in words whether the experiment was refused, whether the drive lost its angle or stopped itself, and the
+    /// faults; nothing for a run that ended as it should.
     pub fn lost(&self) -> Option<String> {
         if let Some(reason) = &self.refusal {
             return Some(format!("Refused: {reason}"));

@@ -1,4 +1,4 @@
-//! Progress bars on standard error; invisible where that is not a terminal.
+//! Progress bars on standard error; they are hidden if standard error is not a terminal.
 
 use std::time::Duration;
 
@@ -9,19 +9,19 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, 
 pub struct Progress(MultiProgress);
 
 impl Default for Progress {
-    /// Bars on standard error, if that is a terminal.
+    /// Makes bars on standard error, if that is a terminal.
     fn default() -> Self {
         Self(MultiProgress::with_draw_target(ProgressDrawTarget::stderr()))
     }
 }
 
 impl Progress {
-    /// No bars at all.
+    /// Makes no bars at all.
     pub fn hidden() -> Self {
         Self(MultiProgress::with_draw_target(ProgressDrawTarget::hidden()))
     }
 
-    /// A bar for `length` units of work.
+    /// Makes a bar for `length` units of work.
     pub fn bar(&self, label: &str, length: u64) -> Bar {
         let bar = self.0.add(ProgressBar::new(length).with_finish(ProgressFinish::AndClear));
         let template = "{msg:24} {bar:32} {percent:>3}% {elapsed}";
@@ -34,7 +34,7 @@ impl Progress {
     }
 }
 
-/// A progress bar; removed when dropped. Can be used from many threads at once.
+/// A progress bar, which is removed when dropped. Many threads may use it at once.
 pub struct Bar(ProgressBar);
 
 impl Bar {

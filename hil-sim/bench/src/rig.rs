@@ -1,4 +1,4 @@
-//! The bench: a drive, a plant, and the one period between them.
+//! The test rig: a drive, a plant, and the one PWM period between them.
 
 use crate::config::{Config, LoadMode, built, check_model, open_phase, plant_settings};
 use crate::error::Error;
@@ -13,9 +13,9 @@ use drive_core::{
 use drive_settings::Settings;
 use std::f64::consts::TAU;
 
-/// Longest learning, s.
+/// Longest saliency self-commissioning, s.
 const LONGEST_LEARNING_S: u32 = 1000;
-/// Time at rest after a learning, in rotor time constants.
+/// Time at rest after a saliency self-commissioning, in rotor time constants.
 const REST_T: f64 = 8.0;
 
 /// Control periods per second.
@@ -28,12 +28,12 @@ pub struct Rig {
     pub plant: Plant,
     /// The drive under test.
     pub drive: Drive,
-    /// State of its front end.
+    /// State of the firmware's interface around the drive.
     pub front_end: FrontEndState,
-    /// Compare values on their way: computed in the last period, in force in this one.
+    /// Compare values on their way: computed in the last period, in force in the present one.
     pending: Compare,
     periods: u64,
-    /// Time of the last learning, s, to a second.
+    /// Duration of the last saliency self-commissioning, s, to a second.
     pub learning_s: f64,
 }
 
@@ -42,33 +42,33 @@ pub struct Rig {
 pub struct Point {
     /// Time, s.
     pub t: f64,
-    /// Current reference on the quadrature axis, after its filter, A.
+    /// Reference of the q-axis current, after its filter, A.
     pub iq_ref: f64,
-    /// Direct-axis current in the estimated flux frame, as measured by the drive, A.
+    /// d-axis current in the estimated flux frame, as measured by the drive, A.
     pub id: f64,
-    /// Quadrature-axis current, likewise.
+    /// q-axis current in the estimated flux frame, as measured by the drive, A.
     pub iq: f64,
     /// Electromagnetic torque of the motor, Nm.
     pub torque: f64,
-    /// Length of the rotor flux, Wb peak.
+    /// Magnitude of the rotor flux, Wb peak.
     pub flux: f64,
-    /// Length of the stator current, A peak.
+    /// Magnitude of the stator current, A peak.
     pub current: f64,
     /// True minus estimated rotor-flux angle, electrical degrees, within ±180.
     pub angle_error_deg: f64,
     /// Current difference of the demodulation, A.
     pub delta_i: f64,
-    /// Saliency q of the synchronous demodulation.
+    /// Saliency q from the synchronous demodulation.
     pub saliency: f64,
-    /// Carrier current along the injection axis, A.
+    /// Injection current along the injection axis, A.
     pub carrier: f64,
-    /// Share of the flux-fixed saliency that the lock monitor misses.
+    /// Saliency deficit: share of the flux-fixed saliency that the lock monitor finds missing.
     pub loss: f64,
     /// Speed of the rotor, rpm.
     pub speed_rpm: f64,
     /// Rotor speed as the drive estimates it, rpm.
     pub speed_estimate_rpm: f64,
-    /// Torque per flux and quadrature current, 3/2 P L_m/L_r.
+    /// Torque per flux and q-axis current, 3/2 P L_m/L_r.
     pub torque_per_flux_ampere: f64,
     /// Position of the rotor, mechanical turns.
     pub turns: f64,
@@ -77,15 +77,15 @@ pub struct Point {
 }
 
 impl Point {
-    /// Signal of the demodulation in use: a current difference in A or, with the synchronous one, a
-    /// saliency. (The other of the two is zero.)
+    /// Signal of the demodulation in use: a saliency with the synchronous demodulation, otherwise a current difference
+    /// in A. The signal that is not in use is zero.
     pub fn signal(&self) -> f64 {
         self.delta_i + self.saliency
     }
 }
 
 impl Rig {
-    /// A drive that is off, connected to a motor at rest.
+    /// Makes a drive that is off, connected to a motor at rest.
     ///
     /// # Errors
     /// [`Error::Refused`] with the setting that the plant or the drive refuses.
@@ -93,14 +93,14 @@ impl Rig {
         Ok(Self::of(Plant::new(plant, seed).map_err(Error::refused)?, Drive::new(built(drive)?)))
     }
 
-    /// A drive that is off, connected to a motor at rest, both made already.
+    /// Connects a drive that is off to a motor at rest, both made by the caller.
     pub fn of(plant: Plant, drive: Drive) -> Self {
         let front_end = FrontEndState::default();
         Self { plant, drive, front_end, pending: Compare::OFF, periods: 0, learning_s: 0.0 }
     }
 
-    /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
-    /// first, with the shaft locked, and the time begins afterwards.
+    /// Makes the bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency first
+    /// runs the saliency self-commissioning with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
     /// As [`Rig::new`], [`Rig::learn`] and [`check_model`].
@@ -120,10 +120,10 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Lets the drive learn; the shaft must be locked. The drive is off afterwards and uses the learned values.
+    /// Runs the saliency self-commissioning; the shaft must be locked. Afterwards the drive is off and uses the learned values.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
+    /// [`Error::Refused`] if the drive refuses the command, stops with a fault or does not finish.
     pub fn learn(&mut self) -> Result<Learned, Error> {
         let began = self.time();
         self.command(&Command::Start(Mode::Learning))?;
@@ -145,7 +145,7 @@ impl Rig {
         Err(Error::Refused(format!("the drive does not learn: it is {}", self.drive.state())))
     }
 
-    /// The same, and started in `mode`.
+    /// Makes the bench that the configuration describes and starts the drive in `mode`.
     ///
     /// # Errors
     /// As [`Rig::from_config`] and [`Rig::start`].
@@ -155,7 +155,8 @@ impl Rig {
         Ok(rig)
     }
 
-    /// A drive that the encoder orients, shaft locked, injection beside it, and `seconds` at the torque current `iq`, A.
+    /// Makes a bench with a locked shaft and a drive that is oriented by the encoder, with injection, and runs it for
+    /// `seconds` at the q-axis current `iq`, A.
     ///
     /// # Errors
     /// As [`Rig::started`] and [`Rig::command`].
@@ -169,29 +170,30 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Periods since the beginning.
+    /// Returns the number of periods since the beginning.
     pub fn periods(&self) -> u64 {
         self.periods
     }
 
-    /// Seconds since the beginning.
+    /// Returns the seconds since the beginning.
     pub fn time(&self) -> f64 {
         self.periods as f64 / RATE_HZ
     }
 
-    /// One PWM period.
+    /// Runs one PWM period.
     pub fn step(&mut self) {
         let sample = self.plant.sample();
         self.step_with(&sample);
     }
 
-    /// One PWM period in which the drive is given `sample` instead of the sample of the plant. This is all that the control
-    /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
+    /// Runs one PWM period in which the drive gets `sample` instead of the sample of the plant. This is all that the
+    /// control interrupt of the firmware does with a drive. No other code does it: every experiment runs its drive
+    /// here.
     #[inline(never)] // compiled once, not in every crate that runs a rig
     pub fn step_with(&mut self, sample: &Sample) {
         let (compare, output) = self.drive.period(&mut self.front_end, sample, &mut |_| {});
         if !compare.enabled {
-            // Off is off at once, not at the end of the period.
+            // The outputs go off at once, not at the end of the period.
             self.pending = Compare::OFF;
         }
         self.plant.set_chopper(output.chopper.into());
@@ -201,7 +203,7 @@ impl Rig {
         self.periods += 1;
     }
 
-    /// Runs for `seconds`. The truth, which nobody looks at, is not computed.
+    /// Runs for `seconds`. The true state of the plant, which no caller needs here, is not computed.
     pub fn wait(&mut self, seconds: f64) {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
             self.step();
@@ -215,7 +217,7 @@ impl Rig {
         }
     }
 
-    /// One PWM period: the truth at the instant of its sample, and the estimates of the drive from that sample.
+    /// Runs one PWM period and returns the true state at the instant of its sample, with the drive's estimates from that sample.
     #[inline(never)] // compiled once, not with every closure that looks at points
     fn point(&mut self) -> Point {
         let (plant, phi) = (&self.plant, self.plant.rotor_flux_angle());
@@ -259,7 +261,7 @@ impl Rig {
     /// Starts in `mode` and runs until the drive regulates.
     ///
     /// # Errors
-    /// When the command is refused, or the drive does not get there within 30 s.
+    /// If the drive refuses the command, or does not regulate within 30 s.
     pub fn start(&mut self, mode: Mode) -> Result<(), Error> {
         self.command(&Command::Start(mode))?;
         for _ in 0..(30.0 * RATE_HZ) as u32 {
@@ -273,10 +275,10 @@ impl Rig {
         Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))
     }
 
-    /// Gives the drive a command; says whether it was taken as given or limited.
+    /// Gives the drive a command; returns whether the drive accepted it as given or limited it.
     ///
     /// # Errors
-    /// When the drive refuses it.
+    /// If the drive refuses the command.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
         let refused = |e| Error::Refused(format!("the drive refuses {}: {e}", words(command)));
         self.drive.command(command).map_err(refused)
@@ -285,39 +287,39 @@ impl Rig {
     /// Gives the drive a command, and time to settle.
     ///
     /// # Errors
-    /// When the drive refuses it.
+    /// If the drive refuses the command.
     pub fn settle(&mut self, command: &Command, seconds: f64) -> Result<(), Error> {
         self.command(command)?;
         self.wait(seconds);
         Ok(())
     }
 
-    /// The fault with which the drive has stopped itself, with its number.
+    /// Returns the fault with which the drive has stopped itself, with its number.
     pub fn fault(&self) -> Option<String> {
         self.drive.state().fault().map(fault_text)
     }
 
-    /// Couples another load.
+    /// Connects another load.
     ///
     /// # Errors
-    /// When the load is out of range.
+    /// If the load is out of range.
     pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
         self.plant.set_load(load).map_err(Error::refused)
     }
 }
 
-/// Whether a drive with these settings tracks the saliency, and can learn.
+/// Whether a drive with these settings tracks the saliency and can learn it.
 pub fn tracks(settings: &Settings) -> bool {
     settings.angle_source == AngleSource::Injection
         && settings.injection.demodulator == DemodulatorKind::Synchronous
 }
 
-/// A fault in words, with its number.
+/// Describes a fault in words, with its number.
 pub fn fault_text(fault: Fault) -> String {
     format!("fault {}: {fault}", fault.code())
 }
 
-/// A command in words.
+/// Describes a command in words.
 fn words(command: &Command) -> String {
     match command {
         Command::Start(mode) => format!("to start in {} mode", mode_word(*mode)),
@@ -330,7 +332,7 @@ fn words(command: &Command) -> String {
         Command::Stop(Stop::Quick) => "to stop quickly".into(),
         Command::Stop(Stop::Now) => "to stop at once".into(),
         Command::Clear => "to clear the fault".into(),
-        Command::Torque(a) => format!("a torque current of {a} A"),
+        Command::Torque(a) => format!("a q-axis current of {a} A"),
         Command::Speed(rpm) => format!("a speed of {rpm} rpm"),
         Command::Jog(rpm) => format!("to jog at {rpm} rpm"),
         Command::Position(turns) => format!("a position of {turns} turns"),
@@ -359,7 +361,7 @@ fn mode_word(mode: Mode) -> &'static str {
     }
 }
 
-/// An angle in radians as degrees within ±180.
+/// Converts an angle in radians to degrees within ±180.
 pub fn wrapped_degrees(radians: f64) -> f64 {
     let turns = radians / TAU;
     (turns - turns.round()) * 360.0

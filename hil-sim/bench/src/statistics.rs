@@ -1,5 +1,5 @@
-//! Experiments of many independent runs: planned from configuration and seed alone, done in any order and on any
-//! machine, judged together.
+//! Experiments of many independent runs. They are planned from configuration and seed alone, can run in any order and
+//! on any machine, and are judged together.
 
 pub mod fault_code;
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 /// A statistical experiment.
 pub trait Study: Sized + Sync {
-    /// All that the outcome needs of a run. Written as JSON it must be read back to the bit: see
+    /// Everything that the outcome needs from a run. Written as JSON, it must be read back exactly: see
     /// [`exact`](crate::stats::exact).
     type Record: Serialize + DeserializeOwned + Send;
     /// The experiment; its `run` is [`whole`].
@@ -21,29 +21,29 @@ pub trait Study: Sized + Sync {
     /// Plans the runs.
     ///
     /// # Errors
-    /// When the configuration is refused.
+    /// If the configuration is refused.
     fn new(context: &Context<'_>) -> Result<Self, Error>;
 
-    /// How many runs there are.
+    /// Returns the number of runs.
     fn runs(&self) -> usize;
 
-    /// Does one of them, counted from 0. It does not depend on the others.
+    /// Does one of the runs, counted from 0. It does not depend on the other runs.
     ///
     /// # Errors
-    /// When the run cannot be done; the experiment fails then.
+    /// If the run cannot be done; the experiment fails then.
     fn run(&self, number: usize) -> Result<Self::Record, Error>;
 
-    /// The outcome of all runs, in their order.
+    /// Computes the outcome of all runs, in their order.
     ///
     /// # Errors
-    /// When there is none.
+    /// If there is no outcome.
     fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error>;
 }
 
-/// A refusal of the drive as a result; other errors are none.
+/// Turns a refusal of the drive into a result; other errors stay errors.
 ///
 /// # Errors
-/// All but [`Error::Refused`].
+/// All errors but [`Error::Refused`].
 pub fn or_refusal<T>(result: Result<T, Error>) -> Result<Result<T, String>, Error> {
     match result {
         Ok(value) => Ok(Ok(value)),
@@ -52,7 +52,7 @@ pub fn or_refusal<T>(result: Result<T, Error>) -> Result<Result<T, String>, Erro
     }
 }
 
-/// The seed of a run of an experiment with this seed.
+/// Returns the seed of a run of an experiment with this seed.
 pub fn seed_of(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(1_000_003).wrapping_add(number as u64)
 }
@@ -60,7 +60,7 @@ pub fn seed_of(seed: u64, number: usize) -> u64 {
 /// Does all runs on all cores.
 ///
 /// # Errors
-/// Those of the study.
+/// The errors of the study.
 pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
     let study = S::new(context)?;
     let numbers: Vec<usize> = (0..study.runs()).collect();
@@ -69,23 +69,23 @@ pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
     study.outcome(context, records)
 }
 
-/// Takes the record of a run.
+/// A function that stores the record of a run.
 pub type Keep<'a> = &'a (dyn Fn(usize, Value) -> Result<(), Error> + Sync);
 
 /// A statistical experiment whose runs are kept as JSON.
 pub struct Statistical {
     /// The experiment.
     pub experiment: &'static Experiment,
-    /// How many runs it has.
+    /// Returns the number of its runs.
     pub runs: fn(&Context<'_>) -> Result<usize, Error>,
-    /// Does these runs on all cores and passes each record on as soon as it is there.
+    /// Does these runs on all cores and passes each record on as soon as it is complete.
     pub some: fn(&Context<'_>, &[usize], Keep<'_>) -> Result<(), Error>,
-    /// The outcome of all runs, in their order.
+    /// Computes the outcome of all runs, in their order.
     pub outcome: fn(&Context<'_>, Vec<Value>) -> Result<Outcome, Error>,
 }
 
 impl Statistical {
-    /// That of a study.
+    /// Makes the entry of a study.
     pub const fn of<S: Study>() -> Self {
         Self {
             experiment: S::EXPERIMENT,
@@ -102,7 +102,7 @@ fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> R
     context.in_parallel(S::EXPERIMENT.name, numbers, one).map(|_: Vec<()>| ())
 }
 
-/// A record as JSON, after a check that it is read back as it is.
+/// Converts a record to JSON, after a check that it is read back unchanged.
 fn value<S: Study>(number: usize, record: &S::Record) -> Result<Value, Error> {
     let lost = |e| Error::Internal(format!("the record of run {number} is not kept exactly: {e}"));
     let value = serde_json::to_value(record).map_err(lost)?;

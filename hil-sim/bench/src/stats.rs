@@ -17,7 +17,7 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Statistics of these values.
+    /// Computes the statistics of these values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut stats = Self::default();
         values.into_iter().for_each(|v| stats.push(v));
@@ -45,7 +45,7 @@ impl Stats {
         self.count
     }
 
-    /// Mean; not a number when there are no values.
+    /// Mean; not a number if there are no values.
     pub fn mean(&self) -> f64 {
         self.sum / self.count as f64
     }
@@ -66,14 +66,14 @@ impl Stats {
     }
 }
 
-/// The values in their order, the smallest first.
+/// Returns the values in ascending order.
 pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values
 }
 
-/// The smallest value that this share of the sorted values does not exceed; not a number without values.
+/// The smallest value that this share of the sorted values does not exceed; not a number if there are no values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
@@ -89,7 +89,7 @@ pub struct StraightLine {
 }
 
 impl StraightLine {
-    /// Least squares of y on x.
+    /// Fits a line by least squares of y on x.
     pub fn through(points: &[(f64, f64)]) -> Self {
         let mean = |f: &dyn Fn(&(f64, f64)) -> f64| Stats::of(points.iter().map(f)).mean();
         let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
@@ -97,14 +97,14 @@ impl StraightLine {
         Self { slope, intercept: y - slope * x }
     }
 
-    /// The value at `x`.
+    /// Returns the value at `x`.
     pub fn at(self, x: f64) -> f64 {
         self.slope * x + self.intercept
     }
 }
 
-/// Upper bound of a rate per trial at 95 % confidence after `events` in `trials`: the rate at which as
-/// few events would occur in 5 % of all cases. Without events it is 3 / trials.
+/// Upper bound of a rate per trial at 95 % confidence after `events` in `trials`: the rate at which as few events would
+/// occur in 5 % of all cases. Without events it is 3 / trials.
 pub fn upper_bound_95(events: u64, trials: u64) -> f64 {
     let at_most = |mean: f64| {
         let mut term = (-mean).exp();

@@ -1,4 +1,4 @@
-//! One run at constant torque current and speed, of which statistics consist.
+//! A run at constant q-axis current and speed, the unit of the statistics.
 
 use crate::prelude::*;
 use crate::statistics::fault_code;
@@ -9,7 +9,7 @@ use crate::stats::exact;
 pub struct OperatingPoint {
     /// Speed, rpm.
     pub rpm: f64,
-    /// Torque current, A.
+    /// q-axis current, A.
     #[serde(rename = "iq_a")]
     pub iq: f64,
     /// Seed of the noise.
@@ -26,15 +26,15 @@ pub struct SteadyRun {
     /// Mean torque, Nm.
     #[serde(with = "exact", rename = "torque_nm")]
     pub torque: f64,
-    /// Whether the error went beyond 45° at any time, or the drive stopped itself.
+    /// Whether the angle error exceeded 45° at any time, or the drive stopped itself.
     pub lost: bool,
-    /// The fault with which it stopped itself.
+    /// The fault with which the drive stopped itself.
     #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
 }
 
 impl SteadyRun {
-    /// The reason why the run was lost, after its operating point; nothing for one that was not.
+    /// Returns the reason why the lock was lost, after the operating point; nothing if the lock held.
     pub fn lost_text(&self) -> Option<String> {
         let OperatingPoint { rpm, iq, seed } = self.case;
         let angle = || format!("angle error beyond {LOST_DEG}°");
@@ -43,13 +43,13 @@ impl SteadyRun {
     }
 }
 
-/// How fast the dynamometer gets up to speed, rpm/s.
+/// Acceleration of the dynamometer, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
 
-/// A drive that has been started, brought up to speed without torque, and given its torque.
+/// Makes a drive that has been started, brought up to speed without torque, and given its torque.
 ///
 /// # Errors
-/// When the configuration is refused or the drive does not start.
+/// If the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
     let mut rig = prepared(config, case.seed)?;
     bring_up(&mut rig, case.rpm)?;
@@ -57,7 +57,7 @@ pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
     Ok(rig)
 }
 
-/// A drive that is off, coupled to a dynamometer at rest.
+/// Makes a drive that is off, coupled to a dynamometer at rest.
 ///
 /// # Errors
 /// As [`Rig::from_config`].
@@ -68,10 +68,10 @@ pub fn prepared(config: &Config, seed: u64) -> Result<Rig, Error> {
     Rig::from_config(&config, seed)
 }
 
-/// Starts a drive and brings it up to speed, rpm, without torque; it may have stopped itself on the way.
+/// Starts a drive and brings it up to speed, rpm, without torque. The drive may have stopped itself on the way.
 ///
 /// # Errors
-/// When the drive does not start.
+/// If the drive does not start.
 pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     rig.start(Mode::Torque)?;
     let steps = (rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
@@ -84,18 +84,18 @@ pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     Ok(())
 }
 
-/// At speed and torque, one second to settle, then `seconds` of judging.
+/// Runs at speed and torque: one second to settle, then `seconds` that are judged.
 ///
 /// # Errors
-/// When the configuration is refused or the drive does not start.
+/// If the configuration is refused or the drive does not start.
 pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     judged(prepared(config, case.seed)?, case, seconds)
 }
 
-/// The same with a drive that is off.
+/// Does a [`steady_run`] with a drive that is off.
 ///
 /// # Errors
-/// When the drive does not start.
+/// If the drive does not start.
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
     if let Some(fault) = rig.drive.state().fault() {

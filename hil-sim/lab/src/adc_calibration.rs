@@ -9,7 +9,7 @@ pub const EXPERIMENT: Experiment = Experiment::new("adc-calibration", run)
     .stands_for("Table 4, Figure 17, Eq. 3.5")
     .about("Least-squares lines through the readings of both current channels.");
 
-/// Codes of the converter: 12 bits.
+/// Largest count of the ADC: 12 bits.
 const LAST_CODE: f64 = 4095.0;
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {

@@ -1,5 +1,5 @@
-//! The plant of the angle estimation, identified with the encoder as reference, and the controller made
-//! from it (section 3.11).
+//! Identification of the plant of the angle estimation with the encoder as reference, and the controller designed for
+//! it (section 3.11).
 
 pub mod measure;
 pub mod model;
@@ -27,7 +27,7 @@ pub const EXPERIMENT: Experiment = Experiment::new("angle-identification", run)
 
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;
-/// The printed zero with the digit that seems to be lost.
+/// The printed zero, completed by the digit that seems to be missing.
 const LIKELY_Z_S: f64 = 0.99;
 /// Gain of band-pass and post-processing filter at dc.
 const LEAK: f64 = 0.0100 * PP;
@@ -35,21 +35,21 @@ const LEAK: f64 = 0.0100 * PP;
 /// The demodulations whose angle plant is identified.
 const DEMODULATIONS: [Demodulation; 3] = [LITERAL, RECTIFIED, SYNCHRONOUS];
 
-/// Identification at one torque current.
+/// Identification at one q-axis current.
 struct IdentifiedPoint {
     record: Record,
-    /// By equation error and by output error.
+    /// The models by equation error and by output error.
     models: [Model; 2],
     steps: StepResponses,
 }
 
 impl IdentifiedPoint {
-    /// Signal per rad once the current has followed the angle.
+    /// Signal per rad after the current has followed the angle.
     fn slow_gain(&self) -> f64 {
         self.steps.with_current[SLOW].iter().sum::<f64>() / SLOW.len() as f64
     }
 
-    /// Signal per rad, the current held.
+    /// Signal per rad while the current is held.
     fn held_gain(&self) -> f64 {
         self.steps.alone[SLOW].iter().sum::<f64>() / SLOW.len() as f64
     }
@@ -96,22 +96,22 @@ fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[Identif
     m.set(format!("{demodulation}_held_over_slow"), design.held_gain() / design.slow_gain());
 }
 
-/// The gains of the axis alone and of axis and current together, measured and predicted.
+/// Makes the table of the measured and predicted gains of the axis alone, and of axis and current together.
 fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
     let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit());
     let title = format!("Two plants: {}", demodulation.name());
     let mut table = Table::new(title, &[]).note(match demodulation.0 {
             DemodulatorKind::Literal => {
-                "Predicted: the leak of the fundamental, −√2 0.01 0.944 |i| sin(x + γ) with x the \
+                "Predicted: the leakage of the fundamental, −√2 0.01 0.944 |i| sin(x + γ) with x the \
                  axis seen from the current's frame: slope √2 0.00944 iq while the current is held; \
-                 none when the current turns with the axis. The loop is closed around the second: it \
+                 none when the current turns with the axis. The loop is closed around the second plant, which \
                  has no gain."
             }
             DemodulatorKind::Synchronous => {
                 "Predicted: q = −Im(s e^(−2jθ)) with s = a e^(2jφ̂₂) + b |i| e^(2j arg i): slope \
                  2(|a| − b |i| cos 2γ) while the current is held, 2|a| once it has turned with the \
-                 axis. The first is what a fast error meets and what section 3.11 identifies; the second \
-                 is what a slow error meets."
+                 axis. The first applies to fast errors, and section 3.11 identifies it; the second \
+                 applies to slow errors."
             }
             _ => {
                 "Predicted: the slopes of the saliency (see synchronous) times √2 |I_hf| and the gain \
@@ -171,7 +171,7 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
     let identified = TABLE_6_A.iter().zip(points).map(|(iq, p)| (format!("{iq} A"), p.models[1]));
     let printed = |(row, iq): (usize, &f64)| (format!("Table 6, {iq} A"), Model::printed(row));
     let models = identified.chain(TABLE_6_A.iter().enumerate().map(printed));
-    // In thousandths, as the signals are printed.
+    // The signals are printed in thousandths.
     let scaled = |m: Model| move |w: f64| Model { k: m.k * 1e3, ..m }.response(w);
     let (gain, phase) = bode.panels(models.map(|(name, model)| (name, scaled(model))));
     let (name, unit) = (demodulation.name(), demodulation.unit());
@@ -183,7 +183,7 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
     let panel = |of: &str, pick: fn(&IdentifiedPoint) -> &Vec<f64>| {
         let y = format!("{of} ({} / rad)", demodulation.unit());
         TABLE_6_A.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, (iq, p)| {
-            // Over a carrier period: the rest is ripple.
+            // Mean over a period of the injection: the rest is ripple.
             let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
             let point = |(n, c): (usize, _)| ((n as f64 * 5.0 + 2.0) / RATE_HZ * 1e3, mean(c));
             let line = pick(p).chunks(5).enumerate().map(point).collect();
@@ -196,7 +196,7 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         .panel(panel("with the current", |p| &p.steps.with_current))
 }
 
-/// Table 6 and Eq. 3.44: what the printed chain gives on the simulated motor, and a design for the printed plant.
+/// Compares Table 6 and Eq. 3.44 with the results of the printed chain on the simulated motor, and with a design for the printed plant.
 fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
     let unknown = "the saliency of its motor and the amplitude of the sequence";
     for (iq, point) in TABLE_6_A.iter().zip(points) {
@@ -225,7 +225,7 @@ fn compared(points: &[IdentifiedPoint], outcome: &mut Outcome) {
     outcome.compared.push(named("pii_for_1_5_a").simulated(largest(Pii::printed()) < 1.0));
 }
 
-/// Controllers in the closed loop: over the steps of Figure 38, and at constant speed.
+/// Runs controllers in the closed loop: over the steps of Figure 38, and at constant speed.
 fn closed_loops(
     context: &Context<'_>,
     points: &[IdentifiedPoint],
@@ -278,7 +278,7 @@ fn fits(points: &[IdentifiedPoint]) -> (f64, f64) {
     fits.fold((f64::MAX, f64::MIN), |(least, most), fit| (least.min(fit), most.max(fit)))
 }
 
-/// Largest distance of the poles from those of Table 6, in either part.
+/// Largest distance of the poles from the poles of Table 6, in real or imaginary part.
 fn distance(points: &[IdentifiedPoint]) -> f64 {
     let of = |(row, p): (usize, &IdentifiedPoint)| {
         let [ours, printed] = [&p.models[1], &Model::printed(row)].map(Model::poles);
@@ -308,8 +308,8 @@ fn remarks(points: &[IdentifiedPoint]) -> Vec<String> {
         format!(
             "Eq. 3.43 fits no chain well: the literal one by {:.0} to {:.0} %, whose step response is that of the \
              post-processing filter and whose poles come out within {:.3} of those of Table 6 in either part; the \
-             rectified one by {:.0} to {:.0} %. Where the carrier is \
-             seen, a step of the axis shows at once, before the carrier current has turned: for 2 samples, \
+             rectified one by {:.0} to {:.0} %. Where the injection is \
+             seen, a step of the axis shows at once, before the injection current has rotated: for 2 samples, \
              and in the rectified chain for the 8.8 samples of the band-pass as well, which it rotates \
              afterwards. The signal answers to how fast the axis turns, not only to where it is. Eq. 3.43 has \
              no zero for that: its gain comes out too high (compare with the steps). In the \

@@ -1,5 +1,5 @@
-//! The drive of Barroso 2017 as its text has it: without a sensor (Figures 38 and 39), the position controller on the plant
-//! that it was made for (Figure 37), filter and rotation in either order (section 3.4), and Table 1 as runs.
+//! The drive of Barroso 2017 as printed: without a sensor (Figures 38 and 39), the position controller on the plant for
+//! which it was designed (Figure 37), filter and rotation in either order (section 3.4), and Table 1 as runs.
 
 mod order;
 mod position;
@@ -10,22 +10,22 @@ use crate::prelude::*;
 /// Figures 37 to 39, Table 1, section 3.4.
 pub const EXPERIMENT: Experiment = Experiment::new("as-printed", run)
     .stands_for("Figures 37, 38, 39, Table 1, section 3.4")
-    .about("The drive as the text has it, on motors of three saliencies: angle error over the torque current; its \
+    .about("The drive as the text has it, on motors of three saliencies: angle error over the q-axis current; its \
             position controller on its plant; filter and rotation in either order; three angle sources at three speeds.")
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]]);
 
 /// Flux-fixed saliencies of the simulated motors; the source measures none.
 const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];
-/// Levels of Figure 38, A.
+/// Current levels of Figure 38, A.
 const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 
-/// Means over the second half of each level; the run ends where the drive stops itself.
+/// Means over the second half of each current level; the run ends if the drive stops itself.
 #[derive(Default)]
 struct Levels {
     error: Vec<f64>,
     torque: Vec<f64>,
-    /// Overshoot of the torque current at the last level, A.
+    /// Overshoot of the q-axis current at the last level, A.
     overshoot: f64,
     trace: Vec<(f64, f64)>,
 }
@@ -60,10 +60,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let figure = Figure::new("levels", "Angle error of the drive as printed", "Figures 38, 39");
     outcome.figures.push(figure.panel(panel));
     outcome.tables.push(table);
-    // The motor whose errors come nearest to what is printed: a tenth of the assumed saliency.
+    // The motor whose errors are closest to the printed ones: a tenth of the assumed saliency.
     let weak = &found[1];
     let errors = Stats::of(weak.error.iter().copied());
-    let unknown = "the saliency of its motor, and the torque current of each angle error";
+    let unknown = "the saliency of its motor, and the q-axis current of each angle error";
     for (place, quantity, value) in [
         ("Figure 38", "angle error, about", errors.mean()),
         ("Figure 39", "angle error, least", weak.error.iter().copied().fold(f64::MAX, f64::min)),
@@ -78,8 +78,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let rises = weak.error.windows(2).all(|pair| pair[1] > pair[0]);
     outcome.remarks.push(format!(
-        "With a tenth of the saliency assumed elsewhere the error {} with the torque current, from {:.0}° at 1 A to {:.0}° at \
-         2 A; the source states about 50° at every level. No saliency gives that: the flat 50° is not explained.",
+        "With a tenth of the saliency assumed elsewhere the error {} with the q-axis current, from {:.0}° at 1 A to {:.0}° at \
+         2 A; the source states about 50° at every level. No saliency gives the constant 50°, which remains unexplained.",
         if rises { "rises" } else { "does not rise" },
         weak.error.first().copied().unwrap_or(f64::NAN),
         weak.error.last().copied().unwrap_or(f64::NAN),
@@ -90,7 +90,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// The torque steps with the chain of the source, its rectifier added.
+/// Runs the torque steps with the chain of the source and the added rectifier.
 fn levels(context: &Context<'_>, a_psi: f64) -> Result<Levels, Error> {
     let mut config = context.config.clone();
     config.saliency.a_psi = a_psi;

@@ -17,19 +17,18 @@ pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;
 const IQ_A: f64 = 1.0;
-/// Turns of the flux that are evaluated.
+/// Revolutions of the flux that are evaluated.
 const TURNS: f64 = 8.0;
-/// Harmonics of the current vector that six voltage steps a period make.
+/// Harmonics of the current vector that are caused by six voltage steps a period.
 const HARMONICS: [i32; 4] = [-5, 7, -11, 13];
 
-/// One run.
+/// Results of one run.
 struct Case {
-    /// Over the angle of the current of phase a, degrees: voltage error along phase a, V, and
-    /// current of phase a, A.
+    /// Voltage error along phase a, V, and current of phase a, A, over the angle of the current of phase a, degrees.
     error: Vec<(f64, f64)>,
     current: Vec<(f64, f64)>,
     error_rms: f64,
-    /// Share of the harmonics in the fundamental.
+    /// Amplitude of each harmonic relative to the fundamental.
     harmonics: [f64; 4],
 }
 
@@ -41,7 +40,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ["", "voltage error (V rms)", "5th (%)", "7th (%)", "11th (%)", "13th (%)", "all four (%)"];
     let mut table = Table::new("Distortion of voltage and current", &heads).note(format!(
         "Every switching edge simulated, {SPEED_RPM} rpm held, iq = {IQ_A} A, encoder, no \
-         injection. The current loop itself takes part of the distortion out of the current."
+         injection. The current loop itself removes part of the distortion of the current."
     ));
     let mut voltage = Panel::new("angle of the current (°)", "voltage error along phase a (V)");
     let mut current = Panel::new("angle of the current (°)", "current of phase a (A)");
@@ -73,7 +72,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// A level over microseconds: where it begins, and the instants at which it changes.
+/// Returns the points of a level over microseconds: its first value, and the instants at which it changes.
 pub(super) fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(f64, f64)> {
     let (mut level, mut line) = (f64::from(high), Vec::new());
     line.push((0.0, level + offset));
@@ -86,7 +85,7 @@ pub(super) fn steps(high: bool, changes: &[f64], end: f64, offset: f64) -> Vec<(
     line
 }
 
-/// A rising edge of a leg (Figure 28), and a pulse of it (Figure 29), by the delays of the simulated inverter.
+/// Draws a rising edge of a leg (Figure 28), and a pulse of a leg (Figure 29), with the delays of the simulated inverter.
 fn edges(context: &Context<'_>) -> [Figure; 2] {
     let inverter = plant_settings(context.config).inverter;
     let (delay, dead) = (inverter.propagation_us, inverter.dead_time_us);
@@ -124,7 +123,7 @@ fn case(context: &Context<'_>, compensate: bool) -> Result<Case, Error> {
     config.drive.angle_source = AngleSource::Encoder;
     config.inverter.switched = true;
     config.drive.inverter.compensate = compensate;
-    // No compensation knows the residual drop; this experiment is about the dead time alone.
+    // No compensation knows the residual voltage drop; this experiment is about the dead time alone.
     config.inverter.residual_v = Some(0.0);
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
@@ -137,7 +136,7 @@ fn case(context: &Context<'_>, compensate: bool) -> Result<Case, Error> {
     // Mean of i e^(-j n angle) over the run: complex amplitude of harmonic n.
     let mut amplitudes = [Complex64::ZERO; 5];
     let mut wanted = Complex64::ZERO;
-    // Whole turns of the flux, so that the fundamental leaks into no harmonic.
+    // The run covers whole revolutions of the flux, so that the fundamental leaks into no harmonic.
     let mut turned = 0.0;
     let mut last = rig.plant.rotor_flux_angle();
     while turned < TURNS * 360.0 {
@@ -150,7 +149,7 @@ fn case(context: &Context<'_>, compensate: bool) -> Result<Case, Error> {
             return Err(Error::Refused(format!("the drive is {}", rig.drive.state())));
         }
         rig.step();
-        // The voltage of this period was computed from the sample before.
+        // The voltage of this period was computed from the previous sample.
         let error = rig.plant.applied_voltage() - wanted;
         let t = rig.drive.telemetry();
         let lead = TAU * (f64::from(t.phi.to_turns()) + 1.5 * f64::from(t.flux_freq));

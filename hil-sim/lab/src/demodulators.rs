@@ -13,17 +13,17 @@ use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality, signal_quality};
 use tracked::StepsRun;
 
-/// Section 5.2 names two ways to extract the carrier better.
+/// Section 5.2 names two ways to extract the injection current better.
 pub const EXPERIMENT: Experiment = Experiment::new("demodulators", run)
     .stands_for("Figures 10, 19, 20, section 5.2")
-    .about("Five demodulations on one motor: what each sees over the injection angle, with and without \
+    .about("Five demodulations on one motor: the signal of each over the injection angle, with and without \
             a saliency, noise, delay, and the angle error without a position sensor.")
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
-/// Torque currents of the map and of the table, A.
+/// q-axis currents of the map and of the table, A.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
-/// Torque current at which the delay is measured, and of the runs at constant speed, A.
+/// q-axis current for the measurement of the delay and for the runs at constant speed, A.
 const DELAY_IQ_A: f64 = 1.0;
 const RUN_IQ_A: f64 = 1.5;
 /// Speeds, rpm.
@@ -31,13 +31,13 @@ const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 
 /// Results of one demodulation.
 struct DemodulationResults {
-    /// With saliency and without, by torque current.
+    /// Curves with saliency and without, by q-axis current.
     maps: [Vec<Curve>; 2],
     seen: Vec<SignalQuality>,
     isotropic: Vec<SignalQuality>,
-    /// Samples; none where the saliency makes no difference.
+    /// Delay, samples; none if the saliency makes no difference.
     delay: Option<f64>,
-    /// By kind of reference and controller.
+    /// Results by kind of reference and controller.
     tracked: Vec<Option<ClosedLoop>>,
 }
 
@@ -86,7 +86,7 @@ impl DemodulationResults {
         (&self.seen[one], &self.isotropic[one])
     }
 
-    /// Share of the signal that is also there without saliency.
+    /// Share of the signal that is also present without saliency.
     fn isotropic_share(&self) -> f64 {
         let (seen, isotropic) = self.at_one_ampere();
         (isotropic.signal / seen.signal).abs()
@@ -95,7 +95,7 @@ impl DemodulationResults {
 
 struct ClosedLoop {
     steps: StepsRun,
-    /// One second at constant speed and torque, by speed.
+    /// Runs of one second at constant speed and torque, by speed.
     turning: Vec<SteadyRun>,
 }
 
@@ -157,9 +157,9 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
         })
     });
     Table::new("What each sees at the right angle", &[]).records(rows).note(
-        "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
-         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
-         should be seen; as angle: what that would shift the angle by.",
+        "Oriented by the encoder, shaft locked. Slope: the injection axis is rotated by ±4° and the \
+         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where the signal \
+         should be zero; as angle: the angle error that it would cause.",
     )
 }
 
@@ -237,7 +237,7 @@ const REMARKS: [&str; 3] = [
          saliency.",
     "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
          envelope promising but for spurious oscillations: they are the leak of the fundamental, at \
-         600 Hz and 1200 Hz, and an average over one carrier period takes them out.",
+         600 Hz and 1200 Hz, and an average over one injection period removes them.",
     "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
          filters (`injection.rms_samples`). Their impedance difference is shown as the current \
          difference that it stands for, I²/(√2 V) amperes an ohm (0.94 mA/Ω with 50 V on the \

@@ -1,4 +1,4 @@
-//! The three digital filters: response, and error in single precision.
+//! The three digital filters: their response, and their error in single precision.
 
 mod compared;
 mod design;
@@ -21,7 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment::new("filters", run)
     )
     .uses(&[&["seconds"]]);
 
-/// How long each filter is fed, s.
+/// Time for which each filter gets input, s.
 const SECONDS: f64 = 100.0;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -42,7 +42,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let direct = outcome.metrics.get("lpf_direct_1_error_rms_a").unwrap_or(f64::NAN);
     outcome.compared.push(named("filters_sensitive").recomputed(direct > 1e-3));
     outcome.remark(
-        "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA come through, as much as \
+        "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA pass, as much as \
          the signal that the demodulation of the source looks for (see injection-map).",
     );
     let worst = |quantity: &str| {
@@ -113,12 +113,12 @@ fn characteristics(filters: &[ComparedFilter], outcome: &mut Outcome) {
     }
 }
 
-/// Frequencies in Hz where the gain of a filter is this many dB.
+/// Returns the frequencies in Hz at which the gain of a filter has this value in dB.
 pub(super) fn edges_hz<const N: usize>(filter: &Sos<N>, level: f64) -> Vec<f64> {
     crossings(|hz| decibels(filter.response(omega_t(hz))) - level)
 }
 
-/// The coefficients of Tables 7 and 8 from the specification, and as the drive has them; what else section 3.10 says.
+/// Compares the coefficients of Tables 7 and 8, from the specification and in the drive, and the other statements of section 3.10.
 fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     let (lpf, bpf, pp) = (elliptic(4, 0.5, 40.0), elliptic(2, 0.5, 40.0), elliptic(4, 0.5, 60.0));
     let designs = [
@@ -148,7 +148,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     outcome.metrics.set("lpf_stop_from_hz", stop[0]);
     outcome.metrics.set("lpf_stop_to_hz", stop[1]);
     outcome.metrics.set("carrier_from_edge_hz", stop[1] - CARRIER_HZ);
-    // PP's own specification: the others of least order that meet it.
+    // The specification of PP: the lowest order of the other filter types that meets it.
     let edges = crossings(|hz| decibels(filters[2].direct(omega_t(hz))) + 60.0);
     let edge = edges.first().copied().unwrap_or(f64::NAN);
     let warped = |hz: f64| (0.5 * omega_t(hz)).tan();
@@ -181,7 +181,7 @@ fn recomputed(filters: &[ComparedFilter], outcome: &mut Outcome) {
     outcome.metrics.set("leak_of_an_ampere_ma", 1e3 * BPF.dc_gain());
 }
 
-/// Numerator and denominator of sections in one.
+/// Multiplies sections to one numerator and one denominator.
 fn expanded(sections: &[Section]) -> [Vec<f64>; 2] {
     let product = |of: fn(&Section) -> [f32; 3]| {
         sections.iter().fold(vec![1.0], |whole, section| {
@@ -197,7 +197,7 @@ fn expanded(sections: &[Section]) -> [Vec<f64>; 2] {
     [product(|s| [s.b0, s.b1, s.b2]), product(|s| [1.0, s.a1, s.a2])]
 }
 
-/// Frequencies in Hz where `f` changes its sign.
+/// Returns the frequencies in Hz at which `f` changes its sign.
 fn crossings(f: impl Fn(f64) -> f64) -> Vec<f64> {
     let grid: Vec<f64> = (1..3000).map(|k| f64::from(k) + 0.123).collect();
     let mut found = Vec::new();

@@ -41,12 +41,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Speeds between standstill and 200 rad/s, electrical rad/s.
 const LOW: [f64; 4] = [20.0, 61.0, 120.0, 200.0];
-/// Slip of their supply, rad/s.
+/// Slip at these speeds, rad/s.
 const SLIP: f64 = 1.8;
-/// Seeds of their mean.
+/// Number of seeds of their mean.
 const SWEEPS: u64 = 8;
 
-/// The claim of section 5 that Model C is as good as Model B from 0 to 200 rad/s.
+/// Tests the claim of section 5 that Model C is as good as Model B from 0 to 200 rad/s.
 fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
     let mut table = Table::new("Models B and C from 0 to 200 rad/s, 50 µs, S_s", &[]);
     let mut similar = true;
@@ -75,7 +75,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
     table.note("Half the printed noise, the mean of eight times seven measurements; supply at the speed and 1.8 rad/s of slip.")
 }
 
-/// Means over the twelve columns.
+/// Computes means over the twelve columns.
 fn means(all: &[Entry], metrics: &mut Metrics) -> Table {
     let heads = ["model", "r_s (%)", "τ_r (%)", "σ l_s (%)", "l_s (%)", "ω_m (%)"];
     let mut table = Table::new("Mean of both signals, speeds and all periods", &heads);
@@ -91,5 +91,5 @@ fn means(all: &[Entry], metrics: &mut Metrics) -> Table {
         }
         table.row([Cell::from(model)].into_iter().chain(means.map(|mean| Cell::fixed(mean, 2))));
     }
-    table.note("Half the printed noise. Where no measurement gives a number it counts as 100 %.")
+    table.note("Half the printed noise. If no measurement gives a number, it counts as 100 %.")
 }

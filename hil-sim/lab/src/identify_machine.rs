@@ -1,4 +1,4 @@
-//! Which machine the tables of Jacobina, Lima, Ribeiro 1996 were made with.
+//! Identification of the machine with which the tables of Jacobina, Lima, Ribeiro 1996 were made.
 
 use crate::identification::ratios::{self, Ratio};
 use crate::identification::{Parameters, claims};

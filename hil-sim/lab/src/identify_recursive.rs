@@ -1,5 +1,4 @@
-//! The recursive form of drive-core on simulated measurements: Figures 2 to 4 of Jacobina, Lima,
-//! Ribeiro 1996.
+//! The recursive form of drive-core on simulated measurements: Figures 2 to 4 of Jacobina, Lima, Ribeiro 1996.
 
 use rotor_id::rls::{Rls, RlsSettings};
 
@@ -14,17 +13,17 @@ pub const EXPERIMENT: Experiment = Experiment::new("identify-recursive", run)
     .stands_for("Jacobina 1996, Figures 2 to 4")
     .about(
         "Parameters and speed by recursive least squares while the machine runs: the f32 code \
-            of the drive beside the same in f64, and how long it takes to converge.",
+            of the drive beside the same in f64, and its convergence time.",
     )
     .uses(&[&["seconds"]]);
 
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;
-/// Base of the current, A.
+/// Base current, A.
 const CURRENT: f64 = 30.0;
 /// Samples between points of the figures.
 const EVERY: usize = 100;
-/// Noise of the figures: a tenth of the printed one, like that of a real converter.
+/// Noise of the figures: a tenth of the printed noise, as with a real ADC.
 const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
 /// Figure, signal, speed (electrical rad/s), convergence times that the paper gives (s).
@@ -69,7 +68,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
     Ok(Run { estimates, speed_rms: (square / f64::from(count.max(1))).sqrt() })
 }
 
-/// When a parameter comes within 10 % of where it ends, s, by a moving median over 20 ms.
+/// Time after which a parameter stays within 10 % of its final value, s, by a moving median over 20 ms.
 fn convergence(estimates: &[[Value; 5]], k: usize) -> f64 {
     let of = |range: std::ops::Range<usize>| {
         let values = sorted(estimates[range].iter().map(|e| e[k].unwrap_or(0.0)));
@@ -116,7 +115,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set(format!("{key}_tau_r_converges_s"), times[1]);
         outcome.metrics.set(format!("{key}_f32_omega_m_rms_rad_s"), noisy.speed_rms);
         outcome.figures.push(figure(&key, source, &trial, &noisy.estimates, paper));
-        // The ordinates of the paper are those of its own machine.
+        // The ordinates of the paper hold for its own machine.
         let trial = Trial { machine: Parameters::RBV.at(speed), ..trial };
         let theirs = estimate(&trial, LEVEL, seconds, context.seed)?;
         let key = format!("{key}_table_6");

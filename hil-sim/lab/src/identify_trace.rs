@@ -1,4 +1,4 @@
-//! The motor from a recorded trace of a drive: voltages, currents and speed in a CSV file.
+//! Identification of the motor from a recorded trace of a drive: voltages, currents and speed in a CSV file.
 
 use std::path::Path;
 
@@ -19,58 +19,58 @@ pub const EXPERIMENT: Experiment = Experiment::new("identify-trace", |_| Err(Err
 
 const TIME: &str = "time_s";
 const SPEED: &str = "speed_rpm";
-/// Voltages and currents, as vectors or of the phases. The third phase may be absent.
+/// Columns of voltages and currents, as vectors or per phase. The third phase may be absent.
 const VECTORS: [&[&str]; 2] = [&["u_alpha_v", "u_beta_v"], &["i_alpha_a", "i_beta_a"]];
 const PHASES: [&[&str]; 2] = [&["u_a_v", "u_b_v", "u_c_v"], &["i_a_a", "i_b_a", "i_c_a"]];
 /// Largest relative difference of two sampling periods.
 const JITTER: f64 = 0.01;
-/// Remark on a drop at its bound.
-const BOUND: &str = "The drop of the inverter would come out negative, which none is: it is held at 0. Are the voltages those of the \
+/// Remark on an inverter voltage error at its bound.
+const BOUND: &str = "The inverter voltage error would be negative, which is impossible, so it is set to 0. Are the voltages those of the \
                      terminals (--voltages sampled or mean)?";
-/// Starts of the fit: factors of the resistance and of the inductances of the settings.
+/// Starts of the fit: factors for the resistance and for the inductances of the settings.
 const STARTS: [f64; 3] = [1.0, 0.2, 5.0];
-/// Largest deviation of a parameter, relative to it, and largest residual, relative to the current, of a record that tells the
-/// motor.
+/// Largest deviation of a parameter, relative to the parameter, and largest residual, relative to the current, with
+/// which a record determines the motor.
 const OPEN: f64 = 0.3;
-/// Residual, relative to the current, that a remark names.
+/// Residual, relative to the current, above which a remark mentions it.
 const REMARKED: f64 = 0.05;
-/// Part that the three phases have in common, relative to phase a, that a remark names.
+/// Common-mode part of the three phases, relative to phase a, above which a remark mentions it.
 const COMMON: f64 = 0.01;
-/// Smallest share of the current by which a rotor time constant twice as long must show. With less, an error of the record of
-/// some percent, which harmonics and iron loss are, is more than what the slip tells.
+/// Smallest relative change of the current that a doubled rotor time constant must cause. With less, errors of the
+/// record of a few percent, such as harmonics and iron loss, exceed the information in the slip.
 const TOLD: f64 = 0.1;
-/// Share to which the residual must fall for the speed to be taken for another quantity.
+/// Share to which the residual must fall before the speed is taken for another quantity.
 const NEARER: f64 = 0.3;
 
 words! {
     /// Kinds of the voltages in a record.
     pub enum Voltages {
-        /// Those a drive asks for: held over a row, less the drop of its inverter.
+        /// Voltages that a drive commands: held over a row, reduced by the inverter voltage error.
         Commanded = "commanded",
-        /// Samples at the terminals, at the instants of the currents; straight between them.
+        /// Samples at the terminals, at the instants of the currents, joined by straight lines.
         Sampled = "sampled",
-        /// Means at the terminals from a row to the next.
+        /// Means at the terminals from one row to the next.
         Mean = "mean",
     }
 }
 
-/// How a file is read.
+/// The way in which a file is read.
 #[derive(Clone, Debug)]
 pub struct Reading {
     /// Other names of columns, each `OURS=THEIRS`.
     pub columns: Vec<String>,
     /// The kind of its voltages.
     pub voltages: Voltages,
-    /// Rows after the currents of a row at which its voltage acts; unset: 0 for a voltage at the terminals, for a commanded one
-    /// 1 and the delay of the current filter.
+    /// Number of rows after the currents of a row at which its voltage acts. Unset: 0 for a voltage at the terminals;
+    /// for a commanded voltage, 1 and the delay of the current filter.
     pub delay: Option<f64>,
-    /// Drop of the inverter, V; unset: none of a voltage at the terminals, found of a commanded one.
+    /// Inverter voltage error, V. Unset: none for a voltage at the terminals, fitted for a commanded one.
     pub drop_v: Option<f64>,
     /// Times of the first and the last row, s; unset: all.
     pub times: [Option<f64>; 2],
 }
 
-/// Our names of columns, each with the one in the file.
+/// Returns our names of columns, each with the name in the file.
 fn renamed(mapping: &[String]) -> Result<Vec<(String, String)>, Error> {
     let known = [&[&[TIME, SPEED][..]], &VECTORS[..], &PHASES].concat().concat();
     let pair = |given: &String| {
@@ -89,7 +89,7 @@ fn renamed(mapping: &[String]) -> Result<Vec<(String, String)>, Error> {
     mapping.iter().map(pair).collect()
 }
 
-/// A record, and what is to be said of its file.
+/// Reads a record; also returns remarks about its file.
 pub(crate) fn read(
     path: &Path,
     reading: &Reading,
@@ -136,7 +136,7 @@ pub(crate) fn read(
             remarks.push(format!("No {last}: taken as −a −b; the three need not sum to zero."));
         } else if common > COMMON {
             remarks.push(format!(
-                "{last} and the others have {:.1} % of phase a in common, which is left out: another point than the star point, \
+                "{last} and the others have {:.1} % of phase a in common, which is ignored: a reference other than the star point, \
                  an offset, or another scale.",
                 100.0 * common
             ));
@@ -155,7 +155,7 @@ pub(crate) fn read(
     Ok((Record { h, v, sampled, i, omega_m }, remarks))
 }
 
-/// A signal some samples later, straight between them; the first and the last value beyond its ends.
+/// Delays a signal by some samples, with straight lines between them; beyond its ends it has the first and the last value.
 fn delayed(signal: &[Complex], samples: f64) -> Vec<Complex> {
     let at = |k: f64| signal[(k.max(0.0) as usize).min(signal.len() - 1)];
     let late =
@@ -163,15 +163,15 @@ fn delayed(signal: &[Complex], samples: f64) -> Vec<Complex> {
     (0..signal.len()).map(|k| late(k as f64 - samples)).collect()
 }
 
-/// Samples whose straight connection has the integral of a smooth line through the given ones: a sine of 40 samples would
-/// otherwise be 0.2 % small.
+/// Returns samples whose straight connection has the integral of a smooth line through the given ones: otherwise a sine
+/// of 40 samples would be 0.2 % too small.
 fn curved(v: &[Complex]) -> Vec<Complex> {
     let mut curved = v.to_vec();
     (1..v.len() - 1).for_each(|k| curved[k] -= (v[k - 1] + v[k + 1] - v[k] * 2.0) / 12.0);
     curved
 }
 
-/// The machine of the settings, as the terminals show it.
+/// Returns the machine of the settings, as its terminals show it.
 fn settings(config: &Config) -> Parameters {
     let m = &config.motor;
     let (l_s, l_r) = (m.l_m + m.l_ls, m.l_m + m.l_lr);
@@ -179,7 +179,7 @@ fn settings(config: &Config) -> Parameters {
     Parameters { r_s: m.r_s, tau_r: l_r / m.r_r, sigma_l_s, l_s, omega_m: 0.0 }
 }
 
-/// The machine nearest to a record, from the best of all starts.
+/// Fits the machine to a record and returns the best of all starts.
 fn nearest_machine(
     record: &Record,
     start: &Parameters,
@@ -197,29 +197,29 @@ fn nearest_machine(
     nearest.unwrap_or(Err(NotIdentifiable::NotConverged))
 }
 
-/// Length of a current, rms.
+/// Returns the magnitude of a current, rms.
 pub(crate) fn rms(current: &[Complex]) -> f64 {
     (current.iter().map(Complex::norm_sqr).sum::<f64>() / current.len() as f64).sqrt()
 }
 
-/// Why a fit does not count, if it does not.
+/// Returns the reason why a fit does not count; none if it counts.
 fn fault(fit: &OutputErrorFit, current_a: f64) -> Option<String> {
     let [share, told] = [fit.residual_a, fit.told_a[1]].map(|a| 100.0 * a / current_a);
     let values = fit.parameters.array();
     let open = (0..4).find(|&n| fit.deviations[n] > OPEN * values[n]);
     match open {
         _ if share > 100.0 * OPEN => {
-            Some(format!("the nearest machine leaves {share:.0} % of the current"))
+            Some(format!("the best machine does not explain {share:.0} % of the current"))
         }
         _ if told < 100.0 * TOLD => Some(format!(
-            "no load: the slip is too small to tell the time constant of the rotor; were it twice as long, the current would change \
+            "no load: the slip is too small to determine the rotor time constant; if it were doubled, the current would change \
              by {told:.1} %, and {:.0} % are needed",
             100.0 * TOLD
         )),
         _ if !fit.converged => Some(NotIdentifiable::NotConverged.to_string()),
         Some(n) => {
             let (name, value, deviation) = (Parameters::NAMES[n], values[n], fit.deviations[n]);
-            Some(format!("it leaves {name} open: {value:.3e} ± {deviation:.1e}, SI units"))
+            Some(format!("it does not determine {name}: {value:.3e} ± {deviation:.1e}, SI units"))
         }
         None => None,
     }
@@ -229,8 +229,8 @@ fn fault(fit: &OutputErrorFit, current_a: f64) -> Option<String> {
 /// `i_beta_a` or `u_a_v`, `u_b_v`, `u_c_v`, `i_a_a`, `i_b_a`, `i_c_a`, of which phase c may be absent.
 ///
 /// # Errors
-/// [`Error::Data`] with the line; [`Error::Refused`] for a wrong mapping, and with the likely reason when the record does not
-/// determine the motor.
+/// [`Error::Data`] with the line; [`Error::Refused`] for a wrong mapping, and if the record does not determine the
+/// motor, with the likely reason.
 pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outcome, Error> {
     let (record, mut remarks) = read(path, reading, config)?;
     let refused = |why: String| {
@@ -238,7 +238,7 @@ pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outco
         Error::Refused(format!("{path}: the record does not determine the motor: {why}"))
     };
     let expected = settings(config);
-    // In electrical radians: an offset of the speed is no turning.
+    // In electrical radians: an offset of the speed does not count as rotation.
     let speed = (record.omega_m.iter().map(|w| w * w).sum::<f64>() / record.i.len() as f64).sqrt();
     if speed * record.h * (record.i.len() as f64) < TAU {
         let why = "the shaft does not turn; a locked rotor shows neither L_s nor the time constant at small slip";
@@ -258,16 +258,16 @@ pub fn identify(path: &Path, reading: &Reading, config: &Config) -> Result<Outco
     let pairs = f64::from(config.motor.pole_pairs);
     let read_as = [
         (60.0 / TAU, "rad/s"),
-        (60.0, "turns a second"),
+        (60.0, "turns per second"),
         (1.0 / pairs, "electrical"),
-        (-1.0, "of the other sense"),
+        (-1.0, "of opposite sign"),
     ];
     let other = read_as.iter().find(|(factor, _)| {
         let omega_m = record.omega_m.iter().map(|w| w * factor).collect();
         let other = Record { omega_m, ..record.clone() };
         nearest(&other).is_ok_and(|it| it.residual_a < NEARER * fit.residual_a)
     });
-    let hint = other.map(|(_, what)| format!("; the speed looks like {what}: so it fits"));
+    let hint = other.map(|(_, what)| format!("; the speed looks like {what}: then it fits"));
     Err(refused(why + &hint.unwrap_or_default()))
 }
 
@@ -285,12 +285,12 @@ fn outcome(
         ("rotor time constant τ_r", "tau_r", "s", p.tau_r, expected.tau_r, 1.0),
         ("transient inductance σL_s", "sigma_l_s", "mH", p.sigma_l_s, expected.sigma_l_s, 1e3),
         ("stator inductance L_s", "l_s", "mH", p.l_s, expected.l_s, 1e3),
-        ("drop of the inverter", "drop", "V", fit.drop_v, f64::NAN, 1.0),
+        ("inverter voltage error", "drop", "V", fit.drop_v, f64::NAN, 1.0),
     ];
     let share = fit.residual_a / rms(&record.i);
     let mut table = Table::new("Identified motor", &[]).note(format!(
-        "{} rows of {:.1} µs. ±: standard deviation between parts of the record; a false scale of voltage, current or speed is \
-         not in it. Residual: {:.1} % of the current. Settings: {}.",
+        "{} rows of {:.1} µs. ±: standard deviation between parts of the record; errors of the scale of voltage, current or speed are \
+         not included. Residual: {:.1} % of the current. Settings: {}.",
         record.i.len(),
         1e6 * record.h,
         100.0 * share,
@@ -324,11 +324,11 @@ fn outcome(
     let apart = Panel::new("time (s)", "difference (A)")
         .with(Series::line("α", line(&|k| difference(k).re)))
         .with(Series::line("β", line(&|k| difference(k).im)));
-    let title = "Recorded current, and that of the identified motor";
+    let title = "Recorded current, and current of the identified motor";
     outcome.figures.push(Figure::new("trace", title, "").panel(current).panel(apart));
     if share > REMARKED {
         outcome.remark(
-            "The residual is large: harmonics, a leakage that saturates, or a false scale.",
+            "The residual is large: harmonics, saturating leakage inductances, or a wrong scale.",
         );
     }
     outcome.remark(

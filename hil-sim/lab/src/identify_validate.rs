@@ -1,5 +1,5 @@
-//! Measured against simulated current, with estimated and with classical parameters: Figure 5 and
-//! Tables 6 and 7 of Jacobina, Lima, Ribeiro 1996.
+//! Measured against simulated current, with estimated and with classical parameters: Figure 5 and Tables 6 and 7 of
+//! Jacobina, Lima, Ribeiro 1996.
 
 use crate::identification::printed::Case;
 use crate::identification::study::errors;
@@ -15,10 +15,10 @@ pub const EXPERIMENT: Experiment = Experiment::new("identify-validate", run)
     );
 
 const H: f64 = 50e-6;
-/// Noise of a real converter: a tenth of that of section 5.
+/// Noise as with a real ADC: a tenth of the noise of section 5.
 const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
-/// A printed row of a table.
+/// Returns a printed row of a table.
 fn printed(table: &str, row: &str) -> Parameters {
     let of = |name| source::number("S0", &format!("{table}, {row}"), name);
     Parameters::of(Parameters::NAMES.map(of))
@@ -39,7 +39,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 Compared::with("S0", format!("{table}, {row}"), name).unknown("what was measured")
             });
             outcome.compared.extend(sg[k].ok().map(|value| of_sg.simulated(value)));
-            // The simulated machine itself.
+            // The values of the simulated machine itself.
             outcome.compared.push(of_ss);
             if k < 4 {
                 let place = Compared::with("S0", format!("{table}, rbv"), name);
@@ -66,7 +66,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         named("sg_close_to_ss").simulated(apart(six_step[0], both[0]) < 0.1),
         named("r_s_far_from_classical").simulated(apart(six_step[1], of_rbv[1]) > 0.3),
     ]);
-    // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
+    // Error of tau_r on such a machine with the printed noise, which is ten times that of a real ADC.
     let [sg, ss] = Signal::ALL.map(|signal| {
         let case = Case { speed: 375.0, signal, period: 0 };
         errors(Parameters::RBV, case, Noise::PRINTED, context.seed, 7).continuous[1][1]
@@ -74,8 +74,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("tau_r_error_of_rbv_sg_printed_noise_pct", sg);
     outcome.metrics.set("tau_r_error_of_rbv_ss_printed_noise_pct", ss);
     outcome.remark(
-        "What was measured is not printed, so the simulated machine is that of the printed estimate with S_s at the measured \
-         speed, and the estimate with S_g says how far Model C gets back to it, at a tenth of the noise of section 5.",
+        "The measured data are not printed. The simulated machine is therefore the printed estimate with S_s at the measured \
+         speed, and the estimate with S_g shows how closely Model C finds it again, at a tenth of the noise of section 5.",
     );
     outcome.remarks.push(format!(
         "The paper does not discuss that τ_r by Model C (0.0114 s at 60 Hz, 0.021 s at 10 Hz) is \
@@ -88,7 +88,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// Current of the d axis: the machine, and simulated with the same voltage and speed.
+/// Current of the d axis: of the machine, and simulated with the same voltage and speed.
 fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome) {
     let current = |p: &Parameters| -> Vec<Complex64> {
         let trial = Trial::printed(*p, Signal::SixStep, H, Noise::NONE);

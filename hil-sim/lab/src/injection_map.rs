@@ -8,14 +8,14 @@ pub(super) const PP: f64 = 0.944_061;
 /// Figure 19.
 pub const EXPERIMENT: Experiment = Experiment::new("injection-map", run)
     .stands_for("Figure 19, Figure 18")
-    .about("Current difference over the injection angle, with the encoder: what each demodulator sees.")
+    .about("Current difference over the injection angle, with the encoder: the signal of each demodulator.")
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
 
 const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// Step of phi2 - theta, degrees.
 const STEP_DEG: i32 = 15;
-/// Time for the filters to settle at each angle, and to average, s.
+/// Time for the filters to settle at each angle, s; the averaging takes the same time.
 const SETTLE_S: f64 = 0.08;
 const AVERAGE_S: f64 = 0.05;
 
@@ -48,7 +48,7 @@ const VARIANTS: [Variant; 7] = [
     Variant { name: "rectified_isotropic_delayed", title: "Rectified, delay left in, motor without saliency", saliency: false, compensate: false, ..RECTIFIED },
 ];
 
-/// delta_i in mA (of the synchronous demodulation: thousandths) over phi2 - theta in degrees.
+/// delta_i in mA (with the synchronous demodulation: thousandths) over phi2 - theta in degrees.
 pub(super) type Curve = Vec<(f64, f64)>;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -77,7 +77,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let same =
         Stats::of(isotropic.iter().flatten().zip(silent.iter().flatten()).map(|(a, b)| a.1 - b.1));
     outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
-    // The curves of the printed chain meet at ±90° and are zero at the arc tangent, on a motor without saliency.
+    // On a motor without saliency, the curves of the printed chain meet at ±90° and are zero at the arc tangent.
     let id = f64::from(context.config.drive.i_d());
     let at_90 =
         |degrees: f64| Stats::of(isotropic[1..].iter().map(|curve| at(curve, degrees).abs()));
@@ -90,7 +90,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         Stats::of(isotropic[1..].iter().map(off)).largest()
     };
     let meets = |degrees: f64| if spread(degrees) < 0.05 { degrees } else { f64::NAN };
-    // LPF as printed makes the currents larger than their references by as much as PP takes away.
+    // LPF as printed makes the currents larger than their references by the factor by which PP reduces the signal.
     let leak = meet[1] / PP;
     outcome.compared.extend([
         named("zero_without_iq").simulated(zero(&isotropic[0])),
@@ -107,8 +107,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
          zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \
-         fundamental current leaking through the 40 dB of the band-pass at dc, which says nothing \
-         about the flux. The rectified chain sees the saliency.",
+         fundamental current leaking through the 40 dB of the band-pass at dc, without information \
+         about the flux. The rectified chain measures the saliency.",
         "The rectified chain, its delay compensated, gives about the same current difference at \
          ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
          the delay of the band-pass (8.83 samples) left in, 2.4 mA per ampere are added by the slip \
@@ -117,19 +117,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// A family of curves, one a torque current, A.
+/// Draws a family of curves, one for each q-axis current, A.
 pub(super) fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
     let line = |(iq, curve): (&f64, &Curve)| Series::line(format!("iq = {iq} A"), curve.clone());
     iq_a.iter().zip(family).map(line).fold(Panel::new("φ̂₂ − θ (° electrical)", y), Panel::with)
 }
 
-/// Makes the motor one without saliency.
+/// Removes the saliency of the motor.
 pub(super) fn take_saliency(config: &mut Config) {
     (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, Some(0.0), 0.0);
 }
 
-/// Sweeps the injection angle with the encoder as angle source and the shaft locked. Where the carrier
-/// belongs along the flux, theta is counted from 90° ahead of it.
+/// Sweeps the injection angle with the encoder as angle source and the shaft locked. If the injection belongs along the
+/// flux, theta is counted from 90° ahead of the flux.
 pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
     let mut config = config.clone();
     config.drive.injection.demodulator = variant.demodulator;
@@ -158,7 +158,7 @@ fn at(curve: &Curve, x: f64) -> f64 {
     a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)
 }
 
-/// Where the curve goes through zero between -90° and 90°, upwards or downwards.
+/// Returns the angle between -90° and 90° at which the curve crosses zero in either direction.
 fn zero(curve: &Curve) -> f64 {
     curve
         .windows(2)
@@ -167,8 +167,8 @@ fn zero(curve: &Curve) -> f64 {
         .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
 }
 
-/// The printed chain on the motor without saliency beside the predicted leakage, and the rectified
-/// chain on the motor with saliency.
+/// Makes the table of the printed chain on the motor without saliency beside the predicted leakage, and of the
+/// rectified chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
     let mut table = Table::new("What Figure 19 shows", &[]).note(
         "The leak predicts Δi = −√2 · 0.01 · 0.944 · |i| · sin(φ̂₂ − θ + γ), γ \

@@ -1,4 +1,4 @@
-//! The drive learns the reference of its angle tracking.
+//! Saliency self-commissioning of the drive.
 
 use drive_core::learned::Fitted;
 use sim_bench::learning;
@@ -8,7 +8,7 @@ use crate::prelude::*;
 /// Section 5.2 asks for a detection that works at every operating point.
 pub const EXPERIMENT: Experiment = Experiment::new("learn-reference", run)
     .stands_for("section 3.3, section 5.2")
-    .about("The drive learns reference, sensor mismatch and saliency with the shaft locked.")
+    .about("The drive learns saliency offset, sensor mismatch and saliency with the shaft locked.")
     .uses(&[BENCH, DRIVE])
     .not(&[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]]);
 
@@ -28,8 +28,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("carrier ratio", Cell::fixed(ratio, 5)),
         ]
     });
-    outcome.tables.push(Table::new("Over the torque current", &[]).records(rows).note(
-        "What the carrier shows at the right angle, odd in iq; the carrier current, as a ratio to that at 0 A, even.",
+    outcome.tables.push(Table::new("Over the q-axis current", &[]).records(rows).note(
+        "Saliency offset at the right angle, odd in iq; injection current relative to its value at 0 A, even.",
     ));
     let row = |name: &str, value: f32, decimals, misfit: Cell, used: bool| {
         let used = Cell::from(if used { "yes" } else { "no" });
@@ -44,7 +44,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         row("saliency fixed to the flux", learned.flux_saliency, 4, "".into(), false),
     ];
     outcome.tables.push(Table::new("Other values", &[]).records(rows).note(
-        "The saliency fixed to the flux is what the check at the start saw, within 5 %; it is for \
+        "The saliency fixed to the flux agrees with the check at the start within 5 %; it is for \
          the reader.",
     ));
 
@@ -60,7 +60,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("current_saliency_misfit", learned.current_saliency.misfit.into());
     m.set("flux_saliency", learned.flux_saliency.into());
     let panel = Panel::new("quadrature current (A)", "q").with(Series::line("learned", points));
-    let figure = Figure::new("reference", "Reference over the torque current", "section 3.3");
+    let figure = Figure::new("reference", "Saliency offset over the q-axis current", "section 3.3");
     outcome.figures.push(figure.panel(panel));
     outcome.remarks = assumptions(context.config);
     Ok(outcome)

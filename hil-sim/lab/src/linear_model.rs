@@ -1,8 +1,8 @@
-//! The linear model of sensorless tracking: how far the flux angle is off after a small disturbance.
+//! The linear model of sensorless tracking, which predicts the error of the flux angle after a small disturbance.
 //!
-//! Everything that turns the angle is linearised about an operating point `i_d, i_q` and stepped at
-//! the control rate. Deviations, with `e` true minus estimated flux angle in rad, `w` electrical rotor
-//! speed, `m` magnetising current (rotor flux over L_m):
+//! Everything that affects the angle is linearised about an operating point `i_d, i_q` and stepped at the control rate.
+//! The variables are deviations, with `e` true minus estimated flux angle in rad, `w` electrical rotor speed, `m`
+//! magnetising current (rotor flux over L_m):
 //!
 //! ```text
 //! currents in the flux frame   i_d' = i_q e             i_q' = di_q - i_d e
@@ -14,8 +14,8 @@
 //! angle                        de/dt = w + slip - w_i - s_ff - (2 + c) w_n g x
 //! ```
 //!
-//! The current loop is the drive's: PI, filter, one period of delay, plant of first order. The speed
-//! loop, where there is one, uses the mean of `w_i + (2 + c) w_n g x` over its period.
+//! The current loop is the drive's: PI, filter, one period of delay, plant of first order. The speed loop, if there is
+//! one, uses the mean of `w_i + (2 + c) w_n g x` over its period.
 
 use drive_core::filter::{LPF, LpfState};
 use drive_core::flux::GainSchedule;
@@ -27,9 +27,9 @@ use crate::prelude::*;
 /// A disturbance at time zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Disturbance {
-    /// Reference of the torque current, by this much, A; the shaft is locked.
+    /// Step of the q-axis current reference, A; the shaft is locked.
     TorqueCurrent(f64),
-    /// Load, by this much, Nm; the drive regulates the speed.
+    /// Step of the load, Nm; the drive regulates the speed.
     Load(f64),
 }
 
@@ -38,9 +38,9 @@ pub enum Disturbance {
 pub struct LinearModel {
     i_d: f64,
     i_q: f64,
-    /// True and believed rotor time constant, s.
+    /// Rotor time constant: true, and as assumed by the drive, s.
     t_r: [f64; 2],
-    /// 3/2 P Lm^2/Lr, Nm per square ampere.
+    /// Torque constant 3/2 P Lm^2/Lr, Nm per square ampere.
     torque: f64,
     mechanics: MechanicsSettings,
     pole_pairs: f64,
@@ -49,7 +49,7 @@ pub struct LinearModel {
     speed: MotionDesign,
     /// Natural frequency of the tracking loop, rad/s.
     w_n: f64,
-    /// Apparent angle error per difference of the torque current, rad/A.
+    /// Apparent angle error per difference of the q-axis current, rad/A.
     apparent_angle: f64,
 }
 
@@ -63,10 +63,10 @@ pub struct LinearResponse {
 }
 
 impl LinearModel {
-    /// About the torque current `i_q`, for a drive with these settings on this machine.
+    /// Makes the model about the q-axis current `i_q`, for a drive with these settings on this machine.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the drive or the design refuses the settings.
+    /// [`Error::Refused`] if the drive or the design refuses the settings.
     pub fn new(
         machine: &MachineSettings,
         mechanics: &MechanicsSettings,
@@ -99,7 +99,7 @@ impl LinearModel {
         })
     }
 
-    /// The response to a disturbance over some seconds.
+    /// Computes the response to a disturbance over some seconds.
     pub fn response(&self, disturbance: Disturbance, seconds: f64) -> LinearResponse {
         let t = f64::from(PERIOD_S);
         let (i_d, i_q, [t_r, believed_t_r]) = (self.i_d, self.i_q, self.t_r);
@@ -119,7 +119,7 @@ impl LinearModel {
             response.angle_deg.push(e * 360.0 / TAU);
             response.speed_rpm.push(w * 60.0 / TAU / self.pole_pairs);
             if free && k % divider == 0 {
-                // turns/s, like the controller
+                // in turns/s, as in the controller
                 let now = match self.speed.source {
                     SpeedSource::Estimate { .. } => rotor,
                     _ => moved / self.speed.gains.period_s,
@@ -164,7 +164,7 @@ impl LinearModel {
     }
 }
 
-/// Mean of the last 20 samples.
+/// Moving mean over the last 20 samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct MovingAverage {
     ring: [f64; 20],

@@ -1,4 +1,4 @@
-//! Simulated motors beside motors that others have measured: a load test, a saturation curve, a direct start.
+//! Comparison of simulated motors with motors that others have measured: a load test, a saturation curve, a direct start.
 
 use std::f64::consts::SQRT_2;
 
@@ -13,7 +13,7 @@ use crate::saliency::steady::at_voltage;
 pub const EXPERIMENT: Experiment = Experiment::new("measured-motors", run)
     .about("Simulated motors beside measured ones: load test of an 18.5 kW, saturation curve of a 2.2 kW, direct start of a 4 kW motor.");
 
-/// The linear circuit of the same motor, from its locked rotor and its current without load; its inertia fits the start, too.
+/// The linear circuit of the same motor, from its locked-rotor test and its no-load current; its inertia is fitted to the start as well.
 const CIRCUIT: [(&str, f64); 6] = [
     ("motor.r_r", 1.287),
     ("motor.l_ls", 0.00824),
@@ -22,14 +22,15 @@ const CIRCUIT: [(&str, f64); 6] = [
     ("motor.inertia", 0.028),
     ("iron.skin_ratio", 1.0),
 ];
-/// What is known of the record: torque of the load step, Nm; voltage of the locked rotor, V peak.
+/// Known values of the record: torque of the load step, Nm; voltage of the locked-rotor test, V peak.
 const LABORATORY: (f64, f64) = (29.03, 72.2);
 
-/// Stray load loss of the 18.5 kW motor at the rated point, W, and that point: line current, A rms, and speed, rad/s (the file
-/// of the load test: 0.5 % of the input). It goes with the square of the current, from the shaft. The plant does not have it.
+/// Stray load loss of the 18.5 kW motor at the rated point, W, and that point: line current, A rms, and speed, rad/s
+/// (from the file of the load test: 0.5 % of the input). The loss is proportional to the square of the current and
+/// reduces the shaft power. The plant does not model it.
 const STRAY: (f64, f64, f64) = (102.2, 32.85, 153.15);
 
-/// A point of the load test, at the supply of the nameplate.
+/// A point of the load test, at the supply voltage and frequency of the nameplate.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct LoadPoint {
     /// Power at the shaft, W.
@@ -44,10 +45,10 @@ pub struct LoadPoint {
     pub efficiency: f64,
 }
 
-/// The measured points of the 18.5 kW motor.
+/// Returns the measured points of the 18.5 kW motor.
 ///
 /// # Errors
-/// [`Error::Internal`] when the table that comes with the program is broken.
+/// [`Error::Internal`] if the table that comes with the program is damaged.
 pub fn measured() -> Result<Vec<LoadPoint>, Error> {
     let load_test = motors::measured("modelica-18kw5.csv")?;
     let mut reader =
@@ -55,7 +56,7 @@ pub fn measured() -> Result<Vec<LoadPoint>, Error> {
     reader.deserialize().map(|row| row.map_err(|e| Error::Internal(e.to_string()))).collect()
 }
 
-/// A motor at its supply, in the steady state.
+/// A motor at its supply, in steady state.
 struct Supplied {
     machine: EnergyMachine,
     shaft: MechanicsSettings,
@@ -80,16 +81,16 @@ impl Supplied {
         })
     }
 
-    /// State at the electrical speed `w`, rad/s.
+    /// Returns the state at the electrical speed `w`, rad/s.
     fn state(&self, w: f64) -> Result<EnergyState, Error> {
-        // The stator flux of an ideal winding, and as much in the rotor.
+        // The stator flux of an ideal winding, and the same flux in the rotor.
         let flux = Complex64::new(0.0, -0.97 * self.v / self.w_s);
         let mut start = EnergyState::of_fluxes([flux; 4]);
         self.machine.settle(&mut start);
         at_voltage(&self.machine, self.v.into(), (self.w_s, w), &start)
     }
 
-    /// The point at the electrical speed `w`, rad/s.
+    /// Returns the point at the electrical speed `w`, rad/s.
     fn point(&self, w: f64) -> Result<LoadPoint, Error> {
         let x = self.state(w)?;
         let (i, speed) = (x.current(), w / self.machine.pole_pairs());
@@ -106,7 +107,8 @@ impl Supplied {
         })
     }
 
-    /// The point at which a quantity that the slip raises has this value, between 90 % and all of the synchronous speed.
+    /// Returns the point at which a quantity that increases with the slip has this value, between 90 % and 100 % of the
+    /// synchronous speed.
     fn at(&self, value: f64, of: impl Fn(&LoadPoint) -> f64) -> Result<LoadPoint, Error> {
         let (mut slow, mut fast) = (0.9 * self.w_s, self.w_s);
         for _ in 0..50 {
@@ -129,11 +131,11 @@ impl Supplied {
     }
 }
 
-/// Peak of the start, A; slip at the torque of the load step, rpm; currents without load and of the locked rotor, A peak; of the
-/// motor of the laboratory record, or of its linear circuit.
+/// Returns the peak current of the start, A; the slip at the torque of the load step, rpm; and the no-load and
+/// locked-rotor currents, A peak. They are of the motor of the laboratory record, or of its linear circuit.
 ///
 /// # Errors
-/// As those of the steady state.
+/// As with the steady state.
 pub fn started(linear: bool) -> Result<[f64; 4], Error> {
     let mut config = config("dissertation", "laboratory-4kw.toml")?;
     if linear {
@@ -153,20 +155,20 @@ fn config(motor: &str, iron: &str) -> Result<Config, Error> {
     Ok(config)
 }
 
-/// The simulated 18.5 kW motor at the powers of the measured points.
+/// Simulates the 18.5 kW motor at the powers of the measured points.
 ///
 /// # Errors
-/// As those of the steady state.
+/// As with the steady state.
 pub fn simulated(measured: &[LoadPoint]) -> Result<Vec<LoadPoint>, Error> {
     let mut motor = Supplied::new(&config("modelica-18kw5", "modelica-18kw5.toml")?)?;
     motor.stray_w = STRAY.0;
     measured.iter().map(|point| motor.at(point.power_w, |p| p.power_w)).collect()
 }
 
-/// Stator flux, Wb, and no-load current, A peak, of the 2.2 kW motor at 50 Hz and a voltage between lines, V rms.
+/// Returns the stator flux, Wb, and the no-load current, A peak, of the 2.2 kW motor at 50 Hz and a line-to-line voltage, V rms.
 ///
 /// # Errors
-/// As those of the steady state.
+/// As with the steady state.
 pub fn no_load(voltage_v: f64) -> Result<(f64, f64), Error> {
     let mut motor = Supplied::new(&config("motulator-2kw2", "motulator-2kw2.toml")?)?;
     motor.v = voltage_v * (2.0_f64 / 3.0).sqrt();
@@ -174,7 +176,7 @@ pub fn no_load(voltage_v: f64) -> Result<(f64, f64), Error> {
     Ok((x.psi_s.norm(), x.current().norm()))
 }
 
-/// The published curve: current, A peak, at a stator flux, Wb.
+/// Returns the published curve: current, A peak, at a stator flux, Wb.
 pub fn published(psi: f64) -> f64 {
     psi * (1.0 + (0.84 * psi).powi(7)) / 0.34
 }

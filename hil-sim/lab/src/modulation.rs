@@ -1,4 +1,4 @@
-//! Space-vector modulation, and the amplitude modulation that carries the angle.
+//! Space-vector modulation, and the amplitude modulation that contains the angle.
 
 mod carrier;
 
@@ -14,11 +14,11 @@ pub const EXPERIMENT: Experiment = Experiment::new("modulation", run)
     .stands_for("Figures 4, 5, 11, Table 2")
     .about(
         "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
-            spectrum of the current difference, an amplitude modulation of the carrier.",
+            spectrum of the current difference, an amplitude modulation of the injection.",
     )
     .uses(&[&["inverter.dc_link_v"]]);
 
-/// The modulator of the drive on this dc link.
+/// The modulator of the drive at this dc-link voltage.
 struct Inverter {
     modulator: Modulator,
     top: f64,
@@ -31,7 +31,7 @@ impl Inverter {
         modulated.duties.map(|duty| (f64::from(duty) * self.top).round())
     }
 
-    /// Mean voltage at the motor for these compare values, V.
+    /// Returns the mean voltage at the motor for these compare values, V.
     fn voltage(&self, compare: [f64; 3]) -> (f64, f64) {
         clarke(compare.map(|c| c / self.top * self.vdc))
     }
@@ -62,7 +62,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// Figure 4, and where the modulator puts voltages that are too long.
+/// Draws Figure 4, and the output of the modulator for voltages that are too large.
 fn vectors(inverter: &Inverter) -> Figure {
     let around = |n: u32, at: &dyn Fn(f64) -> (f64, f64)| -> Vec<(f64, f64)> {
         (0..=n).map(|k| at(f64::from(k) * TAU / f64::from(n))).collect()
@@ -82,11 +82,11 @@ fn vectors(inverter: &Inverter) -> Figure {
         .with(Series::limit("largest circle", around(360, &on(inner))))
         .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
         .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));
-    let title = "Voltage vectors of the inverter, and what the modulator makes of two circles";
+    let title = "Voltage vectors of the inverter, and the output of the modulator for two circles";
     Figure::new("vectors", title, "Figure 4").panel(panel)
 }
 
-/// Figure 5 at 20° and half of the largest circle.
+/// Draws Figure 5 at 20° and half of the largest circle.
 fn sequence(inverter: &Inverter) -> Figure {
     let wanted = vector(0.5 * inverter.vdc / 3.0_f64.sqrt(), 20.0_f64.to_radians());
     let compare = inverter.compare(wanted);
@@ -104,7 +104,7 @@ fn sequence(inverter: &Inverter) -> Figure {
     Figure::new("sequence", title, "Figure 5").panel(panel.y_range(-0.2, 4.2))
 }
 
-/// On-times of the two vectors beside a voltage in the first sector to Table 2, over the period.
+/// On-times of the two vectors adjacent to a voltage in the first sector, by Table 2, divided by the period.
 fn on_times(wanted: (f64, f64), vdc: f64) -> (f64, f64) {
     let second = wanted.1 * 3.0_f64.sqrt() / vdc;
     (1.5 * wanted.0 / vdc - 0.5 * second, second)

@@ -1,4 +1,4 @@
-//! The tests that gave Table 5, on the simulated motor.
+//! The tests that led to Table 5, on the simulated motor.
 
 use crate::identification::bench_tests::{Readings, Shaft, measure};
 use crate::prelude::*;
@@ -47,7 +47,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let bias = readings.as_printed().rr / plant.machine.rr;
     outcome.remarks.extend([
         format!(
-            "The locked-rotor test as section 3.6.2 reads it leaves out the magnetising branch, which \
+            "The locked-rotor test as section 3.6.2 evaluates it neglects the magnetising branch, which \
              at 15 Hz takes part of the current: it gives r_r (L_m/L_r)² and less leakage, here {bias:.2} \
              of r_r. If the printed readings are right, the motor of the source has r_r = {:.2} Ω and \
              not 1.1.",
@@ -55,7 +55,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ),
         format!(
             "37.9 V are a sixth of the rated voltage. There the friction assumed here ({} N m s/rad) \
-             makes a rotor that is not driven slip: {:.3} A instead of {:.3} A, and L_m {:.0} % low. The \
+             causes slip if the rotor is not driven: {:.3} A instead of {:.3} A, and L_m {:.0} % low. The \
              test above is with the shaft driven at synchronous speed.",
             plant.mechanics.friction,
             free.no_load.2,

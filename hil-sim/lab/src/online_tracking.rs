@@ -1,4 +1,4 @@
-//! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
+//! Estimation of rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use rotor_id::online::RotorEstimate;
 use crate::prelude::*;
 use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 
-/// Not in the sources: the recursive estimate in use.
+/// Not in the sources: the recursive estimate in operation.
 pub const EXPERIMENT: Experiment = Experiment::new("online-tracking", run)
     .stands_for("Jacobina 1996, on the drive")
     .about(
@@ -17,30 +17,30 @@ pub const EXPERIMENT: Experiment = Experiment::new("online-tracking", run)
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source", "inverter.residual_v"]]);
 
-/// Begin and end of the warming, s, and the relative growth of r_r. Fast: a motor takes minutes.
+/// Beginning and end of the warming, s, and the relative increase of r_r. This is fast: a motor takes minutes.
 const WARMING: (f64, f64, f64) = (4.0, 10.0, 0.3);
 const SECONDS: f64 = 18.0;
-/// From here on the estimate has settled again, s.
+/// Time after which the estimate has settled again, s.
 const SETTLED: f64 = 15.0;
-/// Speed (rpm) and torque current (A).
+/// Speed (rpm) and q-axis current (A).
 #[rustfmt::skip] // pairs, side by side
 const POINTS: [(f64, f64); 9] = [
     (0.0, 1.0), (0.0, 2.0), (30.0, 1.0), (150.0, 0.5), (150.0, 2.0), (150.0, 3.0), (-150.0, 2.0), (300.0, -1.0), (600.0, 1.0),
 ];
 const SENSORLESS: [(f64, f64); 4] = [(0.0, 2.0), (150.0, 1.0), (150.0, 2.0), (300.0, 1.0)];
-/// Movement of the magnetising current without an encoder, A and Hz.
+/// Variation of the magnetising current without an encoder, A and Hz.
 const EXCITATION: (f64, f64) = (0.1, 2.0);
-/// Shares of the dead time's voltage that stay uncompensated.
+/// Shares of the dead-time voltage that remain uncompensated.
 const RESIDUALS: [f64; 3] = [0.0, 0.2, 0.5];
 
-/// The dead time's voltage: 2.2 us of 6 kHz of the dc link.
+/// The dead-time voltage: 2.2 us at 6 kHz of the dc link.
 fn residual(config: &Config, share: f64) -> f64 {
     share * config.inverter.dc_link_v * config.inverter.dead_time_s * 6e3
 }
 
 /// Means over the end of a run.
 struct FinalMeans {
-    /// Mean error of tau_r (%) and of the speed (rad/s), and how often there was an estimate (%).
+    /// Mean error of tau_r (%) and of the speed (rad/s), and the share of the time with an estimate (%).
     tau_r: Option<f64>,
     speed: Option<f64>,
     valid: f64,
@@ -68,7 +68,7 @@ fn ending(moments: &[WarmingMoment]) -> FinalMeans {
     }
 }
 
-/// One run to make: source, point, excitation, residual, whether the drive uses it.
+/// A run to be done: source, point, excitation, residual, and whether the drive uses the estimate.
 type Job = (AngleSource, (f64, f64), (f64, f64), f64, bool);
 
 fn jobs() -> Vec<Job> {
@@ -94,7 +94,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;
         let mut config = context.config.clone();
         config.drive.angle_source = source;
-        // The monitor knows one direct current: with it the drive refuses the steps of another.
+        // The monitor knows only one magnetising current: with it the drive would refuse to change that current.
         config.drive.injection.synchronous.monitor = false;
         config.inverter.residual_v = Some(residual(&config, share));
         let (warming, seconds) = (WARMING, SECONDS);
@@ -167,12 +167,12 @@ fn without(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     let speed = most(endings, 0..3, |e| e.speed.unwrap_or(100.0));
     metrics.set("sensorless_tau_r_error_max_pct", tau_r);
     metrics.set("sensorless_speed_error_max_rad_s", speed);
-    // The last of the four is the one that was not moved.
+    // The last of the four runs is the one without variation.
     metrics.set("sensorless_not_moved_valid_max_pct", most(endings, 3..4, |e| e.valid));
     table
 }
 
-/// An estimate beside the motor's own value.
+/// Draws an estimate beside the true value.
 fn traced(
     label: &str,
     moments: &[WarmingMoment],
@@ -211,19 +211,19 @@ fn speed_figure(moments: &[WarmingMoment]) -> Figure {
 fn remarks(config: &Config) -> Vec<String> {
     vec![
         format!(
-            "The voltage is the one the drive put out, reconstructed from its own compare values. Of \
-             the dead time ({:.1} V) what is not compensated acts like a resistance, and the stator \
-             resistance is estimated beside τ_r to take it up; held fixed, 20 % of the dead time \
-             left puts 10 % on τ_r at 2 A (measured on a motor without saliency).",
+            "The voltage is the output of the drive, reconstructed from its own compare values. The uncompensated \
+             part of the dead time ({:.1} V) acts like a resistance, and the stator \
+             resistance is estimated together with τ_r to absorb it; if it is fixed, 20 % of the dead time \
+             left cause an error of 10 % of τ_r at 2 A (measured on a motor without saliency).",
             residual(config, 1.0)
         ),
         "Model D, the inverse of all four complex coefficients, is of no use here: two or three \
          sinusoids do not fix them, and even without noise it missed the speed by a factor of two. The machine is fitted \
          to the coefficients instead, weighted by their covariance."
             .to_owned(),
-        "Without a sensor a flux that stands still shows the slip alone, not speed and rotor \
-         resistance apart. The estimate says so. The speed of the injection's tracking loop does not \
-         help: the believed slip is in it. Moving the magnetising current by ±0.1 A costs about 2° of \
+        "Without a sensor a constant flux shows only the slip, not speed and rotor \
+         resistance separately. The estimate reports this. The speed of the injection's tracking loop does not \
+         help, because it contains the assumed slip. Varying the magnetising current by ±0.1 A costs about 2° of \
          angle error while it lasts."
             .to_owned(),
     ]

@@ -1,19 +1,18 @@
-//! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
-//! and predicted.
+//! Perturbation analysis: the angle error after steps of the load and of the q-axis current, measured and predicted.
 
 use crate::linear_model::{Disturbance, LinearModel, LinearResponse};
 use crate::prelude::*;
 
-/// Section 5.2 names it as work to be done.
+/// Section 5.2 lists it as future work.
 pub const EXPERIMENT: Experiment = Experiment::new("perturbation", run)
     .stands_for("section 5.2")
     .about("Angle error after load and current steps, measured and by the linear model.")
     .uses(&[BENCH, DRIVE, &["prepare.learn"]])
     .not(&[&["angle_source"]]);
 
-/// Seeds over which the measured response is averaged; a fifth of the noise remains.
+/// Number of seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;
-/// Time before the step from which on it is compared, and after it, s.
+/// Time before the step that is included in the comparison, and time after it, s.
 const BEFORE_S: f64 = 0.5;
 const AFTER_S: f64 = 1.5;
 
@@ -22,9 +21,9 @@ const AFTER_S: f64 = 1.5;
 struct StepCase {
     name: &'static str,
     disturbance: Disturbance,
-    /// Speed reference, rpm, or torque current before the step, A.
+    /// Speed reference, rpm, or q-axis current before the step, A.
     from: f64,
-    /// True rotor resistance over the one the drive believes.
+    /// True rotor resistance divided by the one the drive assumes.
     warmer: f64,
 }
 
@@ -33,7 +32,7 @@ impl StepCase {
         matches!(self.disturbance, Disturbance::Load(_))
     }
 
-    /// The case in proportion to the motor and the pole pairs of a configuration.
+    /// Scales the case to the motor and the pole pairs of a configuration.
     fn scaled(self, config: &Config) -> Self {
         let (disturbance, from) = match self.disturbance {
             Disturbance::Load(nm) => {
@@ -69,10 +68,10 @@ const CASES: [StepCase; 8] = [
 /// Measured and predicted response of a case.
 struct StepResponse {
     case: StepCase,
-    /// Mean over the seeds, less the mean before the step.
+    /// Mean over the seeds, minus the mean before the step.
     angle: Vec<f64>,
     speed: Vec<f64>,
-    /// Largest single error, noise and all.
+    /// Largest single error, including noise.
     largest: f64,
     lost: usize,
     predicted: LinearResponse,
@@ -89,7 +88,7 @@ fn peak(of: &[f64]) -> f64 {
     of.iter().copied().fold(0.0, |most, x| if x.abs() > f64::abs(most) { x } else { most })
 }
 
-/// The configuration of a case: the drive believes the resistance that the experiment was given.
+/// Makes the configuration of a case: the drive assumes the resistance of the experiment's own configuration.
 fn configured(config: &Config, case: &StepCase) -> Config {
     let mut config = config.clone();
     config.motor.r_r *= case.warmer;
@@ -99,7 +98,7 @@ fn configured(config: &Config, case: &StepCase) -> Config {
     config
 }
 
-/// Angle error and speed from the step on; the first value is the mean before it.
+/// Returns angle error and speed from the step on; the first value is the mean before the step.
 fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
     let reference = |value: f64| match case.disturbance {
         Disturbance::Load(_) => Command::Speed(value as f32),
@@ -125,7 +124,7 @@ fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f6
 fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, Error> {
     let config = configured(config, &case);
     let (plant, drive) = (plant_settings(&config), config.drive);
-    // Where the drive ends up: there it is for most of the response.
+    // The final state of the drive, which applies to most of the response.
     let i_q = match case.disturbance {
         Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.i_d())),
         Disturbance::TorqueCurrent(by) => case.from + by,
@@ -161,8 +160,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
     let mut table = Table::new(title, &[]).note(
         "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \
-         taken away, but not from the largest single error, which has \
-         noise and bias in it.",
+         subtracted, but not from the largest single error, which contains \
+         noise and bias.",
     );
     let is_load = |m: &&StepResponse| m.case.is_load();
     for m in &results {
@@ -217,8 +216,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks = assumptions(context.config);
     outcome.remark(
         "The model is linear about the operating point after the step: tracking loop with its \
-         averages, slip fed forward, current loop, rotor flux, shaft and speed loop. What it leaves \
-         out is the way there: gain, slope of the saliency and flux at other currents.",
+         averages, slip fed forward, current loop, rotor flux, shaft and speed loop. It neglects \
+         the transition: gain, saliency sensitivity and flux at other currents.",
     );
     Ok(outcome)
 }

@@ -1,5 +1,4 @@
-//! The design of the current controllers in the w plane, and its margins with everything that is
-//! really in the loop.
+//! The design of the current controllers in the w plane, and its margins with all parts of the actual loop.
 
 use drive_core::filter::{BPF, LPF};
 use drive_settings::tuning::{
@@ -19,7 +18,7 @@ pub const EXPERIMENT: Experiment = Experiment::new("pi-design", run)
     .uses(&[&["motor.", "drive.motor."]])
     .not(&[TURNING, &["drive.motor.inertia"]]);
 
-/// The identified plants: where they are printed, the name in the tables and the one of the metrics.
+/// The identified plants: the place where they are printed, and their names in the tables and in the metrics.
 pub const PLANTS: [(&str, &str, &str); 3] = [
     ("Eq. 3.34", "Eq. 3.34", "motor"),
     ("Eq. 3.41", "Eq. 3.41, d axis", "d"),
@@ -64,8 +63,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.compared.push(named("loop_below_bpf").recomputed(hz(rule.v) < edges[0]));
     outcome.remarks.push(format!(
         "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
-         its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 hold a slip \
-         of a factor {:.2}. The gain k_FTD survives it because the factor cancels.",
+         its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 contain an error \
+         of a factor {:.2}. The gain k_FTD is right because the factor cancels.",
         -physical.p.ln() * RATE / std::f64::consts::TAU,
         physical.k / (1.0 - physical.p) / printed("Eq. 3.20", "k_FT"),
     ));
@@ -125,7 +124,7 @@ fn margin_table(loops: &[(&str, FirstOrder, RuleDesign, CurrentLoopDesign)]) -> 
         })
     });
     Table::new("Margins on the motor, with LPF and one period of delay", &[]).records(rows).note(
-        "The rule sees neither the filter nor the delay. Where it leaves less than 45° or a \
+        "The rule considers neither the filter nor the delay. If it leaves less than 45° or a \
          sensitivity peak Ms above 2.2, kc is lowered until both hold.",
     )
 }
@@ -147,7 +146,7 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         format!("used, kc = {:.1}", design.k_c),
     ];
     let (mut gain, mut phase) = bode.panels([(&names[0], &rule), (&names[1], &used)]);
-    // The phases are the same: dashed, the rule does not hide behind the other.
+    // The phases are the same: a dashed line, so that the rule stays visible behind the other.
     for panel in [&mut gain, &mut phase] {
         panel.series[0].style = Style::Reference;
     }

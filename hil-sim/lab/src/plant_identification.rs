@@ -1,5 +1,4 @@
-//! The plants of the current loop, identified through the drive's own loop, and the controllers that
-//! follow from them.
+//! The plants of the current loop, identified through the drive's own loop, and the controllers that follow from them.
 
 use drive_core::Dq;
 use drive_core::filter::{LPF, LpfState};
@@ -17,16 +16,16 @@ pub const EXPERIMENT: Experiment = Experiment::new("plant-identification", run)
     .uses(&[BENCH, DRIVE])
     .not(&[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]]);
 
-/// Amplitude of the pseudo-random voltage, V: assumed, the source gives none. It moves the current by
-/// some 0.3 A.
+/// Amplitude of the pseudo-random voltage, V: assumed, because the source gives none. It changes the current by about
+/// 0.3 A.
 const PRBS_V: f32 = 30.0;
 /// Repetitions of the sequence.
 const PRBS_PERIODS: usize = 8;
-/// Length of each level of the steps, s.
+/// Duration of each level of the steps, s.
 const LEVEL_S: f64 = 0.05;
 /// Samples shown in a figure.
 const SHOWN: usize = 600;
-/// Delays tried, samples beyond one.
+/// Delays under trial, in samples beyond one.
 const DELAYS: [usize; 3] = [0, 1, 2];
 
 #[derive(Clone, Copy, PartialEq)]
@@ -41,12 +40,12 @@ impl Axis {
     }
 }
 
-/// Voltage and current of an axis as the drive saw them.
+/// Voltage and current of an axis as seen by the drive.
 #[derive(Default)]
 struct Record {
     u: Vec<f64>,
     y: Vec<f64>,
-    /// Means that were taken from voltage and current.
+    /// Means that were subtracted from voltage and current.
     mean: [f64; 2],
 }
 
@@ -58,8 +57,8 @@ impl Record {
         self.y.push(axis.of(telemetry.current));
     }
 
-    /// The voltage through the filter that the current went through: the same equation then holds
-    /// between the two, and the plant is that of the motor.
+    /// Returns the voltage after the same filter that the current has passed. The same equation then holds between the
+    /// two, and the plant is that of the motor.
     fn alike(&self) -> Vec<f64> {
         let mut state = LpfState::default();
         let filtered =
@@ -67,7 +66,7 @@ impl Record {
         self.u.iter().map(filtered).collect()
     }
 
-    /// Deviations from the means: the plant about the point of operation.
+    /// Subtracts the means, which gives the plant about the operating point.
     fn without_mean(mut self) -> Self {
         for (x, kept) in [&mut self.u, &mut self.y].into_iter().zip(&mut self.mean) {
             let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
@@ -83,7 +82,7 @@ struct Trial {
     name: &'static str,
     key: &'static str,
     figure: &'static str,
-    /// Where its plant is printed.
+    /// The place where its plant is printed.
     printed: &'static str,
     axis: Axis,
     record: fn(&mut Rig) -> Result<Record, Error>,
@@ -96,7 +95,7 @@ const TRIALS: [Trial; 3] = [
     Trial { name: "pseudo-random on q at 2 A", key: "q", figure: "Figure 32", printed: "Eq. 3.42", axis: Axis::Q, record: at_2_a },
 ];
 
-/// Pseudo-random voltage on q, beside a torque current of 2 A.
+/// Pseudo-random voltage on q, at a q-axis current of 2 A.
 fn at_2_a(rig: &mut Rig) -> Result<Record, Error> {
     rig.settle(&Command::Torque(2.0), 1.0)?;
     prbs(rig, Axis::Q)
@@ -126,8 +125,7 @@ fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
     Ok(record.without_mean())
 }
 
-/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and the rms residual of the
-/// current, A.
+/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and the rms residual of the current, A.
 #[derive(Clone, Copy)]
 struct IdentifiedPlant {
     plant: FirstOrder,
@@ -138,8 +136,8 @@ struct IdentifiedPlant {
 }
 
 impl IdentifiedPlant {
-    /// With two coefficients of the voltage where the delay is no whole number of samples: the current's
-    /// analog filter has 0.18.
+    /// Fits the plant, with two coefficients of the voltage if the delay is not a whole number of samples: the
+    /// current's analog filter has 0.18.
     fn fit(u: &[f64], y: &[f64], inputs: usize, delay: usize) -> Result<Self, Error> {
         let refused = |reason| Error::Refused(format!("least squares: {reason}"));
         let Arx { a, b, condition, rms } =
@@ -209,8 +207,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.figures.push(figure(trial, &record, &u, &best));
     }
     outcome.tables.push(plants.note(format!(
-        "The motor alone: k = {:.6} A/V, p = {:.5}. d is the delay beyond one sample that leaves the \
-         least; the source fits without one.",
+        "The motor alone: k = {:.6} A/V, p = {:.5}. d is the delay beyond one sample with the \
+         smallest residual; the source fits without one.",
         motor.k, motor.p
     )));
     let constant = fit(&[10.0; 500], &[1.0; 500], Orders { outputs: 1, inputs: 1, delay: 0 });
@@ -219,7 +217,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// The measured current beside the response of the identified plant to the same voltage.
+/// Draws the measured current beside the response of the identified plant to the same voltage.
 fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) -> Figure {
     let axis = if trial.axis == Axis::D { "d" } else { "q" };
     let count = record.y.len().min(if trial.key == "steps" { usize::MAX } else { SHOWN });
@@ -265,14 +263,14 @@ fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
     Ok(vec![
         format!("A constant voltage and current is {verdict}."),
         format!(
-            "Noise alone passes the check of the condition ({:.0}), and says nothing: k = {:.5} A/V. \
-             What the loop is designed for must come from data that move.",
+            "Noise alone passes the check of the condition ({:.0}), but gives no information: k = {:.5} A/V. \
+             The loop must be designed from data with excitation.",
             noise.condition, noise.plant.k
         ),
         "The voltage is the one of the current loop with the sequence added, the current the filtered \
          one that the loop regulates; the sample of a period acts in the next one, so that a plant \
-         without a delay (as printed) cannot fit a voltage that changes every period: its k is that of \
-         what the controller answers."
+         without a delay (as printed) cannot fit a voltage that changes every period: its k describes \
+         the response of the controller."
             .to_owned(),
         "The motor of the source and its amplitude of the sequence are not known; the simulated one is \
          that of Table 5."

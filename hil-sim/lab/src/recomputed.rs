@@ -1,4 +1,4 @@
-//! The constants of this project that are said to be those of Barroso 2017, and what follows from his numbers by no formula.
+//! Comparison of this project's constants with those of Barroso 2017, and results that follow from his numbers without a printed formula.
 
 use drive_core::carrier::CARRIER_SAMPLES;
 use drive_settings::tuning::rule_3_8;
@@ -14,10 +14,10 @@ pub const EXPERIMENT: Experiment = Experiment::new("printed-numbers", run)
 
 /// Control period, s.
 pub const PERIOD_S: f64 = 1.0 / RATE;
-/// The carrier, Hz.
+/// The injection frequency, Hz.
 pub const CARRIER_HZ: f64 = RATE / CARRIER_SAMPLES as f64;
 
-/// A printed plant: gain and pole.
+/// Returns a printed plant: gain and pole.
 pub fn plant(place: &str) -> FirstOrder {
     FirstOrder { k: printed(place, "gain"), p: printed(place, "pole") }
 }
@@ -40,7 +40,7 @@ fn constants(outcome: &mut Outcome) {
     let (drive, config, motor) =
         (Settings::default(), Config::default(), MachineSettings::default());
     let (plate, tests) = (config.drive.nameplate, Readings::PRINTED);
-    // The same in the plant, on the bench and in the drive.
+    // The value is the same in the plant, on the bench and in the drive.
     let both = |plant: f64, drive: f32| if plant as f32 == drive { plant } else { f64::NAN };
     let three = |plant: f64, bench: f64, drive: f32| both(both(plant, bench as f32), drive);
     let bench = config.motor;
@@ -82,13 +82,13 @@ fn constants(outcome: &mut Outcome) {
     outcome.compared.extend(constants.map(ours));
 }
 
-/// Eq. 4.1 under Eq. 4.2: (z - 1)² (z - p) + k_c k (z - z_c).
+/// Analyses Eq. 4.1 with Eq. 4.2: (z - 1)² (z - p) + k_c k (z - z_c).
 fn position_loop(outcome: &mut Outcome) {
     let (plant, zero) = (plant("Eq. 4.1"), printed("Eq. 4.2", "zero"));
     let gain = printed("Eq. 4.2", "gain") * plant.k;
     let pole = largest_pole(&[-2.0 - plant.p, 1.0 + 2.0 * plant.p + gain, -plant.p - gain * zero]);
     outcome.metrics.set("position_loop_largest_pole", pole);
-    // The rule of section 3.8 sees one integrator: as if the other were not there.
+    // The rule of section 3.8 considers one integrator, as if the other did not exist.
     if let Ok(rule) = rule_3_8(plant, 1.0 / printed("Eq. 4.1", "f_s")) {
         outcome.compared.push(beside("Eq. 4.2", "gain").recomputed(rule.k_c));
         outcome.compared.push(beside("Eq. 4.2", "zero").recomputed(rule.z_c));
@@ -98,7 +98,7 @@ fn position_loop(outcome: &mut Outcome) {
     outcome.compared.extend(["gain", "pole"].map(of));
 }
 
-/// Fictitious over real frequency.
+/// Draws the fictitious over the real frequency.
 fn figure_13() -> Figure {
     let points = |of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
         (1..=280).map(|n| 10.0 * f64::from(n)).map(|hz| (hz, of(hz))).collect()

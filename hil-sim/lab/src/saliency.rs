@@ -1,4 +1,5 @@
-//! The saliency that a motor shows at 600 Hz, over torque current and angle error: what an injection drive can see.
+//! The saliency that a motor shows at 600 Hz over q-axis current and angle error, which is the signal available to a
+//! drive with injection.
 
 pub(super) mod steady;
 
@@ -13,37 +14,37 @@ use crate::prelude::*;
 
 /// The map.
 pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)
-    .about("Saliency at 600 Hz over torque current and angle error: sign, slope and second zeros; with --plant FAMILY, what emerges from the iron.")
+    .about("Saliency at 600 Hz over q-axis current and angle error: sign, sensitivity, second zeros; with --plant MODEL, as saturation causes it.")
     .uses(&[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]])
     .not(&[
         &["iron.slots", "iron.bars", "iron.stator_fixed", "iron.stator_fixed_deg"],
         &["motor.inertia", "motor.friction"],
     ]);
 
-/// Frequency of the carrier, rad/s.
+/// Angular frequency of the injection, rad/s.
 const CARRIER: f64 = TAU * 600.0;
-/// Torque currents, A with the dissertation's motor: up to 1.66 times the rated one.
+/// q-axis currents, A with the dissertation's motor: up to 1.66 times the rated one.
 const CURRENTS_A: [f64; 9] = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0];
 /// Angle errors of the table, degrees.
 const SHOWN_DEG: [i32; 7] = [-10, 0, 10, 20, 40, 60, 70];
-/// Angle errors of the curves: up to the quadrature axis on either side.
+/// Angle errors of the curves: up to the q axis on either side.
 const FIRST_DEG: i32 = -60;
 const LAST_DEG: i32 = 90;
-/// Half the angle over which the slope is taken, degrees.
+/// Half of the angle over which the saliency sensitivity is computed, degrees.
 const SLOPE_DEG: f64 = 8.5;
-/// Least direct current in the flux frame, as a share of the whole: with less the flux is gone.
+/// Smallest d-axis current in the flux frame, as a share of the whole current: below it the flux has collapsed.
 const LEAST_DIRECT: f64 = 0.02;
 
-/// Steps from no load to the load where a steady state is not found at once.
+/// Number of steps from no load to the load, if a steady state is not found at once.
 const LOAD_STEPS: u32 = 40;
-/// Saliency below which a signal is rounding.
+/// Saliency below which a signal is only rounding.
 const NOTHING: f64 = 1e-6;
 
-/// A motor at rest whose saliency can be asked for.
+/// A motor at rest whose saliency can be computed.
 pub struct Probe {
     machine: ProbeModel,
     settings: MachineSettings,
-    /// Direct current of the nominal flux, A.
+    /// Magnetising current of the nominal flux, A.
     pub i_d: f64,
 }
 
@@ -53,7 +54,7 @@ enum ProbeModel {
 }
 
 impl Probe {
-    /// Of the motor that the configuration describes; what does not turn with the flux is left out.
+    /// Makes a probe of the motor that the configuration describes, without parts that do not rotate with the flux.
     ///
     /// # Errors
     /// [`Error::Refused`] with the setting.
@@ -76,9 +77,10 @@ impl Probe {
         Ok(Self { machine, settings, i_d })
     }
 
-    /// Saliency signal q at the current `(i_d, i_q)`, A, of a frame that lies `e`, rad, behind the rotor flux, with the carrier
-    /// across that frame; in the steady state, shaft locked. With the carrier current `x` along its axis and `y` across,
-    /// `q = -Re(y x*)/|x|^2`: what synchronous demodulation gives. None where the flux is gone.
+    /// Returns the saliency signal q at the current `(i_d, i_q)`, A, of a frame that lags the rotor flux by `e`, rad,
+    /// with the injection across that frame, in steady state with the shaft locked. With the injection current `x`
+    /// along its axis and `y` across, `q = -Re(y x*)/|x|^2`, as the synchronous demodulation gives it. None if the flux
+    /// has collapsed.
     pub fn q(&self, i_d: f64, i_q: f64, e: f64) -> Option<f64> {
         let axis = FRAC_PI_2 - e;
         let [along, across] = self.admittance(i_d, i_q, e)?;
@@ -89,13 +91,13 @@ impl Probe {
         Some(-(y * x.conj()).re / x.norm_sqr())
     }
 
-    /// Slope dq/de at no angle error, 1/rad.
+    /// Returns the saliency sensitivity dq/de at zero angle error, 1/rad.
     pub fn slope(&self, i_d: f64, i_q: f64) -> Option<f64> {
         let e = SLOPE_DEG.to_radians();
         Some((self.q(i_d, i_q, e)? - self.q(i_d, i_q, -e)?) / (2.0 * e))
     }
 
-    /// Saliency without load, relative (positive is low inductance along the flux), and the mean inductance, H.
+    /// Returns the saliency without load, relative (positive is low inductance along the flux), and the mean inductance, H.
     pub fn at_rest(&self, i_d: f64) -> Option<(f64, f64)> {
         let [along, across] = self.admittance(i_d, 0.0, 0.0)?;
         let inductance = |y: Complex64| (1.0 / y).im / CARRIER;
@@ -119,8 +121,8 @@ impl Probe {
         }
     }
 
-    /// Admittance at the steady state with the current `i`, A, in the frame of the flux; `linear` is the state of the
-    /// linear machine with a current, its rotor flux and its main flux.
+    /// Returns the admittance at the steady state with the current `i`, A, in the frame of the flux. `linear` gives the
+    /// state of the linear machine for a current, its rotor flux and its main flux.
     fn of<M: Listed>(
         &self,
         machine: &M,
@@ -139,7 +141,7 @@ impl Probe {
         let psi = m.lm * i.re;
         let (state, ..) = steady::at_current(machine, i, &guess(i), psi)
             .or_else(|_| {
-                // From no load on, step by step.
+                // Proceeds from no load, step by step.
                 (0..=LOAD_STEPS).try_fold(guess(i.re.into()), |start, k| {
                     let share = f64::from(k) / f64::from(LOAD_STEPS);
                     steady::at_current(machine, Complex64::new(i.re, share * i.im), &start, psi)
@@ -149,7 +151,7 @@ impl Probe {
         steady::admittance(machine, &state, CARRIER, psi)
     }
 
-    /// Angle errors, degrees, at which the signal is again that of no error, within the range of the curves.
+    /// Returns the angle errors, degrees, at which the signal is the same as at zero error, within the range of the curves.
     fn second_zeros(curve: &[(f64, f64)], at_zero: f64) -> Vec<f64> {
         curve
             .windows(2)
@@ -188,12 +190,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let mut panel = Panel::new("angle error (°)", "q (%)");
     let mut map = Table::new("q (%) over the angle error", &[]).note(
-        "Rotor flux minus frame, electrical; positive: flux ahead. The saliency is that of the steady state at a current that \
-         keeps to the frame, shaft locked. q is positive with low inductance ahead of the frame; -: the flux is gone.",
+        "Rotor flux minus frame, electrical; positive: flux ahead. The saliency holds in steady state at a current that \
+         is constant in the frame, shaft locked. q is positive with low inductance ahead of the frame; -: the flux has collapsed.",
     );
     let mut table = Table::new("Slope and second zeros", &[]).note(
-        "Slope k = dq/de over ±8.5°: its sign says which axis has the low inductance (positive: along the flux). Second zeros: \
-         angle errors from -60° to 90° with the signal of no error, where a drive may lock falsely.",
+        "Slope k = dq/de over ±8.5°: its sign shows which axis has the low inductance (positive: along the flux). Second zeros: \
+         angle errors from -60° to 90° with the signal of zero error, at which a drive may lock wrongly.",
     );
     for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
         let q = |e: i32| curve.iter().find(|point| point.0 == f64::from(e)).map(|point| point.1);

@@ -1,5 +1,5 @@
-//! What the two sources print, and what is found wrong in them: the lists of `hil-sim/lab/source`, and the verdict on a
-//! printed value with ours beside it.
+//! Printed values of the two sources and their errors: the lists of `hil-sim/lab/source`, and the verdict on a printed
+//! value with ours beside it.
 //!
 //! S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996.
 
@@ -20,18 +20,18 @@ use errata::ERRATA;
 const FILES: [&str; 2] =
     [include_str!("../source/barroso-2017.toml"), include_str!("../source/jacobina-1996.toml")];
 
-/// What a printed value is to its source.
+/// Role of a printed value in its source.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A rating, reading or specification that the source starts from.
     #[default]
     Input,
-    /// What the source computed, designed, identified or measured.
+    /// A value that the source computed, designed, identified or measured.
     Result,
-    /// A result that it read off a graph.
+    /// A result that the source read off a graph.
     Graph,
-    /// A statement that holds or does not; its value is `yes` or `no`.
+    /// A statement that is true or false; its value is `yes` or `no`.
     Claim,
 }
 
@@ -42,11 +42,11 @@ pub struct Printed {
     pub source: String,
     /// Number and name of the chapter or section.
     pub chapter: String,
-    /// Its short name.
+    /// Short name of the chapter.
     id: String,
-    /// Its name in the program, where an experiment names it; else empty.
+    /// Name in the program, if an experiment uses it; otherwise empty.
     name: String,
-    /// Where it stands: `Eq. 3.20`, `Table 6, 1.5 A`.
+    /// The printed place: `Eq. 3.20`, `Table 6, 1.5 A`.
     pub place: String,
     /// Symbol or name.
     pub quantity: String,
@@ -54,21 +54,21 @@ pub struct Printed {
     pub unit: String,
     /// The value with its digits.
     pub value: String,
-    /// What it is to its source.
+    /// Its role in the source.
     pub kind: Kind,
-    /// How it follows from other printed values.
+    /// Formula by which it follows from other printed values.
     pub formula: Option<String>,
-    /// The slip that the print has beside the number, such as its unit.
+    /// Error in print beside the number, for example in its unit.
     slip: Option<String>,
-    /// Whether an experiment or a formula took it from here.
+    /// Whether an experiment or a formula has read the value from here.
     taken: AtomicBool,
 }
 
-/// A source: the values of a chapter stand before its tables.
+/// A source. The single values of a chapter come before its tables.
 #[derive(Deserialize)]
 struct File {
     source: String,
-    /// Quantities of the formulas, each from those before it.
+    /// Quantities of the formulas, each computed from those before it.
     #[serde(default)]
     names: Vec<[String; 2]>,
     chapter: Vec<Chapter>,
@@ -86,14 +86,14 @@ struct Chapter {
     table: Vec<Cells>,
 }
 
-/// A printed table; the place of a cell is that of the table and the head of the row.
+/// A printed table; the place of a cell consists of the place of the table and the head of the row.
 #[derive(Deserialize)]
 struct Cells {
     place: String,
     kind: Kind,
-    /// Quantity, unit; formula.
+    /// Quantity, unit, and formula if there is one.
     columns: Vec<Vec<String>>,
-    /// Head, then a value for each column.
+    /// Head, followed by a value for each column.
     rows: Vec<Vec<String>>,
 }
 
@@ -153,7 +153,7 @@ static NAMES: LazyLock<HashMap<String, HashMap<String, f64>>> = LazyLock::new(||
     files().map(of).collect()
 });
 
-/// The value of a formula of a source: of printed values, `{PLACE | QUANTITY}`, and of names.
+/// Evaluates a formula of a source, which contains printed values, `{PLACE | QUANTITY}`, and names.
 fn evaluate(source: &str, formula: &str, names: &HashMap<String, f64>) -> Option<f64> {
     formula::evaluate(formula, &|name| match name.split_once(" | ") {
         Some((place, quantity)) => PRINTED[place_of(source, place, quantity)?].take(),
@@ -161,47 +161,47 @@ fn evaluate(source: &str, formula: &str, names: &HashMap<String, f64>) -> Option
     })
 }
 
-/// The value of a formula of a source.
+/// Evaluates a formula of a source.
 pub fn value_of(source: &str, formula: &str) -> Option<f64> {
     evaluate(source, formula, &NAMES[source])
 }
 
-/// Number of a value in [`PRINTED`].
+/// Returns the index of a value in [`PRINTED`].
 pub fn place_of(source: &str, place: &str, quantity: &str) -> Option<usize> {
     let is_it = |p: &Printed| p.source == source && p.place == place && p.quantity == quantity;
     PRINTED.iter().position(is_it)
 }
 
-/// A printed number, for an experiment that uses it.
+/// Returns a printed number, for an experiment that uses it.
 ///
 /// # Panics
-/// When the list has none there: the lists are part of the program.
+/// If the list has no such number: the lists are part of the program.
 pub fn number(source: &str, place: &str, quantity: &str) -> f64 {
     let found = place_of(source, place, quantity).and_then(|found| PRINTED[found].take());
     found.unwrap_or_else(|| panic!("{source} prints no number at {place}, {quantity}"))
 }
 
-/// A printed number of S1.
+/// Returns a printed number of S1.
 pub fn printed(place: &str, quantity: &str) -> f64 {
     number("S1", place, quantity)
 }
 
-/// Ours beside a printed value of S1.
+/// Makes an entry for our value beside a printed value of S1.
 pub fn beside(place: &str, quantity: &str) -> Compared {
     Compared::with("S1", place, quantity)
 }
 
-/// Ours beside the printed value of this name.
+/// Makes an entry for our value beside the printed value of this name.
 ///
 /// # Panics
-/// When the list has none: the lists are part of the program.
+/// If the list has no such name: the lists are part of the program.
 pub fn named(name: &str) -> Compared {
     let found = PRINTED.iter().find(|printed| printed.name == name);
     let found = found.unwrap_or_else(|| panic!("no printed value is called {name}"));
     Compared::with(&found.source, &*found.place, &*found.quantity)
 }
 
-/// The numbers of a column of a table, from the first row on.
+/// Returns the numbers of a column of a table, starting with the first row.
 pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
     let begins = format!("{table}, ");
     let is_in =
@@ -210,7 +210,7 @@ pub fn column(source: &str, table: &str, quantity: &str) -> Vec<f64> {
 }
 
 impl Printed {
-    /// The value as a number: 1 and 0 for `yes` and `no`; fractions are divided out.
+    /// Returns the value as a number: 1 and 0 for `yes` and `no`; fractions are divided.
     pub fn number(&self) -> Option<f64> {
         match &*self.value {
             "yes" => Some(1.0),
@@ -224,25 +224,25 @@ impl Printed {
         self.number()
     }
 
-    /// Ours by its formula.
+    /// Computes our value by its formula.
     fn recomputed(&self) -> Option<f64> {
         value_of(&self.source, self.formula.as_deref()?)
     }
 
-    /// Whether ours is the printed value within this share of a unit of its last digit.
+    /// Whether our value equals the printed value within this share of a unit of its last digit.
     fn agrees(&self, ours: f64, units: f64) -> bool {
         let exact = self.kind == Kind::Claim || self.value.contains('/');
         let bound = if exact { 1e-9 } else { units * self.last_digit() };
         self.number().is_some_and(|printed| (ours - printed).abs() <= bound)
     }
 
-    /// Whether what the program takes is the printed value: to its last digit, or to single precision where that has fewer.
+    /// Whether the constant of the program equals the printed value: to its last digit, or to single precision if that has fewer digits.
     fn is_used(&self, used: f64) -> bool {
         self.agrees(used, 0.501)
             || self.number().is_some_and(|printed| (used / printed - 1.0).abs() < SINGLE)
     }
 
-    /// A unit of the last printed digit. Of a whole number it is 1, whatever its zeros.
+    /// Returns one unit of the last printed digit. For a whole number it is 1, regardless of trailing zeros.
     fn last_digit(&self) -> f64 {
         let (digits, exponent) = self.value.split_once('e').unwrap_or((&self.value, "0"));
         let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
@@ -250,34 +250,34 @@ impl Printed {
     }
 }
 
-/// How a printed value stands beside ours.
+/// Comparison of a printed value with ours.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// Equal to the last printed digit.
     Equal,
-    /// Equal but for this.
+    /// Equal except for this.
     EqualBut(String),
-    /// Differs, by this row of [`ERRATA`].
+    /// Different; this row of [`ERRATA`] explains it.
     Differs(usize),
-    /// Differs, and the source does not state this.
+    /// Different; the source does not state this quantity.
     Unknown(&'static str),
-    /// A mean of random runs: ours over printed, and this over seeds.
+    /// A mean of random runs: our value divided by the printed one, and its range over seeds.
     Statistics {
-        /// Ours over printed.
+        /// Our value divided by the printed one.
         factor: f64,
-        /// The least and the largest over seeds.
+        /// Smallest and largest value over seeds.
         seeds: [f64; 2],
     },
-    /// Nothing is compared, or nobody says why it differs.
+    /// Nothing is compared, or the difference is not explained.
     None,
 }
 
 /// Relative precision of constants and filter sections in `f32`.
 const SINGLE: f64 = 1e-5;
-/// Share within which a value that was read off a graph counts as equal.
+/// Relative difference within which a value that was read off a graph counts as equal.
 const GRAPH: f64 = 0.02;
 
-/// The verdict on a printed value. An input or a reading that is taken from the list needs nothing beside it.
+/// Returns the verdict on a printed value. An input or a reading that is taken from the list needs no value beside it.
 pub fn verdict(place: usize, ours: &Compared) -> Verdict {
     let printed = &PRINTED[place];
     let taken =
@@ -295,7 +295,7 @@ pub fn verdict(place: usize, ours: &Compared) -> Verdict {
     };
     let ratio = printed.number().map_or(f64::NAN, |printed| value / printed);
     let off = (ratio - 1.0).abs();
-    // Ours is rounded as well.
+    // Our value is rounded as well.
     if printed.agrees(value, 0.501) {
         return printed.slip.clone().map_or(Verdict::Equal, Verdict::EqualBut);
     }
@@ -332,7 +332,7 @@ impl Verdict {
         "none",
     ];
 
-    /// Place in [`Self::NAMES`].
+    /// Returns the index in [`Self::NAMES`].
     pub fn number(&self) -> usize {
         match self {
             Self::Equal => 0,
@@ -344,7 +344,7 @@ impl Verdict {
         }
     }
 
-    /// In words.
+    /// Describes the verdict in words.
     pub fn text(&self) -> String {
         match self {
             Self::Equal | Self::None => Self::NAMES[self.number()].to_owned(),

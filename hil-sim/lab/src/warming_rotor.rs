@@ -1,4 +1,4 @@
-//! A drive whose rotor warms up, with the online estimate beside it as the idle loop runs it.
+//! A drive whose rotor warms up, with the online estimate that the idle loop of the firmware runs.
 
 use rotor_id::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 
@@ -7,7 +7,7 @@ use crate::prelude::*;
 
 /// Calls of `refine` per second.
 const REFINES_PER_S: f64 = 10.0;
-/// How fast the dynamometer gets to its speed, rpm/s: the sensorless angle can follow.
+/// Acceleration of the dynamometer, rpm/s: the sensorless angle can follow it.
 const RAMP_RPM_PER_S: f64 = 150.0;
 
 /// A run with a rotor that warms up.
@@ -15,19 +15,19 @@ const RAMP_RPM_PER_S: f64 = 150.0;
 pub struct WarmingCase {
     /// Speed that the dynamometer holds, rpm.
     pub speed_rpm: f64,
-    /// Torque current, A.
+    /// q-axis current, A.
     pub iq_a: f64,
-    /// Amplitude of the magnetising current's movement, A, and its frequency, Hz.
+    /// Amplitude of the magnetising current's variation, A, and its frequency, Hz.
     pub excitation: (f64, f64),
     /// Whether the drive uses the estimate.
     pub used: bool,
-    /// When the rotor begins to warm up and when it has done so, s; and how much r_r has grown then.
+    /// Times at which the rotor begins and ends to warm up, s, and the relative increase of r_r.
     pub warming: (f64, f64, f64),
     /// End of the run, s.
     pub seconds: f64,
 }
 
-/// State of the run, one every tenth of a second.
+/// State of the run, recorded every tenth of a second.
 #[derive(Clone, Copy, Debug)]
 pub struct WarmingMoment {
     /// Time, s.
@@ -40,15 +40,14 @@ pub struct WarmingMoment {
     pub estimate: Result<RotorEstimate, NoEstimate>,
     /// Model D from the same least squares.
     pub model_d: Estimate,
-    /// Mean of the flux angle error, degrees.
+    /// Mean flux angle error, degrees.
     pub angle_error_deg: f64,
 }
 
-/// Runs a case. The angle source is that of the configuration; with the encoder the estimate is given
-/// its speed.
+/// Runs a case. The configuration chooses the angle source; with the encoder the estimate also gets its speed.
 ///
 /// # Errors
-/// [`Error::Refused`] when the plant or the drive refuses the case, or the drive stops.
+/// [`Error::Refused`] if the plant or the drive refuses the case, or the drive stops.
 pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<WarmingMoment>, Error> {
     let settings = drive_settings::Settings { track_rotor: case.used, ..config.drive };
     let plant = plant_settings(config);

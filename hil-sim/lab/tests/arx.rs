@@ -30,7 +30,7 @@ fn a_clean_sequence_gives_the_plant() {
     let u = prbs();
     let found = fit(&u, &output(&u), FIRST).unwrap();
     assert!((found.a[0] + P).abs() < 1e-13 && (found.b[0] - K).abs() < 1e-14, "{found:?}");
-    // Quantised as the current sensors of the source do: 2.2 mA.
+    // Quantised like the current sensors of the source: 2.2 mA.
     let quantised: Vec<f64> = output(&u).iter().map(|y| (y / 0.0022).round() * 0.0022).collect();
     let found = fit(&u, &quantised, FIRST).unwrap();
     println!("{:.1e} {:.2e}", found.a[0] + P, found.b[0] / K - 1.0);

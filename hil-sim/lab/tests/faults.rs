@@ -1,4 +1,4 @@
-//! The recursive form of drive-core on bad input (R4): finite, flagged, and back in time.
+//! The recursive form of drive-core with bad input (R4): its output stays finite, is flagged invalid, and becomes valid again in time.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use sim_lab::identification::{Complex, Parameters, Signal, Trial};
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;
 const CURRENT: f64 = 30.0;
-/// Samples of good input before the fault, and the end of it.
+/// Samples of good input before the fault, and the last sample of the fault.
 const BEFORE: usize = 2 * RATE;
 const RETURN: usize = 12 * RATE;
 
@@ -27,11 +27,11 @@ enum Fault {
     Sine,
     /// One sample that is not a number.
     OneNan,
-    /// Nothing but such samples.
+    /// Only samples that are not a number.
     Nan,
-    /// The converter saturates.
+    /// The ADC saturates.
     Saturated,
-    /// Voltage as commanded, no current at all.
+    /// Voltage as commanded, but no current.
     NoCurrent,
     /// Phase a is open: no current along alpha.
     OpenPhase,
@@ -39,16 +39,16 @@ enum Fault {
 
 #[derive(Clone, Copy, Debug)]
 struct Result {
-    /// From the begin of the fault until it is no longer said to be valid, s.
+    /// Time from the beginning of the fault until the estimate is no longer reported as valid, s.
     flagged: f64,
-    /// Largest error of the speed while valid, rad/s.
+    /// Largest error of the speed while the estimate is valid, rad/s.
     worst_valid: f64,
-    /// From the return until it is valid for good, s.
+    /// Time from the end of the fault until the estimate is valid permanently, s.
     back: f64,
-    /// The same from the last sample at which the converter saturated: the current that flows in after a
-    /// fault is larger than the converter's range for up to 0.24 s, and till then there is no input.
+    /// The same time, counted from the last sample at which the ADC saturated. After a fault the current exceeds the
+    /// range of the ADC for up to 0.24 s, and there is no valid input until then.
     back_from_good: f64,
-    /// Error of the speed 0.2 s and 0.5 s after the return, rad/s.
+    /// Error of the speed 0.2 s and 0.5 s after the end of the fault, rad/s.
     errors: [f64; 2],
 }
 
@@ -57,7 +57,7 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
     let trial = Trial::printed(machine, signal, H, Noise::NONE);
     let truth = machine.delta(H).g1.im / H;
     let [peak_v, peak_i] = peaks(trial.raw().skip(RATE).take(RATE / 5));
-    // The converter ends at one and a half times the largest current.
+    // The range of the ADC ends at one and a half times the largest current.
     let full_scale = 1.5 * peak_i;
     let settings = RlsSettings {
         corner: (5.0 * TAU * trial.hz * H) as f32,
@@ -101,7 +101,7 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
         }
         let single = |x: Complex| AlphaBeta { alpha: x.re as f32, beta: x.im as f32 };
         if matches!(fault, Fault::NoCurrent | Fault::OpenPhase) && n == RETURN {
-            // Keeps the estimate and forgets how sure it is.
+            // Keeps the estimate but resets its covariance.
             rls.begin_at(rls.latest());
         }
         rls.step(single(v), single(i));
@@ -151,14 +151,14 @@ fn r4_bad_input() {
             let noisy = run(signal, speed, fault, Noise { voltage: 0.005, current: 0.02 });
             println!("   with noise {noisy:.4?}");
             let open = matches!(fault, Fault::NoCurrent | Fault::OpenPhase);
-            // After 0.2 s, after an open phase and a reset of the covariance after 0.5 s.
+            // Checked after 0.2 s, or, after an open phase and a reset of the covariance, after 0.5 s.
             let right = result.errors[usize::from(open)] < 0.1;
             let back = right && result.back_from_good <= 0.2 && noisy.back_from_good <= 0.2;
-            // One sample is no fault that lasts; a saturated one is left out like it, and what is
-            // left can be enough. The flag is then true, and so is the estimate.
+            // One bad sample is not a lasting fault. Saturated samples are ignored in the same way, and the remaining
+            // ones can be sufficient. The flag is then true, and the estimate is right.
             let lasting = !matches!(fault, Fault::OneNan | Fault::Saturated);
-            // Good data fade from the memory before the flag falls; the clean estimate is right until
-            // then, but where a phase is open.
+            // Good data fade from the memory before the flag drops. Until then the estimate without noise is right,
+            // except with an open phase.
             let longest = if open { 0.15 } else { 0.45 };
             let flagged = !lasting || result.flagged <= longest && noisy.flagged <= longest;
             let honest = lasting && open || result.worst_valid < 0.1;

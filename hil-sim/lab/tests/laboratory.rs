@@ -1,4 +1,4 @@
-//! Parts of the laboratory: models, signals, filters and designs, each against what is known of it.
+//! Tests of parts of the laboratory: models, signals, filters and designs, each against known results.
 
 use std::f64::consts::{FRAC_PI_3, TAU};
 
@@ -35,14 +35,14 @@ fn a_known_plant_is_found_and_stabilised() {
     let (pii, crossover) = plant.design().unwrap();
     assert!(largest_pole(&plant.closed_loop(pii)) < 0.9999);
     assert!((plant.open_loop(pii, crossover).norm() - 1.0).abs() < 1e-9);
-    // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
+    // The loop must remain stable with slightly more gain and phase lag than the margin of that peak, which is 1/Ms.
     let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
     assert!(largest_pole(&plant.closed_loop(more)) < 1.0);
 }
 
 #[test]
 fn the_printed_controller_is_at_the_limit_on_the_printed_plants() {
-    // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
+    // Values from an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
     let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
     for (row, expected) in expected.into_iter().enumerate() {
         let found = largest_pole(&Model::printed(row).closed_loop(Pii::printed()));
@@ -50,7 +50,7 @@ fn the_printed_controller_is_at_the_limit_on_the_printed_plants() {
     }
 }
 
-/// Slow gain with the axis alone and with the current, by the demodulation.
+/// Slow gain with the axis alone and with the current, by demodulation.
 fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
     let mut config = Config::default();
     config.drive.injection.demodulator = demodulator;
@@ -61,14 +61,14 @@ fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
 
 #[test]
 fn the_leak_turns_with_the_current_and_the_flux_does_not() {
-    // The leak: sqrt2 * 0.01 * 0.944 * iq while the current is held, nothing when it turns along.
+    // The leakage: sqrt2 * 0.01 * 0.944 * iq while the current is held, zero if it rotates with the axis.
     let [held, slow] = gains(DemodulatorKind::Literal, 2.0);
     let leak = 2f64.sqrt() * 0.01 * 0.944_061 * 2.0;
     assert!((held / leak - 1.0).abs() < 0.03, "{held} {leak}");
     assert!(slow.abs() < 0.05 * leak, "{slow}");
 
-    // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and the part that dead time
-    // and noise leave take some tenths.
+    // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and the errors of dead time and noise
+    // cause a few tenths.
     let [held, slow] = gains(DemodulatorKind::Synchronous, 2.0);
     let cos_2_gamma = (4.0 - 0.49) / (4.0 + 0.49);
     let fast = 2.0 * (0.035 + 0.036 * 4.49_f64.sqrt() * cos_2_gamma);
@@ -82,31 +82,31 @@ fn linear(i_q: f64, settings: &Settings) -> LinearModel {
     LinearModel::new(&machine, &mechanics, settings, i_q).unwrap()
 }
 
-/// Without slip of its own the tracking loop leaves a step of its frequency d with the error
-/// d s / ((s + w_n)^2 (s + w_n/5)), whose peak is 0.3240 d / w_n: a rotor resistance 10 % off at a
-/// small current, where the slip hardly depends on the angle and the delays are short.
+/// If the slip is constant, the tracking loop responds to a step d of its frequency with the error d s / ((s + w_n)^2
+/// (s + w_n/5)), whose peak is 0.3240 d / w_n. The step is a rotor resistance 10 % off at a small current, at which the
+/// slip hardly depends on the angle and the delays are short.
 #[test]
 fn a_wrong_slip_has_the_peak_of_the_tracking_loop() {
     let mut settings = Settings::default();
     settings.motor.r_r *= 0.9;
-    // Slow against the delays, fast against the rotor.
+    // Slow compared with the delays, fast compared with the rotor.
     settings.injection.synchronous.bandwidth_hz = 6.0;
-    // No saliency of the current: its transient looks like an angle.
+    // No saliency of the current, because its transient looks like an angle error.
     settings.injection.synchronous.reference =
         ReferenceTable::from_points(Grid::REFERENCE, [0.0; POINTS]);
     let response = linear(0.01, &settings).response(Disturbance::TorqueCurrent(0.1), 0.4);
     let t_r = 0.2047 / 1.1;
     let wrong = 0.1 * (1.0 - 0.9) / (t_r * 0.7);
     let expected = 0.3240 * wrong / (TAU * 6.0) * 360.0 / TAU;
-    // The peak comes after 1/w_n = 27 ms; by 10 ms the current stands.
+    // The peak comes after 1/w_n = 27 ms; the current has settled by 10 ms.
     let peak = response.angle_deg[60..].iter().copied().fold(0.0, f64::max);
     println!("peak {peak} expected {expected}");
-    // Above it, because the averages' 3.2 ms take damping: 1.14 at this bandwidth, integrated
-    // apart from this model with the averages and the loop alone. The current's rise is the rest.
+    // The peak is higher because the 3.2 ms of the averages reduce the damping: 1.14 at this bandwidth, from a separate
+    // integration of only the averages and the loop. The rise of the current causes the rest.
     assert!((1.1..1.2).contains(&(peak / expected)));
 }
 
-/// A load step ends with the speed back, and with the current that carries the load.
+/// After a load step the speed returns, with the current that carries the load.
 #[test]
 fn the_speed_loop_brings_the_rotor_back() {
     let response = linear(1.0, &Settings::default()).response(Disturbance::Load(0.2), 6.0);
@@ -158,8 +158,8 @@ fn schroeder_peaks_lower_than_cosines_and_is_flat() {
 
 #[test]
 fn the_filter_has_its_corner() {
-    // At omega_n a third-order section of this kind has |1/(1+j)|³ = 2^(-3/2); Tustin warps
-    // omega_n h = 0.1 by h² omega_n² / 12.
+    // At omega_n a third-order section of this kind has |1/(1+j)|³ = 2^(-3/2); Tustin's rule warps omega_n h = 0.1 by
+    // h² omega_n² / 12.
     let (omega, h) = (1000.0, 1e-4);
     let mut filter = Filter::new(omega, h);
     let mut gain = 0.0;
@@ -169,8 +169,8 @@ fn the_filter_has_its_corner() {
     assert!((gain - 0.5f64.powf(1.5)).abs() < 1e-3, "{gain}");
 }
 
-/// Sections in single precision are as good as exact, the direct form is useless (a tenth of
-/// the samples that the experiment takes; `seconds` takes more).
+/// Sections in single precision are as good as exact; the direct form is useless. The test uses a tenth of the samples
+/// of the experiment; `seconds` takes more.
 #[test]
 fn filters_in_single_precision() {
     let config = Config::default();

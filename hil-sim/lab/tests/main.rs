@@ -1,4 +1,4 @@
-//! The tests of the laboratory: one program, a module a subject.
+//! The tests of the laboratory: one program, with one module for each subject.
 
 mod arx;
 mod faults;

@@ -30,8 +30,7 @@ fn real_regression(data: &Data) -> Result<[f64; 8], NotIdentifiable> {
     Ok(std::array::from_fn(|k| theta[k]))
 }
 
-/// Stator resistance from the gain at standstill of the signals, 1/r_s = (h1 + h0)/(1 - f1 - f0):
-/// exact at any speed and period.
+/// Stator resistance from the gain at zero frequency, 1/r_s = (h1 + h0)/(1 - f1 - f0): exact at any speed and period.
 fn dc_resistance(delta: &Delta) -> Complex {
     -delta.g0 / delta.u0
 }
@@ -46,7 +45,7 @@ fn series(machine: &Parameters, h: f64) -> CurrentVoltage {
     machine.continuous().series(h, 5).current_voltage()
 }
 
-/// Largest difference of two sets of coefficients, each relative to its own length.
+/// Largest difference of two sets of coefficients, each relative to its own magnitude.
 fn apart(a: &CurrentVoltage, b: &CurrentVoltage) -> f64 {
     let pairs = [(a.f1, b.f1), (a.f0, b.f0), (a.h1, b.h1), (a.h0, b.h0)];
     pairs.map(|(a, b)| (a - b).norm() / b.norm()).into_iter().fold(0.0, f64::max)
@@ -58,7 +57,7 @@ fn percent(estimate: &Estimate, truth: &Parameters) -> [f64; 5] {
     std::array::from_fn(|k| 100.0 * (estimate[k].expect("identifiable") / truth[k] - 1.0))
 }
 
-/// Largest difference of two steps, relative to the largest entry of the matrix it is in.
+/// Largest difference of two steps, relative to the largest entry of the matrix that contains it.
 fn steps_apart(a: &Step, b: &Step) -> f64 {
     let largest = |all: &[Complex]| all.iter().map(|x| x.norm()).fold(0.0, f64::max);
     let f = largest((a.f() - b.f()).as_slice()) / largest(b.f().as_slice());
@@ -109,7 +108,7 @@ fn poles_are_those_of_the_continuous_machine() {
         let exact = machine.current_voltage(h);
         for z in exact.poles() {
             assert!((z * z - exact.f1 * z - exact.f0).norm() < 1e-14);
-            // Eq. 25, which prints |z² - f1 z - f0|² for real z, has these roots too.
+            // Eq. 25, which prints |z² - f1 z - f0|² for real z, has these roots as well.
             let CurrentVoltage { f1, f0, .. } = exact;
             let c2 = f1.norm_sqr() - 2.0 * f0.re;
             let c1 = 2.0 * (f1.re * f0.re + f1.im * f0.im);
@@ -126,7 +125,7 @@ fn a2_least_squares_on_clean_data_is_exact_and_complex_equals_real() {
         for signal in Signal::ALL {
             let clean = Trial::printed(machine, signal, h, Noise::NONE).run(1, 0);
             let noisy = Trial::printed(machine, signal, h, Noise::PRINTED).run(1, 0);
-            // Clean data are those of the fine series, the exponential to 1e-13.
+            // Clean data come from the fine series, which equals the exponential to within 1e-13.
             let truth = machine.current_voltage(h).array();
             let complex = clean.regression().unwrap().delta.current_voltage().array();
             for (estimated, truth) in complex.iter().zip(truth) {
@@ -229,7 +228,7 @@ fn what_cannot_be_identified_says_why() {
     assert!(c.sigma_l_s.is_ok());
     let d = model_d(&still, h).parameters().unwrap();
     assert!((d.tau_r / Parameters::PX.tau_r - 1.0).abs() < 1e-9);
-    // Nothing at all, no gain, not a number.
+    // All coefficients zero, no gain, not a number.
     let zero = Delta::from_array([Complex::ZERO; 4]);
     for estimate in [model_b(&zero.into(), h), model_c(&zero, h), model_d(&zero, h)] {
         assert!(estimate.array()[..4].iter().all(Result::is_err), "{estimate:?}");

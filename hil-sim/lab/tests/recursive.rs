@@ -52,7 +52,7 @@ fn samples(trial: Trial, level: Noise, seed: u64) -> impl Iterator<Item = (Compl
 
 struct Comparison {
     omega_rms: f64,
-    /// Median relative difference of Model C, of each parameter.
+    /// Median relative difference of each parameter of Model C.
     medians: [f64; 5],
     valid: f64,
     misfit: f32,
@@ -70,7 +70,7 @@ fn compare(signal: Signal, speed: f64, level: Noise, seconds: usize) -> Comparis
     let mut differences = [(); 5].map(|()| Vec::new());
     for (n, (v, i)) in samples(trial, level, 3).take(seconds * RATE).enumerate() {
         single_precision.step(single(v), single(i));
-        // The same data: as the converter and the modulator give them, in single precision.
+        // The same data in single precision, as the ADC and the modulator give them.
         let rounded = |x: Complex| Complex::new(f64::from(x.re as f32), f64::from(x.im as f32));
         double.step(on_v.step(rounded(v) / VOLTAGE), on_i.step(rounded(i) / CURRENT));
         assert!(single_precision.uncertainty() > 0.0 && single_precision.uncertainty() < 1e9);
@@ -126,10 +126,10 @@ fn r1_sixty_seconds_in_single_precision() {
     }
 }
 
-/// The plain recursion on Eq. 14 as textbooks print it: with g = P conj(x), K = g / (lambda + x g) and
-/// P = (P - K gᴴ) / lambda.
+/// The plain recursion on Eq. 14 as textbooks print it: with g = P conj(x), K = g / (lambda + x g) and P = (P - K gᴴ) /
+/// lambda.
 ///
-/// It fails, in `f32` and in `f64`: P loses its symmetry, then its sign.
+/// It fails in `f32` and in `f64`: P loses first its symmetry, then its sign.
 #[derive(Clone, Copy, Debug)]
 struct Plain<T> {
     lambda: T,
@@ -141,7 +141,7 @@ struct Plain<T> {
 }
 
 impl<T: Float> Plain<T> {
-    /// All coefficients zero, P0 = `p0` I.
+    /// Starts with all coefficients zero and P0 = `p0` I.
     fn new(lambda: T, p0: T) -> Self {
         let zero = Of::new(T::zero(), T::zero());
         let mut p = [[zero; 4]; 4];
@@ -151,7 +151,7 @@ impl<T: Float> Plain<T> {
         Self { lambda, theta: [zero; 4], p, samples: [[zero; 2]; 2], count: 0 }
     }
 
-    /// One filtered sample.
+    /// Processes one filtered sample.
     fn step(&mut self, v: Of<T>, i: Of<T>) {
         let [[v1, v2], [i1, i2]] = self.samples;
         self.samples = [[v, v1], [i, i1]];
@@ -220,7 +220,7 @@ fn r2_the_plain_recursion_fails() {
     }
 }
 
-/// When r_s and tau_r come within 10 % of where they end, s, by a moving median over 20 ms.
+/// Times after which r_s and tau_r stay within 10 % of their final values, s, by a moving median over 20 ms.
 fn convergence(signal: Signal, speed: f64) -> [f64; 2] {
     let trial = trial(signal, speed);
     let mut estimator = rls(trial.hz);

@@ -62,7 +62,7 @@ fn s1_starts_a_factor_five_off() {
         let h = PERIODS[trial as usize / 4 % 3];
         let data = Trial::printed(machine, signal, h, Noise::HALF);
         let regression = data.run(2, trial).regression().expect("excited");
-        // Each parameter five times too large or too small, and l_s above sigma_l_s.
+        // Each parameter is five times too large or too small, and l_s is above sigma_l_s.
         let mut off = |x: f64| if rng.random::<bool>() { 5.0 * x } else { 0.2 * x };
         let sigma_l_s = off(machine.sigma_l_s);
         let start = Parameters {
@@ -72,7 +72,7 @@ fn s1_starts_a_factor_five_off() {
             l_s: sigma_l_s + off(machine.l_s - machine.sigma_l_s),
             omega_m: off(machine.omega_m),
         };
-        // Where the noise puts the best r_s below zero there is no machine to find.
+        // If the noise makes the best r_s negative, there is no machine to find.
         let Ok(best) = model_s(&regression, h) else {
             assert!(signal == Signal::SixStep && fit_from(&regression, h, &start).is_err());
             none += 1;

@@ -1,21 +1,21 @@
 //! One PWM period with the voltages of the inverter averaged over it.
 //!
-//! Between the currents at which a phase's smoothed sign has its kinks, ±20 mA by default, the equations are
-//! smooth and few integration steps are enough; a step across a kink would cost accuracy. So a step
-//! that is about to take a phase across one is cut there.
+//! The smoothed sign of a phase current has kinks at two currents, ±20 mA by default. Between the kinks the equations
+//! are smooth and few integration steps are enough, but a step across a kink would cost accuracy. A step that is about
+//! to take a phase current across a kink is therefore cut there.
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
 use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel};
 use crate::terminals::{Source, Terminals};
 
-/// Shortest part of a step that one is cut to.
+/// Shortest part of a step after it has been cut.
 const SHORTEST: f64 = 1.0 / 16.0;
 
 /// Sign of a phase current, smoothed linearly up to a current of either sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SmoothSign {
-    /// That current, A, and its inverse.
+    /// The current of the kink, A, and its inverse.
     pub kink: f64,
     inverse: f64,
 }
@@ -40,12 +40,12 @@ pub(crate) struct Averaged {
     pub lost: [f64; 3],
     /// Voltage that each leg gains with a negative current, V.
     pub gained: [f64; 3],
-    /// The part of both that is not the dead time's, V.
+    /// The part of both that does not come from the dead time, V.
     pub residual: f64,
-    /// 1 over the current that just swings a leg within the dead time, 1/A; 0 without capacitance.
+    /// Inverse of the current that just charges the node of a leg within the dead time, 1/A; 0 without capacitance.
     pub inverse_knee: f64,
     pub sign: SmoothSign,
-    /// Ohm.
+    /// Resistance of a conducting switch, ohm.
     pub on_resistance: f64,
     /// Further resistance of each phase, ohm.
     pub resistances: [f64; 3],
@@ -58,8 +58,9 @@ impl Averaged {
     }
 }
 
-/// Share of the dead-time error of a current, in units of that which just swings the leg: while the
-/// leg swings linearly it is `y/2`, and `1 - 1/(2 y)` where it arrives before the end.
+/// Share of the full dead-time error at a current `y`, in units of the current that just charges the node within the
+/// dead time. The share is `y/2` if the leg still swings at the end of the dead time, and `1 - 1/(2 y)` if it arrives
+/// before the end.
 #[inline]
 fn swung(y: f64) -> f64 {
     let inverse = 1.0 / y.abs().max(1.0);
@@ -78,7 +79,7 @@ impl Source for Averaged {
     }
 }
 
-/// An inverter with capacitance at the nodes and resistance of the switches, at phases whose resistances differ.
+/// An inverter with node capacitance and switch resistance, connected to phases whose resistances differ.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RealSwitches(pub Averaged);
 
@@ -102,8 +103,7 @@ impl Source for RealSwitches {
     }
 }
 
-/// Integrates over `h` seconds, in parts between the kinks; returns the terminal voltage integrated over
-/// them, V s.
+/// Integrates over `h` seconds, in parts between the kinks. Returns the terminal voltage integrated over them, V s.
 #[inline]
 pub(crate) fn step<M: MachineModel>(
     terminals: &impl Terminals,
@@ -128,11 +128,11 @@ pub(crate) fn step<M: MachineModel>(
     }
 }
 
-/// Time until the first phase current crosses a kink, if one does within `h` seconds at this rate.
+/// Time until the first phase current crosses a kink; none if no current does within `h` seconds at this rate.
 #[inline]
 fn until_kink(i: Complex, rate: Complex, h: f64, kink: f64) -> Option<f64> {
     let (now, later) = (phases(i), phases(i + rate * h));
-    // Which of the three pieces between the kinks a current is on.
+    // The piece between the kinks on which a current lies.
     let piece = |i: f64| (i > -kink, i > kink);
     if (0..3).all(|k| piece(now[k]) == piece(later[k])) {
         return None;

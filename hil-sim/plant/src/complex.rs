@@ -1,7 +1,7 @@
 //! Space vectors as complex numbers, and the Clarke transformation in `f64`.
 
-/// A space vector in the stator frame: the real part is alpha (along the axis of phase a), the
-/// imaginary part beta. Amplitude-invariant, so its length is a peak phase value.
+/// A space vector in the stator frame: the real part is alpha (along the axis of phase a), the imaginary part beta. It
+/// is amplitude-invariant, so its magnitude is a peak phase value.
 pub use num_complex::Complex64 as Complex;
 
 const FRAC_1_SQRT_3: f64 = 0.577_350_269_189_625_8;
@@ -19,7 +19,7 @@ pub fn phases(x: Complex) -> [f64; 3] {
     [x.re, other - half, -other - half]
 }
 
-/// Square of the length, without the square root.
+/// Square of the magnitude, without the square root.
 pub(crate) fn square(x: Complex) -> f64 {
     x.re * x.re + x.im * x.im
 }

@@ -6,7 +6,7 @@ use crate::Plant;
 use crate::error::PlantError;
 use crate::settings::{or_zero, settings};
 
-/// The chopper goes off at this fraction of the voltage at which it goes on.
+/// The chopper switches off at this fraction of its switch-on voltage.
 const CHOPPER_OFF: f64 = 0.98;
 /// Range of the link, V.
 const RANGE: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
@@ -16,7 +16,7 @@ settings! {
     DcLinkSettings "dc_link." |s| {
         /// Relative amplitude of a sine ripple on a stiff link.
         ripple: f64 = 0.0, 0.0..=0.5, "";
-        /// Its frequency, Hz.
+        /// Frequency of that ripple, Hz.
         ripple_hz: f64 = 100.0, 0.1..=3000.0, "Hz";
         /// Capacitor behind a rectifier, F; 0 is a stiff link.
         capacitor: f64 = 0.0, or_zero(s.capacitor, 1e-6..=0.1), "F";
@@ -26,25 +26,25 @@ settings! {
         mains_hz: f64 = 50.0, 1.0..=1000.0, "Hz";
         /// Resistance of mains and rectifier, ohm.
         source: f64 = 1.0, 0.01..=1000.0, "ohm";
-        /// Resistance more while the precharge relay is open, ohm; 0 without a relay.
+        /// Further resistance while the precharge relay is open, ohm; 0 for no relay.
         precharge: f64 = 0.0, 0.0..=1e5, "ohm";
-        /// Start and duration of a mains outage, s; none with a duration of 0.
+        /// Start and duration of a mains outage, s; a duration of 0 means no outage.
         outage_at: f64 = 0.0, 0.0..=1e6, "s";
         /// See `outage_at`.
         outage: f64 = 0.0, 0.0..=1e6, "s";
-        /// Start and duration of a sag of the mains, s; none with a duration of 0.
+        /// Start and duration of a sag of the mains, s; a duration of 0 means no sag.
         sag_at: f64 = 0.0, 0.0..=1e6, "s";
         /// See `sag_at`.
         sag: f64 = 0.0, 0.0..=1e6, "s";
-        /// Peak of the rectified mains meanwhile, V.
+        /// Peak of the rectified mains during the sag, V.
         sag_v: f64 = 0.0, RANGE, "V";
-        /// Time in which the sag comes, and goes, s; within its duration.
+        /// Time in which the mains voltage falls to the sag, and returns, s; within the duration of the sag.
         sag_ramp: f64 = 0.01, 1e-4..=1e6, "s";
-        /// Power that others take from the link, W.
+        /// Power that other devices take from the link, W.
         load: f64 = 0.0, 0.0..=1e6, "W";
-        /// Voltage at which the brake chopper goes on by itself, V; 0 for one that the drive alone commands.
+        /// Voltage at which the brake chopper switches on by itself, V; 0 if only the drive commands it.
         chopper_v: f64 = 0.0, RANGE, "V";
-        /// Its resistor, ohm.
+        /// Resistor of the chopper, ohm.
         chopper: f64 = 100.0, 0.1..=1e6, "ohm";
     }
 }
@@ -61,7 +61,7 @@ impl DcLinkSettings {
 pub(crate) struct DcLink {
     pub settings: DcLinkSettings,
     pub nominal: f64,
-    /// Duty that the drive gives the chopper.
+    /// Duty cycle that the drive commands for the chopper.
     pub duty: f64,
     /// Whether the precharge relay is closed.
     pub relay: bool,
@@ -75,8 +75,8 @@ impl DcLink {
         Ok(Self { settings: *s, nominal, duty: 0.0, relay: false, time: 0.0, braking: false })
     }
 
-    /// Voltage after `h` seconds from `v`, V, in which the inverter takes the energy `taken`, J. The rectifier is
-    /// integrated implicitly, so a stiff mains is allowed.
+    /// Returns the voltage, V, after `h` seconds from `v`, in which the inverter takes the energy `taken`, J. The
+    /// rectifier is integrated implicitly, so that stiff mains are allowed.
     pub(crate) fn after(&mut self, v: f64, taken: f64, h: f64) -> f64 {
         let s = &self.settings;
         self.time += h;
@@ -86,9 +86,9 @@ impl DcLink {
         self.braking =
             s.chopper_v > 0.0 && v > s.chopper_v * if self.braking { CHOPPER_OFF } else { 1.0 };
         let duty = if self.braking { 1.0 } else { self.duty };
-        // What others take stops with the voltage.
+        // Other devices stop when the voltage is zero.
         let taken = taken + h * (duty * v * v / s.chopper + if v > 0.0 { s.load } else { 0.0 });
-        // The energy of the capacitor is balanced, not its charge: exact for a constant power.
+        // The balance is of the capacitor's energy, not of its charge, because this is exact for a constant power.
         let alone = (v * v - 2.0 * taken / s.capacitor).max(0.0).sqrt();
         let mains = self.mains();
         let source = s.source + if self.relay { 0.0 } else { s.precharge };
@@ -97,7 +97,7 @@ impl DcLink {
         charged.clamp(*RANGE.start(), *RANGE.end())
     }
 
-    /// Rectified mains, V.
+    /// Rectified mains voltage, V.
     fn mains(&self) -> f64 {
         let s = &self.settings;
         let since = self.time - s.outage_at;
@@ -108,12 +108,12 @@ impl DcLink {
             return self.peak();
         }
         let sector = if s.pulses == 2 { PI } else { FRAC_PI_3 };
-        // Time is not negative.
+        // Time is never negative.
         let pulses = TAU * s.mains_hz * self.time / sector + 0.5;
         self.peak() * (sector * (pulses.fract() - 0.5)).cos()
     }
 
-    /// Its peak, V.
+    /// Peak of the rectified mains, V.
     fn peak(&self) -> f64 {
         let s = &self.settings;
         let since = self.time - s.sag_at;
@@ -123,8 +123,8 @@ impl DcLink {
 }
 
 impl Plant {
-    /// Changes the peak of the rectified mains alone, V, behind which a capacitor keeps its voltage; without one as
-    /// [`Self::set_dc_link`].
+    /// Changes only the peak of the rectified mains, V; a capacitor behind the rectifier keeps its voltage. Without a
+    /// capacitor it does the same as [`Self::set_dc_link`].
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
@@ -134,7 +134,7 @@ impl Plant {
         if self.dc_link.settings.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
     }
 
-    /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.
+    /// Sets the duty cycle of the brake chopper, clamped to 0 to 1.
     pub fn set_chopper(&mut self, duty: f64) {
         self.dc_link.duty = duty.clamp(0.0, 1.0);
     }

@@ -8,7 +8,7 @@ use crate::settings::settings;
 settings! {
     /// Resolution of the encoder.
     EncoderSettings "encoder." {
-        /// Lines per turn; the counter makes four counts of each.
+        /// Lines per turn; the counter makes four counts of each line.
         lines: u32 = 2500, 1.0..=100_000.0, "";
     }
 }
@@ -19,16 +19,16 @@ pub enum EncoderFault {
     /// No fault.
     #[default]
     None,
-    /// The counter stands still: cable off, or one channel dead.
+    /// The counter does not move: a disconnected cable, or one dead channel.
     Stuck,
-    /// This fraction of the counts is lost, 0 to 1: slipping coupling, dirty disc.
+    /// This fraction of the counts is lost, 0 to 1: a slipping coupling, a dirty disc.
     Losing(f64),
 }
 
-/// The encoder and its counter: starts at zero, counts upwards with positive speed.
+/// The encoder and its counter, which starts at zero and counts up with positive speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
-    /// Its fault.
+    /// Fault of the encoder.
     pub fault: EncoderFault,
     counts_per_radian: f64,
     position: f64,
@@ -36,7 +36,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// The encoder with these settings.
+    /// Makes the encoder with these settings.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -46,7 +46,7 @@ impl Encoder {
         Ok(Self { fault: EncoderFault::None, counts_per_radian, position: 0.0, lost: 0.0 })
     }
 
-    /// Follows the rotor to this mechanical angle, rad, not wrapped.
+    /// Follows the rotor to a mechanical angle, rad, not wrapped.
     pub fn follow(&mut self, angle: f64) {
         let position = angle * self.counts_per_radian;
         match self.fault {
@@ -59,11 +59,11 @@ impl Encoder {
         self.position = position;
     }
 
-    /// The counter, wrapping.
+    /// The counter, which wraps.
     pub fn count(&self) -> u32 {
         let seen = self.position - self.lost;
         let towards_zero = seen as i64;
-        // Round down without the call that `floor` is on older processors.
+        // Rounds down without the library call that `floor` needs on older processors.
         let count = towards_zero - i64::from((towards_zero as f64) > seen);
         count as u32
     }

@@ -10,7 +10,7 @@ pub enum PlantError {
     OutOfRange {
         /// Name of the setting, for example `saliency.b1`.
         key: &'static str,
-        /// The value given.
+        /// The given value.
         value: f64,
         /// Smallest allowed value.
         min: f64,
@@ -19,7 +19,7 @@ pub enum PlantError {
         /// Unit of the three values.
         unit: &'static str,
     },
-    /// The saliency vector could grow beyond half, towards the singularity at one; see
+    /// The saliency vector could grow beyond 0.5, towards the singularity at 1; see
     /// [`Machine::new`](super::Machine::new).
     #[error(
         "{key} = {value} is outside the allowed range {min} to {max} {unit}: \
@@ -28,15 +28,15 @@ pub enum PlantError {
     TooSalient {
         /// Name of the setting that contributes most.
         key: &'static str,
-        /// The value given.
+        /// The given value.
         value: f64,
-        /// Smallest allowed value, the other saliency settings being as they are.
+        /// Smallest allowed value with the present other saliency settings.
         min: f64,
-        /// Largest allowed value, the other saliency settings being as they are.
+        /// Largest allowed value with the present other saliency settings.
         max: f64,
         /// Unit of the three values.
         unit: &'static str,
-        /// The length of the saliency vector that would be reached.
+        /// Magnitude that the saliency vector would reach.
         saliency: f64,
     },
 }

@@ -1,23 +1,21 @@
 //! All six switches off: the diodes carry the currents into the dc link until they are zero.
 //!
-//! A phase whose current flows into the machine is held at the negative rail, one whose current
-//! flows back at the positive rail, one without current floats. A floating phase stays without
-//! current, exactly, unless its potential leaves the range between the rails. When all three float
-//! the terminals show the back-emf of the decaying rotor flux, which turns with the rotor.
+//! A phase whose current flows into the machine is connected to the negative rail by its diode, and a phase whose
+//! current flows back to the positive rail. A phase without current floats. It stays exactly without current unless its
+//! potential leaves the range between the rails. If all three phases float, the terminals show the back-EMF of the
+//! decaying rotor flux, which rotates with the rotor.
 
 use crate::complex::{Complex, clarke, phases, square};
 use crate::integrate::{MotorModel, MotorState};
 use crate::model::{ElectricalState as _, MachineModel};
 use crate::terminals::{All, Open, Without, without};
 
-/// Current below which a phase counts as without, A.
+/// Current below which a phase counts as having none, A.
 const NO_CURRENT: f64 = 1e-9;
-/// Most changes of conduction followed within one step; more do not occur in a passive circuit but
-/// through rounding.
+/// Largest number of conduction changes within one step. In a passive circuit more changes can only come from rounding.
 const CHANGES: usize = 8;
 
-/// Which way each diode leg conducts: +1 into the machine (negative rail), -1 back (positive
-/// rail), 0 not at all.
+/// Conduction of the diodes of each leg: +1 into the machine (negative rail), -1 back (positive rail), 0 none.
 type Conduction = [i8; 3];
 
 /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
@@ -29,7 +27,7 @@ pub(crate) fn step<M: MachineModel>(
 ) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
-    // Phases that began to conduct and were found not to: they float for the rest of the step.
+    // Phases that began to conduct but turned out not to: they float for the rest of the step.
     let mut blocked = [false; 3];
     if let Some(open) = open {
         blocked[open] = true;
@@ -55,7 +53,7 @@ pub(crate) fn step<M: MachineModel>(
         confine(motor, if square(i).sqrt() <= NO_CURRENT { Complex::ZERO } else { i });
         rest -= done;
     }
-    // Rounding keeps the conduction changing: the currents are practically zero.
+    // Only rounding still changes the conduction: the currents are practically zero.
     confine(motor, Complex::ZERO);
     volt_seconds + motor.advance(&Open, rest) * rest
 }
@@ -65,22 +63,22 @@ fn confine<M: MachineModel>(motor: &mut MotorModel<M>, i: Complex) {
     motor.state.electrical = motor.machine.with_current(&motor.state.electrical, i);
 }
 
-/// Which diodes conduct in the present state.
+/// Returns the diodes that conduct in the present state.
 fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 3]) -> Conduction {
     let mut flow = phases(motor.state.electrical.current()).map(sign);
     let conducting = flow.iter().filter(|&&f| f != 0).count();
     match conducting {
-        // One floats: does its potential leave the range between the rails?
+        // One phase floats: does its potential leave the range between the rails?
         2 => {
             let k = flow.iter().position(|&f| f == 0).unwrap_or(0);
             let (_, v) = motor.rates(&Without(k, diodes(flow, vdc)));
-            // v_k = 2/3 leg_k - 1/3 (sum of the others), and the others are on opposite rails.
+            // v_k = 2/3 leg_k - 1/3 (sum of the others), and the other legs are on opposite rails.
             let leg = 0.5 * vdc + 1.5 * phases(v)[k];
             if !blocked[k] {
                 flow[k] = i8::from(leg < 0.0) - i8::from(leg > vdc);
             }
         }
-        // All float: does the back-emf between two of them exceed the link?
+        // All phases float: does the back-EMF between two of them exceed the link voltage?
         0 => {
             let emf = phases(motor.rates(&Open).1);
             let highest = (0..3).fold(0, |m, k| if emf[k] > emf[m] { k } else { m });
@@ -99,7 +97,7 @@ fn sign(i: f64) -> i8 {
     i8::from(i > NO_CURRENT) - i8::from(i < -NO_CURRENT)
 }
 
-/// Integrates over `h` seconds with this conduction throughout; returns the mean terminal voltage.
+/// Integrates over `h` seconds with this conduction; returns the mean terminal voltage.
 fn advance<M: MachineModel>(
     motor: &mut MotorModel<M>,
     flow: Conduction,
@@ -113,13 +111,13 @@ fn advance<M: MachineModel>(
     }
 }
 
-/// The voltage at the terminals that conduct: legs of opposite sign about the middle of the link; their common
-/// part has no space vector.
+/// Returns the voltage at the conducting terminals. Legs with opposite signs lie symmetrically about the middle of the
+/// link; their common-mode part has no space vector.
 fn diodes(flow: Conduction, vdc: f64) -> Complex {
     clarke(flow.map(|f| -0.5 * vdc * f64::from(f)))
 }
 
-/// The phase whose current first goes against its diode, and at which fraction of the step.
+/// Returns the phase whose current is the first to reverse against its diode, and the fraction of the step at which it does.
 fn first_reversal<M: MachineModel>(
     motor: &MotorModel<M>,
     before: &MotorState<M::State>,

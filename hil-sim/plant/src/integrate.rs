@@ -1,4 +1,4 @@
-//! The machine and its shaft, integrated by the classical Runge-Kutta rule.
+//! The machine and its shaft, integrated by the classical Runge-Kutta method.
 
 use crate::complex::Complex;
 use crate::machine::Machine;
@@ -29,7 +29,7 @@ pub struct MotorModel<M: MachineModel = Machine> {
 }
 
 impl<M: MachineModel> MotorModel<M> {
-    /// At rest, without current and flux; turning already where the load holds a speed.
+    /// Makes a motor without current and flux. It is at rest, or turns already if the load holds a speed.
     pub fn new(machine: M, mechanics: Mechanics) -> Self {
         let mut motor = Self { machine, mechanics, state: MotorState::default() };
         machine.settle(&mut motor.state.electrical);
@@ -37,7 +37,7 @@ impl<M: MachineModel> MotorModel<M> {
         motor
     }
 
-    /// Sets the speed that the load imposes, if it imposes one. To be called after a change of load.
+    /// Sets the speed that the load imposes, if it imposes one. Must be called after a change of load.
     pub fn hold_speed(&mut self) {
         if let Some(speed) = self.mechanics.held_speed() {
             self.state.speed = speed;
@@ -52,14 +52,14 @@ impl<M: MachineModel> MotorModel<M> {
         self.end_step(h);
     }
 
-    /// Fixes for a period what depends on the angle of the rotor.
+    /// Sets the values that depend on the rotor angle, for one period.
     #[inline]
     pub(crate) fn begin_period(&mut self) {
         self.mechanics.begin_period(self.state.angle);
         self.machine.turn(&mut self.state.electrical);
     }
 
-    /// Fixes the torques on the shaft for an integration step.
+    /// Sets the torques on the shaft for an integration step.
     #[inline]
     pub(crate) fn begin_step(&mut self) {
         if self.mechanics.has_extras() {
@@ -77,7 +77,7 @@ impl<M: MachineModel> MotorModel<M> {
         self.machine.after_step(&self.state.electrical, h);
     }
 
-    /// Derivative of the electrical state, and terminal voltage, now.
+    /// Returns the present derivative of the electrical state, and the terminal voltage.
     #[inline(always)]
     pub(crate) fn rates(&self, terminals: &impl Terminals) -> (Rate<M>, Complex) {
         let w = self.machine.pole_pairs() * self.state.speed;
@@ -90,7 +90,7 @@ impl<M: MachineModel> MotorModel<M> {
         self.advance_from(self.rates(terminals), terminals, h)
     }
 
-    /// As [`Self::advance`]; `first` are the rates at the present state.
+    /// As [`Self::advance`]; `first` holds the rates at the present state.
     #[inline]
     pub(crate) fn advance_from(
         &mut self,

@@ -1,14 +1,14 @@
 //! The inverter, averaged over a PWM period.
 //!
-//! A leg is high for the fraction `c/top` of the period. Its mean voltage falls short of that by
-//! the dead time (section 3.9: while both switches are off the current holds the leg at the rail it
-//! flows from) and by a residual drop of the switches, both against the direction of the current.
-//! That direction is the sign of the actual phase current, smoothed linearly over ±20 mA by default and
-//! evaluated at every stage of the integration. A leg that does not switch has no dead-time error.
+//! A leg is high for the fraction `c/top` of the period. Two errors reduce the magnitude of its mean voltage, both
+//! against the direction of the current. One is the dead time (section 3.9): while both switches are off, the current
+//! holds the leg at the rail from which it flows. The other is the residual voltage drop of the switches. The direction
+//! is the sign of the actual phase current, smoothed linearly over ±20 mA by default and evaluated at every stage of
+//! the integration. A leg that does not switch has no dead-time error.
 //!
-//! The propagation delay shifts the pulses within the period; averaged, a fraction delay/T of the
-//! previous period's voltage replaces as much of this period's, spread over the whole period. To
-//! first order in delay/T (1.3 %) that is the same delay.
+//! The propagation delay shifts the pulses within the period. Averaged, a fraction delay/T of this period's voltage is
+//! replaced by the previous period's voltage, spread over the whole period. To first order in delay/T (1.3 %) this is
+//! the same delay.
 
 use drive_core::Compare;
 
@@ -22,36 +22,36 @@ settings! {
     InverterSettings "inverter." |s| {
         /// Dc-link voltage, V.
         vdc: f64 = 311.0;
-        /// Compare value that means high side on throughout, with one pulse. The default is 170 MHz / (2 * 6 kHz).
+        /// Compare value at which the high side is on for the whole period, with one pulse. The default is 170 MHz / (2 * 6 kHz).
         timer_top: u16 = 14_167, 100.0..=65_535.0, "";
-        /// Equal pulses of each leg in a period; that compare value is the share of one of them.
+        /// Number of equal pulses of each leg in a period; the compare value gives the width of one pulse.
         pulses: u16 = 1, 1.0..=10.0, "";
         /// Time in which both switches of a leg are off at every edge, us (section 3.9).
         dead_time_us: f64 = 2.2;
-        /// Time from the command to the first switch acting, us (section 3.9).
+        /// Time from the command to the first switching, us (section 3.9).
         propagation_us: f64 = 2.2, 0.0..=10.0, "us";
-        /// Drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
+        /// Voltage drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
         residual_v: f64 = 1.64, 0.0..=20.0, "V";
-        /// Further dead time, of which the drive does not know, us; negative is less than it believes.
+        /// Further dead time that the drive does not know, us; if negative, the dead time is shorter than the drive assumes.
         extra_dead_time_us: f64 = 0.0, -s.dead_time_us..=10.0, "us";
-        /// Capacitance of the output node of each leg, F. During the dead time the current has to
-        /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
+        /// Capacitance of the output node of each leg, F. During the dead time the current has to charge it, so the
+        /// dead-time error of a small current is smaller. Averaged inverter only.
         node_capacitance: f64 = 0.0, 0.0..=if s.switched { 0.0 } else { 1e-6 }, "F";
-        /// Current up to which the sign of a phase current grows in proportion to it, A.
+        /// Current below which the smoothed sign of a phase current is proportional to that current, A.
         smoothing_a: f64 = 0.020, 1e-5..=100.0, "A";
-        /// Resistance of a switch that conducts, ohm.
+        /// Resistance of a conducting switch, ohm.
         on_resistance: f64 = 0.0, 0.0..=100.0, "ohm";
         /// Further resistance of the line and the winding of each phase, ohm. Averaged inverter only.
         more_ohm: [f64; 3] = [0.0; 3];
         /// Further dead time of each leg, us. Averaged inverter only.
         more_dead_time_us: [f64; 3] = [0.0; 3];
-        /// Whether to integrate between the exact instants of the edges rather than averages.
+        /// Whether the integration runs between the exact instants of the edges, instead of over averages.
         switched: bool = false;
     }
 }
 
 impl InverterSettings {
-    /// No dead time, no delay, no drop.
+    /// No dead time, no delay, no voltage drop.
     pub const IDEAL: Self =
         Self { dead_time_us: 0.0, propagation_us: 0.0, residual_v: 0.0, ..Self::DEFAULT };
 }
@@ -65,28 +65,28 @@ pub struct Inverter {
     /// Pulses of each leg in a period.
     pub(crate) pulses: u16,
     timer_top: u16,
-    /// Seconds.
+    /// Dead time, s.
     pub(crate) dead_time: f64,
-    /// Part of it that the drive does not know, us.
+    /// Part of the dead time that the drive does not know, us.
     extra_us: f64,
-    /// Seconds.
+    /// Propagation delay, s.
     pub(crate) propagation: f64,
     pub(crate) residual: f64,
-    /// F.
+    /// Capacitance of the output node, F.
     pub(crate) capacitance: f64,
     pub(crate) sign: SmoothSign,
-    /// Ohm.
+    /// Resistance of a conducting switch, ohm.
     pub(crate) on_resistance: f64,
-    /// Resistance of each phase, ohm, and dead time of each leg, s, beyond the common ones.
+    /// Resistance of each phase, ohm, and dead time of each leg, s, in excess of the common values.
     pub(crate) resistances: [f64; 3],
     pub(crate) more_dead_time: [f64; 3],
     pub(crate) switched: bool,
-    /// Compare values of the period before.
+    /// Compare values of the previous period.
     pub(crate) previous: Compare,
 }
 
 impl Inverter {
-    /// The inverter with these settings, off.
+    /// Makes the inverter with these settings, off.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -135,7 +135,7 @@ impl Inverter {
         Ok(())
     }
 
-    /// Changes the dead time, us, to which the extra one is added.
+    /// Changes the dead time, us; the extra dead time is added to it.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 10 us.
@@ -145,8 +145,8 @@ impl Inverter {
         Ok(())
     }
 
-    /// Power that the switches turn into heat at this current, W: none while the outputs are off, whose diodes are
-    /// ideal. The dead time costs voltage but no energy.
+    /// Power that the switches dissipate at this current, W. It is zero while the outputs are off, because the diodes
+    /// are ideal. The dead time costs voltage but no energy.
     pub(crate) fn conduction_loss(&self, i: Complex) -> f64 {
         if !self.previous.enabled {
             return 0.0;
@@ -161,7 +161,7 @@ impl Inverter {
         [compare.a, compare.b, compare.c].map(|c| (f64::from(c) * inverse).min(1.0))
     }
 
-    /// The averages of a period of `period` seconds with these compare values, outputs on.
+    /// Computes the averages of a period of `period` seconds with these compare values, outputs on.
     pub(crate) fn averaged(&self, compare: &Compare, period: f64) -> Averaged {
         let duties = self.duties(compare);
         let mut v = clarke(duties);
@@ -170,7 +170,7 @@ impl Inverter {
             v += (clarke(self.duties(&self.previous)) - v) * blend;
         }
         let pulses = f64::from(self.pulses);
-        // A pulse shorter than the dead time vanishes; the dead time cannot take more than it.
+        // A pulse shorter than the dead time vanishes, so the dead time cannot take more than the pulse.
         let taken = |leg: usize, available: f64| {
             let dead = (self.dead_time + self.more_dead_time[leg]) * pulses / period;
             let switches = duties[leg] > 0.0 && duties[leg] < 1.0;

@@ -1,8 +1,7 @@
 //! The plant that the drive is connected to: motor, shaft, inverter, sensors and encoder, in `f64`.
 //!
-//! One call of [`Plant::advance`] is one PWM period. The caller keeps the delay convention of
-//! [`drive_core::io`]: the output computed from the sample at `k T` is applied from
-//! `(k + 1) T` on, except that outputs that go off do so at once:
+//! One call of [`Plant::advance`] is one PWM period. The caller keeps the delay convention of [`drive_core::io`]: the
+//! output computed from the sample at `k T` takes effect at `(k + 1) T`, except that outputs switch off at once:
 //!
 //! ```no_run
 //! use drive_core::Compare;
@@ -20,10 +19,10 @@
 //! # Ok::<(), motor_plant::PlantError>(())
 //! ```
 
-// Hints to inline are where they were measured, in nanoseconds a period: without those of machine, model and mechanics
-// model A takes 339 in place of 279, without those here and in model 284; without those of the energy model and the
-// switched edges all effects take 780 in place of 731. They are `always` where a plain hint was not followed (the
-// derivative of model A: 2330 in place of 2170 with switched edges).
+// The inline hints stand where measurements justify them, in nanoseconds a period. Without the hints of machine, model
+// and mechanics, model A takes 339 instead of 279; without the hints here and in model, 284. Without those of the
+// energy model and the switched edges, all effects together take 780 instead of 731. A hint is `always` where the
+// compiler did not follow a plain one (the derivative of model A: 2330 instead of 2170 with switched edges).
 mod averaged;
 mod complex;
 mod dc_link;
@@ -71,9 +70,9 @@ settings! {
     PlantSettings "" {
         /// Parameters of the machine.
         machine: MachineSettings = MachineSettings::DEFAULT;
-        /// Its saliency in model A; of no effect with `iron`.
+        /// Saliency of the machine in model A; no effect with `iron`.
         saliency: SaliencySettings = SaliencySettings::DEFAULT;
-        /// The iron of the energy model; without, the machine is model A.
+        /// Magnetic settings of the energy model; if none are given, the machine is model A.
         iron: Option<IronSettings> = None;
         /// The shaft and its load.
         mechanics: MechanicsSettings = MechanicsSettings::DEFAULT;
@@ -83,12 +82,12 @@ settings! {
         dc_link: DcLinkSettings = DcLinkSettings::DEFAULT;
         /// The inverter.
         inverter: InverterSettings = InverterSettings::DEFAULT;
-        /// The current sensors and the converter.
+        /// The current sensors and the ADC.
         measurement: MeasurementSettings = MeasurementSettings::DEFAULT;
         /// The encoder.
         encoder: EncoderSettings = EncoderSettings::DEFAULT;
-        /// Integration steps per PWM period. Two, the default, are within 1e-5 A of 24, and the analog
-        /// filter takes the current as straight between them.
+        /// Integration steps per PWM period. The default of two steps differs from 24 steps by less than 1e-5 A. The
+        /// analog filter assumes a straight current between the steps.
         substeps: u32 = 2, 1.0..=1000.0, "";
     }
 }
@@ -99,7 +98,7 @@ pub struct Plant {
     motor: Motor,
     around: Around,
     dc_link: DcLink,
-    /// None where the resistances are constant.
+    /// Warming; none if the resistances are constant.
     warming: Option<Warming>,
     periods: u64,
     /// Whether anything changes once a period.
@@ -111,8 +110,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The plant at rest, without currents and flux. Equal settings and seeds give equal plants, to
-    /// the bit.
+    /// Makes the plant at rest, without currents and flux. Equal settings and seeds give exactly equal plants.
     ///
     /// # Errors
     /// [`PlantError`] with the setting that is refused.
@@ -152,15 +150,15 @@ impl Plant {
         })
     }
 
-    /// The present readings of converters, counter and hardware. Each call draws new noise and clears the
-    /// reported hardware events.
+    /// Returns the present readings of ADCs, counter and hardware. Each call draws new noise and clears the reported
+    /// hardware events.
     #[inline(never)]
     pub fn sample(&mut self) -> Sample {
         let [current_a, current_b] = self.around.sensors.currents(&mut self.rng);
         Sample {
             current_a,
             current_b,
-            // Two sensors.
+            // There are only two sensors.
             current_c: 0,
             dc_link: self.around.sensors.dc_link(self.around.inverter.vdc, &mut self.rng),
             heat_sink: self.around.sensors.heat_sink(),
@@ -169,7 +167,7 @@ impl Plant {
         }
     }
 
-    /// One PWM period of `period_s` seconds with these compare values, delayed already.
+    /// Advances by one PWM period of `period_s` seconds with these compare values, which the caller has delayed.
     #[inline(never)] // its models are compiled once, not in every crate that runs a plant
     pub fn advance(&mut self, compare: &Compare, period_s: f64) {
         let around = &mut self.around;
@@ -181,7 +179,7 @@ impl Plant {
         }
     }
 
-    /// What changes once a period: the dc link and its sensor, and the resistances.
+    /// Advances the quantities that change once a period: the dc link and its sensor, and the resistances.
     fn slow(&mut self, period_s: f64) {
         let around = &mut self.around;
         if self.dc_link.settings.moves() {
@@ -192,12 +190,12 @@ impl Plant {
         around.sensors.follow_dc_link(around.inverter.vdc, period_s);
         self.periods += 1;
         if let Some((rs, rr)) = self.warming.and_then(|w| w.resistances(self.periods, period_s)) {
-            // Within their ranges: half to three times those that `new` has accepted.
+            // The values are in range: half to three times those that `new` has accepted.
             let _ = self.set_resistances(rs, rr);
         }
     }
 
-    /// The motor, with its state, where it is model A: machine, shaft and their state.
+    /// Returns the motor with its shaft and state, if it is model A.
     pub fn model_a(&self) -> Option<&MotorModel<Machine>> {
         match &self.motor {
             Motor::A(motor) => Some(motor),
@@ -205,7 +203,7 @@ impl Plant {
         }
     }
 
-    /// The motor, with its state, where it is the energy model.
+    /// Returns the motor with its shaft and state, if it is the energy model.
     pub fn energy_model(&self) -> Option<&MotorModel<EnergyMachine>> {
         match &self.motor {
             Motor::A(_) => None,
@@ -279,7 +277,7 @@ impl Plant {
         (self.around.taken / period_s + lost) / self.dc_link()
     }
 
-    /// Changes the dc-link voltage, V; behind a rectifier, the voltage now and the peak of the rectified mains.
+    /// Changes the dc-link voltage, V. Behind a rectifier it changes both the present voltage and the peak of the rectified mains.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
@@ -289,7 +287,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Slopes of the phase currents while the terminals are shorted, A/s.
+    /// Returns the rates of the phase currents while the terminals are shorted, A/s.
     pub fn shorted_slopes(&self) -> [f64; 3] {
         phases(whichever!(&self.motor, motor => {
             let speed = motor.machine.pole_pairs() * motor.state.speed;
@@ -311,7 +309,7 @@ impl Plant {
         self.around.inverter.set_dead_time(us)
     }
 
-    /// Couples another load. A held speed holds at once; a free shaft continues from there.
+    /// Couples another load. A held speed applies at once; a free shaft continues at its present speed.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] for its torque or speed.
@@ -323,7 +321,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Changes the resistances of stator and rotor, ohm (a warmer motor), and keeps all else.
+    /// Changes the resistances of stator and rotor, ohm (a warmer motor), and keeps everything else.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -333,8 +331,8 @@ impl Plant {
         Ok(())
     }
 
-    /// Changes the assumed saliency of model A and keeps the state; without effect on the energy model,
-    /// whose saliency is that of its iron.
+    /// Changes the assumed saliency of model A and keeps the state. It has no effect on the energy model, whose
+    /// saliency comes from its magnetic settings.
     ///
     /// # Errors
     /// As [`Machine::new`].
@@ -349,8 +347,8 @@ impl Plant {
         Ok(())
     }
 
-    /// Turns the rotor flux by an angle, electrical rad, at once: an estimate of the flux angle is then
-    /// wrong by as much.
+    /// Rotates the rotor flux by an angle, electrical rad, at once. An estimate of the flux angle is then wrong by that
+    /// angle.
     pub fn turn_rotor_flux(&mut self, angle: f64) {
         let turn = Complex::new(angle.cos(), angle.sin());
         whichever!(&mut self.motor, motor => {
@@ -380,7 +378,7 @@ impl Plant {
         self.encoder.fault = fault;
     }
 
-    /// Changes the code of the heat-sink temperature.
+    /// Changes the ADC counts of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
         self.around.sensors.set_heat_sink(code);
     }

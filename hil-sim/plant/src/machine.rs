@@ -12,23 +12,22 @@
 //! Te      = 3/2 P k Im(psi* i)
 //! ```
 //!
-//! With `a_psi = b1 = chi = 0` this is Eq. 2.9 with the rotor currents eliminated, term by term. A
-//! positive `s` means low impedance along its axis. The size of the saliency is an assumption:
-//! nothing in the source measures it. The factor `2/(1 + r)`, one at `psi_n`, saturates the flux
-//! part at `2 |a_psi|`; the current part is held at its value for `hold_a` beyond
-//! that current, so that `|s|` stays below one whatever the currents.
-//! Iron loss, slotting, skin effect and the saturation of the main flux are absent.
+//! With `a_psi = b1 = chi = 0` this is Eq. 2.9 with the rotor currents eliminated, term by term. A positive `s` means
+//! low impedance along its axis. The size of the saliency is an assumption, because nothing in the source measures it.
+//! The factor `2/(1 + r)`, which is one at `psi_n`, limits the flux part to `2 |a_psi|`. Above the current `hold_a` the
+//! current part stays at its value for `hold_a`, so that `|s|` remains below one at all currents. Iron loss, slotting,
+//! skin effect and the saturation of the main flux are not modelled.
 
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
 use crate::model::{ElectricalRate, ElectricalState, MachineModel, increment};
 use crate::settings::settings;
 
-/// Largest length of the saliency vector that settings may reach.
+/// Largest magnitude of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
 /// Corner of the filter that splits off the high-frequency current for the `chi` term, rad/s.
 const CHI_CORNER: f64 = std::f64::consts::TAU * 60.0;
-/// Below these the directions of current (A) and flux (Wb squared) count as undefined.
+/// Values below which the direction of the current (A) and of the flux (Wb squared) counts as undefined.
 const NO_CURRENT: f64 = 1e-9;
 const NO_FLUX_SQUARED: f64 = 1e-18;
 
@@ -51,24 +50,23 @@ settings! {
 }
 
 settings! {
-    /// Size of the saliency. The defaults are assumed; all zero (with any `psi_n`) is the textbook
+    /// Size of the saliency. The defaults are assumed. If all values are zero (with any `psi_n`), it is the textbook
     /// machine.
     SaliencySettings "saliency." {
-        /// Part fixed to the rotor flux, at the flux `psi_n`; negative is high impedance along it.
+        /// Part fixed to the rotor flux, at the flux `psi_n`; negative is high impedance along the flux.
         a_psi: f64 = -0.035, -0.25..=0.25, "";
-        /// Part fixed to the stator current, 1/A; positive is low impedance along it (saturating
-        /// leakage paths).
+        /// Part fixed to the stator current, 1/A; positive is low impedance along the current (saturating leakage
+        /// paths).
         b1: f64 = 0.036, -50.0..=50.0, "1/A";
-        /// Resistive part of Eq. 3.8, as a factor of it: 0 is none, 1 as printed. Acts well above
-        /// 60 Hz only.
+        /// Resistive part of Eq. 3.8, as a factor: 0 is none, 1 is the part as printed. It acts only well above 60 Hz.
         chi: f64 = 0.0, 0.0..=10.0, "";
-        /// Current up to which the current part grows, A peak; beyond, it is held.
+        /// Current above which the current part no longer grows, A peak.
         hold_a: f64 = 5.0, 0.01..=10_000.0, "A";
-        /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
+        /// Flux at which `a_psi` holds, Wb; if not given, the flux of a magnetising current of 0.7 A.
         psi_n: Option<f64> = None;
         /// Part fixed to the stator; positive is low impedance along its axis.
         stator_fixed: f64 = 0.0, -0.1..=0.1, "";
-        /// That axis, electrical degrees from phase a.
+        /// Axis of that part, electrical degrees from phase a.
         stator_fixed_deg: f64 = 0.0, -180.0..=180.0, "deg";
     }
 }
@@ -85,7 +83,7 @@ pub struct MachineState {
     pub i: Complex,
     /// Rotor flux linkage, Wb.
     pub psi: Complex,
-    /// Stator current behind the 60 Hz low-pass filter of the `chi` term, A; unused when that is 0.
+    /// Stator current after the 60 Hz low-pass filter of the `chi` term, A; unused if `chi` is 0.
     pub i_lp: Complex,
 }
 
@@ -147,12 +145,12 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The machine with these settings.
+    /// Makes the machine with these settings.
     ///
-    /// Refused are values that are not finite or outside the range named in the error, and
-    /// saliency that could reach `|s| > 0.5` with any current up to `hold_a` and any flux up to
-    /// that of `hold_a`. (The largest `|s|` is the sum of the largest lengths of its two parts, as their
-    /// directions are independent; the flux part grows with the flux.)
+    /// It refuses values that are not finite or outside the range named in the error. It also refuses a saliency that
+    /// could reach `|s| > 0.5` with any current up to `hold_a` and any flux up to the flux of `hold_a`. (The largest
+    /// `|s|` is the sum of the largest magnitudes of its two parts, because their directions are independent; the flux
+    /// part grows with the flux.)
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
@@ -187,7 +185,7 @@ impl Machine {
         })
     }
 
-    /// Changes the resistances and keeps all else.
+    /// Changes the resistances and keeps everything else.
     pub(crate) fn set_resistances(&mut self, rs: f64, rr: f64) {
         let coupling = self.coupling;
         self.half_chi_r *= rr / (self.alpha * self.lr);
@@ -211,8 +209,8 @@ impl Machine {
         1.0 / self.alpha
     }
 
-    /// The saliency vector `s`: its length is the relative saliency, half its angle the axis of
-    /// low impedance.
+    /// Returns the saliency vector `s`: its magnitude is the relative saliency, half its angle the axis of low
+    /// impedance.
     #[inline]
     pub fn saliency(&self, x: &MachineState) -> Complex {
         // (psi/psi_n)^2 2/(1 + r) = 2 psi^2 / (psi_n^2 + |psi|^2)
@@ -238,7 +236,7 @@ impl Machine {
         Complex::new(self.alpha * psi.re + w * psi.im, self.alpha * psi.im - w * psi.re)
     }
 
-    /// Voltage left for the transient inductance, without the terminal voltage.
+    /// Voltage that remains for the transient inductance, without the terminal voltage.
     #[inline]
     fn drive_voltage(&self, x: &MachineState, decay: Complex) -> Complex {
         let y = decay * self.coupling - x.i * self.r_prime;
@@ -251,7 +249,7 @@ impl Machine {
         y - (h - u * h.conj()) * self.half_chi_r
     }
 
-    /// Time derivative of the state without that of the current.
+    /// Time derivative of the state, except for the current.
     #[inline]
     fn rest(&self, x: &MachineState, decay: Complex) -> MachineState {
         MachineState {
@@ -295,7 +293,7 @@ impl MachineModel for Machine {
         let decay = self.decay(x.psi, w);
         let internal = self.drive_voltage(x, decay);
         let s = self.saliency(x);
-        // Column of L x = sigma Ls (x - s x*) for x along the axis.
+        // A column of L x = sigma Ls (x - s x*), for x along the axis.
         let column = (axis - s * axis.conj()) * self.sigma_ls;
         let rate = (v_axis + dot(internal, axis)) / dot(column, axis);
         let rates = MachineState { i: axis * rate, ..self.rest(x, decay) };
@@ -315,7 +313,7 @@ impl MachineModel for Machine {
         MachineState { psi: x.psi * turn, ..*x }
     }
 }
-/// Refuses saliency that could come near the singularity; see [`Machine::new`].
+/// Refuses a saliency that could come near the singularity; see [`Machine::new`].
 fn refuse_singular(
     m: &MachineSettings,
     s: &SaliencySettings,

@@ -1,7 +1,7 @@
 //! The shaft: inertia, friction and load; with an elastic coupling, a second inertia.
 //!
-//! Static friction and the torque of the coupling are constant within an integration step, a torque once a turn within a
-//! PWM period, so the shaft is of first order in them.
+//! Static friction and the torque of the coupling are constant within an integration step, and a torque that varies
+//! once per revolution is constant within a PWM period. The shaft is therefore of first order in these torques.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,9 +17,9 @@ pub enum Load {
         /// Load torque, N m; positive brakes a positive speed and drives a negative one.
         torque: f64,
     },
-    /// The shaft is blocked.
+    /// The shaft is locked.
     Locked,
-    /// A dynamometer holds the speed, whatever the torque.
+    /// A dynamometer holds the speed against any torque.
     Speed {
         /// Mechanical speed, rad/s.
         speed: f64,
@@ -29,21 +29,22 @@ pub enum Load {
 settings! {
     /// Inertia, friction and load.
     MechanicsSettings "mechanics." |s| {
-        /// Inertia of everything that turns, kg m^2. The default is assumed: the source gives none.
+        /// Inertia of all rotating parts, kg m^2. The default is assumed: the source gives none.
         inertia: f64 = 0.012, 1e-6..=1000.0, "kg m^2";
         /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
         friction: f64 = 0.001, 0.0..=10.0, "N m s/rad";
-        /// Static friction: the torque to break away, and that against the motion, N m.
+        /// Static friction: the breakaway torque, and the same torque against the motion, N m.
         static_torque: f64 = 0.0, 0.0..=1000.0, "N m";
-        /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
+        /// Amplitude of a load torque that varies once per revolution with the cosine of the rotor angle, N m.
         once_torque: f64 = 0.0, 0.0..=1000.0, "N m";
-        /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
+        /// Distance of the stops on both sides from angle 0, mechanical rad; 0 for no stops.
         stops: f64 = 0.0, 0.0..=1e4, "rad";
-        /// Stiffness of a stop, N m/rad; with the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
+        /// Stiffness of a stop, N m/rad. Its resonance with the inertia may be 100 Hz at most, because the torque is
+        /// constant within a PWM period.
         stop_stiffness: f64 = 100.0, 0.0..=(s.inertia * 628.0 * 628.0).max(100.0), "N m/rad";
-        /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
+        /// Damping of a stop, N m s/rad: with the other defaults the shaft rebounds with 0.65 of its speed.
         stop_damping: f64 = 0.3, 0.0..=1000.0, "N m s/rad";
-        /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
+        /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 for a rigid shaft.
         load_inertia: f64 = 0.0, or_zero(s.load_inertia, 1e-6..=1000.0), "kg m^2";
         /// Stiffness of the coupling, N m/rad.
         stiffness: f64 = 100.0, 1e-3..=s.stiffest(), "N m/rad";
@@ -55,7 +56,7 @@ settings! {
 }
 
 impl MechanicsSettings {
-    /// Largest stiffness of the coupling, N m/rad: a resonance of at most 500 Hz, which the integration follows.
+    /// Largest stiffness of the coupling, N m/rad: a resonance of at most 500 Hz, which the integration can follow.
     fn stiffest(&self) -> f64 {
         let parallel = self.inertia * self.load_inertia / (self.inertia + self.load_inertia);
         if self.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 }
@@ -69,24 +70,24 @@ pub struct Mechanics {
     friction: f64,
     load: Load,
     load_torque: f64,
-    /// 1/J when the shaft is free, else 0.
+    /// 1/J if the shaft is free, otherwise 0.
     mobility: f64,
     extras: Option<Extras>,
 }
 
-/// What most shafts do not have, with its state.
+/// Effects that most shafts do not have, with their state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extras {
     settings: MechanicsSettings,
     coupling: Option<Coupling>,
-    /// Torque by the angle in this period.
+    /// Torque that depends on the angle, in this period.
     by_angle: f64,
-    /// Speed at the start of the step; 0 also while friction holds the shaft.
+    /// Speed at the start of the step; also 0 while friction holds the shaft.
     speed: f64,
 }
 
 impl Extras {
-    /// Torque of the stop that the shaft has reached: it pushes, and does not pull.
+    /// Torque of the stop that the shaft has reached: it pushes, but does not pull.
     fn stop_torque(&self, angle: f64) -> f64 {
         let s = &self.settings;
         let beyond = angle.abs() - s.stops;
@@ -103,12 +104,12 @@ impl Extras {
 struct Coupling {
     twist: f64,
     speed: f64,
-    /// Torque that it takes from the motor in this step.
+    /// Torque that the coupling takes from the motor in this step.
     torque: f64,
 }
 
 impl Mechanics {
-    /// The shaft with these settings.
+    /// Makes the shaft with these settings.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -156,7 +157,7 @@ impl Mechanics {
         self.load
     }
 
-    /// The speed that the load imposes, mechanical rad/s; none with a free shaft.
+    /// Returns the speed that the load imposes, mechanical rad/s; none with a free shaft.
     pub fn held_speed(&self) -> Option<f64> {
         match self.load {
             Load::Free { .. } => None,
@@ -165,24 +166,24 @@ impl Mechanics {
         }
     }
 
-    /// Acceleration, rad/s^2, by the electromagnetic `torque` at this mechanical speed.
+    /// Returns the acceleration, rad/s^2, caused by the electromagnetic `torque` at this mechanical speed.
     #[inline]
     pub fn acceleration(&self, torque: f64, speed: f64) -> f64 {
         (torque - self.load_torque - self.friction * speed) * self.mobility
     }
 
-    /// Mechanical speed of the inertia behind the elastic coupling, rad/s; none without.
+    /// Returns the mechanical speed of the inertia behind the elastic coupling, rad/s; none with a rigid shaft.
     pub fn load_speed(&self) -> Option<f64> {
         self.extras?.coupling.map(|coupling| coupling.speed)
     }
 
-    /// Whether anything but inertia, viscous friction and a constant load acts.
+    /// Whether anything besides inertia, viscous friction and a constant load acts.
     #[inline]
     pub(crate) fn has_extras(&self) -> bool {
         self.extras.is_some()
     }
 
-    /// Fixes the torques by the angle for a period that begins at this one of the rotor.
+    /// Sets the torques that depend on the angle, for a period that begins at this angle of the rotor.
     #[inline]
     pub(crate) fn begin_period(&mut self, angle: f64) {
         if let Some(extras) = &mut self.extras {
@@ -190,8 +191,8 @@ impl Mechanics {
         }
     }
 
-    /// Fixes the torques of an integration step that begins at this speed and electromagnetic torque.
-    /// Returns the speed, zero where friction holds the shaft.
+    /// Sets the torques of an integration step that begins at this speed and electromagnetic torque. Returns the speed,
+    /// or zero if friction holds the shaft.
     #[inline(never)]
     pub(crate) fn begin(&mut self, speed: f64, torque: f64) -> f64 {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
@@ -202,7 +203,7 @@ impl Mechanics {
             coupling.torque = s.stiffness * coupling.twist + s.damping * (speed - coupling.speed);
             coupling.torque
         });
-        // A shaft that has come to rest, or passed it, stays where friction can hold it.
+        // A shaft that has come to rest, or has passed through zero speed, stays there if friction can hold it.
         let rests = speed == 0.0 || extras.speed * speed < 0.0;
         let driven = torque - against;
         extras.speed = speed;
@@ -220,7 +221,7 @@ impl Mechanics {
         speed
     }
 
-    /// Ends an integration step of `h` seconds: the inertia behind the coupling follows.
+    /// Ends an integration step of `h` seconds: updates the inertia behind the coupling.
     pub(crate) fn end(&mut self, speed: f64, h: f64) {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return;

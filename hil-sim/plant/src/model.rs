@@ -1,11 +1,11 @@
-//! What shaft, inverter and sensors need of a machine model.
+//! The interface of a machine model to shaft, inverter and sensors.
 
 use crate::complex::Complex;
 
-/// A machine, in the stator frame: amplitude-invariant space vectors, `w` the electrical speed of
-/// the rotor in rad/s. A model is a set of coefficients; its state is apart from it.
+/// A machine in the stator frame, with amplitude-invariant space vectors; `w` is the electrical speed of the rotor in
+/// rad/s. A model is a set of coefficients; its state is separate.
 pub trait MachineModel: Copy {
-    /// What the model integrates.
+    /// The integrated state.
     type State: ElectricalState;
 
     /// Pole pairs.
@@ -17,9 +17,9 @@ pub trait MachineModel: Copy {
     /// Time derivative of the state at the terminal voltage `v`, V.
     fn derivative(&self, x: &Self::State, v: Complex, w: f64) -> Rate<Self>;
 
-    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit
-    /// vector `axis`, where the terminal voltage has the component `v_axis`. Also returns the
-    /// terminal voltage, whose other component follows from the machine.
+    /// As [`Self::derivative`], while the current is confined to the line through zero along the unit vector `axis`,
+    /// and the terminal voltage has the component `v_axis` along it. Also returns the terminal voltage, whose other
+    /// component follows from the machine.
     fn derivative_on_line(
         &self,
         x: &Self::State,
@@ -28,35 +28,34 @@ pub trait MachineModel: Copy {
         w: f64,
     ) -> (Rate<Self>, Complex);
 
-    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the
-    /// terminal voltage.
+    /// As [`Self::derivative`] with open terminals, which make the current zero. Also returns the terminal voltage.
     fn derivative_open(&self, x: &Self::State, w: f64) -> (Rate<Self>, Complex);
 
-    /// The state with the stator current `i`, A, and the same rotor flux.
+    /// Returns the state with the stator current `i`, A, and unchanged rotor flux.
     fn with_current(&self, x: &Self::State, i: Complex) -> Self::State;
 
-    /// The state with its rotor flux turned by `turn`, a unit vector.
+    /// Returns the state with its rotor flux rotated by `turn`, a unit vector.
     fn with_turned_flux(&self, x: &Self::State, turn: Complex) -> Self::State;
 
-    /// What changes slowly with the state, after a step of `h` seconds.
+    /// Updates quantities that change slowly with the state, after a step of `h` seconds.
     #[inline]
     fn after_step(&mut self, _: &Self::State, _h: f64) {}
 
-    /// Makes the dependent quantities of a state match the integrated ones.
+    /// Makes the dependent quantities of a state consistent with the integrated ones.
     fn settle(&self, x: &mut Self::State) {
         self.turn(x);
         self.finish(x);
     }
 
-    /// Sets what turns with the rotor to its angle. Once a period is enough: between, it is integrated.
+    /// Sets the quantities that rotate with the rotor to its angle. Once a period is enough, because they are integrated in between.
     #[inline]
     fn turn(&self, _: &mut Self::State) {}
 
-    /// Takes the slopes at a stage of an integration step.
+    /// Stores the derivatives at a stage of an integration step.
     #[inline]
     fn correct(&self, _: &mut Self::State) {}
 
-    /// Takes the error of an integration step off what depends on the integrated quantities.
+    /// Removes the error of an integration step from quantities that depend on the integrated ones.
     #[inline]
     fn finish(&self, _: &mut Self::State) {}
 }
@@ -75,7 +74,7 @@ pub trait ElectricalState: Copy + Default {
     /// Rotor flux linkage, Wb.
     fn rotor_flux(&self) -> Complex;
 
-    /// Becomes `from + rate h`. (In place: a state may be large.)
+    /// Becomes `from + rate h`. (It works in place, because a state may be large.)
     fn set_moved(&mut self, from: &Self, rate: &Self::Rate, h: f64);
 
     /// Becomes `from + (k0 + 2 k1 + 2 k2 + k3) h/6`.
@@ -88,7 +87,7 @@ pub trait ElectricalRate {
     fn current_rate(&self) -> Complex;
 }
 
-/// `(k0 + 2 k1 + 2 k2 + k3) sixth`, the increment of the Runge-Kutta rule.
+/// Returns `(k0 + 2 k1 + 2 k2 + k3) sixth`, the increment of the Runge-Kutta method.
 #[inline]
 pub(crate) fn increment(k: [Complex; 4], sixth: f64) -> Complex {
     (k[0] + k[3] + (k[1] + k[2]) * 2.0) * sixth

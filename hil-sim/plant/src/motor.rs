@@ -1,10 +1,10 @@
-//! The choice of the machine model.
+//! The selection of the machine model.
 
 use crate::energy::EnergyMachine;
 use crate::integrate::MotorModel;
 use crate::machine::Machine;
 
-/// The motor, one variant a machine model. A call of the plant chooses once a period.
+/// The motor, with one variant for each machine model. A call of the plant selects once a period.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::large_enum_variant,
@@ -15,7 +15,7 @@ pub(crate) enum Motor {
     Energy(Box<MotorModel<EnergyMachine>>),
 }
 
-/// `$body` with `$motor` bound to the [`MotorModel`] of whichever machine model.
+/// Evaluates `$body` with `$motor` bound to the [`MotorModel`] of either machine model.
 macro_rules! whichever {
     ($which:expr, $motor:ident => $body:expr) => {
         match $which {

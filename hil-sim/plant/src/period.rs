@@ -12,10 +12,10 @@ use crate::switched::Legs;
 use crate::terminals::{All, Terminals, Without};
 use crate::{averaged, freewheel, switched};
 
-/// Integration steps per period while the outputs are off: at most this fraction of the period.
+/// Smallest number of integration steps per period while the outputs are off.
 const FREEWHEEL_SUBSTEPS: u32 = 8;
 
-/// What stands around the motor, whichever model it is.
+/// Everything around the motor, independent of its model.
 #[derive(Clone, Debug)]
 pub(crate) struct Around {
     pub inverter: Inverter,
@@ -54,7 +54,7 @@ impl Around {
         self.inverter.previous = *compare;
     }
 
-    /// Integration steps of `h` seconds, each done by `step`, with the shaft and the sensors.
+    /// Does integration steps of `h` seconds, each by `step`, with the shaft and the sensors.
     #[inline]
     fn steps<M: MachineModel>(
         &mut self,
@@ -75,8 +75,8 @@ impl Around {
         }
     }
 
-    /// With the averages of the period as the source. An interrupted phase does not choose between ideal and
-    /// real switches.
+    /// Uses the averages of the period as the source. With an interrupted phase the code does not distinguish ideal
+    /// from real switches.
     #[inline]
     fn averaged<M: MachineModel>(
         &mut self,
@@ -105,7 +105,7 @@ impl Around {
         });
     }
 
-    /// With the legs between their edges as the source.
+    /// Uses the legs between their edges as the source.
     fn switched<M: MachineModel, T: Terminals>(
         &mut self,
         terminals: impl Fn(Legs) -> T,

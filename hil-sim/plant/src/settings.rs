@@ -1,7 +1,8 @@
-//! Settings as tables: a row a setting.
+//! Settings as tables, with one row for each setting.
 
-/// A structure of settings, its defaults, and the check of the ranges. A row is `field: type = default, range, unit;`; one without a
-/// range is checked elsewhere. `|s|` names the settings for ranges that depend on others.
+/// Defines a structure of settings, its defaults, and the check of the ranges. A row is `field: type = default, range,
+/// unit;`. A row without a range is checked elsewhere. `|s|` names the settings for ranges that depend on other
+/// settings.
 macro_rules! settings {
     ($(#[$doc:meta])* $name:ident $group:literal $(|$s:ident|)? {
         $($(#[$field_doc:meta])* $field:ident: $type:ty = $default:expr $(, $range:expr, $unit:literal)?;)+
@@ -14,10 +15,10 @@ macro_rules! settings {
         }
 
         impl $name {
-            /// The default.
+            /// The default settings.
             pub const DEFAULT: Self = Self { $($field: $default,)+ };
 
-            /// Refuses what is outside its range.
+            /// Refuses values outside their range.
             pub(crate) fn check(&self) -> Result<(), $crate::PlantError> {
                 $(let $s = self;)?
                 $($($crate::error::check(
@@ -36,7 +37,7 @@ macro_rules! settings {
 }
 pub(crate) use settings;
 
-/// `range`, and 0 beside it.
+/// Returns the allowed range: only 0 if the value is 0, otherwise `range`.
 pub(crate) fn or_zero(
     value: f64,
     range: std::ops::RangeInclusive<f64>,

@@ -1,11 +1,10 @@
 //! The inverter with its switching edges: the state of each leg at every instant of a PWM period.
 //!
-//! The counter starts at its top and a leg is commanded high while the counter is below its
-//! compare value, so a pulse of width `T c/top` sits in the middle of the period. An edge takes
-//! effect after the propagation delay; from then on both switches of the leg are off for the dead
-//! time, and the diodes hold the leg at the rail from which its current flows (the direction at the
-//! start of the integration step counts; without current, half the dc link). A pulse shorter than
-//! the dead time vanishes, as it does in the timer.
+//! The counter starts at its top, and a leg is commanded high while the counter is below the compare value of the leg.
+//! A pulse of width `T c/top` therefore lies in the middle of the period. An edge takes effect after the propagation
+//! delay. From then on both switches of the leg are off for the dead time, and the diodes hold the leg at the rail from
+//! which its current flows. The direction of the current is taken at the start of the integration step; without current
+//! the leg is at half the dc link. A pulse shorter than the dead time vanishes, as it does in the timer.
 
 use drive_core::Compare;
 
@@ -14,12 +13,12 @@ use crate::complex::{Complex, clarke, phases};
 use crate::inverter::Inverter;
 use crate::terminals::Source;
 
-/// Current below which a leg without a switch on has no defined level, A.
+/// Current below which a leg with both switches off has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
-/// Edges of one leg that matter in one period: two of this period, two of the period before, one at
-/// the boundary.
+/// Number of edges of one leg that matter in one period: two of this period, two of the previous period, one at the
+/// boundary.
 const EDGES: usize = 5;
-/// Times at which anything changes: two per edge and leg, and the end.
+/// Number of times at which anything changes: two per edge and leg, and the end.
 const INSTANTS: usize = 3 * 2 * EDGES + 1;
 
 /// State of a leg.
@@ -36,7 +35,7 @@ pub(crate) enum Level {
 /// Commanded edges of one leg, in order of time.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
-    /// Instant at which it takes effect (s from the start of the period) and whether the leg goes high.
+    /// Instant at which the edge takes effect (s from the start of the period), and whether the leg goes high.
     edges: [(f64, bool); EDGES],
     count: usize,
 }
@@ -50,7 +49,7 @@ impl Leg {
         }
         leg.pulse(now, 0.0, period);
         if leg.count == 0 {
-            // Long ago.
+            // An edge in the distant past.
             leg.push(f64::NEG_INFINITY, now >= 1.0);
         }
         for (time, _) in &mut leg.edges {
@@ -71,12 +70,12 @@ impl Leg {
         }
     }
 
-    /// At `time`.
+    /// Returns the level at `time`.
     #[inline]
     fn level(&self, time: f64, dead_time: f64) -> Level {
         let edges = &self.edges[..self.count];
         let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| *edge <= time) else {
-            // Before the first edge.
+            // The time is before the first edge.
             return if edges[0].1 { Level::Low } else { Level::High };
         };
         match (time - edge < dead_time, high) {
@@ -87,7 +86,7 @@ impl Leg {
     }
 }
 
-/// The instants of one period at which a leg changes.
+/// The instants of one period at which a leg changes its level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pattern {
     legs: [Leg; 3],
@@ -97,9 +96,9 @@ pub(crate) struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of a period of `period` seconds with these compare values, outputs on.
+    /// Computes the pattern of a period of `period` seconds with these compare values, outputs on.
     pub(crate) fn new(inverter: &Inverter, compare: &Compare, period: f64) -> Self {
-        // Coming from off, there are no edges of the period before: as if it had been all low.
+        // If the outputs were off, there are no edges of the previous period, as if it had been all low.
         let before =
             if inverter.previous.enabled { inverter.previous } else { Compare::LOW_SIDES_ON };
         let duty = |c: u16| f64::from(c) / inverter.top;
@@ -123,7 +122,7 @@ impl Pattern {
         Self { legs, instants, count, dead_time: inverter.dead_time }
     }
 
-    /// The pieces of the period: duration (s), and the state of the legs.
+    /// Returns the pieces of the period: duration (s), and the levels of the legs.
     pub(crate) fn pieces(&self) -> impl Iterator<Item = (f64, [Level; 3])> + '_ {
         let mut start = 0.0;
         self.instants[..self.count].iter().filter_map(move |&end| {
@@ -151,7 +150,7 @@ fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
     })
 }
 
-/// The legs with the drops of the switches that conduct.
+/// The legs with the voltage drops of the conducting switches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Legs {
     /// Leg voltages as a space vector, V.
@@ -162,7 +161,7 @@ pub(crate) struct Legs {
 }
 
 impl Legs {
-    /// At these levels; the direction of the stator current `i` counts.
+    /// Computes the legs at these levels; the direction of the stator current `i` matters.
     #[inline]
     pub(crate) fn new(inverter: &Inverter, levels: [Level; 3], i: Complex) -> Self {
         Self {

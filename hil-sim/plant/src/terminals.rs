@@ -1,16 +1,16 @@
-//! What the terminals of the motor are connected to.
+//! Circuits at the terminals of the motor.
 
 use crate::complex::{Complex, dot};
 use crate::model::{ElectricalState as _, MachineModel, Rate};
 
-/// Unit vectors along which the current lies while phase a, b or c is without current.
+/// Unit vectors along which the current vector lies while phase a, b or c carries no current.
 const LINES: [Complex; 3] = [
     Complex::new(0.0, 1.0),
     Complex::new(0.866_025_403_784_438_6, 0.5),
     Complex::new(0.866_025_403_784_438_6, -0.5),
 ];
 
-/// A source of voltage.
+/// A voltage source.
 pub(crate) trait Source {
     /// Line-to-neutral voltage, V, at the stator current `i`, A.
     fn voltage(&self, i: Complex) -> Complex;
@@ -24,23 +24,23 @@ impl Source for Complex {
     }
 }
 
-/// What the terminals are connected to. (A type each: the usual one pays nothing for the others.)
+/// The circuit at the terminals. (Each circuit has its own type, so that the usual one pays nothing for the others.)
 pub(crate) trait Terminals {
-    /// Derivative of the state, and terminal voltage.
+    /// Returns the derivative of the state, and the terminal voltage.
     fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex);
 
-    /// Takes what current the open phases have. At an interruption its energy goes into the arc; later it is
-    /// an error of rounding.
+    /// Removes the current of open phases. At an interruption the energy of that current goes into the arc; later the
+    /// current is only a rounding error.
     fn confine<M: MachineModel>(&self, _: &M, _: &mut M::State) {}
 }
 
 /// All three phases are connected to a source.
 pub(crate) struct All<S>(pub S);
 
-/// All but this phase, 0 to 2.
+/// All phases but this one, 0 to 2, are connected to a source.
 pub(crate) struct Without<S>(pub usize, pub S);
 
-/// None is.
+/// No phase is connected.
 pub(crate) struct Open;
 
 impl<S: Source> Terminals for All<S> {
@@ -53,7 +53,7 @@ impl<S: Source> Terminals for All<S> {
 
 impl<S: Source> Terminals for Without<S> {
     fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex) {
-        // Along this axis the leg of the open phase has no part.
+        // The leg of the open phase has no component along this axis.
         let axis = LINES[self.0];
         machine.derivative_on_line(x, dot(self.1.voltage(x.current()), axis), axis, w)
     }
@@ -73,7 +73,7 @@ impl Terminals for Open {
     }
 }
 
-/// The current `i` less that of this phase.
+/// Returns the current `i` without the component of this phase.
 pub(crate) fn without(i: Complex, phase: usize) -> Complex {
     LINES[phase] * dot(i, LINES[phase])
 }

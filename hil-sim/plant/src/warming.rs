@@ -5,7 +5,7 @@ use crate::machine::MachineSettings;
 use crate::settings::settings;
 
 settings! {
-    /// Warming: each resistance goes to `1 + rise` times its value with one time constant.
+    /// Warming: each resistance rises to `1 + rise` times its value with a common time constant.
     WarmingSettings "warming." {
         /// Relative rise of the stator resistance.
         rs: f64 = 0.0, -0.5..=2.0, "";
@@ -26,7 +26,7 @@ impl WarmingSettings {
 /// Periods between two changes of the resistances.
 const PERIODS: u64 = 64;
 
-/// Resistances that follow time.
+/// Resistances as functions of time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Warming {
     law: WarmingSettings,
@@ -34,7 +34,7 @@ pub(crate) struct Warming {
 }
 
 impl Warming {
-    /// Of the machine with these cold resistances; none where they are constant.
+    /// Starts from the cold resistances; none if the resistances are constant.
     pub(crate) fn new(
         law: &WarmingSettings,
         machine: &MachineSettings,
@@ -43,7 +43,7 @@ impl Warming {
         Ok(law.acts().then_some(Self { law: *law, cold: (machine.rs, machine.rr) }))
     }
 
-    /// Resistances of stator and rotor after so many periods, ohm, where they are to be changed.
+    /// Resistances of stator and rotor after this number of periods, ohm; none if they need no change.
     pub(crate) fn resistances(&self, periods: u64, period_s: f64) -> Option<(f64, f64)> {
         if !periods.is_multiple_of(PERIODS) {
             return None;

@@ -1,4 +1,4 @@
-//! The plant that the tests of the inverter share.
+//! The plant for the tests of the inverter.
 
 use drive_core::Compare;
 use motor_plant::{
@@ -9,7 +9,7 @@ use crate::duties::duties;
 
 pub const PERIOD: f64 = 1.0 / 6000.0;
 
-/// With a locked shaft and an ideal measurement.
+/// Settings with a locked shaft and an ideal measurement.
 pub fn settings(inverter: InverterSettings) -> PlantSettings {
     let mut settings = PlantSettings { inverter, ..Default::default() };
     settings.mechanics.load = Load::Locked;

@@ -1,4 +1,4 @@
-//! The dc link against the energy of motor and shaft, and against an integrator of its own.
+//! Checks of the dc link against the energy of motor and shaft, and against an independent integrator.
 
 use std::f64::consts::TAU;
 
@@ -34,8 +34,9 @@ fn heat(plant: &Plant, s: &PlantSettings) -> f64 {
     copper + switches + s.mechanics.friction * plant.mechanical_speed().powi(2)
 }
 
-/// Without mains the energy of capacitor, inductances and shaft is the initial one less the heat, and less what load and
-/// chopper take: while the shaft feeds the link, while it brakes into the resistor, and after the outputs have gone off.
+/// Without mains, the energy of capacitor, inductances and shaft is the initial energy minus the heat and minus the
+/// energy of load and chopper. This holds during kinetic buffering, while the shaft brakes into the resistor, and after
+/// the outputs have gone off.
 #[test]
 fn no_energy_is_lost_or_made_between_shaft_and_capacitor() {
     for switched in [false, true] {
@@ -58,7 +59,7 @@ fn no_energy_is_lost_or_made_between_shaft_and_capacitor() {
             let duty = if (0.2..0.3).contains(&t) { 0.3 } else { 0.0 };
             plant.set_chopper(duty);
             let before = heat(&plant, &s);
-            // 56 Hz at 60 Hz of rotor speed: it generates. `compare` is for 311 V.
+            // 56 Hz at 60 Hz of rotor speed: the motor generates. `compare` is for 311 V.
             let asked = Complex::cis(TAU * 56.0 * t) * (100.0 * 311.0 / v);
             plant.advance(&if t < 0.4 { compare(asked) } else { Compare::OFF }, T);
             let outside = 5.0 + duty * 0.5 * (v * v + plant.dc_link().powi(2)) / RESISTOR;
@@ -67,16 +68,16 @@ fn no_energy_is_lost_or_made_between_shaft_and_capacitor() {
         }
         let (found, spent) = (stored(&plant, &s), first - expected);
         println!("{spent:.2} J spent, {:.4} J missing, highest {highest:.0} V", found - expected);
-        // The sums are trapezoid rules at the PWM rate: 0.1 % of what flows.
+        // The sums use the trapezoidal rule at the PWM rate: 0.1 % of the energy that flows.
         near(found - expected, 0.0, 0.001 * spent);
         let last = plant.dc_link();
-        // It has charged, and was never empty.
+        // The link was charged and never empty.
         assert!(highest > 320.0 && last > 20.0, "{highest} V, {last} V");
     }
 }
 
-/// Rectifier behind its resistance, constant power, sag, outage and chopper, with the outputs off: beside steps of a third of a
-/// microsecond of `C dv/dt = max(mains - v, 0)/R - P/v - duty v/R_b`.
+/// Compares rectifier and resistance, constant power, sag, outage and chopper, with the outputs off, with steps of a
+/// third of a microsecond of `C dv/dt = max(mains - v, 0)/R - P/v - duty v/R_b`.
 #[test]
 fn the_link_alone_is_that_of_its_equation() {
     let mut s = settings();
@@ -104,8 +105,8 @@ fn the_link_alone_is_that_of_its_equation() {
             let current = (mains - v).max(0.0) / 2.0 - 150.0 / v - duty * v / RESISTOR;
             v += current / CAPACITOR * T / 500.0;
         }
-        // The plant knows instants to half a period: of a link that falls by 1.1 V/ms, of a ramp of 8.1 V/ms, and of a
-        // charge from 270 V with 1 ms.
+        // The plant resolves instants to half a period. This matters for a link that falls by 1.1 V/ms, a ramp of 8.1
+        // V/ms, and a charge from 270 V with 1 ms.
         let edge = if mains_moves(f64::from(k) * T) { 2.0 } else { 0.1 };
         near(plant.dc_link(), v, edge);
         lowest = lowest.min(v);
@@ -118,7 +119,7 @@ fn the_link_alone_is_that_of_its_equation() {
     assert!(lowest < 255.0, "{lowest}");
 }
 
-/// Whether the mains change, or have within the last 20 ms.
+/// Whether the mains voltage changes, or has changed within the last 20 ms.
 fn mains_moves(t: f64) -> bool {
     [0.1, 0.3, 0.5, 0.55, 0.7].iter().any(|at| (-0.015..0.02).contains(&(t - at)))
 }

@@ -1,4 +1,4 @@
-//! Effects of inverter, dc link and sensors that can be switched on, by what they do to the physics.
+//! Tests of optional effects of inverter, dc link and sensors, by their physical consequences.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use motor_plant::{
     phases,
 };
 
-/// Currents that the drive would read, A, without the errors of the converter.
+/// Currents that the drive would read, A, without the errors of the ADC.
 fn read(plant: &mut Plant, settings: &PlantSettings) -> [f64; 2] {
     let lines = settings.measurement.calibration();
     let sample = plant.sample();
@@ -22,7 +22,7 @@ fn read(plant: &mut Plant, settings: &PlantSettings) -> [f64; 2] {
 
 #[test]
 fn sensors_have_the_errors_they_are_given() {
-    // Phase a 2.2 A, b and c half of it, back.
+    // Phase a carries 2.2 A; b and c each carry half of it back.
     let v = Complex::cis(0.3) * 12.0;
     let error = |change: &dyn Fn(&mut MeasurementSettings), seconds: f64| {
         let mut settings = settings();
@@ -32,7 +32,7 @@ fn sensors_have_the_errors_they_are_given() {
         let [read_a, read_b] = read(&mut plant, &settings);
         (a, b, read_a - a, read_b - b)
     };
-    let step = 2e-4; // a code
+    let step = 2e-4; // one ADC count
     let (_, _, da, db) = error(&|_| {}, 1.0);
     near(da.abs() + db.abs(), 0.0, step);
     let (a, b, da, db) = error(&|m| (m.cross_talk_a, m.cross_talk_b) = (0.02, -0.01), 1.0);
@@ -44,7 +44,7 @@ fn sensors_have_the_errors_they_are_given() {
     let (_, _, da, db) = error(&|m| (m.drift_a, m.drift_b) = (0.05, -0.02), 1.0);
     near(da, 0.05, step);
     near(db, -0.02, step);
-    // After 2 ms the current still rises: the reading of b is that of 40 us before.
+    // After 2 ms the current still rises, so the reading of b is the current of 40 us before.
     let slope = (error(&|_| {}, 0.0025).1 - error(&|_| {}, 0.0015).1) / 0.001;
     let (_, _, _, db) = error(&|m| m.lag_b_us = 40.0, 0.002);
     near(db, -40e-6 * slope, 0.1 * (40e-6 * slope).abs() + step);
@@ -68,7 +68,7 @@ fn two_conversions_a_period_have_less_noise_and_are_a_quarter_older() {
     };
     near(deviation(false), 0.01, 2e-4);
     near(deviation(true), 0.01 / 2.0_f64.sqrt(), 2e-4);
-    // A rising current, 12 V on 51 mH: the mean is T/4 behind.
+    // The current rises, 12 V on 51 mH, so the mean is T/4 late.
     let mut settings = settings();
     (settings.measurement.both_zero_vectors, settings.measurement.lsb_a) = (true, 0.000_28);
     let mut plant = held(&settings, Complex::from(12.0), 0.002);
@@ -80,14 +80,14 @@ fn two_conversions_a_period_have_less_noise_and_are_a_quarter_older() {
     };
     let behind = plant.current().re - read(&mut plant, &settings)[0];
     near(behind, 0.25 * T * slope, 0.05 * T * slope + 2e-4);
-    // With the outputs off the current is gone: in the middle of the period too.
+    // With the outputs off there is no current, in the middle of the period either.
     for _ in 0..100 {
         plant.advance(&Compare::OFF, T);
     }
     near(read(&mut plant, &settings)[0], 0.0, 2e-4);
 }
 
-/// Voltage that the inverter loses at a constant current, and that current.
+/// Inverter voltage error at a constant current, and that current.
 fn lost(change: impl Fn(&mut InverterSettings), volts: f64) -> (f64, f64) {
     let mut settings = settings();
     settings.inverter = InverterSettings { residual_v: 0.0, ..InverterSettings::default() };
@@ -101,7 +101,7 @@ fn lost(change: impl Fn(&mut InverterSettings), volts: f64) -> (f64, f64) {
 
 #[test]
 fn the_inverter_has_the_errors_it_is_given() {
-    // Phase a against b and c: 4/3 of the error of a leg.
+    // Phase a in series with b and c in parallel: 4/3 of the error of a leg.
     let leg = |error: f64| 4.0 / 3.0 * error;
     let dead = 2.2e-6 * 6000.0 * 311.0;
     let (error, _) = lost(|_| {}, 15.0);
@@ -115,12 +115,13 @@ fn the_inverter_has_the_errors_it_is_given() {
     near(error, leg(dead) + 0.2 * i, 1e-3);
     let (error, _) = lost(|s| s.more_dead_time_us = [0.0, 0.5, 0.5], 15.0);
     near(error, 2.0 / 3.0 * dead * (1.0 + 2.7 / 2.2), 1e-6);
-    // 20 nF take 2.8 A to swing within the dead time. Below, the error of a leg is i t^2/(2 C) of a period.
+    // A capacitance of 20 nF needs 2.8 A to be charged within the dead time. Below that current, the error of a leg is
+    // i t^2/(2 C) of a period.
     let (error, i) = lost(|i| i.node_capacitance = 20e-9, 10.0);
     let swing = |i: f64| i * 2.2e-6 * 2.2e-6 / (2.0 * 20e-9) * 6000.0;
     assert!(i > 0.5 && i < 2.8);
     near(error, 2.0 / 3.0 * (swing(i) + swing(0.5 * i)), 1e-3);
-    // Far above, the full error less C V^2/(2 i) of a period.
+    // Far above that current the error is the full error minus C V^2/(2 i) of a period.
     let (error, i) = lost(|i| i.node_capacitance = 450e-12, 15.0);
     let full = |i: f64| dead - 450e-12 * 311.0 * 311.0 / (2.0 * i) * 6000.0;
     near(error, 2.0 / 3.0 * (full(i) + full(0.5 * i)), 1e-3);
@@ -144,10 +145,10 @@ fn the_dc_link_ripples_holds_up_and_is_braked() {
         .collect();
     near(volts.iter().fold(0.0, |a, &b| f64::max(a, b)), 342.1, 0.1);
     let crossings = volts.windows(2).filter(|w| (w[0] < 311.0) != (w[1] < 311.0)).count();
-    // Two a period; the last may fall on the end.
+    // Two crossings a period; the last may fall on the end.
     assert!((19..=20).contains(&crossings), "{crossings}");
 
-    // Mains gone: the energy that the motor takes comes from the capacitor.
+    // Without mains, the energy that the motor takes comes from the capacitor.
     settings.dc_link = DcLinkSettings { capacitor: 470e-6, outage: 1.0, ..Default::default() };
     let mut alone = plant(&settings);
     let mut taken = 0.0;
@@ -158,11 +159,11 @@ fn the_dc_link_ripples_holds_up_and_is_braked() {
         taken += 1.5 * (mean.conj() * alone.applied_voltage()).re * T;
     }
     let left = 0.5 * 470e-6 * (311.0 * 311.0 - alone.dc_link().powi(2));
-    // The plant takes the mean of half a period.
+    // The plant uses the mean over half a period.
     near(left / taken, 1.0, 1e-4);
     assert!(taken > 5.0 && alone.dc_link() < 290.0);
 
-    // Six pulses of 50 Hz without load leave the peak; under load the ripple is 300 Hz.
+    // Without load, six pulses of 50 Hz leave the peak; under load the ripple is 300 Hz.
     settings.dc_link = DcLinkSettings { capacitor: 470e-6, ..Default::default() };
     let mut fed = plant(&settings);
     for _ in 0..3000 {
@@ -179,12 +180,12 @@ fn the_dc_link_ripples_holds_up_and_is_braked() {
     assert_eq!(rising, 30);
     assert!(mean > 300.0 && mean < 311.0, "{mean}");
 
-    // A chopper brings an overcharged link down to 98 % of its threshold, by R C, and leaves it.
+    // A chopper brings an overcharged link down to 98 % of its threshold, with the time constant R C, and then stops.
     settings.dc_link = DcLinkSettings {
         capacitor: 470e-6,
         chopper_v: 400.0,
         chopper: 100.0,
-        // The mains would be those of 420 V.
+        // The mains would otherwise have a peak of 420 V.
         outage: 10.0,
         ..Default::default()
     };
@@ -243,7 +244,7 @@ fn an_open_phase_has_no_current_and_the_others_have_the_same() {
                 largest = largest.max(i[(open + 1) % 3].abs());
             }
             assert!(largest > 0.3, "{largest}");
-            // Off, the other two die down; the open one stays without.
+            // With the outputs off the other two currents decay; the open phase stays without current.
             for _ in 0..300 {
                 plant.advance(&Compare::OFF, T);
                 assert!(plant.phase_currents()[open].abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Effects of motor and shaft that can be switched on, by what they do to the physics.
+//! Tests of optional effects of motor and shaft, by their physical consequences.
 
 use std::f64::consts::TAU;
 
@@ -35,12 +35,12 @@ fn a_stator_fixed_saliency_stays_and_a_slot_saliency_turns_with_the_bars() {
         (across - along) / (across + along)
     };
     let fixed = IronSettings { stator_fixed: 0.01, stator_fixed_deg: 25.0, ..IronSettings::LINEAR };
-    // To first order in it.
+    // To first order in the saliency.
     near(saliency(&fixed, 25.0, 0.0), 0.01, 3e-4);
     near(saliency(&fixed, 25.0, 1.0), 0.01, 3e-4);
     near(saliency(&fixed, 70.0, 0.0), 0.0, 3e-4);
     let slots = IronSettings { slots: 0.01, bars: 28, ..IronSettings::LINEAR };
-    // 28 bars are 14 a pole pair: half a turn of the axis in 2 pi/14 electrical.
+    // 28 bars are 14 per pole pair: the axis makes half a turn in 2 pi/14 electrical.
     for (theta, axis) in [(0.0, 0.0), (TAU / 28.0, 90.0), (TAU / 56.0, 45.0), (TAU / 14.0, 0.0)] {
         near(saliency(&slots, axis, theta), 0.01, 3e-4);
     }
@@ -74,7 +74,7 @@ fn iron_loss_is_that_of_its_resistance() {
 fn bars_have_more_resistance_and_less_leakage_at_high_frequency() {
     let skin = IronSettings { skin_ratio: 3.5, skin_leakage: 0.010, ..IronSettings::LINEAR };
     let (deep, plain) = (inductance(&skin, 0.0, 0.0), inductance(&IronSettings::LINEAR, 0.0, 0.0));
-    // The whole 10 mH, seen through the main inductance, less what 600 Hz leave: 43.3 mH of 51.5.
+    // The whole 10 mH, seen through the main inductance, minus the part that remains at 600 Hz: 43.3 mH of 51.5.
     near(plain - deep, 0.0081, 0.0004);
 }
 
@@ -85,7 +85,7 @@ fn shaft(change: impl Fn(&mut MechanicsSettings)) -> MotorModel<EnergyMachine> {
     MotorModel::new(machine.expect("machine"), Mechanics::new(&settings).expect("shaft"))
 }
 
-/// Runs without voltage, and so without torque.
+/// Runs without voltage, and therefore without torque.
 fn coast(motor: &mut MotorModel<EnergyMachine>, seconds: f64) {
     for _ in 0..(seconds / 1e-4).round() as u32 {
         motor.step(Complex::ZERO, 1e-4);
@@ -105,9 +105,9 @@ fn static_friction_holds_the_shaft_until_it_breaks_away() {
     };
     assert_eq!(with(0.49, 0.0), 0.0);
     assert_eq!(with(-0.49, 0.0), 0.0);
-    // Beyond, the rest accelerates 0.012 kg m^2.
+    // Above the static friction, the rest of the torque accelerates 0.012 kg m^2.
     near(with(0.62, 0.0), -0.12 / 0.012 * 0.1, 1e-6);
-    // A turning shaft is braked by it, stops and stays.
+    // Static friction brakes a turning shaft, which stops and stays at rest.
     near(with(0.0, 10.0), 10.0 - 0.5 / 0.012 * 0.1, 1e-6);
     assert_eq!(with(0.0, 2.0), 0.0);
 }
@@ -130,8 +130,8 @@ fn a_stop_throws_the_shaft_back_with_its_restitution() {
         let mut motor = shaft(|m| (m.stops, m.stop_stiffness, m.stop_damping) = (0.5, 100.0, 0.3));
         motor.state.speed = side * 4.0;
         coast(&mut motor, 0.4);
-        // A damped swing leaves a stop that does not pull when the stop's torque is 0: at the angle whose tangent is
-        // -2 damping sqrt(1 - damping^2)/(1 - 2 damping^2) of it.
+        // A damped swing leaves a stop that does not pull when the torque of the stop is 0: at the angle whose tangent
+        // is -2 damping sqrt(1 - damping^2)/(1 - 2 damping^2).
         let damping = 0.5 * 0.3 / (100.0_f64 * 0.012).sqrt();
         let root = (1.0 - damping * damping).sqrt();
         let leaves = (2.0 * damping * root).atan2(2.0 * damping * damping - 1.0);
@@ -147,7 +147,7 @@ fn an_elastic_coupling_resonates() {
         (m.inertia, m.load_inertia, m.stiffness) = (0.003, 0.009, 15.0);
     });
     motor.state.speed = 4.0;
-    // Half a period later the motor is as far below the common speed as it was above it.
+    // Half a period later, the speed of the motor is as far below the common speed as it was above it.
     let half = 0.5 * TAU / (15.0_f64 * (1.0 / 0.003 + 1.0 / 0.009)).sqrt();
     coast(&mut motor, half);
     let common = 4.0 * 0.003 / 0.012;
@@ -166,7 +166,7 @@ fn resistances_warm_up() {
         let v = Complex::from(10.0);
         let factor = 1.0 + 0.3 * (1.0 - (-2.0_f64 / 2.0).exp());
         let found = held(&settings, v, 2.0);
-        // The current follows the resistance within its own time constant, 40 ms of 2 s.
+        // The current follows the resistance within its time constant, 40 ms of 2 s.
         near(found.current().re * 5.4 * factor / found.applied_voltage().re, 1.0, 0.005);
     }
 }
@@ -181,7 +181,7 @@ fn a_load_turns_the_axis_of_the_teeth_behind_a_lag() {
     let machine = EnergyMachine::new(&MachineSettings::default(), &iron).expect("machine");
     let locked = MechanicsSettings { load: Load::Locked, ..Default::default() };
     let mut motor = MotorModel::new(machine, Mechanics::new(&locked).expect("shaft"));
-    // A turning voltage: a flux, and a current across it.
+    // A rotating voltage causes a flux, and a current across the flux.
     for k in 0..60_000u32 {
         motor.step(Complex::cis(TAU * 2.0 * f64::from(k) * 1e-5) * 12.0, 1e-5);
     }
@@ -194,7 +194,7 @@ fn a_load_turns_the_axis_of_the_teeth_behind_a_lag() {
         machine.settle(&mut x);
         x.current()
     };
-    // The lag makes 2 % of a load that still changes; without a turn the current is another.
+    // The lag causes an error of 2 % while the load changes; without the rotation of the axis the current differs.
     let (turned, straight) = ((current(&set) - current(&machine)).norm(), current(&seen));
     assert!((straight - current(&set)).norm() < 0.1 * turned && turned > 1e-3, "{turned}");
 }

@@ -1,4 +1,4 @@
-//! The energy model against the equivalent circuit, its own energy, and model A.
+//! Checks of the energy model against the equivalent circuit, its own energy, and model A.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ const M: MachineSettings =
     MachineSettings { rs: 5.4, rr: 1.1, lls: 0.0276, llr: 0.0276, lm: 0.1771, pole_pairs: 2 };
 const J: Complex = Complex::new(0.0, 1.0);
 
-/// Everything at once that is a gradient of the energy.
+/// All terms at once that are gradients of the energy.
 const ALL: IronSettings = IronSettings {
     saturation: 1.3,
     teeth: -0.035,
@@ -38,13 +38,13 @@ fn motor(iron: &IronSettings, load: Load) -> MotorModel<EnergyMachine> {
     MotorModel::new(machine, Mechanics::new(&mechanics).expect("shaft"))
 }
 
-/// Energy that is missing after 0.3 s of a voltage of 60 V at 15 Hz with 50 V at 600 Hz on it, and the
-/// energy fed in, J.
+/// Energy that is missing after 0.3 s of a voltage of 60 V at 15 Hz with a superposed voltage of 50 V at 600 Hz, and
+/// the energy fed in, J.
 fn missing(iron: &IronSettings, steps_per_period: u32) -> (f64, f64) {
     let mut motor = motor(iron, Load::Free { torque: 0.3 });
     let h = 1.0 / 6000.0 / f64::from(steps_per_period);
     let (mut fed, mut spent) = (0.0, 0.0);
-    // Powers by the trapezoid rule, at a voltage that is constant within a step.
+    // Powers by the trapezoidal rule, at a voltage that is constant within a step.
     for k in 0..(0.3 / h).round() as u32 {
         let t = (f64::from(k) + 0.5) * h;
         let v = Complex::cis(TAU * 15.0 * t) * 60.0 + (TAU * 600.0 * t).cos() * 50.0;
@@ -67,12 +67,12 @@ fn no_term_makes_energy() {
     let rest: Vec<f64> = [2, 4, 8, 16].map(|steps| missing(&ALL, steps).0.abs()).into();
     let fed = missing(&ALL, 16).1;
     println!("of {fed:.2} J missing {rest:?} J at 2, 4, 8, 16 steps a period");
-    // At least first order, and nothing remains: less than 1e-5 of the energy.
+    // The error is of at least first order, and almost nothing remains: less than 1e-5 of the energy.
     for pair in rest.windows(2) {
         assert!(pair[1] < 0.6 * pair[0], "{rest:?}");
     }
     assert!(fed > 5.0 && rest[3] < 1e-5 * fed, "{rest:?} of {fed} J");
-    // The one exception: teeth that follow the rotor flux alone. Its size is bounded, not zero.
+    // The one exception: teeth that follow the rotor flux alone. Their error is bounded, not zero.
     for name in ["r", "rl"] {
         let r = family(name);
         assert!(!r.conservative() && ALL.conservative());
@@ -125,7 +125,7 @@ fn a_linear_motor_is_the_equivalent_circuit() {
     }
 }
 
-/// Impedances at 600 Hz along and across phase a, ohm, by a small carrier in the state of rest.
+/// Impedances at 600 Hz along and across phase a, ohm, from a small injected voltage at rest.
 fn at_600_hz(iron: &IronSettings) -> [Complex; 2] {
     [Complex::from(1.0), J].map(|axis| {
         let mut motor = motor(iron, Load::Locked);
@@ -134,7 +134,7 @@ fn at_600_hz(iron: &IronSettings) -> [Complex; 2] {
         for k in 0..per_cycle * 240 {
             let phase = TAU * (f64::from(k) + 0.5) / f64::from(per_cycle);
             motor.step(axis * phase.cos(), h);
-            // The last forty cycles: what the switching on has left behind has decayed, or averages out.
+            // Only the last forty cycles count: the switch-on transient has decayed by then, or averages out.
             if k >= per_cycle * 200 {
                 let i = (axis.conj() * motor.state.electrical.current()).re;
                 sum += Complex::cis(-phase - 0.5 * TAU / f64::from(per_cycle)) * i;
@@ -152,11 +152,11 @@ fn a_linear_motor_has_no_saliency() {
     let found = along.im / (TAU * 600.0);
     println!("{found} for {sigma_ls} H, saliency {saliency:e}");
     assert!(saliency < 1e-12, "{saliency:e}");
-    // The staircase of 400 steps a cycle and what is left of the transient.
+    // The tolerance covers the staircase of 400 steps a cycle and the rest of the transient.
     assert!((found / sigma_ls - 1.0).abs() < 1e-3, "{found} for {sigma_ls} H");
 }
 
-/// The same run by a plant: outputs on at a turning voltage with a carrier, then off.
+/// Runs a plant: outputs on at a rotating voltage with an injected voltage, then off.
 fn run(settings: &PlantSettings, periods: u32) -> Vec<Complex> {
     let mut plant = Plant::new(settings, 1).expect("plant");
     let top = f64::from(settings.inverter.timer_top);
@@ -185,7 +185,7 @@ fn linear_iron_is_model_a_without_saliency() {
         let a = run(&PlantSettings { inverter, substeps: 8, ..textbook }, 1500);
         let iron = Some(IronSettings::LINEAR);
         let b = run(&PlantSettings { iron, inverter, substeps: 8, ..textbook }, 1500);
-        // Off means off: the last currents are exactly zero in both.
+        // With the outputs off, the last currents are exactly zero in both.
         assert_eq!(a.last(), b.last());
         println!("switched {switched}: {:e} A", worst(&a, &b));
         assert!(worst(&a, &b) < 2e-6, "{:e} A", worst(&a, &b));
@@ -202,7 +202,7 @@ fn two_steps_a_period_are_enough() {
             measurement: MeasurementSettings::IDEAL,
             ..Default::default()
         };
-        // While the outputs are on; off, the instants at which diodes stop count.
+        // This holds only while the outputs are on; with the outputs off, the instants at which diodes stop conducting matter.
         let on = |substeps| {
             let mut currents = run(&PlantSettings { substeps, ..settings }, 1200);
             currents.truncate(960);
@@ -211,7 +211,7 @@ fn two_steps_a_period_are_enough() {
         let exact = on(64);
         let errors = [2, 4, 8].map(|substeps| worst(&on(substeps), &exact));
         println!("2, 4, 8 steps: {errors:?} A from 64");
-        // Order four leaves 1/256 of the error; with a rate missing it is of order one, a quarter.
+        // An error of fourth order leaves 1/256; with a missing rate it is of first order and leaves a quarter.
         assert!(errors[0] < 5e-5 && errors[2] < 0.02 * errors[0], "{errors:?}");
     }
 }

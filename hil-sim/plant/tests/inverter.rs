@@ -1,4 +1,4 @@
-//! The inverter: averaged against switched, dead time, delay, and the integration steps.
+//! Tests of the inverter: averaged against switched, dead time, delay, and the integration steps.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use motor_plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// After 0.2 s of these duty cycles: the current, and the voltage of the last period.
+/// Runs 0.2 s with these duty cycles; returns the current, and the voltage of the last period.
 fn settled(inverter: InverterSettings, d: [f64; 3]) -> (Complex, Complex) {
     let mut plant = plant(&settings(inverter));
     let compare = duties(d);
@@ -23,8 +23,8 @@ fn settled(inverter: InverterSettings, d: [f64; 3]) -> (Complex, Complex) {
 fn averaged_and_switched_agree_on_the_mean_voltage() {
     let averaged = InverterSettings::default();
     let switched = InverterSettings { switched: true, ..averaged };
-    // Large currents of either direction; legs that do not switch; a pulse and a gap (0.5 us)
-    // shorter than the dead time.
+    // Large currents of either direction; legs that do not switch; a pulse and a gap (0.5 us) shorter than the dead
+    // time.
     for d in [
         [0.56, 0.48, 0.46],
         [0.43, 0.54, 0.56],
@@ -37,11 +37,11 @@ fn averaged_and_switched_agree_on_the_mean_voltage() {
         let (i_switched, v_switched) = settled(switched, d);
         println!("{d:?}: {i:.4} A {v:.5} V, switched {i_switched:.4} A {v_switched:.5} V");
         assert!(phases(i).iter().all(|i| i.abs() > 0.1), "{i}: phases well off zero");
-        // The same edges, and all currents keep their sign through the ripple: only rounding.
+        // The edges are the same, and all currents keep their sign through the ripple: only rounding remains.
         assert!((v - v_switched).norm() < 1e-6, "{d:?}: {v} against {v_switched}");
-        // The pulses are symmetrical about the sampling instant, so the ripple crosses zero there but
-        // for delay and half the dead time: 3.3 us of what is applied then, at most 207 V (one leg
-        // always high), on 51 mH are 13 mA.
+        // The pulses are symmetrical about the sampling instant. Apart from the delay and half the dead time the ripple
+        // therefore crosses zero there: 3.3 us of the voltage applied then, at most 207 V (one leg always high), on 51
+        // mH are 13 mA.
         assert!((i - i_switched).norm() < 0.014, "{d:?}: {i} against {i_switched}");
     }
 }
@@ -49,9 +49,9 @@ fn averaged_and_switched_agree_on_the_mean_voltage() {
 #[test]
 fn short_pulses_and_gaps_vanish() {
     for switched in [false, true] {
-        // Pulses of 0.5, 0.7 and 0.8 us, gaps of the same: all shorter than the dead time. With
-        // i_a > 0 > i_b, i_c, phase a loses its pulse, b and c gain the dead time; of the gaps, a
-        // loses the dead time and b and c lose theirs.
+        // Pulses of 0.5, 0.7 and 0.8 us, and gaps of the same lengths, are all shorter than the dead time. With i_a > 0
+        // > i_b, i_c, phase a loses its pulse while b and c gain the dead time. In the gaps, a loses the dead time
+        // while b and c lose their gaps.
         for (d, expected) in [
             ([0.003, 0.004, 0.005], [0.0, 0.004 + 0.0132, 0.005 + 0.0132]),
             ([0.997, 0.996, 0.995], [0.997 - 0.0132, 1.0, 1.0]),
@@ -61,7 +61,7 @@ fn short_pulses_and_gaps_vanish() {
             for _ in 0..1200 {
                 plant.advance(&duties([0.56, 0.48, 0.46]), PERIOD);
             }
-            // Two, as the first still has the delay's part of the period before.
+            // Two periods, because the first still contains the delayed part of the previous period.
             plant.advance(&duties(d), PERIOD);
             plant.advance(&duties(d), PERIOD);
             let error = plant.applied_voltage() - clarke(expected.map(|d| 311.0 * d));
@@ -77,15 +77,15 @@ fn the_dead_time_takes_4_1_volts() {
     for (switched, pulses) in [(false, 1), (true, 1), (false, 2), (true, 2), (false, 3), (true, 3)]
     {
         let d = [0.56, 0.47, 0.47];
-        // As many counts a pulse, whatever their number.
+        // The number of counts per pulse is the same for any number of pulses.
         let alike = InverterSettings { switched, pulses, timer_top: pulses * TOP, ..with };
         let (_, v) = settled(alike, d);
         let (_, v0) = settled(InverterSettings { dead_time_us: 0.0, ..alike }, d);
-        // a loses e, b and c gain it: 4/3 e along alpha. Each pulse has a dead time of its own.
+        // Phase a loses e, b and c gain e: 4/3 e along alpha. Each pulse has its own dead time.
         let e = 0.75 * (v0 - v).re / f64::from(pulses);
         assert!((e - 311.0 * 2.2 / 166.667).abs() < 1e-3, "{switched} {pulses}: {e} V");
         assert!((e - 4.1).abs() < 0.01 && (v0 - v).im.abs() < 1e-6, "{e} {v0} {v}");
-        // And nothing from legs that do not switch.
+        // Legs that do not switch have no error.
         let d = [1.0, 0.0, 0.0];
         let short = |s: InverterSettings| {
             let mut plant = plant(&settings(InverterSettings { switched, vdc: 20.0, ..s }));
@@ -98,7 +98,7 @@ fn the_dead_time_takes_4_1_volts() {
 
 #[test]
 fn the_delay_shifts_the_voltage() {
-    // A step of the voltage: the period after it has the delay's part of the old one.
+    // After a step of the voltage, the next period contains the delayed part of the old voltage.
     for switched in [false, true] {
         let ideal = InverterSettings { switched, ..InverterSettings::IDEAL };
         let delayed = InverterSettings { propagation_us: 2.2, ..ideal };
@@ -107,15 +107,15 @@ fn the_delay_shifts_the_voltage() {
         plant.advance(&duties([0.6, 0.5, 0.5]), PERIOD);
         let v = plant.applied_voltage().re;
         let full = 311.0 * 0.1 * 2.0 / 3.0;
-        // Switched, the pulses are well inside the period and merely move; averaged, 1.32 % spills.
+        // With switching edges the pulses lie well inside the period and only shift; averaged, 1.32 % moves to the next period.
         let expected = if switched { full } else { full * (1.0 - 2.2 / 166.667) };
         // Compare values are whole numbers: 311 V/14167 = 22 mV.
         assert!((v - expected).abs() < 0.02, "{switched}: {v} V instead of {expected}");
     }
 }
 
-/// Largest difference between the currents of two plants at the sampling instants, A, under a
-/// rotating voltage with the injected one, on a free shaft.
+/// Largest difference between the currents of two plants at the sampling instants, A, with a rotating voltage and an
+/// injected voltage, on a free shaft.
 fn worst_difference(one: &PlantSettings, other: &PlantSettings) -> f64 {
     let (mut one, mut other) = (plant(one), plant(other));
     let mut worst = 0f64;
@@ -140,8 +140,8 @@ fn two_substeps_are_enough() {
     let worst = worst_difference(&coarse, &fine);
     let one = worst_difference(&PlantSettings { substeps: 1, ..coarse }, &fine);
     println!("against 24 substeps: {worst:.1e} A with 2, {one:.1e} A with 1");
-    // Far below the converter's 2.2 mA: what is left is a kink crossed a little beside the instant
-    // predicted, and the fifth order of 5570 rad/s (the slope of the smoothed sign) times T/2.
+    // The difference is far below the ADC's 2.2 mA. It comes from a kink that is crossed slightly off the predicted
+    // instant, and from the fifth order of 5570 rad/s (the slope of the smoothed sign) times T/2.
     assert!(worst < 1e-5, "{worst:e} A");
     assert!(one < 1e-4, "{one:e} A");
 }
@@ -154,8 +154,8 @@ fn averaged_and_switched_currents_stay_together() {
     switched.inverter.switched = true;
     let worst = worst_difference(&averaged, &switched);
     println!("averaged and switched: {worst:.1e} A apart at most");
-    // Where a current passes zero the two differ by up to the dead-time error: the ripple, not
-    // in the average, decides about its sign.
+    // When a current passes zero the two differ by up to the dead-time error, because its sign then depends on the
+    // ripple, which the average does not contain.
     assert!(worst < 0.1, "{worst} A");
 }
 

@@ -1,4 +1,4 @@
-//! The machine model against the exact solution of the textbook machine, and its power balance.
+//! Checks of the machine model against the exact solution of the textbook machine, and of its power balance.
 
 use motor_plant::{
     Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
@@ -20,8 +20,8 @@ fn motor(saliency: &SaliencySettings, mechanics: &MechanicsSettings) -> MotorMod
     )
 }
 
-/// Eq. 2.9 in stator and rotor currents, all in the stator frame, as real matrices: the exact
-/// step over `h` seconds at constant voltage, by the matrix exponential.
+/// Eq. 2.9 in stator and rotor currents, all in the stator frame, as real matrices. Returns the exact step over `h`
+/// seconds at constant voltage, by the matrix exponential.
 fn exact_step(w: f64, h: f64) -> (Matrix4<f64>, Matrix4x2<f64>) {
     let (l, lm) = (LS, M.lm);
     #[rustfmt::skip]
@@ -45,7 +45,7 @@ fn exact_step(w: f64, h: f64) -> (Matrix4<f64>, Matrix4x2<f64>) {
     let mut augmented = SMatrix::<f64, 6, 6>::zeros();
     augmented.fixed_view_mut::<4, 4>(0, 0).copy_from(&(a * h));
     augmented.fixed_view_mut::<4, 2>(0, 4).copy_from(&(b * h));
-    // The series of the exponential: nalgebra's own needs a feature that compiles SIMD types.
+    // The series of the exponential is summed here, because nalgebra's own needs a feature that compiles SIMD types.
     let (mut exp, mut term) = (SMatrix::<f64, 6, 6>::identity(), SMatrix::<f64, 6, 6>::identity());
     for n in 1..=20 {
         term = term * augmented / f64::from(n);
@@ -54,8 +54,8 @@ fn exact_step(w: f64, h: f64) -> (Matrix4<f64>, Matrix4x2<f64>) {
     (exp.fixed_view::<4, 4>(0, 0).into(), exp.fixed_view::<4, 2>(0, 4).into())
 }
 
-/// Largest error of current and flux relative to their largest lengths, over a second of voltages
-/// that change at random every period.
+/// Largest error of current and flux relative to their largest magnitudes, over one second of voltages that change at
+/// random every period.
 fn worst_error(rpm: f64, substeps: u32) -> f64 {
     let speed = rpm * std::f64::consts::TAU / 60.0;
     let shaft = MechanicsSettings { load: Load::Speed { speed }, ..Default::default() };
@@ -65,7 +65,7 @@ fn worst_error(rpm: f64, substeps: u32) -> f64 {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     let (mut i_error, mut psi_error, mut i_max, mut psi_max) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
     for k in 0..6000 {
-        // A rotating voltage to have some flux, and a random one.
+        // A rotating voltage, which builds up flux, and a random voltage.
         let rotating = Complex::from_polar(60.0, 130.0 * f64::from(k) * PERIOD);
         let random = Complex::new(rng.random_range(-50.0..50.0), rng.random_range(-50.0..50.0));
         let v = rotating + random;
@@ -87,12 +87,12 @@ fn worst_error(rpm: f64, substeps: u32) -> f64 {
 #[test]
 fn agrees_with_the_matrix_exponential() {
     for rpm in [0.0, 30.0, -150.0, 1440.0] {
-        // Fourth order: the error falls as h^4 until rounding, about 1e-13, takes over. At 1440 rpm
-        // (302 rad/s electrical) a step of T/16 has (w h)^5/120 = 2.6e-15 of error, and a flux
-        // that remembers 186 ms, or 18 000 steps: 5e-11.
+        // Fourth order: the error falls as h^4 until rounding, about 1e-13, dominates. At 1440 rpm (302 rad/s
+        // electrical) a step of T/16 has an error of (w h)^5/120 = 2.6e-15. The flux accumulates it over its time
+        // constant of 186 ms, or 18 000 steps: 5e-11.
         let fine = worst_error(rpm, 16);
         assert!(fine < 1e-10, "{rpm} rpm, 16 substeps: {fine:e}");
-        // With the two substeps that are the default: 8^4 = 4096 times as much.
+        // With the default of two substeps the error is 8^4 = 4096 times as large.
         let coarse = worst_error(rpm, 2);
         println!("{rpm} rpm: {fine:.1e} with 16 substeps, {coarse:.1e} with 2");
         assert!(coarse < 5e-8, "{rpm} rpm, 2 substeps: {coarse:e}");
@@ -121,7 +121,7 @@ fn without_saliency_the_derivative_is_that_of_the_textbook() {
         let rotor = i_r * M.rr + rate.psi - j * w * x.psi;
         assert!((stator - v).norm() < 1e-10, "stator equation: {stator} for {v}");
         assert!(rotor.norm() < 1e-10, "rotor equation: {rotor}");
-        // And the saliency is nothing at all, not a small number.
+        // The saliency is exactly zero, not a small number.
         assert_eq!(machine.saliency(&x), Complex::ZERO);
     }
 }
@@ -139,7 +139,7 @@ fn power_balances_at_every_instant() {
         let stator_flux_rate = rate.i * LS + rate_r * M.lm;
         let input = real(x.i, v);
         let losses = M.rs * real(x.i, x.i) + M.rr * real(i_r, i_r);
-        // The inductance matrix is symmetric: dW/dt = i . d(L i)/dt.
+        // The inductance matrix is symmetric, therefore dW/dt = i . d(L i)/dt.
         let stored = real(x.i, stator_flux_rate) + real(i_r, rate.psi);
         let mechanical = machine.torque(&x) * w / 2.0;
         let error = input - losses - stored - mechanical;
@@ -174,7 +174,7 @@ fn energy_balances_over_a_start() {
     let kinetic = 0.5 * shaft.inertia * motor.state.speed.powi(2);
     let error = (delivered - stored - kinetic) / kinetic;
     println!("{delivered:.6} J delivered, {stored:.6} stored, {kinetic:.6} kinetic: {error:.1e}");
-    // The trapezoidal rule is off by (300 rad/s * 3.3 us)^2/12 = 8e-8 of the power, which is several
-    // times what becomes kinetic.
+    // The error of the trapezoidal rule is (300 rad/s * 3.3 us)^2/12 = 8e-8 of the power, which is several times the
+    // power that becomes kinetic.
     assert!(motor.state.speed > 30.0 && error.abs() < 1e-6, "{error:e}");
 }

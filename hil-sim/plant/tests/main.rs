@@ -1,4 +1,4 @@
-//! The tests of the plant: one program, a module a subject.
+//! The tests of the plant: one program, with one module for each subject.
 
 mod bridge;
 mod common;

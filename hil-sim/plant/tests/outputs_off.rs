@@ -1,4 +1,4 @@
-//! All outputs off: the currents end in the diodes.
+//! Tests with all outputs off: the diodes bring the currents to zero.
 
 use std::f64::consts::TAU;
 
@@ -6,8 +6,8 @@ use crate::bridge::{PERIOD, plant, settings, voltage};
 use drive_core::Compare;
 use motor_plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
 
-/// A motor at a held speed after 0.3 s of a voltage of this many volts that turns with it, from `start`;
-/// and how far they turn in a period, rad.
+/// Returns a motor at a held speed after 0.3 s of a voltage of `volts` that rotates synchronously from `start`, and the
+/// angle by which both rotate in a period, rad.
 fn magnetised(rpm: f64, volts: f64, start: f64) -> (Plant, f64) {
     let speed = rpm * TAU / 60.0;
     let mut settings = settings(InverterSettings::default());
@@ -42,15 +42,15 @@ fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
                 plant.advance(&Compare::OFF, PERIOD);
                 assert_eq!(plant.current(), Complex::ZERO);
             }
-            // psi decays by rr/Lr = 5.37 1/s and turns with the rotor.
+            // psi decays by rr/Lr = 5.37 1/s and rotates with the rotor.
             let decayed = flux * (-1.1f64 / 0.2047 * 0.1).exp();
             let turned = Complex::from_polar(1.0, angle + 600.0 * turning);
             let expected = turned * decayed;
             assert!((plant.rotor_flux() - expected).norm() < 1e-7 * flux, "{rpm} rpm");
-            // The terminals show the back-emf, (Lm/Lr) |alpha - j w| psi.
+            // The terminals show the back-EMF, (Lm/Lr) |alpha - j w| psi.
             let w = 2.0 * rpm * TAU / 60.0;
             let emf = 0.1771 / 0.2047 * (1.1f64 / 0.2047).hypot(w) * decayed;
-            // Averaged over a period in which it turns and decays a little.
+            // The voltage is averaged over a period in which it rotates and decays a little.
             let v = plant.applied_voltage().norm();
             assert!((v - emf).abs() < 2e-3 * emf + 1e-9, "{rpm} rpm: {v} V, not {emf}");
         }
@@ -71,7 +71,7 @@ fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
         plant.advance(&Compare::OFF, PERIOD);
     }
     assert_eq!(plant.current(), Complex::ZERO);
-    // Line-to-line the back-emf is sqrt(3) of its length.
+    // The line-to-line back-EMF is sqrt(3) of its magnitude.
     let emf = plant.applied_voltage().norm() * 3f64.sqrt();
     plant.set_dc_link(1.05 * emf).expect("voltage");
     for _ in 0..20 {
@@ -85,27 +85,27 @@ fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
         let i = plant.current();
         assert!(i.is_finite());
         most = most.max(i.norm());
-        // Power into the machine, by the mean voltage of the period and the current at its end.
+        // Power into the machine, from the mean voltage of the period and the current at its end.
         charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * PERIOD;
     }
     println!("emf {emf:.1} V line to line: up to {most:.2} A, {charged:.4} J into the link");
     assert!(most > 0.05 && charged > 0.0, "{most} A, {charged} J");
-    // The energy comes from the flux, so it dies down, and with it the current.
+    // The energy comes from the flux, so the flux and the current decay.
     for _ in 0..12_000 {
         plant.advance(&Compare::OFF, PERIOD);
     }
     assert_eq!(plant.current(), Complex::ZERO);
 }
 
-/// Largest difference of the currents, A, over these periods with the outputs off, from a bridge
-/// whose diodes are not ideal: its legs go from rail to rail between -1 mA and 1 mA.
+/// Largest difference of the currents, A, over these periods with the outputs off, from a bridge whose diodes are not
+/// ideal: its legs go from rail to rail between -1 mA and 1 mA.
 fn worst_against_soft_diodes(plant: &mut Plant, periods: u32) -> f64 {
     let mut reference = *plant.model_a().expect("model A");
     let vdc = plant.dc_link();
     let mut worst = 0f64;
     for _ in 0..periods {
         plant.advance(&Compare::OFF, PERIOD);
-        // 311 V/2 mA on 51 mH is a pole at 3e6 rad/s; Runge and Kutta bear 2.7 of it in a step.
+        // 311 V/2 mA on 51 mH is a pole at 3e6 rad/s; the Runge-Kutta method is stable up to 2.7 of it per step.
         for _ in 0..400 {
             let legs = phases(reference.state.electrical.i).map(|i| (-i / 1e-3).clamp(-1.0, 1.0));
             reference.step(clarke(legs) * (0.5 * vdc), PERIOD / 400.0);
@@ -123,15 +123,14 @@ fn outputs_off_is_a_bridge_of_diodes() {
             let start = TAU * f64::from(direction) / 12.0 + 0.1;
             let (mut plant, _) = magnetised(rpm, 40.0, start);
             assert!(plant.current().norm() > 0.4, "{}", plant.current());
-            // Decay against a high link; then, against one below the back-emf if there is one,
-            // diodes that come and go through several turns of the rotor.
+            // First the current decays against a high link. Then the link is below the back-EMF, if there is one, and
+            // the diodes conduct again and again through several turns of the rotor.
             worst = worst.max(worst_against_soft_diodes(&mut plant, 8));
             plant.set_dc_link(20.0).expect("voltage");
             worst = worst.max(worst_against_soft_diodes(&mut plant, 200));
         }
     }
     println!("ideal and soft diodes: {worst:.1e} A apart at most");
-    // The soft ones carry up to 1 mA where the ideal ones carry none, in each phase, and switch
-    // that much later.
+    // The soft diodes carry up to 1 mA in each phase when the ideal ones carry none, and switch correspondingly later.
     assert!(worst < 3e-3, "{worst} A");
 }

@@ -1,6 +1,6 @@
-//! The machine model against the six phase equations of Eq. 2.8, derived and integrated on their
-//! own: flux linkages of three stator and three rotor windings as states, the inductances between
-//! them as functions of the rotor angle, the midpoint rule with small steps.
+//! Checks of the machine model against the six phase equations of Eq. 2.8, which are derived and integrated
+//! independently. The states are the flux linkages of three stator and three rotor windings; the inductances between
+//! them are functions of the rotor angle; the integration is the midpoint rule with small steps.
 
 use std::f64::consts::TAU;
 
@@ -22,15 +22,15 @@ struct PhaseModel {
     friction: f64,
     linkages: Vector6<f64>,
     speed: f64,
-    /// Electrical.
+    /// Electrical angle.
     angle: f64,
 }
 
 impl PhaseModel {
     /// Inductances of the windings at an electrical angle, or their derivatives by that angle.
     fn inductances(&self, angle: f64, derivative: bool) -> Matrix6<f64> {
-        // Sinusoidal windings: the mutual inductance of two is proportional to the cosine of the
-        // angle between their axes, with M = 2/3 Lm at angle zero (the source: Lm = 3/2 M).
+        // Sinusoidal windings: the mutual inductance of two is proportional to the cosine of the angle between their
+        // axes, with M = 2/3 Lm at angle zero (the source: Lm = 3/2 M).
         let m = 2.0 / 3.0 * self.settings.lm;
         Matrix6::from_fn(|row, column| {
             let axis = |k: usize, angle: f64| TAU / 3.0 * (k % 3) as f64 + angle;
@@ -90,7 +90,7 @@ impl PhaseModel {
 
 #[test]
 fn agrees_with_the_six_phase_equations() {
-    // Different leakages of stator and rotor, so that mixing them up would show.
+    // The leakages of stator and rotor differ, so that the test would show a mix-up.
     let settings = MachineSettings { lls: 0.0207, llr: 0.0345, ..Default::default() };
     let shaft = MechanicsSettings { load: Load::Free { torque: LOAD }, ..Default::default() };
     let mut motor = MotorModel::new(
@@ -137,9 +137,9 @@ fn agrees_with_the_six_phase_equations() {
         motor.state.speed
     );
     assert!(motor.state.speed > 20.0, "it should have started: {}", motor.state.speed);
-    // The midpoint rule turns an oscillation wrongly by (w h)^2/24 per radian. With w = 130 rad/s
-    // in the rotating windings and h = 4 us that is 1e-8; over 40 rad and at 11 A, 5e-6 A. What the
-    // 600 Hz of 0.26 A and the transients of 8 ms add is of the same size.
+    // The midpoint rule has a phase error of (w h)^2/24 per radian of an oscillation. With w = 130 rad/s in the
+    // rotating windings and h = 4 us that is 1e-8; over 40 rad and at 11 A, 5e-6 A. The 600 Hz of 0.26 A and the
+    // transients of 8 ms add an error of the same size.
     assert!(i_error < 5e-6, "current: {i_error:e} A");
     assert!(psi_error < 5e-7, "rotor flux: {psi_error:e} Wb");
     assert!(speed_error < 5e-5, "speed: {speed_error:e} rad/s");

@@ -1,4 +1,4 @@
-//! What an injected voltage sees of the machine, and which settings are refused.
+//! Tests of the saliency that an injected voltage measures, and of the settings that are refused.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
@@ -10,9 +10,9 @@ use motor_plant::{
 const FREQUENCY: f64 = 600.0;
 const STEPS: u32 = 50;
 
-/// Current phasor (cosine reference) at 600 Hz, A, in the stator frame as two complex amplitudes
-/// along and across the injection axis. The rotor is locked, with the rotor flux of `id` along
-/// alpha; the injected voltage is `v` V peak at this angle from it.
+/// Current phasor (cosine reference) at 600 Hz, A, in the stator frame, as two complex amplitudes along and across the
+/// injection axis. The rotor is locked, with the rotor flux of `id` along alpha; the injected voltage is `v` V peak at
+/// this angle from it.
 fn injected(saliency: SaliencySettings, id: f64, v: f64, angle: f64) -> [Complex; 2] {
     let machine = Machine::new(&MachineSettings::default(), &saliency).expect("machine");
     let locked = MechanicsSettings { load: Load::Locked, ..Default::default() };
@@ -26,7 +26,7 @@ fn injected(saliency: SaliencySettings, id: f64, v: f64, angle: f64) -> [Complex
     let mean = motor.state.electrical.i;
     let h = 1.0 / (FREQUENCY * f64::from(STEPS));
     let mut phasors = [Complex::ZERO; 2];
-    // 0.1 s for the transient of 8 ms to die away, then 60 cycles.
+    // 0.1 s for the decay of the 8 ms transient, then 60 cycles.
     for k in 0..120 * STEPS {
         // Voltage at the middle of the step, phase measured at its end.
         let v = v * (TAU * (f64::from(k) + 0.5) / f64::from(STEPS)).cos();
@@ -74,13 +74,13 @@ fn the_flux_axis_has_the_high_impedance() {
     let s = SaliencySettings::default();
     let [d, _] = injected(s, 0.7, 1.0, 0.0);
     let [q, _] = injected(s, 0.7, 1.0, FRAC_PI_2);
-    // Small signal, current along the flux: s = a_psi + b1 0.7 A = -0.0098, and the currents are as
-    // (1 + s) to (1 - s).
+    // Small signal, current along the flux: s = a_psi + b1 0.7 A = -0.0098, and the ratio of the currents is (1 + s) to
+    // (1 - s).
     let ratio = d.norm() / q.norm();
     println!("|i_d|/|i_q| = {ratio:.5}");
     assert!(d.norm() < q.norm(), "d must have the higher impedance");
     assert!((ratio - (1.0 - 0.0098) / (1.0 + 0.0098)).abs() < 5e-4, "{ratio}");
-    // Opposite sign of the flux part: opposite order.
+    // If the flux part has the opposite sign, the order is reversed.
     let opposite = SaliencySettings { a_psi: 0.035, ..s };
     let d = injected(opposite, 0.7, 1.0, 0.0)[0].norm();
     let q = injected(opposite, 0.7, 1.0, FRAC_PI_2)[0].norm();
@@ -96,7 +96,7 @@ fn chi_is_the_resistive_saliency_of_eq_3_8() {
     let omega_sigma_ls = TAU * FREQUENCY * (0.2047 - 0.1771 * 0.1771 / 0.2047);
     let expected = 0.5 * 1.1 * (0.1771f64 / 0.2047).powi(2) / omega_sigma_ls;
     println!("quadrature {quadrature:.5}, expected {expected:.5}");
-    // The split at 60 Hz turns it by atan(60/600) = 6 degrees and takes 1 % off.
+    // The split at 60 Hz rotates it by atan(60/600) = 6 degrees and reduces it by 1 %.
     assert!((quadrature.im.abs() / expected - 1.0).abs() < 0.03, "{quadrature}");
     assert!(quadrature.re.abs() < 0.15 * expected, "{quadrature}");
 }
@@ -116,13 +116,13 @@ fn the_inductance_is_the_tensor_of_the_model() {
             psi: Complex::from_polar(psi_length, psi_angle),
             i_lp: Complex::ZERO,
         };
-        // s = a_psi (psi/psi_n)^2 2/(1 + r) + b1 i^2/|i|, by lengths and angles.
+        // s = a_psi (psi/psi_n)^2 2/(1 + r) + b1 i^2/|i|, from magnitudes and angles.
         let r = (psi_length / psi_n).powi(2);
         let s = Complex::from_polar(1.0, 2.0 * psi_angle) * (-0.035 * r * 2.0 / (1.0 + r))
             + Complex::from_polar(0.036 * i_length, 2.0 * i_angle);
         assert!((machine.saliency(&x) - s).norm() < 1e-14, "{} {s}", machine.saliency(&x));
-        // The voltage that is left for the transient inductance is that of the textbook machine;
-        // sigma Ls (x - s x*) of the current's rate must give it back.
+        // The voltage that remains for the transient inductance is that of the textbook machine; sigma Ls (x - s x*) of
+        // the current's rate must give the same voltage.
         let v = Complex::from_polar(100.0, n);
         let (rate, plain) = (machine.derivative(&x, v, 50.0), textbook.derivative(&x, v, 50.0));
         let left = rate.i - s * rate.i.conj();
@@ -140,7 +140,7 @@ fn the_saliency_stays_below_half() {
         for turn in 0..36 {
             let flux = 0.02 * f64::from(step) * m.lm * SaliencySettings::default().hold_a;
             let psi = Complex::from_polar(flux, TAU * f64::from(turn) / 36.0);
-            // Four times the current that the settings are checked for.
+            // Up to four times the current for which the settings are checked.
             for i in [0.0, 1e-12, 0.7, 3.0, 5.0, 20.0] {
                 let x = MachineState { i: i.into(), psi, i_lp: Complex::ZERO };
                 worst = worst.max(machine.saliency(&x).norm());
@@ -171,7 +171,7 @@ fn refusals_name_the_setting_its_value_and_its_range() {
     let text = refusal(|s| s.machine.rs = f64::NAN);
     assert_eq!(text, "machine.rs = NaN is outside the allowed range 0.0001 to 1000 ohm");
     let text = refusal(|s| s.measurement.lsb_a = 0.0001);
-    // From a range of 4.4727 A: 16 to 7 bits.
+    // With a range of 4.4727 A: 16 to 7 bits.
     let begin = "measurement.lsb_a = 0.0001 is outside the allowed range 0.00013977";
     assert!(text.starts_with(begin) && text.ends_with(" to 0.0559089175 A"), "{text}");
     type Change = fn(&mut PlantSettings);

@@ -1,4 +1,4 @@
-//! The current sensors, the converter and the encoder.
+//! Tests of the current sensors, the ADC and the encoder.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ fn rng() -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(11)
 }
 
-/// Codes of a current that has been there for long.
+/// Returns the ADC counts of a steady current.
 fn codes(settings: &MeasurementSettings, i: Complex) -> [u16; 2] {
     let mut sensors = Sensors::new(settings).expect("settings of the test");
     for _ in 0..100 {
@@ -33,7 +33,7 @@ fn of_two_phases(a: f64, b: f64) -> Complex {
 #[test]
 fn codes_are_those_of_the_calibration_of_the_source() {
     let quiet = MeasurementSettings { noise_a: 0.0, ..Default::default() };
-    // Table 4, measured; the lines of Eq. 3.5 fit it within five codes.
+    // Table 4, measured; the lines of Eq. 3.5 fit it within five counts.
     let table = [
         (-3.0, 666, 671),
         (-2.0, 1117, 1118),
@@ -60,7 +60,7 @@ fn the_calibration_lines_undo_the_codes() {
             for (k, i) in [i, -i].into_iter().enumerate() {
                 let line = lines[k];
                 let read = f64::from(codes[k]) * line.a_per_code + line.a_at_zero;
-                // Half a code of rounding, and a hair.
+                // The tolerance is slightly more than half a count of rounding.
                 assert!((read - i).abs() < 0.5001 * line.a_per_code, "{lsb_a}: {read} for {i} A");
             }
         }
@@ -139,8 +139,8 @@ fn the_analog_filter_lags_by_6_5_degrees_at_600_hz() {
         }
         let lag = -phasor.arg().to_degrees();
         let gain = phasor.norm() / (15.0 * f64::from(per_cycle));
-        // atan(600/5305); the straight pieces have the phase of the cosine but, at ten a cycle,
-        // only sinc(1/10)^2 = 0.967 of its size (their images alias back and add a little).
+        // atan(600/5305). The straight pieces have the phase of the cosine but, at ten a cycle, only sinc(1/10)^2 =
+        // 0.967 of its size (their images alias back and add a little).
         println!("{substeps} substeps: {lag:.3} degrees, gain {gain:.4}");
         let expected = (600.0f64 / 5305.0).atan().to_degrees();
         assert!((expected - 6.45).abs() < 0.01);
@@ -202,7 +202,7 @@ fn faulty_channels_read_what_they_should() {
 #[test]
 fn the_other_channels() {
     let mut plant = running(5);
-    // 311 V at 0.11 V a code.
+    // 311 V at 0.11 V per count.
     assert_eq!((plant.sample().dc_link, plant.sample().heat_sink), (2827, 1309));
     plant.set_dc_link(500.0).expect("voltage");
     plant.set_heat_sink(77);
@@ -224,12 +224,12 @@ fn the_encoder_counts_quarter_lines_both_ways_and_wraps() {
     let turn = |plant: &mut Plant| (0..6000).for_each(|_| plant.advance(&Compare::OFF, PERIOD));
     assert_eq!(plant.sample().encoder, 0);
     turn(&mut plant);
-    // Within a count of rounding.
+    // Within one count of rounding.
     assert!(plant.sample().encoder.abs_diff(100_000) <= 1, "{}", plant.sample().encoder);
     plant.set_load(Load::Speed { speed: -speed }).expect("speed");
     turn(&mut plant);
     plant.advance(&Compare::OFF, PERIOD);
-    // 16.7 counts backwards from zero: downwards to -17, wrapped.
+    // 16.7 counts backwards from zero: down to -17, wrapped.
     let below = plant.sample().encoder.wrapping_neg();
     assert!((17..=18).contains(&below), "{below}");
 
@@ -252,7 +252,7 @@ fn loads_hold_release_and_brake_the_shaft() {
     plant.set_load(Load::Speed { speed: 20.0 }).expect("speed");
     plant.advance(&Compare::OFF, PERIOD);
     assert_eq!(plant.mechanical_speed(), 20.0);
-    // Free again, it slows down by torque and friction: (0.3 + 0.001 w)/0.012.
+    // The free shaft slows down by load torque and friction: (0.3 + 0.001 w)/0.012.
     plant.set_load(Load::Free { torque: 0.3 }).expect("torque");
     (0..600).for_each(|_| plant.advance(&Compare::OFF, PERIOD));
     let rate = 0.001 / 0.012;

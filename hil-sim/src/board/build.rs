@@ -1,5 +1,5 @@
-//! Builds of the image and of the virtual board. While one runs, something is shown at least every ten seconds: cargo's
-//! progress where standard error is a terminal, and lines of our own elsewhere.
+//! Builds of the image and of the virtual board. A build shows progress at least every ten seconds: cargo's progress if
+//! standard error is a terminal, otherwise lines of our own.
 
 use std::io::{BufRead as _, BufReader, IsTerminal as _};
 use std::process::{Command, Stdio};
@@ -13,13 +13,13 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// Builds and checks the image of a board as it is flashed; returns its path.
 ///
 /// # Errors
-/// [`Error::Internal`] when cargo does not run or the build fails.
+/// [`Error::Internal`] if cargo does not run or the build fails.
 pub fn image(board: &str, verbose: bool) -> Result<PathBuf, Error> {
-    eprintln!("firmware: built where its source has changed; some minutes the first time");
+    eprintln!("firmware: rebuilt where its source has changed; a few minutes the first time");
     let mut command = cargo();
     command.args(["run", "--package", "xtask", "--", "firmware", "--board", board]);
     command.current_dir(root()?);
-    // The last line is the path; the others tell what xtask does.
+    // The last line is the path; the other lines report progress of xtask.
     let mut lines = lines_of("firmware", command)?;
     let path = lines.pop().map(PathBuf::from);
     if verbose {
@@ -33,7 +33,7 @@ pub fn image(board: &str, verbose: bool) -> Result<PathBuf, Error> {
 /// # Errors
 /// As [`image`].
 pub fn virtual_board() -> Result<PathBuf, Error> {
-    eprintln!("emulator: built where its source has changed; some 2 minutes the first time");
+    eprintln!("emulator: rebuilt where its source has changed; about 2 minutes the first time");
     let mut command = cargo();
     command.args(["build", "--release", "--bin", "board"]);
     command.arg("--message-format=json-render-diagnostics");
@@ -43,13 +43,13 @@ pub fn virtual_board() -> Result<PathBuf, Error> {
     program.ok_or_else(|| failed("emulator", "cargo names no program"))
 }
 
-/// The program that a message of cargo names.
+/// Returns the program that a message of cargo names.
 fn executable(message: &str) -> Option<PathBuf> {
     let message: serde_json::Value = serde_json::from_str(message).ok()?;
     message["executable"].as_str().map(PathBuf::from)
 }
 
-/// Runs a command to its end; the lines of its standard output.
+/// Runs a command to its end; returns the lines of its standard output.
 fn lines_of(name: &str, mut command: Command) -> Result<Vec<String>, Error> {
     let mut run = || {
         let mut child = command.stdout(Stdio::piped()).spawn()?;
@@ -71,7 +71,7 @@ fn failed(name: &str, why: impl std::fmt::Display) -> Error {
     Error::Internal(format!("build of the {name}: {why}"))
 }
 
-/// Does some work and says after every interval how long it has taken so far.
+/// Does some work, and prints after every interval how long it has taken so far.
 fn while_saying<T>(
     interval: Duration,
     say: impl Fn(Duration) + Send,
@@ -95,12 +95,13 @@ fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// The repository: around this program, or around the folder that one is in. A shipped program names no folder of its builder.
+/// Returns the repository around this program, or otherwise around the current folder. A shipped program contains no
+/// path of the machine that built it.
 fn root() -> Result<PathBuf, Error> {
     let places = [std::env::current_exe(), std::env::current_dir()];
     let mut folders = places.iter().flatten().flat_map(|place| place.ancestors());
     let root = folders.find(|folder| folder.join("hil-sim/virtual-board").is_dir());
-    let refused = "the virtual board is built in the repository: go there";
+    let refused = "the virtual board is built in the repository: change to it";
     root.map(Path::to_owned).ok_or_else(|| Error::Refused(refused.into()))
 }
 

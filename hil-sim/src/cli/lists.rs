@@ -7,10 +7,10 @@ use crate::config::{Key, Value, file};
 use crate::experiments::{EVERYDAY, EXPERIMENTS, WITH_INPUT};
 use crate::prelude::*;
 
-/// All experiments as JSON; as text those of every day, or the others.
+/// Lists all experiments as JSON, or as text the most used ones or the others.
 ///
 /// # Errors
-/// [`Error::Internal`] when JSON cannot be made.
+/// [`Error::Internal`] if JSON cannot be made.
 pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
     let all = EXPERIMENTS.iter().chain(WITH_INPUT);
     if as_json {
@@ -35,14 +35,14 @@ fn pretty(value: &serde_json::Value) -> Result<String, Error> {
     Ok(format!("{text}\n"))
 }
 
-/// The keys that begin with `prefix`, or the configuration as TOML.
+/// Lists the keys that begin with `prefix`, or the configuration as TOML.
 ///
 /// # Errors
-/// As [`Input::config`]; [`Error::Unknown`] when no key begins so.
+/// As [`Input::config`]; [`Error::Unknown`] if no key begins so.
 pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String, Error> {
     let config = input.config()?;
     let prefix = prefix.unwrap_or_default();
-    // Those of `after.` repeat the plant's; they are shown when they are asked for.
+    // The keys of `after.` repeat the plant's, so they are shown only on request.
     let after = Key::after().filter(|_| !prefix.is_empty());
     let found: Vec<Key> =
         Key::all().chain(after).filter(|key| key.assigned_name().starts_with(prefix)).collect();
@@ -67,7 +67,7 @@ fn key_text(key: Key, config: &Config) -> String {
     format!("{} = {value}\n{}\n", key.assigned_name(), report::paragraph(&text, 4))
 }
 
-/// All motors; or one, with sources and lines for the console.
+/// Lists all motors; or describes one, with sources and lines for the console.
 ///
 /// # Errors
 /// As [`Motor::find`] and [`Motor::apply`].
@@ -128,6 +128,6 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let lines = motor.console_lines().join("\n");
     Ok(format!(
         "{name}: {title}\n\n{about}\n\n{table}\nLeakage inductance {leakage:.4} mH, rotor time constant {tau_r:.0} ms, \
-         carrier {carrier:.1} V.\n\nAt the console, with the scales of your board:\n{lines}\n"
+         injected voltage {carrier:.1} V.\n\nAt the console, with the scales of your board:\n{lines}\n"
     ))
 }

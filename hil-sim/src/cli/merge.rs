@@ -1,13 +1,13 @@
-//! Shards that are merged.
+//! The command that merges shards.
 
 use super::run::{self, Output, Run};
 use crate::prelude::*;
 use crate::shards::{self, Merged};
 
-/// Merges shards, prints the JSON object of the whole run, and writes its page and its CSV files where wanted.
+/// Merges shards, prints the JSON object of the whole run, and writes its page and its CSV files if requested.
 ///
 /// # Errors
-/// As [`shards::merge`]; [`Error::Write`]; [`Error::Lost`] after all is written.
+/// As [`shards::merge`]; [`Error::Write`]; [`Error::Lost`] after everything is written.
 pub fn merge(files: &[PathBuf], out: Option<PathBuf>, csv: Option<PathBuf>) -> Result<(), Error> {
     let Merged { experiment, config, seed, outcome } = shards::merge(files)?;
     let input = Input { seed, quiet: true, ..Input::default() };

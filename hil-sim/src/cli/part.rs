@@ -1,22 +1,22 @@
-//! A part of the runs of a statistical experiment, and runs that are continued.
+//! A part of the runs of a statistical experiment, and continued runs.
 
 use super::say;
 use crate::experiments;
 use crate::prelude::*;
 use crate::shards::{self, Header, Journal, Shard};
 
-/// Which runs are done, and where they are kept.
+/// Selection of the runs, and the place where they are stored.
 #[derive(Args, Default)]
 pub struct Part {
-    /// Do every Nth run only, from the Ith on, and print them for `merge`; `env`: those of this job of an array of Slurm,
-    /// Kubernetes or AWS Batch
+    /// Do only every Nth run, starting with the Ith, and print them for `merge`; `env`: the runs of this job in a job
+    /// array of Slurm, Kubernetes or AWS Batch
     #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "csv"])]
     shard: Option<Shard>,
-    /// Keep every finished run in this file, or in a file of its own in this folder, and do not repeat those that are
+    /// Keep every finished run in this file, or in its own file in this folder, and do not repeat the runs that are
     /// there
     #[arg(long, value_name = "PATH")]
     resume: Option<PathBuf>,
-    /// Write a CSV file with a row for each run: what was drawn for it, and what came out
+    /// Write a CSV file with a row for each run: its random values and its results
     #[arg(long, value_name = "FILE")]
     rows: Option<PathBuf>,
 }
@@ -27,10 +27,10 @@ impl Part {
         self.shard.is_some()
     }
 
-    /// Runs the experiment. Prints a shard; otherwise returns the outcome.
+    /// Runs the experiment. Prints a shard, or returns the outcome.
     ///
     /// # Errors
-    /// Those of the experiment; with options of this part as [`experiments::statistical`], [`Journal::open`] and
+    /// The errors of the experiment; with options of this part, as [`experiments::statistical`], [`Journal::open`] and
     /// [`shards::runs`].
     pub fn run(
         &self,
@@ -63,7 +63,7 @@ impl Part {
     }
 }
 
-/// What was found in a journal, on standard error. A torn line is named even if little is to be said.
+/// Prints the state of a journal on standard error. A torn line is reported even in quiet mode.
 fn note(journal: &Journal, header: &Header, quiet: bool) {
     let path = message(journal.path.display());
     if let Some(line) = journal.torn {

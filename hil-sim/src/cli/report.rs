@@ -11,7 +11,7 @@ use crate::prelude::*;
 use crate::progress::Bar;
 use crate::report::{self, Section};
 
-/// Shows which experiments are running.
+/// Shows the names of the running experiments.
 struct Running<'a> {
     bar: &'a Bar,
     names: Mutex<Vec<&'static str>>,
@@ -19,7 +19,7 @@ struct Running<'a> {
 
 impl Running<'_> {
     fn change(&self, change: impl FnOnce(&mut Vec<&'static str>)) {
-        // A panic elsewhere ends the program anyway.
+        // A panic in another thread ends the program anyway.
         if let Ok(mut names) = self.names.lock() {
             change(&mut names);
             self.bar.label(&names.join(", "));
@@ -35,7 +35,7 @@ impl Running<'_> {
     }
 }
 
-/// What a page is about.
+/// Subject of a page.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Of {
     /// Both sources, then all experiments
@@ -44,11 +44,11 @@ pub enum Of {
     Sources,
 }
 
-/// Runs all experiments, or those that repeat the sources, into one page. One that is refused or lost is named in the page and
-/// on standard error.
+/// Runs all experiments, or those that repeat the sources, into one page. An experiment that is refused or fails is
+/// named in the page and on standard error.
 ///
 /// # Errors
-/// As [`Input::config`] and [`used::check`]; [`Error::Write`]; [`Error::Incomplete`] after the page is written.
+/// As [`Input::config`] and [`used::check`]; [`Error::Write`]; [`Error::Incomplete`] after the page has been written.
 pub fn report(of: Of, input: &Input, out: &Path) -> Result<(), Error> {
     let is_chosen = |one: &&Experiment| of == Of::All || experiments::SOURCES.contains(&one.name);
     report_of(&EXPERIMENTS.iter().filter(is_chosen).collect::<Vec<_>>(), of, input, out)
@@ -89,7 +89,7 @@ fn report_of(experiments: &[&Experiment], of: Of, input: &Input, out: &Path) -> 
     let origin = Origin::new(input.seed, &config.changes());
     let (file, title) = match of {
         Of::All => ("report.html", "Induction drive: sources and experiments"),
-        Of::Sources => ("sources.html", "Induction drive: what both sources print, beside ours"),
+        Of::Sources => ("sources.html", "Induction drive: both sources as printed, beside ours"),
     };
     let path = out.join(file);
     let page = report::page(title, &origin, &sections)?;
@@ -134,7 +134,7 @@ mod tests {
         for part in ["Refused: dc link too low", "0.625", "fault 12: the flux angle is lost"] {
             assert!(page.contains(part), "{part}");
         }
-        // The results first, and of them those that failed.
+        // The results come first, and among them the failed ones.
         let place = |part: &str| page.find(part).unwrap_or_else(|| panic!("no {part}"));
         let rows = ["refused", "lost", "sound"].map(|name| place(&format!("href=\"#{name}\"")));
         assert!(place("<h2>Results</h2>") < rows[0] && rows.is_sorted(), "{rows:?}");

@@ -11,16 +11,16 @@ use crate::passport;
 use crate::prelude::*;
 use crate::report::{self, Section};
 
-/// Where the results of a run go.
+/// Destination of the results of a run.
 #[derive(Args, Default)]
 pub struct Output {
     /// Folder of the page [default: out; with --json no page unless this is given]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Print one JSON object and nothing else; of a group, one with all in a list
+    /// Print one JSON object and nothing else; for a group, one object with a list of all
     #[arg(long)]
     pub json: bool,
-    /// Folder of CSV files, one a figure and one a table [default: none]
+    /// Folder of CSV files, one per figure and one per table [default: none]
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
 }
@@ -28,9 +28,9 @@ pub struct Output {
 /// A requested run: its experiment, input, part and output.
 #[derive(Args, Default)]
 pub struct Request {
-    /// Name of the experiment, as `list` shows it, or the TOML file of a scenario
+    /// Name of the experiment as in `list`, or the TOML file of a scenario
     pub name: String,
-    /// For `profile`: CSV file with the profile; for `measured-start`: with the recorded start
+    /// For `profile`: CSV file with the profile; for `measured-start`: CSV file with the recorded start
     #[arg(long = "input", value_name = "FILE")]
     pub file: Option<PathBuf>,
     #[command(flatten)]
@@ -47,21 +47,21 @@ pub struct Trace {
     /// CSV file with a header; its columns are named in the documentation
     #[arg(long = "input", value_name = "FILE")]
     file: PathBuf,
-    /// Another name of a column in the file; can be given many times
+    /// Another name of a column in the file; can be repeated
     #[arg(long = "column", value_name = "OURS=THEIRS")]
     columns: Vec<String>,
-    /// What the voltages are: `commanded` by a drive that recorded them; measured at the terminals, `sampled` when the currents
-    /// are, or `mean` from a row to the next
+    /// Kind of the voltages: `commanded` by a drive that recorded them; measured at the terminals, `sampled` together
+    /// with the currents, or `mean` from one row to the next
     #[arg(long, value_name = "KIND", value_parser = voltages, default_value = "commanded")]
     voltages: Voltages,
-    /// Rows by which a voltage acts after the currents of its row [default: 0; commanded: 1 and the delay of the current
-    /// filter, as the drive records it]
+    /// Rows between the currents of a row and the action of its voltage [default: 0; commanded: 1 and the delay of the
+    /// current filter, as the drive records it]
     #[arg(long, value_name = "ROWS", value_parser = |text: &str| within(text, -1.0, 10.0, "rows"), allow_negative_numbers = true)]
     delay: Option<f64>,
-    /// Voltage that the inverter loses at each phase current [default: 0; commanded: found]
+    /// Inverter voltage error at each phase current [default: 0; commanded: fitted]
     #[arg(long, value_name = "V", value_parser = |text: &str| within(text, 0.0, 100.0, "V"), allow_negative_numbers = true)]
     drop: Option<f64>,
-    /// Passport of the motor that was found, with nameplate and dc link of --motor
+    /// Passport of the identified motor, with nameplate and dc link of --motor
     #[arg(long, value_name = "FILE.json", requires = "motor")]
     passport: Option<PathBuf>,
     /// Time of the first row
@@ -83,12 +83,12 @@ fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> 
     number.ok_or_else(|| format!("allowed: {least} to {most} {unit}"))
 }
 
-/// A run, as the functions that write its results need it.
+/// A run, in the form that the functions need that write its results.
 pub struct Run<'a> {
     pub experiment: &'a Experiment,
     pub input: &'a Input,
     pub config: &'a Config,
-    /// The command behind `cargo sim`, without the configuration.
+    /// The command after `cargo sim`, without the configuration.
     pub command: String,
 }
 
@@ -99,7 +99,7 @@ impl<'a> Run<'a> {
         Section { name, stands_for, about, command, outcome }
     }
 
-    /// Writes the files of an outcome and prints its results; returns the JSON object if that is wanted.
+    /// Writes the files of an outcome and prints its results; returns the JSON object if requested.
     pub fn write(&self, outcome: &Outcome, output: &Output) -> Result<String, Error> {
         let name = self.experiment.name;
         let mut whole = outcome.clone();
@@ -137,7 +137,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The error of an experiment whose run was lost; its results are written before it is returned.
+/// Returns the error of an experiment whose run failed; its results are written before.
 pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
     match outcome.lost() {
         Some(reason) => Err(Error::Lost { name: name.to_owned(), reason }),
@@ -145,10 +145,10 @@ pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
     }
 }
 
-/// Runs the experiment of this name, or all of a group, with the file of an experiment that takes one; prints the results.
+/// Runs the experiment of this name, or all of a group, with the input file if the experiment takes one; prints the results.
 ///
 /// # Errors
-/// As [`made`]; [`Error::Lost`] after all is written.
+/// As [`made`]; [`Error::Lost`] after everything is written.
 pub fn run(request: &Request) -> Result<(), Error> {
     let (objects, lost) = made(request)?;
     if !request.part.is_shard() {
@@ -157,20 +157,20 @@ pub fn run(request: &Request) -> Result<(), Error> {
     lost
 }
 
-/// The JSON object that `cargo sim run --json` prints; where the run is lost, it says so itself.
+/// Returns the JSON object that `cargo sim run --json` prints; if the run failed, the object says so.
 ///
 /// # Errors
-/// What `cargo sim run` refuses or fails with.
+/// The refusals and failures of `cargo sim run`.
 pub fn json(name: String, file: Option<PathBuf>, input: Input) -> Result<String, Error> {
     let output = Output { json: true, ..Output::default() };
     let (objects, _) = made(&Request { name, file, input, output, ..Request::default() })?;
     Ok(outcome::joined(&objects))
 }
 
-/// The JSON objects of the results, if they are wanted, and whether one of them is lost.
+/// Returns the JSON objects of the results, if requested, and whether one of the runs failed.
 ///
 /// # Errors
-/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; those of the experiment; [`Error::Write`].
+/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; the errors of the experiment; [`Error::Write`].
 fn made(request: &Request) -> Result<(Vec<String>, Result<(), Error>), Error> {
     let Request { name, input, part, output, .. } = request;
     let own = scenario::own(name);
@@ -230,7 +230,7 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     print(&[run.write(&outcome, output)?], output)
 }
 
-/// Prints the JSON objects, if they are wanted.
+/// Prints the JSON objects, if requested.
 ///
 /// # Errors
 /// [`Error::Write`].

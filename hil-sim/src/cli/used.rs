@@ -4,8 +4,8 @@ use crate::config::{assigned, file, keys_of};
 use crate::prelude::*;
 
 /// Checks that each key set by `--set` or `--seconds` is used by one of the experiments that `name` stands for. A
-/// configuration file may describe more than one experiment needs: its unused keys are only named on standard error,
-/// unless they leave the configuration as it is.
+/// configuration file may describe more than one experiment needs. Its unused keys are only reported on standard error,
+/// unless they do not change the configuration.
 ///
 /// # Errors
 /// [`Error::Refused`]; as [`assigned`], [`keys_of`] and [`file::read`].

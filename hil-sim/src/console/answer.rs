@@ -1,27 +1,27 @@
-//! The protocol of the console: the meaning of a line while the answer to a request is awaited.
+//! The protocol of the console: the meaning of a line while the program awaits the answer to a request.
 //!
-//! Requests are sent with a tag, `@17 speed 300`; the last line of an answer repeats it, `@17 ok`. Lines that begin with `* ` come
-//! unasked, at any time. A line of the drive without a tag is one of a list that goes on, or the error of a request that was damaged on its
-//! way, whose tag the drive does not know.
+//! Requests are sent with a tag, `@17 speed 300`, and the last line of an answer repeats it, `@17 ok`. Lines that begin
+//! with `* ` are unsolicited and may come at any time. A line of the drive without a tag continues a list, or it is the
+//! error of a request that was damaged on its way, so that the drive does not know the tag.
 
 /// The meaning of a line while an answer is awaited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning<'a> {
-    /// The request itself, sent back, or its beginning.
+    /// The echo of the request, or its beginning.
     Echo,
     /// A line of the answer; others follow.
     Answer,
     /// The last line of the answer.
     Last(&'a str),
-    /// The last line of the answer to an older request, which was not awaited.
+    /// The last line of the answer to an older request, which is not awaited.
     Older(&'a str),
-    /// The last line of the answer to a younger request: it has cut this one's short.
+    /// The last line of the answer to a younger request, which has cut short this one's.
     Younger(&'a str),
-    /// Not of an answer.
+    /// Not part of an answer.
     Unasked,
 }
 
-/// Whether the drive says such a line without being asked.
+/// Whether the drive sends such a line unsolicited.
 pub fn is_unasked(line: &str) -> bool {
     line.starts_with("* ")
 }
@@ -31,17 +31,17 @@ pub fn is_error(line: &str) -> bool {
     line.starts_with("error:")
 }
 
-/// A request with this tag, as it is sent.
+/// Returns a request with this tag, as it is sent.
 pub fn tagged(tag: u32, request: &str) -> String {
     format!("@{tag:x} {request}")
 }
 
-/// The tag of a line and the text behind it, if it has one.
+/// Returns the tag of a line and the text after it, if it has one.
 pub fn split_tag(line: &str) -> Option<(&str, &str)> {
     line.strip_prefix('@')?.split_once(' ')
 }
 
-/// The meaning of a line while the answer to `request`, sent with `tag`, is awaited. Tags count up, and wrap.
+/// Returns the meaning of a line while the answer to `request`, sent with `tag`, is awaited. Tags count up, and wrap.
 pub fn meaning<'a>(tag: u32, request: &str, line: &'a str) -> Meaning<'a> {
     if is_unasked(line) {
         return Meaning::Unasked;

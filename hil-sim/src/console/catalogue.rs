@@ -1,11 +1,11 @@
-//! The commands and settings of a drive, as it lists them itself; and the completion of a line from them.
+//! The commands and settings of a drive, as the drive lists them; and the completion of a line from them.
 
 use serde_json::Value;
 
 use super::link::{Answer, Link, LinkError};
 use super::own;
 
-/// A command, or a setting behind `set`, with the words that can follow it.
+/// A command, or a setting after `set`, with the words that can follow it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Known {
     name: String,
@@ -20,7 +20,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Asks a drive.
+    /// Asks a drive for its commands and settings.
     ///
     /// # Errors
     /// The drive does not answer.
@@ -36,7 +36,7 @@ impl Catalogue {
         self.settings.len()
     }
 
-    /// The words that can stand at the end of a line: where the last word begins, and its candidates.
+    /// Returns the completion of a line: the position of its last word, and the candidates for that word.
     pub fn complete(&self, line: &str) -> (usize, Vec<String>) {
         let begin = line.rfind(char::is_whitespace).map_or(0, |at| at + 1);
         let (before, word) = line.split_at(begin);
@@ -54,7 +54,7 @@ impl Catalogue {
                 all
             }
             ["get" | "describe"] => names(&self.settings),
-            // Names and values in turn.
+            // Names and values alternate.
             ["set", .., name] if before.len().is_multiple_of(2) => words(&self.settings, name),
             ["set", ..] => names(&self.settings),
             [command] => words(&self.commands, command),
@@ -64,8 +64,8 @@ impl Catalogue {
     }
 }
 
-/// The commands of `help`: usage and, behind two spaces, the meaning. Words in lower case behind the name can be typed;
-/// others stand for something.
+/// Parses the commands of `help`: usage and, after two spaces, the meaning. Words in lower case after the name can be
+/// typed; other words are placeholders.
 fn commands(help: &Answer) -> Vec<Known> {
     let mut commands: Vec<Known> = Vec::new();
     let usages = help.contents().iter().filter_map(|line| Some(line.split_once("  ")?.0));
@@ -84,7 +84,7 @@ fn commands(help: &Answer) -> Vec<Known> {
     commands
 }
 
-/// The setting of a line of `describe`, a JSON object.
+/// Parses the setting from a line of `describe`, a JSON object.
 fn described_setting(line: &str) -> Option<Known> {
     let object: Value = serde_json::from_str(line).ok()?;
     let mut words: Vec<String> = match &object["words"] {

@@ -1,5 +1,5 @@
-//! The console of a person: a line editor with history and completion. Lines that the drive says meanwhile are shown
-//! above the line that is being typed.
+//! The console of a person: a line editor with history and completion. Lines from the drive are shown above the line
+//! that is being typed.
 
 use std::sync::mpsc::channel;
 
@@ -39,20 +39,20 @@ impl Highlighter for Completion {}
 impl Validator for Completion {}
 impl Helper for Completion {}
 
-/// Shows a line that the drive says unasked.
+/// A function that shows an unsolicited line of the drive.
 type Show = Box<dyn FnMut(&str) + Send>;
 
-/// Talks to a drive until the person ends it.
+/// Talks to a drive until the person ends the session.
 ///
 /// # Errors
-/// [`Error::Internal`] when the terminal fails or the port is closed.
+/// [`Error::Internal`] if the terminal fails or the port is closed.
 pub fn run(port: &str, connect: impl FnOnce(Show) -> Link) -> Result<(), Error> {
     let terminal = |why: ReadlineError| Error::Internal(format!("terminal: {why}"));
     let config = Config::builder().completion_type(CompletionType::List).auto_add_history(true);
     let mut editor: Editor<Completion, DefaultHistory> =
         Editor::with_config(config.build()).map_err(terminal)?;
     let mut printer = editor.create_external_printer().map_err(terminal)?;
-    // The printer waits for the editor; whoever says a line does not.
+    // The printer may wait for the editor; the sender of a line must not.
     let (send, lines) = channel::<String>();
     std::thread::spawn(move || {
         lines.iter().for_each(|line| drop(printer.print(format!("{line}\n"))));

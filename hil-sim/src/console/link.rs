@@ -1,6 +1,6 @@
-//! Moves lines between this program and the drive. A thread reads; its lines go to the request that awaits an answer, or
-//! are shown at once. Each request has a tag of its own, which tells its answer from all else ([`super::answer`]). Frames of a
-//! stream between the lines go their own way.
+//! Moves lines between this program and the drive. A thread reads; its lines go to the request that awaits an answer,
+//! or are shown at once. Each request has its own tag, which distinguishes its answer from other lines
+//! ([`super::answer`]). Frames of a stream between the lines are passed on separately.
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -12,23 +12,23 @@ use drive_stream::{Frame, Piece, Splitter};
 use super::answer::{self, Meaning, is_error};
 use super::trace::Trace;
 
-/// Longest silence within an answer: a setting is designed for seconds, on a virtual board at a fraction of real time.
+/// Longest wait for the next line of an answer: computing a setting takes seconds, on a virtual board at a fraction of real time.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// The same of a trace, which is recorded before anything is said.
+/// Longest wait for a line of a trace, which is recorded before anything is sent.
 const PATIENCE_WITH_TRACE: Duration = Duration::from_secs(600);
-/// Longest line that is put together.
+/// Longest line that is assembled.
 const LONGEST: usize = 4096;
 
-/// Why there is no answer.
+/// Reasons for a missing answer.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The drive says nothing.
+    /// The drive does not answer.
     #[error("`{0}`: no answer within {1} s")]
     Silence(String, u64),
     /// The port is gone: unplugged, or the virtual board has ended.
     #[error("the port is closed")]
     Closed,
-    /// A line that could not wait was sent meanwhile; it ends a list.
+    /// An urgent line was sent meanwhile, which ends a list.
     #[error("`{0}`: cut short by another line")]
     Cut(String),
 }
@@ -36,17 +36,17 @@ pub enum LinkError {
 /// The answer to a command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answer {
-    /// Its lines, the last one included.
+    /// The lines of the answer, including the last one.
     pub lines: Vec<String>,
 }
 
 impl Answer {
-    /// The line that refuses the command.
+    /// Returns the line that refuses the command.
     pub fn error(&self) -> Option<&str> {
         self.lines.last().map(String::as_str).filter(|line| is_error(line))
     }
 
-    /// The lines but an `ok` at the end.
+    /// Returns the lines without an `ok` at the end.
     pub fn contents(&self) -> &[String] {
         match self.lines.split_last() {
             Some((last, before)) if last == "ok" => before,
@@ -55,11 +55,11 @@ impl Answer {
     }
 }
 
-/// Where the lines of the drive go.
+/// Destinations of the lines from the drive.
 struct Route {
-    /// To the command that awaits them.
+    /// The command that awaits them.
     asked: Option<Sender<String>>,
-    /// Or to the person.
+    /// Otherwise the person.
     show: Box<dyn FnMut(&str) + Send>,
     frames: Box<dyn FnMut(Option<Frame>) + Send>,
     trace: Trace,
@@ -75,7 +75,7 @@ impl Route {
         }
     }
 
-    /// Shows a line that nobody awaits, without its tag.
+    /// Shows a line that no command awaits, without its tag.
     fn unawaited(&mut self, line: &str) {
         (self.show)(answer::split_tag(line).map_or(line, |(_, rest)| rest));
     }
@@ -91,7 +91,7 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    /// Sends a request; its tag. An empty line is a sign of life, which has no answer and cuts nothing short.
+    /// Sends a request and returns its tag. An empty line is a sign of life, which has no answer and interrupts nothing.
     fn send(&mut self, request: &str) -> std::io::Result<u32> {
         let line = if request.is_empty() {
             String::new()
@@ -111,22 +111,22 @@ pub struct Link {
     route: Arc<Mutex<Route>>,
 }
 
-/// Sends lines that cannot wait for an answer that is awaited.
+/// Sends urgent lines, without waiting for an answer that is awaited.
 #[derive(Clone)]
 pub struct Urgent(Port);
 
 impl Urgent {
-    /// Sends a line at once. Its answer is shown, unless a list is being answered: the line cuts that short.
+    /// Sends a line at once. Its answer is shown, unless a list is being answered: then the line cuts the list short.
     ///
     /// # Errors
-    /// The port is gone.
+    /// The port is closed.
     pub fn send(&self, line: &str) -> Result<(), LinkError> {
         locked(&self.0).send(line).map(drop).map_err(|_| LinkError::Closed)
     }
 }
 
 impl Link {
-    /// A connection over two directions of a port; `show` gets the lines that answer nothing.
+    /// Makes a connection over two directions of a port; `show` gets the lines that answer nothing.
     pub fn new(
         reader: impl Read + Send + 'static,
         port: impl Write + Send + 'static,
@@ -135,7 +135,7 @@ impl Link {
         Self::with_frames(reader, port, show, |_| ())
     }
 
-    /// The same; `frames` gets the frames of a stream, and `None` for bytes that were damaged.
+    /// Makes a connection like [`Link::new`]; `frames` gets the frames of a stream, and `None` for damaged bytes.
     pub fn with_frames(
         reader: impl Read + Send + 'static,
         port: impl Write + Send + 'static,
@@ -151,27 +151,27 @@ impl Link {
         Self { port, route }
     }
 
-    /// A way for lines that cannot wait.
+    /// Returns a sender for urgent lines.
     pub fn urgent(&self) -> Urgent {
         Urgent(self.port.clone())
     }
 
-    /// Whether the port is gone.
+    /// Whether the port is closed.
     pub fn is_closed(&self) -> bool {
         locked(&self.route).closed
     }
 
-    /// Ends a line that may have begun on the drive's side, and lets the answer go by.
+    /// Ends a line that may have begun on the drive's side, and ignores its answer.
     pub fn begin(&mut self) {
-        // The port is found closed with the first command.
+        // A closed port is detected by the first command.
         let _ = locked(&self.port).send("");
         std::thread::sleep(Duration::from_millis(100));
     }
 
-    /// Sends a command and hears its answer; every line of it is shown when it comes.
+    /// Sends a command and receives its answer; `show` gets every line when it comes.
     ///
     /// # Errors
-    /// There is no whole answer.
+    /// There is no complete answer.
     pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
         let (send, lines) = channel();
         {
@@ -200,7 +200,7 @@ impl Link {
         show: &mut impl FnMut(&str),
     ) -> Result<Answer, LinkError> {
         let mut answer = Answer::default();
-        // A trace is recorded before anything is said.
+        // A trace is recorded before anything is sent.
         let is_trace = command.split_whitespace().next() == Some("trace");
         let patience = if is_trace { PATIENCE_WITH_TRACE } else { PATIENCE };
         loop {
@@ -231,20 +231,20 @@ impl Link {
         }
     }
 
-    /// The last trace that the drive has printed.
+    /// Returns the last trace that the drive has printed.
     pub fn last_trace(&self) -> Option<Trace> {
         Some(locked(&self.route).trace.clone()).filter(|trace| trace.records() > 0)
     }
 }
 
-/// The thread that reads ends, and with it the port is closed, within the time limit of a read.
+/// Ends the reading thread, and with it closes the port, within the time limit of a read.
 impl Drop for Link {
     fn drop(&mut self) {
         locked(&self.route).closed = true;
     }
 }
 
-/// A thread that panicked while it held the lock leaves what is behind it whole.
+/// If a thread panicked while it held the lock, the data behind the lock are still valid.
 pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -285,7 +285,7 @@ fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
     route.asked = None;
 }
 
-/// The text of a line without the sequences that move the cursor of a terminal.
+/// Returns the text of a line without the sequences that move the cursor of a terminal.
 fn readable(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut shown = String::new();
@@ -305,7 +305,7 @@ fn readable(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// A drive that answers each request with the next of these texts; what was shown unasked.
+    /// Simulates a drive that answers each request with the next of these texts; returns the lines that were shown as unsolicited.
     #[cfg(unix)]
     fn talk(answers: &'static [&str], with: impl FnOnce(&mut Link, &Urgent)) -> Vec<String> {
         use std::io::{BufRead as _, BufReader};
@@ -317,7 +317,7 @@ mod tests {
         let mut out = theirs.try_clone().unwrap();
         let drive = std::thread::spawn(move || {
             let lines = BufReader::new(theirs).lines().map_while(Result::ok);
-            // In this order: it does not wait for a line behind the last answer.
+            // The order matters: the simulated drive does not wait for a line after the last answer.
             for (answer, _) in answers.iter().zip(lines.filter(|line| !line.is_empty())) {
                 std::thread::sleep(Duration::from_millis(30));
                 out.write_all(answer.as_bytes()).unwrap();
@@ -366,7 +366,7 @@ mod tests {
             let sent = later(urgent.clone());
             assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; x"]);
             sent.join().unwrap();
-            // Lines that look like news, or like an end, are those of a list all the same.
+            // Lines that look like unsolicited ones, or like an end, still belong to a list.
             assert_eq!(link.ask("help", |_| ()).unwrap().lines, ["off: y", "ok", "ok"]);
         });
         assert_eq!(shown, ["ok", "ok"]);

@@ -22,14 +22,14 @@ pub const HELP: [(&str, &str); 5] = [
     ("!help", "lists the commands of this program; other lines go to the drive"),
     ("!backup FILE", "writes the drive's settings to a file"),
     ("!restore FILE", "sends the lines of such a file, one by one, up to the first error"),
-    ("!plot [FILE.svg]", "draws the last trace; without a name to out/trace.svg"),
+    ("!plot [FILE.svg]", "draws the last trace; the default file is out/trace.svg"),
     ("!quit", "ends this program; also quit or Ctrl-D"),
 ];
 
 /// Default file of a plot.
 const PLOT: &str = "out/trace.svg";
 
-/// The command to a program itself in a line: what begins with `!`, and `quit` for `!quit`; `None` for a line to the drive.
+/// Returns the command to this program in a line: the text after `!`, and `quit` for `!quit`; `None` for a line to the drive.
 pub fn to_program(line: &str) -> Option<&str> {
     match line.trim() {
         "quit" => Some("!quit"),
@@ -38,10 +38,10 @@ pub fn to_program(line: &str) -> Option<&str> {
 }
 
 impl Own {
-    /// The command in a line; `None` for a line to the drive.
+    /// Parses the command in a line; `None` for a line to the drive.
     ///
     /// # Errors
-    /// The line begins with `!` and is no such command, or the file is missing.
+    /// The line begins with `!` but is no such command, or the file is missing.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
         let (word, file) = line.split_once(char::is_whitespace).unwrap_or((line, ""));

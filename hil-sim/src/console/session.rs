@@ -1,21 +1,21 @@
-//! A line is entered: a command of this program is done, all others go to the drive.
+//! Entering of a line: commands of this program are executed, all others go to the drive.
 
 use super::link::{Link, LinkError};
 use super::own::{HELP, Own};
 use super::transfer;
 use crate::prelude::*;
 
-/// Time between two lines about the progress of a restore.
+/// Time between two progress lines of a restore.
 const PROGRESS: Duration = Duration::from_secs(5);
 
 /// Action after a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// The next line.
+    /// Continue with the next line.
     Next,
-    /// The next line; the drive has refused this one.
+    /// Continue with the next line; the drive has refused this one.
     Refused(String),
-    /// The end.
+    /// End.
     Quit,
 }
 
@@ -40,7 +40,7 @@ impl Session {
     /// Enters lines up to the first that fails; the answers go to standard output.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the drive refuses a line or does not answer; those of [`Session::enter`].
+    /// [`Error::Internal`] if the drive refuses a line or does not answer; the errors of [`Session::enter`].
     pub fn play(&mut self, lines: impl Iterator<Item = String>) -> Result<(), Error> {
         for line in lines {
             match self.enter(&line, |line| println!("{line}"))? {
@@ -58,8 +58,8 @@ impl Session {
     /// Enters a line; `say` gets the lines of the answer.
     ///
     /// # Errors
-    /// [`Error::Refused`] for a line that is no command of this program, a file that cannot be read, or no trace to plot;
-    /// [`Error::Write`]; [`Error::Internal`] when the drive does not answer or refuses a line of a file.
+    /// [`Error::Refused`] for a line that is no command of this program, a file that cannot be read, or a plot without
+    /// a trace; [`Error::Write`]; [`Error::Internal`] if the drive does not answer or refuses a line of a file.
     pub fn enter(&mut self, line: &str, mut say: impl FnMut(&str)) -> Result<Flow, Error> {
         let line = line.trim();
         match Own::parse(line).map_err(Error::Refused)? {

@@ -6,7 +6,7 @@ use crate::outcome::{Figure, Panel, Series};
 /// Names of the first column: the time from the trigger, or the number of the record.
 const HEADS: [&str; 2] = ["t_s", "record"];
 
-/// A table of numbers whose first column is the time or the number of the record: the last among the lines of a drive.
+/// A table of numbers whose first column is the time or the number of the record: the last such table among the lines of a drive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     names: Vec<String>,
@@ -14,7 +14,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Takes a line: the head of a trace, one of its rows, or anything else.
+    /// Processes a line: the head of a trace, one of its rows, or anything else.
     pub fn push(&mut self, line: &str) {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let numbers: Result<Vec<f64>, _> = fields.iter().map(|field| field.parse()).collect();
@@ -28,7 +28,7 @@ impl Trace {
         }
     }
 
-    /// A panel for every unit, in the order of the columns.
+    /// Draws a panel for every unit, in the order of the columns.
     pub fn figure(&self) -> Figure {
         let (x, columns) = match self.names.split_first() {
             Some((x, columns)) => (label(x), columns),
@@ -59,7 +59,7 @@ impl Trace {
     }
 }
 
-/// A name with its unit in parentheses: `speed (rpm)` for `speed_rpm`.
+/// Returns a name with its unit in parentheses: `speed (rpm)` for `speed_rpm`.
 fn label(name: &str) -> String {
     split_unit(name).map_or(name.to_owned(), |(quantity, unit)| format!("{quantity} ({unit})"))
 }

@@ -1,12 +1,12 @@
-//! Settings to and from a file: lines that are sent one by one.
+//! Transfer of settings to and from a file: lines that are sent one by one.
 
 use super::link::{Link, LinkError};
 use crate::error::cut;
 
-/// The lines that restore the present settings: those of the drive's `backup`.
+/// Returns the lines that restore the present settings, from the drive's `backup`.
 ///
 /// # Errors
-/// The drive does not answer. The inner one is the answer of a drive that refuses.
+/// The drive does not answer. The inner error is the answer of a drive that refuses.
 pub fn backup(link: &mut Link) -> Result<Result<Vec<String>, String>, LinkError> {
     let answer = link.ask("backup", |_| ())?;
     Ok(match answer.error() {
@@ -15,11 +15,11 @@ pub fn backup(link: &mut Link) -> Result<Result<Vec<String>, String>, LinkError>
     })
 }
 
-/// Sends the lines of a text, without empty ones and those that begin with `#`; returns their number. `progress` gets
-/// the number of lines sent so far and that of all.
+/// Sends the lines of a text, without empty lines and lines that begin with `#`; returns their number. `progress` gets
+/// the number of lines sent so far and the number of all lines.
 ///
 /// # Errors
-/// In words: the first line that the drive refuses or does not answer.
+/// The first line that the drive refuses or does not answer, in words.
 pub fn restore(
     link: &mut Link,
     text: &str,

@@ -1,9 +1,9 @@
 //! `cargo sim update`: writes another image over the serial port of the console, through ST's loader (AN3155, AN2606).
 //!
-//! The pages of the image alone are erased, so settings and history stay. The first page comes last: until then the old start
-//! block tells, after a loss of power, that the image is damaged, and takes `update` again.
+//! Only the pages of the image are erased, so settings and history stay. The first page is written last. If power fails
+//! before that, the old start block reports that the image is damaged, and accepts `update` again.
 //!
-//! Own code for the protocol: no crate of it is maintained, and it is nine commands of a few bytes.
+//! The protocol is our own code: no crate for it is maintained, and it consists of nine commands of a few bytes.
 
 use std::io::ErrorKind;
 
@@ -17,32 +17,32 @@ use crate::prelude::*;
 /// Options of an update.
 #[derive(Args)]
 pub struct Options {
-    /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` names
+    /// Serial port: /dev/ttyACM0, COM3, or the pseudo-terminal that `cargo sim board` prints
     #[arg(long, value_name = "PATH")]
     pub port: String,
-    /// Board whose image is built and written; without it that which the drive at the port names
+    /// Board whose image is built and written [default: the board that the drive at the port reports]
     #[arg(long, value_name = "NAME", conflicts_with = "file")]
     pub board: Option<String>,
-    /// The image instead: a `.bin` of `cargo firmware`, or the ELF beside it
+    /// Write this image: a `.bin` of `cargo firmware`, or the ELF beside it
     pub file: Option<PathBuf>,
-    /// The supply of the gate drivers is off: ST's loader switches a gate on (PA9)
+    /// Confirm that the supply of the gate drivers is off: ST's loader switches a gate on (PA9)
     #[arg(long)]
     pub gates_off: bool,
-    /// Write the image although the drive at the port names another board
+    /// Write the image although the drive at the port reports another board
     #[arg(long)]
     pub other_board: bool,
 }
 
 const FLASH: u32 = 0x0800_0000;
-/// Bytes of a page, and of a block of the protocol.
+/// Number of bytes of a page, and of a block of the protocol.
 const PAGE: usize = 2048;
 const BLOCK: usize = 256;
-/// The first page of settings and history, from the beginning of the flash.
+/// Offset of the first page of settings and history from the beginning of the flash.
 const STORED: usize = (512 - 16) * 1024;
-/// The chip, as the loader names it: STM32G47x and G48x.
+/// The chip identifier of the loader: STM32G47x and G48x.
 const PRODUCT: [u8; 2] = [0x04, 0x69];
 const ACK: u8 = 0x79;
-/// Longest wait for an answer of the loader, and of the firmware; of its greeting, behind the design of the control.
+/// Longest wait for an answer of the loader and of the firmware, and for its greeting, which follows the design of the control.
 const ANSWER: Duration = Duration::from_secs(2);
 const GREETING: Duration = Duration::from_secs(30);
 
@@ -54,22 +54,22 @@ const NAME: usize = 32;
 pub struct Image {
     bytes: Vec<u8>,
     check: u32,
-    /// The board that it is for; `None` for an image of an older firmware.
+    /// The board for which it is built; `None` for an image of an older firmware.
     pub board: Option<String>,
 }
 
 impl Image {
-    /// Takes the contents of a `.bin`.
+    /// Parses the contents of a `.bin`.
     ///
     /// # Errors
-    /// It is no image, or damaged.
+    /// The contents are no image, or damaged.
     pub fn new(mut bytes: Vec<u8>) -> Result<Self, &'static str> {
         bytes.resize(bytes.len().next_multiple_of(PAGE), 0xff);
         let word = |at: usize| {
             let word = bytes.get(at..at + 4)?;
             Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
         };
-        // The list of pieces (`memory.x`) begins with the piece before it.
+        // The list of pieces (`memory.x`) begins with the previous piece.
         let begins =
             |at: &usize| [word(*at), word(at + 4)] == [FLASH, FLASH + *at as u32].map(Some);
         let list = (0..PAGE).step_by(4).find(begins).ok_or("no image of this drive")?;
@@ -93,21 +93,21 @@ impl Image {
         Ok(Self { bytes, check, board })
     }
 
-    /// Passes if the image is for the board that is there, as far as both are known.
+    /// Checks that the image is for the present board, as far as both are known.
     ///
     /// # Errors
-    /// It is for another one.
+    /// The image is for another board.
     pub fn fits(&self, there: Option<&str>) -> Result<(), String> {
         match (self.board.as_deref(), there) {
             (Some(of), Some(there)) if of != there => Err(format!(
                 "the image is for the board {of}, and the drive at the port is a {there}: on it, the image may switch gates on; \
-                 take the image of {there}, or say --other-board"
+                 take the image of {there}, or add --other-board"
             )),
             _ => Ok(()),
         }
     }
 
-    /// The pages with contents, in the order in which they are written.
+    /// Returns the pages with contents, in the order in which they are written.
     fn pages(&self) -> Vec<(usize, &[u8])> {
         let used = |(_, page): &(usize, &[u8])| page.iter().any(|byte| *byte != 0xff);
         let mut pages: Vec<_> = self.bytes.chunks(PAGE).enumerate().filter(used).collect();
@@ -119,10 +119,10 @@ impl Image {
 /// Builds the image or reads it, and writes it.
 ///
 /// # Errors
-/// [`Error::Refused`] for what has to be changed: file, port, state of the drive; [`Error::Internal`] for what went wrong on the way.
+/// [`Error::Refused`] for things that have to be changed: file, port, state of the drive; [`Error::Internal`] for failures on the way.
 pub fn run(options: &Options) -> Result<(), Error> {
     if !options.gates_off {
-        let why = "switch off the supply of the gate drivers, for ST's loader switches a gate on; then add --gates-off";
+        let why = "switch off the supply of the gate drivers, because ST's loader switches a gate on; then add --gates-off";
         return Err(Error::Refused(why.into()));
     }
     let mut port = super::open(&options.port, 115_200)?.0;
@@ -131,7 +131,7 @@ pub fn run(options: &Options) -> Result<(), Error> {
         (Some(file), _) => file.clone(),
         (None, Some(board)) => board::image(board, false)?,
         (None, None) => {
-            let why = "the drive at the port does not say which board it is: name it with --board";
+            let why = "the drive at the port does not report its board: name it with --board";
             return Err(Error::Refused(why.into()));
         }
     };
@@ -147,12 +147,12 @@ pub fn run(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-/// The name of the board that the drive at the port tells; `None` where it does not answer, or its image is damaged.
+/// Returns the name of the board that the drive at the port reports; `None` if it does not answer, or its image is damaged.
 ///
 /// # Errors
 /// The port fails.
 pub fn board_at(port: &mut Port) -> Result<Option<String>, Error> {
-    // Ends a line that may have begun; what is said to that goes by.
+    // Ends a line that may have begun; the answer to it is ignored.
     send(port, b"\n").map_err(Error::Internal)?;
     line(port, Duration::from_millis(300), |_| false);
     send(port, b"board\n").map_err(Error::Internal)?;
@@ -166,16 +166,16 @@ pub fn board_at(port: &mut Port) -> Result<Option<String>, Error> {
 
 fn lost(what: impl std::fmt::Display) -> Error {
     let next =
-        "the image is not whole: `cargo sim update` again; if nothing answers, docs/update.md";
+        "the image is incomplete: `cargo sim update` again; if nothing answers, docs/update.md";
     Error::Internal(format!("{what}; {next}"))
 }
 
-/// Writes an image; what the new one says to `version`.
+/// Writes an image; returns the answer of the new one to `version`.
 ///
 /// # Errors
-/// As of [`run`].
+/// As [`run`].
 pub fn update(port: &mut Port, image: &Image, mut show: impl FnMut(&str)) -> Result<String, Error> {
-    // Ends a line that may have begun; what is said to that goes by.
+    // Ends a line that may have begun; the answer to it is ignored.
     send(port, b"\n").map_err(Error::Internal)?;
     line(port, Duration::from_millis(300), |_| false);
     send(port, b"update gates-off\n").map_err(Error::Internal)?;
@@ -197,17 +197,17 @@ pub fn update(port: &mut Port, image: &Image, mut show: impl FnMut(&str)) -> Res
     line(port, ANSWER, |line| line.contains(&sum)).ok_or_else(|| lost("another image runs"))
 }
 
-/// The loader does its part.
+/// Writes the image through the loader.
 fn write(port: &mut Port, image: &Image, show: &mut impl FnMut(&str)) -> Result<(), String> {
     synchronise(port)?;
     let [count, high, low, _] = read(port, ANSWER)?;
     if count != 1 || [high, low] != PRODUCT {
-        return Err(format!("the loader is that of another chip, {high:02x}{low:02x}"));
+        return Err(format!("the loader belongs to another chip, {high:02x}{low:02x}"));
     }
     let pages = image.pages();
     for (n, (page, bytes)) in pages.iter().enumerate() {
         command(port, 0x44)?;
-        // One page: their number less one, and its own.
+        // One page: the number of pages minus one, and the number of the page.
         checked(port, &[0, 0, (page >> 8) as u8, *page as u8])?;
         for (block, data) in bytes.chunks(BLOCK).enumerate() {
             let at = (FLASH + (page * PAGE + block * BLOCK) as u32).to_be_bytes();
@@ -229,9 +229,9 @@ fn write(port: &mut Port, image: &Image, show: &mut impl FnMut(&str)) -> Result<
     checked(port, &FLASH.to_be_bytes())
 }
 
-/// Begins with the loader, and asks it for its product.
+/// Starts the communication with the loader, and asks it for its product.
 fn synchronise(port: &mut Port) -> Result<(), String> {
-    // Many, if it runs already and is in the middle of a command; half of one may be left of them.
+    // Sends many bytes, in case the loader already runs and is in the middle of a command; half a command may be left of them.
     for count in [1, 2 * BLOCK, 1, 1] {
         send(port, &vec![0x7f; count])?;
         if read::<1>(port, ANSWER).is_ok() {
@@ -253,7 +253,7 @@ fn command(port: &mut Port, code: u8) -> Result<(), String> {
     acknowledged(port)
 }
 
-/// Sends bytes with their sum behind them.
+/// Sends bytes followed by their check sum.
 fn checked(port: &mut Port, bytes: &[u8]) -> Result<(), String> {
     let sum = bytes.iter().fold(0, |sum, byte| sum ^ byte);
     send(port, &[bytes, &[sum]].concat())?;
@@ -271,14 +271,14 @@ fn read<const N: usize>(port: &mut Port, patience: Duration) -> Result<[u8; N], 
         match port.read(&mut bytes[filled..]) {
             Ok(count) if count > 0 => filled += count,
             Err(why) if why.kind() != ErrorKind::TimedOut => return Err(why.to_string()),
-            _ if Instant::now() > end => return Err("the loader is silent".into()),
+            _ if Instant::now() > end => return Err("the loader does not answer".into()),
             _ => {}
         }
     }
     Ok(bytes)
 }
 
-/// The next line of this kind, until the time is over.
+/// Returns the next line of this kind, until the time is over.
 fn line(port: &mut Port, patience: Duration, wanted: impl Fn(&str) -> bool) -> Option<String> {
     let (mut text, end) = (Vec::new(), Instant::now() + patience);
     while Instant::now() < end {

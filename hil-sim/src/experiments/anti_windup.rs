@@ -20,7 +20,7 @@ const SAMPLES: usize = 200;
 /// A controller: from the error to the output before the limit.
 type Controller = Box<dyn FnMut(f64) -> f64>;
 
-/// Eq. B.1 in immediate form, which forgets that there is a limit.
+/// Eq. B.1 in immediate form, which ignores the limit.
 fn without() -> Controller {
     let (mut u, mut before) = (0.0, 0.0);
     Box::new(move |e| {
@@ -41,7 +41,7 @@ fn with() -> Controller {
     })
 }
 
-/// Eq. B.3 as printed, with the limited output in it; without a limit Eq. B.1. The output of a step appears one step later.
+/// Eq. B.3 as printed, with the limited output; without a limit it is Eq. B.1. The output of a step appears one step later.
 fn literal(limit: f64) -> Controller {
     let (mut u, mut next, mut before) = (0.0_f64, 0.0_f64, 0.0);
     Box::new(move |e| {
@@ -59,7 +59,7 @@ struct Response {
 }
 
 impl Response {
-    /// A unit step on an integrator behind a limit.
+    /// Simulates a unit step on an integrator behind a limit.
     fn of(mut controller: Controller, limit: f64) -> Self {
         let (mut y, mut u) = (vec![0.0], Vec::new());
         let mut output = 0.0;
@@ -73,7 +73,7 @@ impl Response {
     }
 
     fn saturated(&self) -> f64 {
-        // The controller of the drive is f32: its limit is not quite this one.
+        // The controller of the drive is in f32, so its limit differs slightly from this one.
         let beyond = self.u.iter().filter(|u| u.abs() > LIMIT + 1e-6).count();
         beyond as f64 / self.u.len() as f64
     }
@@ -140,15 +140,15 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(figure);
     compared(&mut outcome);
     outcome.remarks.push(format!(
-        "Eq. B.1 and B.3 print u[k+1] on the left. Accepted literally that is one more delay, and the \
+        "Eq. B.1 and B.3 print u[k+1] on the left. Taken literally that is one more delay, and the \
          example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
-         u[k] = u[k − 1] + K_c (e[k] − z_c e[k − 1]), gives what Figure 40 is said to show; the drive \
+         u[k] = u[k − 1] + K_c (e[k] − z_c e[k − 1]), gives the behaviour described for Figure 40; the drive \
          uses that."
     ));
     Ok(outcome)
 }
 
-/// What appendix B says of Figure 40.
+/// Adds the statements of appendix B about Figure 40.
 fn compared(outcome: &mut Outcome) {
     let plain = Response::of(without(), LIMIT);
     let late = Response::of(literal(LIMIT), LIMIT).y.split_off(SAMPLES - 40);

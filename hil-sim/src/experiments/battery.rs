@@ -1,9 +1,10 @@
-//! The battery: runs that shake the angle, on any simulated motor.
+//! The stress test: runs that disturb the angle, on any simulated motor.
 //!
-//! The runs and the verdicts are those of a study of this drive on an independent saturating motor: what counts is not
-//! the error alone but whether the drive notices. A run is *lost* when the error is beyond 45° at any time, *wrong* when
-//! it is beyond 30° for more than 0.5 s while the drive regulates, and its *flux is off* when the flux is below half or
-//! above twice its nominal value for as long. It is *silent* when it is wrong or its flux is off.
+//! The runs and the verdicts come from a study of this drive on an independent saturating motor. It is important not
+//! only how large the error is, but also whether the drive detects it. A run is *lost* if the error exceeds 45° at any
+//! time. It is *wrong* if the error exceeds 30° for more than 0.5 s while the drive regulates. Its *flux is off* if the
+//! flux is below half or above twice its nominal value for as long. It is *silent* (undetected) if it is wrong or its
+//! flux is off.
 
 mod bench;
 pub(super) mod disturbed;
@@ -27,35 +28,35 @@ use crate::prelude::*;
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("battery", whole::<Battery>)
     .stands_for("what section 5.2 leaves open")
-    .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.")
+    .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and errors that the drive does not detect.")
     .uses(&[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]]);
 
-/// Runs for which the drive learns anew.
+/// Number of runs after which the drive repeats the saliency self-commissioning.
 const GROUP: usize = KINDS.len();
 
-/// What is drawn beside the noise has seeds of its own.
+/// Random numbers other than the noise have their own seeds.
 const LEARNING: u64 = 1 << 40;
 const DRAWN: u64 = 2 << 40;
 
-/// A drive, or the number of the fault with which it refused to learn.
+/// A drive, or the number of the fault with which it refused the saliency self-commissioning.
 pub(super) type Learnt = Result<Drive, u8>;
 
-/// What is made by the first run that needs it.
+/// Returns a value that the first run that needs it makes.
 pub(super) fn once<T>(
     place: &OnceLock<T>,
     make: impl FnOnce() -> Result<T, Error>,
 ) -> Result<&T, Error> {
     match place.get() {
         Some(made) => Ok(made),
-        // Two threads that came at once made the same.
+        // If two threads come at once, both make the same value.
         None => make().map(|made| place.get_or_init(|| made)),
     }
 }
 
-/// The runs.
+/// The runs of the stress test.
 pub struct Battery {
     config: Config,
-    /// The bench after the learning.
+    /// The bench after the saliency self-commissioning.
     after: Config,
     seed: u64,
     kinds: Vec<Kind>,
@@ -65,13 +66,13 @@ pub struct Battery {
 }
 
 impl Battery {
-    /// The group of a run: all are one unless the drive learns anew.
+    /// Returns the group of a run. All runs are one group unless the drive repeats the saliency self-commissioning.
     fn group(&self, number: usize) -> usize {
         let many = self.config.battery.relearn || self.config.disturbed.drawn > 0.0;
         if many { number / GROUP } else { 0 }
     }
 
-    /// Sizes of the disturbances that are always there, and of those that come after the learning.
+    /// Sizes of the disturbances that are always present, and of those that appear after the saliency self-commissioning.
     fn sizes(&self, number: usize) -> [Vec<f64>; 2] {
         let group = seed_of(self.seed, self.group(number)) ^ LEARNING;
         let run = seed_of(self.seed, number) ^ DRAWN;
@@ -81,7 +82,7 @@ impl Battery {
         ]
     }
 
-    /// The drive of a group; with `prepare.learn` it has learned.
+    /// Returns the drive of a group; with `prepare.learn` it has done the saliency self-commissioning.
     fn drive(&self, number: usize) -> Result<&Learnt, Error> {
         let (group, config) = (self.group(number), &self.config);
         once(&self.drives[group], || {
@@ -96,7 +97,7 @@ impl Battery {
         })
     }
 
-    /// The disturbances of a run in words, in % of their full sizes.
+    /// Describes the disturbances of a run in words, in % of their full sizes.
     fn disturbances(&self, number: usize) -> String {
         let [always, after] = self.sizes(number);
         let all =

@@ -1,4 +1,4 @@
-//! The commissioning: one session on the motor of the configuration, or statistics over machines drawn around it.
+//! The commissioning: one session on the motor of the configuration, or statistics over random machines around it.
 
 pub mod refusals;
 mod session;
@@ -15,7 +15,7 @@ use crate::stats::exact;
 pub(super) use session::unaware;
 use session::{Abort, Session};
 
-/// Not in the source, which asks for it as future work.
+/// Not in the source, which lists it as future work.
 pub const EXPERIMENT: Experiment = Experiment::new("commission", whole::<Commission>)
     .stands_for("beyond the dissertation")
     .about("From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
@@ -26,18 +26,18 @@ pub const EXPERIMENT: Experiment = Experiment::new("commission", whole::<Commiss
         &["load.", "prepare.learn", "spread.machine", "runs", "seconds", "commission."],
     ]);
 
-/// Errors, in percent, as [`Circuit::values`] and of the gain mismatch, twice of which count as wrong: of a linear machine, and
-/// of one of iron.
+/// Errors, in percent, of [`Circuit::values`] and of the gain mismatch, for a linear machine and for one with
+/// saturation. Twice these errors count as wrong.
 const RIGHT_PCT: [f64; 6] = [1.5, 1.5, 1.5, 1.5, 1.5, 0.5];
 const RIGHT_IRON_PCT: [f64; 6] = [2.0, 2.0, 6.0, 6.0, 6.0, 0.5];
-/// Time of each run afterwards, s, unless `seconds` says otherwise.
+/// Time of each run after the commissioning, s, unless `seconds` sets another.
 const RUN_S: f64 = 2.0;
-/// Share of the expected saliency from which on a machine counts as one that has enough.
+/// Share of the expected saliency above which a machine counts as sufficiently salient.
 const ENOUGH: f64 = 0.7;
-/// Machines in the table, the worst first.
+/// Number of machines in the table, worst first.
 const LISTED: usize = 20;
 
-/// A whole commissioning of the motor of this configuration by a drive that knows its nameplate.
+/// Runs a whole commissioning of the motor of this configuration with a drive that knows its nameplate.
 pub(super) fn session(config: &Config, seed: u64) -> Result<Session, Error> {
     let settings = unaware(config);
     let mut unlearned = Config { drive: settings, ..config.clone() };
@@ -47,10 +47,10 @@ pub(super) fn session(config: &Config, seed: u64) -> Result<Session, Error> {
     Session::run(rig, Commissioning::new(&settings), steps, Abort::default(), |_| {})
 }
 
-/// The settings that `accept` then puts in force. The inertia, which needs a free shaft, is the one of the configuration.
+/// Returns the settings that `accept` then puts into force. The inertia, which needs a free shaft, is the one of the configuration.
 ///
 /// # Errors
-/// When it is refused, or does not end.
+/// If the commissioning is refused, or does not end.
 pub fn commissioned(config: &Config, seed: u64) -> Result<Settings, Error> {
     let session = session(config, seed)?;
     if let Some((step, why)) = session.refusal() {
@@ -66,18 +66,18 @@ pub struct Commission {
     config: Config,
     seed: u64,
     machines: Option<usize>,
-    /// Seconds of each run afterwards, if there are any.
+    /// Seconds of each run after the commissioning, if there are any.
     after: Option<f64>,
 }
 
 /// A session of the statistics.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
-    /// Why it was refused.
+    /// Reason why the session was refused.
     refused: Option<String>,
-    /// Errors in percent, as [`Circuit::values`] and of the gain mismatch.
+    /// Errors in percent of [`Circuit::values`] and of the gain mismatch.
     errors: Vec<f64>,
-    /// Time of the steps up to the leakage, of the staircase, and of the current loop, s.
+    /// Time of the steps up to the leakage, of the magnetising-curve test, and of the current loop, s.
     seconds: f64,
     staircase_seconds: f64,
     loop_seconds: f64,
@@ -85,21 +85,22 @@ pub struct Record {
     /// Largest phase current as a share of the nameplate's peak.
     #[serde(with = "exact")]
     current: f64,
-    /// The loop on the true plant: phase margin, degrees.
+    /// Phase margin of the current loop on the true plant, degrees.
     #[serde(with = "exact")]
     margin_deg: f64,
-    /// Whether its saliency is at least 0.7 of the expected one.
+    /// Whether its saliency is at least 0.7 of the expected value.
     salient: bool,
-    /// Whether all runs afterwards are good, and the time of the learning, s, or why there are none.
+    /// Whether all runs after the commissioning are good, and the time of the saliency self-commissioning, s; or the
+    /// reason why there are none.
     after: Option<Result<(bool, f64), String>>,
-    /// The parameters found, as [`Circuit::values`].
+    /// The identified parameters, as [`Circuit::values`].
     found: Vec<f64>,
     /// The session in words: time, step and verdict; its values.
     told: Vec<(String, Vec<String>)>,
 }
 
 impl Record {
-    /// The result in words.
+    /// Describes the result in words.
     fn result(&self) -> String {
         let accepted = match &self.after {
             None => "accepted",
@@ -135,7 +136,7 @@ impl Commission {
         Ok(Ok((machines::good(&runs), learned.learning_s)))
     }
 
-    /// What was found beside what is filed.
+    /// Makes the table of the results that are shown beside the filed ones.
     fn found_table(&self, record: &Record) -> Table {
         let mut table = Table::new("The motor", &["parameter", "found", "true", "error (%)"]);
         let units = ["ohm", "H", "ohm", "H", "s"];
@@ -151,7 +152,7 @@ impl Commission {
                 Cell::fixed_or_dash(record.errors.get(n).copied(), 2),
             ]);
         }
-        table.note("Inverse-Gamma circuit; that of iron at the magnetising current found, the leakage that of small changes at the bias.")
+        table.note("Inverse-Gamma circuit; with saturation at the magnetising current found, and the small-signal leakage at the bias.")
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
@@ -186,7 +187,7 @@ impl Study for Commission {
         let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
         let mut truth = Circuit::at(&config, commissioned.i_d().into());
-        // With iron the leakage that was measured is the incremental one at the bias.
+        // With saturation the measured leakage is the incremental one at the bias.
         let mut found = found;
         let measured = session.commissioning.found().leakage;
         if let (Some(incremental), Some(measured)) = (session.leakage, measured) {
@@ -310,7 +311,7 @@ impl Study for Commission {
     }
 }
 
-/// The session: steps with their values and verdicts.
+/// Makes the table of the session: steps with their values and verdicts.
 fn session_table(record: &Record) -> Table {
     let heads = ["step and verdict", "found, and what nameplate and noise allow"];
     let mut table = Table::new("The session", &heads);
@@ -326,7 +327,7 @@ fn session_table(record: &Record) -> Table {
 fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
     built(settings)?;
     let [design, _] = settings.current_loops().map_err(Error::refused)?;
-    // In this circuit the leakage lies on the stator's side, all of it.
+    // In this circuit the whole leakage inductance lies on the stator's side.
     let Circuit { r_s, r_r, leakage: l_ls, coupled: l_m } = *truth;
     let circuit = EquivalentCircuit { r_s, r_r, l_ls, l_m, l_lr: 1e-9 };
     let period = f64::from(PERIOD_S);

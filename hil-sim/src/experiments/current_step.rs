@@ -17,7 +17,7 @@ pub const EXPERIMENT: Experiment =
 const SAMPLES: usize = 240;
 const PERIOD_MS: f64 = 1.0 / 6.0;
 
-/// Unit step: controller, plant without any other delay, reference filter or none.
+/// Simulates a unit step: controller, plant without further delay, reference filter or none.
 fn step(plant: FirstOrder, filtered: bool) -> Vec<f64> {
     let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
     let (mut y, mut u, mut before, mut reference) = (0.0, 0.0, 0.0, 0.0);
@@ -34,7 +34,7 @@ fn step(plant: FirstOrder, filtered: bool) -> Vec<f64> {
     response
 }
 
-/// The plant of Eq. 3.34, and with the pole of Figure 27.
+/// Returns the plant of Eq. 3.34, and the same plant with the pole of Figure 27.
 fn plants() -> (FirstOrder, FirstOrder) {
     let plant = plant("Eq. 3.34");
     (plant, FirstOrder { p: 1.03 * plant.p, ..plant })
@@ -44,7 +44,7 @@ fn overshoot(response: &[f64]) -> f64 {
     response.iter().map(|y| y - 1.0).fold(0.0, f64::max)
 }
 
-/// Samples until the response stays within 2 % of its end.
+/// Number of samples until the response stays within 2 % of its final value.
 fn settling(response: &[f64]) -> usize {
     response.iter().rposition(|y| (y - 1.0).abs() > 0.02).map_or(0, |k| k + 1)
 }
@@ -89,7 +89,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         named("filter_settles_later").recomputed(longer),
     ]);
     outcome.remark(
-        "The identified plant has no delay and no current filter in it; with those the same rule \
+        "The identified plant contains no delay and no current filter; with them the same rule \
          leaves less margin (see pi-design).",
     );
     Ok(outcome)

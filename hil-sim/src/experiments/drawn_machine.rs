@@ -1,4 +1,4 @@
-//! Machines to be commissioned: the truth about them, and random ones.
+//! Machines for the commissioning: true parameters, and random machines.
 
 use drive_settings::tuning::bisected;
 
@@ -11,21 +11,21 @@ pub struct Circuit {
     pub r_s: f64,
     /// Transient inductance, H.
     pub leakage: f64,
-    /// Rotor resistance as the stator sees it, ohm.
+    /// Rotor resistance as seen by the stator, ohm.
     pub r_r: f64,
     /// Coupled magnetising inductance, H.
     pub coupled: f64,
 }
 
 impl Circuit {
-    /// That of a T circuit.
+    /// Converts a T circuit.
     pub fn of([r_s, r_r, l_ls, l_lr, l_m]: [f64; 5]) -> Self {
         let k = l_m / (l_m + l_lr);
         Self { r_s, leakage: l_ls + k * l_lr, r_r: k * k * r_r, coupled: k * l_m }
     }
 
-    /// That of the simulated motor, with the switch that a phase current flows through, and the mean of the phases; with iron,
-    /// at its nominal flux.
+    /// Returns the circuit of the simulated motor, including the switch in the path of a phase current and the mean of
+    /// the phases; with saturation, at its nominal flux.
     pub fn of_plant(config: &Config) -> Self {
         let (m, i) = (plant_settings(config).machine, &config.inverter);
         let more = i.on_resistance + (i.more_ohm_b + i.more_ohm_c) / 3.0;
@@ -51,7 +51,7 @@ impl Circuit {
         self.coupled / self.r_r
     }
 
-    /// Name, in the metrics, and value of each parameter.
+    /// Returns the name for the metrics, and the value, of each parameter.
     pub fn values(&self) -> [(&'static str, f64); 5] {
         [
             ("r_s", self.r_s),
@@ -63,12 +63,12 @@ impl Circuit {
     }
 }
 
-/// A factor up to `most`, or down to its reciprocal.
+/// Returns a random factor up to `most`, or down to its reciprocal.
 fn factor(random: &mut impl Rng, most: f64) -> f64 {
     random.random_range(-most.ln()..=most.ln()).exp()
 }
 
-/// A machine whose resistances, inductances and saliencies are each multiplied by a factor of its own, up to `spread`.
+/// Multiplies resistances, inductances and saliencies of a machine by random factors, one for each, up to `spread`.
 pub fn around(config: &Config, random: &mut impl Rng, spread: f64) -> Config {
     let mut factor = || factor(random, spread);
     let mut drawn = config.clone();
@@ -87,9 +87,10 @@ pub fn around(config: &Config, random: &mut impl Rng, spread: f64) -> Config {
     drawn
 }
 
-/// A machine and a board around those of the configuration: each parameter and saliency times or over a factor up to
-/// `spread.machine` (2 unless set), free shaft, dead time 2 to 5 us, further drop 0.5 to 3 V at 311 V, gain errors up to
-/// 0.5 % and offsets up to 0.7 % of the range. The drive knows its dead time.
+/// Returns a random machine and board around those of the configuration. Each parameter and saliency is multiplied or
+/// divided by a factor up to `spread.machine` (2 unless set). The shaft is free, the dead time is 2 to 5 us, the
+/// further inverter voltage error 0.5 to 3 V at 311 V, gain errors are up to 0.5 % and offsets up to 0.7 % of the
+/// range. The drive knows its dead time.
 pub fn drawn(config: &Config, seed: u64) -> Config {
     let mut random = seeded(seed);
     let spread = if config.spread.machine > 1.0 { config.spread.machine } else { 2.0 };

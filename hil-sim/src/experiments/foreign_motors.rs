@@ -1,4 +1,5 @@
-//! Motors that the drive has never seen: each from its nameplate alone through commissioning and learning, four quadrants and disturbances.
+//! Third-party motors: each goes from its nameplate alone through commissioning and saliency self-commissioning to runs
+//! in four quadrants and with disturbances.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{SQRT_2, TAU};
@@ -17,18 +18,18 @@ use crate::stats::exact;
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("foreign-motors", whole::<ForeignMotors>)
     .stands_for("beyond the dissertation")
-    .about("Motors drawn over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
+    .about("Random motors over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
     .uses(&[&["runs"]]);
 
 const RUNS: u32 = 30;
-/// Parts of a record: undisturbed, and with all disturbances drawn up to this share of their full sizes.
+/// Disturbances in the two parts of a record: none, and all of them at random up to this share of their full sizes.
 const DRAWN: [f64; 2] = [0.0, 0.5];
-/// Least slope, 1/rad, from which on a motor counts as one that can be tracked, and the angle error that it should have, degrees rms.
+/// Smallest saliency sensitivity, 1/rad, at which a motor counts as trackable, and its largest good angle error, degrees rms.
 const ENOUGH: f64 = 0.035;
 const GOOD_DEG: f64 = 2.0;
-/// Rated frequency of an ordinary motor at most, Hz.
+/// Highest rated frequency of an ordinary motor, Hz.
 const SLOW_HZ: f64 = 60.0;
-/// Faults that say what went wrong, but not why with this motor.
+/// Faults that state the failure, but not its cause in this motor.
 const UNNAMED: [Fault; 10] = [
     Fault::OverCurrentA,
     Fault::OverCurrentB,
@@ -42,16 +43,16 @@ const UNNAMED: [Fault; 10] = [
     Fault::NothingLearned,
 ];
 
-/// The motors.
+/// The random motors.
 pub struct ForeignMotors {
     seed: u64,
     runs: usize,
 }
 
-/// A line of the verdict: its name, the motors that it is counted in, and which count.
+/// A line of the verdict: its name, the motors among which it counts, and the condition.
 type Class<'a> = (&'a str, &'a [&'a Record], fn(&Record) -> bool);
 
-/// Where a motor was refused, in which words, and whether they name the cause.
+/// Stage at which a motor was refused, the words of the refusal, and whether they name the cause.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Refusing {
     stage: String,
@@ -68,20 +69,20 @@ pub struct Record {
     hertz: f64,
     /// Errors of the commissioning in percent, as [`Circuit::values`].
     errors: Vec<f64>,
-    /// Slope of the motor at the drive's direct current, without load, 1/rad.
+    /// Saliency sensitivity of the motor at the drive's magnetising current, without load, 1/rad.
     slope: Option<f64>,
-    /// Largest torque current in relation to the direct current, and carrier voltage to that of the dc link.
+    /// Largest q-axis current relative to the d-axis current, and injected voltage relative to the dc-link voltage.
     ratios: Option<(f64, f64)>,
-    /// Its runs: undisturbed, and disturbed.
+    /// Its runs without and with disturbances.
     runs: [Vec<Trial>; 2],
 }
 
-/// A refusal, as [`course`] returns it.
+/// Makes a refusal as [`course`] returns it.
 fn refused(stage: &str, why: impl ToString, named: bool) -> Result<Option<Refusing>, Error> {
     Ok(Some(Refusing { stage: stage.to_owned(), why: why.to_string(), named }))
 }
 
-/// Whether settings were refused by a key of the nameplate.
+/// Whether settings were refused because of a key of the nameplate.
 fn by_plate(error: &SettingsError) -> bool {
     matches!(error, SettingsError::Range { name, .. } if name.starts_with("nameplate."))
 }
@@ -90,8 +91,8 @@ fn is_named(state: State) -> bool {
     state.fault().is_some_and(|fault| !UNNAMED.contains(&fault))
 }
 
-/// Slip at which a circuit, in units of its plate's impedance, takes the rated current, and the shaft's power there in relation to
-/// the apparent one.
+/// Returns the slip at which a circuit, in units of its plate's impedance, takes the rated current, and the shaft power
+/// there relative to the apparent power.
 fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
     let impedance = |slip: f64| {
         let (r, x) = (r_r / slip, x_m + x_r);
@@ -106,9 +107,12 @@ fn rated([r_s, r_r, x_s, x_r, x_m]: [f64; 5]) -> (f64, f64) {
     (slip, (1.0 - slip) * impedance(slip).0)
 }
 
-/// A motor with its inverter and sensors: nameplate log-uniform over its range; circuit in the usual range, per unit, whose rated
-/// current, slip and power are those of the nameplate; inertia constant 0.1 to 1 s (`motulator-2kw2` has 0.08 s, Krause's 3 hp 0.7 s);
-/// teeth, yoke and leakage of iron up to those of the families. Switches of a size that goes with the sensors' range. Sensors of 2 to 3 times the rated peak current without errors, with 12 bits and the noise of the dissertation's in proportion to the rated current.
+/// Returns a random motor with its inverter and sensors. The nameplate is log-uniform over its range. The circuit is in
+/// the usual range, per unit, and its rated current, slip and power are those of the nameplate. The inertia constant is
+/// 0.1 to 1 s (`motulator-2kw2` has 0.08 s, Krause's 3 hp 0.7 s). Saturation of teeth, yoke and leakage goes up to that
+/// of the saturation models. The size of the switches corresponds to the range of the sensors. The sensors reach 2 to 3
+/// times the rated peak current without errors, with 12 bits and the noise of the dissertation's sensors in proportion
+/// to the rated current.
 fn drawn(seed: u64) -> Config {
     let mut random = seeded(seed);
     let mut between = |low: f64, high: f64| random.random_range(low..=high);
@@ -157,7 +161,7 @@ fn some<'a>(from: &[&'a Record], is: fn(&Record) -> bool) -> Vec<&'a Record> {
     from.iter().copied().filter(|record| is(record)).collect()
 }
 
-/// From the nameplate to the last run; returns the refusal that ended it.
+/// Runs a motor from the nameplate to the last run; returns the refusal that ended it.
 fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<Refusing>, Error> {
     if let Err(error) = config.drive.build() {
         return refused(if by_plate(&error) { "nameplate" } else { "settings" }, error, true);
@@ -226,20 +230,20 @@ impl Record {
         self.refused.as_ref().is_some_and(|refused| refused.stage == stage)
     }
 
-    /// Angle error of the undisturbed runs, degrees rms.
+    /// Angle error of the runs without disturbances, degrees rms.
     fn rms(&self) -> f64 {
         let mut error = Stats::default();
         self.runs[0].iter().for_each(|run| error.add(&run.error));
         error.rms()
     }
 
-    /// Whether it learned, and all undisturbed runs came to their end.
+    /// Whether the motor completed the saliency self-commissioning, and all runs without disturbances reached their end.
     fn is_whole(&self) -> bool {
         let whole = |run: &Trial| run.refused.is_none() && run.trip.is_none();
         self.refused.is_none() && self.runs[0].iter().all(whole)
     }
 
-    /// And with a small error.
+    /// Whether the runs are complete and their error is small.
     fn is_good(&self) -> bool {
         self.is_whole() && self.rms() <= GOOD_DEG
     }
@@ -302,7 +306,7 @@ impl Study for ForeignMotors {
                 ("share (%)", Cell::fixed(share, 1)),
             ]);
         }
-        outcome.tables.push(table.note("With a slope: above 0.035 /rad at the direct current; the lines below are of these. Good: all undisturbed runs to their end, within 2° rms."));
+        outcome.tables.push(table.note("With a slope: saliency sensitivity above 0.035 /rad at the magnetising current; the lines below are of these. Good: all undisturbed runs to their end, within 2° rms."));
         let m = &mut outcome.metrics;
         m.set("motors", all.len() as f64);
         for (n, (name, _)) in Circuit::of([1.0; 5]).values().iter().enumerate() {
@@ -363,15 +367,15 @@ impl Study for ForeignMotors {
 mod tests {
     use super::*;
 
-    /// Without leakage and magnetising current, and without stator resistance, the rated slip is the rotor resistance, and the power is
-    /// what passes the gap less that share.
+    /// Without leakage, magnetising current and stator resistance, the rated slip is the rotor resistance, and the
+    /// power is the air-gap power minus that share.
     #[test]
     fn the_nameplate_is_that_of_the_circuit() {
         let (slip, power) = rated([0.0, 0.05, 1e-9, 1e-9, 1e9]);
         assert!((slip - 0.05).abs() < 1e-6 && (power - 0.95).abs() < 1e-6, "{slip} {power}");
     }
 
-    /// A line beginning and a knee: at the flux of the knee the inductance is the filed one, far below it the unsaturated one.
+    /// A straight beginning and a knee: at the flux of the knee the inductance is the filed one, far below it the unsaturated one.
     #[test]
     fn the_truth_is_the_chord_at_the_direct_current() {
         let config = drawn(7);
@@ -383,7 +387,7 @@ mod tests {
         assert!((knee - 1.0).abs() < 1e-6 && (straight - 1.0).abs() < 1e-6, "{knee} {straight}");
     }
 
-    /// The draws fill the range of the nameplate, and nothing else is refused of them before the motor is known.
+    /// The random values fill the range of the nameplate, and the nameplate is the only reason for a refusal before the motor is known.
     #[test]
     fn a_nameplate_builds_or_is_refused_by_its_own_key() {
         let mut poles = [0; 6];

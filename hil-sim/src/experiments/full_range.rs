@@ -1,8 +1,9 @@
-//! The whole range of the speed: torque, load steps, ramps, wrong parameters, turned flux, starts on a turning shaft, and the
-//! dc link, per region of the speed.
+//! The full speed range: torque, load steps, ramps, wrong parameters, rotated flux, flying starts, and the dc link, for
+//! each region of the speed.
 //!
-//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless the settings say otherwise, or the
-//! drive commissions itself; it learns its tables at that current first. Keys `after.NAME` change the motor or the sensors behind that.
+//! Model A runs with a magnetising current of 1.4 A and the energy model with high flux, unless the settings say
+//! otherwise or the drive commissions itself. The drive first learns its tables at that current. Keys `after.NAME`
+//! change the motor or the sensors afterwards.
 
 mod case;
 mod summary;
@@ -21,26 +22,26 @@ use crate::prelude::*;
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("full-range", whole::<FullRange>)
     .stands_for("beyond the dissertation")
-    .about("Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
-            the drive does not notice.")
+    .about("Runs over the full speed range, `runs` of each kind in each region: angle error, current, dc link, and errors that \
+            the drive does not detect.")
     .uses(&[BENCH, DRIVE, &["full_range.", "prepare.commission", "after.", "runs"]]);
 
-/// Runs of a kind in a region, unless `runs` says otherwise.
+/// Number of runs of a kind in a region, unless `runs` sets another.
 const RUNS: u32 = 10;
-/// Direct current of model A, A on the dissertation's motor.
+/// Magnetising current of model A, A on the dissertation's motor.
 pub const I_D_A: f64 = 1.4;
-/// Settings of the drive for the range, where they are not set: largest speed, speed that trips, rpm; ramp, rpm/s; of four
-/// poles.
+/// Settings of the drive for the full range, if they are not set: largest speed and over-speed trip, rpm, and ramp,
+/// rpm/s, on four poles.
 const LIMIT_RPM: f64 = 3600.0;
 const TRIP_RPM: f64 = 4500.0;
 const RAMP_RPM_PER_S: f64 = 1000.0;
-/// Errors of what a drive believes that has learned a motor which then changes: leakage, stator resistance, magnetising
-/// inductance; each with both signs.
+/// Errors of the motor parameters in a drive whose motor has changed after the saliency self-commissioning: leakage
+/// inductance, stator resistance, magnetising inductance; each with both signs.
 const WRONG: (f64, f64, f64) = (0.05, 0.3, 0.1);
-/// The drives: one of the motor's own shaft, and one of a heavy shaft.
+/// Number of drives: one for the motor's own shaft, and one for a heavy shaft.
 const DRIVES: usize = 2;
 
-/// The configuration with what the whole range needs and does not say.
+/// Adds settings that the full range needs to a configuration that does not have them.
 ///
 /// # Errors
 /// As [`check_model`].
@@ -65,16 +66,16 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
     Ok(config)
 }
 
-/// A drive of this configuration, off; it has learned where it can, or refused to with a fault of this number.
+/// Returns a drive of this configuration, off. It has learned if it can, or it refused to with a fault of this number.
 ///
 /// # Errors
-/// When the settings are refused.
+/// If the settings are refused.
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
     if tracks(&config.drive) { learned(config, drive, seed) } else { Ok(Ok(drive)) }
 }
 
-/// The runs: of each case one after the other, so that shards have their part of each.
+/// The runs, with the cases in alternation, so that each shard has its part of each case.
 pub struct FullRange {
     config: Config,
     seed: u64,
@@ -89,7 +90,7 @@ impl FullRange {
         self.cases[number % self.cases.len()]
     }
 
-    /// The motor of a run of which the drive is wrong: one of eight choices of the signs.
+    /// Returns a motor that differs from the drive's parameters: one of eight combinations of the signs.
     fn changed(&self, number: usize, config: &Config) -> Config {
         let (mut config, choice) = (config.clone(), number / self.cases.len());
         let believed =
@@ -102,13 +103,13 @@ impl FullRange {
         config
     }
 
-    /// The drive of a run, which has learned where it can.
+    /// Returns the drive of a run, which has learned if it can.
     fn drive(&self, case: Case, config: &Config) -> Result<&Learnt, Error> {
         let place = &self.drives[usize::from(case.kind == RangeKind::Braking)];
         once(place, || learned_drive(config, self.seed))
     }
 
-    /// Does a run; with `traced` it is recorded.
+    /// Does a run; with `traced` it also records the curves.
     fn done(&self, number: usize, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
         let (case, seed) = (self.case(number), seed_of(self.seed, number));
         let mut config = self.config.clone();

@@ -1,4 +1,4 @@
-//! Trials of the lock monitor: lost and false locks, and false alarms.
+//! Trials of the lock monitor: loss of lock, wrong locks, and false alarms.
 
 mod trials;
 
@@ -10,11 +10,11 @@ use crate::stats::upper_bound_95;
 /// Not in the source: it has no monitor.
 pub const EXPERIMENT: Experiment = Experiment::new("lock-monitor", whole::<LockMonitor>)
     .stands_for("what section 5.2 leaves open")
-    .about("The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.")
+    .about("The angle forced off, false alarms, over-speed, flying starts; `--set runs=N`.")
     .uses(&[BENCH, DRIVE, &["prepare.learn", "runs"]])
     .not(&[&["angle_source"]]);
 
-/// Trials of each forced offset; ten times as many runs are checked for false alarms.
+/// Number of trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;
 const HEALTHY_PER_RUN: usize = 10;
 /// Forced offsets, degrees, and their names in the metrics.
@@ -22,12 +22,12 @@ const OFFSETS: [(f64, &str); 5] =
     [(90.0, "p90"), (-90.0, "m90"), (120.0, "p120"), (-120.0, "m120"), (180.0, "180")];
 /// Speeds of the forced offsets, rpm.
 const SPEED_RPM: f64 = 300.0;
-/// How far the speed estimate may be off, rpm: 5° of angle error are that much slip at 3 A.
+/// Permitted error of the speed estimate, rpm: 5° of angle error cause this slip at 3 A.
 const ESTIMATE_RPM: f64 = 50.0;
-/// Speeds of the starts, rpm: beyond the highest the flux does not get to 10 % of its length.
+/// Speeds of the starts, rpm: above the highest the flux does not reach 10 % of its magnitude.
 const START_RPM: [f64; 11] = [0.0, 5.0, -5.0, 15.0, -15.0, 30.0, -50.0, 80.0, 150.0, -150.0, 300.0];
 
-/// The trials, in this order: all of each forced offset, the sound runs, over-speed, and at each speed of
+/// The trials, in this order: all trials of each forced offset, the healthy runs, over-speed, and at each speed of
 /// [`START_RPM`] the starts and then the relocks.
 pub struct LockMonitor {
     config: Config,
@@ -51,7 +51,7 @@ impl Study for LockMonitor {
     }
 
     fn run(&self, number: usize) -> Result<Trial, Error> {
-        // Each part has seeds of its own.
+        // Each part has its own seeds.
         let seed = |part: usize, n| seed_of(self.seed, n).wrapping_add((part as u64) << 40);
         let mut n = number;
         if n < OFFSETS.len() * self.runs {
@@ -59,7 +59,7 @@ impl Study for LockMonitor {
             let case = trials::case(seed(offset, n), SPEED_RPM);
             let mut trial = trials::forced(&self.config, case, OFFSETS[offset].0)?;
             if n > 0 {
-                // The figure shows the first.
+                // The figure shows only the first trial.
                 trial.loss.clear();
             }
             return Ok(trial);
@@ -101,7 +101,7 @@ impl Study for LockMonitor {
 }
 
 impl LockMonitor {
-    /// Starts, and relocks, at each speed.
+    /// Number of starts, and of relocks, at each speed.
     fn starts_each(&self) -> usize {
         self.runs.div_ceil(5)
     }
@@ -115,7 +115,7 @@ impl LockMonitor {
         f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
     }
 
-    /// The columns of all trials; tables take some of them.
+    /// The columns of all trials; each table uses some of them.
     fn columns(&self) -> Vec<Column<'_, Trial>> {
         let fault = |r: &Trial| r.fault.map(|fault| fault.to_string()).unwrap_or_default();
         columns![|n, r: &Trial|
@@ -130,7 +130,7 @@ impl LockMonitor {
         ]
     }
 
-    /// A table of those trials of a part which something is wrong with, with these of the columns; none without trials.
+    /// Makes a table of the failed trials of a part, with these columns; none if there are no such trials.
     fn listed(&self, title: &str, heads: &[&str], of: Vec<(usize, &Trial)>) -> Option<Table> {
         let mut columns = self.columns();
         columns.retain(|column| heads.contains(&column.head));
@@ -224,7 +224,7 @@ impl LockMonitor {
             ("not in time", Cell::fixed(late.len() as f64, 0)),
         ];
         let table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &[]).records([row]);
-        outcome.tables.push(table.note("The drive goes by its estimate, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier."));
+        outcome.tables.push(table.note("The drive goes by its estimate, which is off by 50 rpm at most; a shaft that is accelerated against the torque of the drive loses its flux earlier."));
         let heads = ["seed", "iq (A)", "rpm/s"];
         outcome.tables.extend(self.listed("Over-speed not in time", &heads, late));
     }
@@ -242,7 +242,7 @@ impl LockMonitor {
             "relocks" => Cell::fixed(count(&trials[each..], |s| s.accepted), 0);
             "accepted at a wrong angle" => Cell::fixed(count(trials, |s| !s.is_honest()), 0);
         ];
-        let title = "Starts and relocks accepted on a turning shaft";
+        let title = "Accepted flying starts and relocks";
         outcome.tables.push(Table::of(title, &columns, parts.iter().enumerate()));
         let at_rest = |s: &Trial| s.case.rpm == 0.0 && !s.accepted;
         outcome.metrics.set("refused_at_rest", count(all, at_rest));

@@ -1,4 +1,4 @@
-//! Copper loss of the motor against the least one that its torque can have, with and without `flux.economy`.
+//! Copper loss of the motor against the minimum for its torque, with and without `flux.economy`.
 
 use super::battery::held;
 use super::full_range::for_the_range;
@@ -9,17 +9,17 @@ use crate::prelude::*;
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("losses", run)
     .stands_for("beyond the dissertation")
-    .about("Copper loss against the least one for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.")
+    .about("Copper loss against the minimum for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.")
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT]);
 
-/// Speed, rpm on four poles: beyond the carrier, short of field weakening.
+/// Speed, rpm on four poles: above the range of the injection, below field weakening.
 const RPM: f64 = 1200.0;
 const SHARES: [f64; 3] = [0.25, 0.5, 1.0];
-/// Corrections of the torque current until it gives the torque, and the time of each, s.
+/// Number of corrections of the q-axis current until it gives the torque, and the time of each, s.
 const CORRECTIONS: u32 = 6;
 const CORRECTED_S: f64 = 1.5;
-/// Samples of the mean, and the time between two, s.
+/// Number of samples of the mean, and the time between two, s.
 const SAMPLES: u32 = 50;
 const SAMPLE_S: f64 = 0.01;
 
@@ -51,18 +51,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.tables.push(table);
     outcome.remarks = assumptions(&config);
-    outcome.remark("Least: stator and rotor of a machine without iron losses and saturation, over all direct currents.");
+    outcome.remark("Least: stator and rotor of a machine without iron losses and saturation, over all d-axis currents.");
     Ok(outcome)
 }
 
-/// Least copper loss at a torque, W: `1.5 (r_s i_d^2 + (r_s + R_R) i_q^2)` with `i_d = i_q sqrt((r_s + R_R)/r_s)`.
+/// Minimum copper loss at a torque, W: `1.5 (r_s i_d^2 + (r_s + R_R) i_q^2)` with `i_d = i_q sqrt((r_s + R_R)/r_s)`.
 fn least_loss(machine: &MachineSettings, nm: f64) -> f64 {
     let k = machine.lm / (machine.lm + machine.llr);
     let both = machine.rs + k * k * machine.rr;
     2.0 * nm * (machine.rs * both).sqrt() / (f64::from(machine.pole_pairs) * k * machine.lm)
 }
 
-/// Mean direct current, A, torque, Nm, and copper loss, W, at a torque and the torque current that it may need.
+/// Mean d-axis current, A, torque, Nm, and copper loss, W, at a torque; also takes a first value of the q-axis current.
 fn measure(
     config: &Config,
     drive: &Drive,
@@ -75,7 +75,7 @@ fn measure(
     for _ in 0..CORRECTIONS {
         bench.torque(i_q as f32)?;
         on(bench.watch(CORRECTED_S))?;
-        // The torque grows with the current or its square.
+        // The torque is proportional to the current or to its square.
         i_q *= (nm / bench.rig.plant.torque()).sqrt();
     }
     let mut mean = [0.0; 3];

@@ -1,32 +1,32 @@
-//! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
-//! drawn around it.
+//! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for random
+//! machines around it.
 
 use super::drawn_machine::around;
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use crate::prelude::*;
 
-/// Not a figure of the source: whether the drive suits other motors.
+/// Not a figure of the source: tests whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment::new("machines", whole::<Machines>)
     .stands_for("beyond the dissertation")
-    .about("A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
+    .about("A drive that has learned its motor, at 16 operating points; with `spread.machine` for random machines around \
             the motor.")
     .uses(&[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
-/// Torque currents of the operating points, A on the dissertation's motor; both signs.
+/// q-axis currents of the operating points, A on the dissertation's motor; both signs.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 /// Speeds, rpm on four poles.
 const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 /// Time of each run, s, after the settling.
 const RUN_S: f64 = 2.0;
-/// Angle error of a good machine in every run, degrees: rms, largest.
+/// Largest angle error of a good machine in every run, degrees: rms, largest.
 const GOOD_DEG: (f64, f64) = (4.0, 14.0);
-/// Machines that are drawn, unless `runs` says otherwise.
+/// Number of random machines, unless `runs` sets another.
 const MACHINES: u32 = 100;
-/// Machines in the table, the worst first.
+/// Number of machines in the table, worst first.
 const LISTED: usize = 20;
 
-/// A machine and its runs, or why there are none.
+/// A machine and its runs, or the reason why there are none.
 struct Machine {
     config: Config,
     runs: Result<Vec<SteadyRun>, String>,
@@ -53,7 +53,7 @@ impl Machine {
         self.runs.as_ref().is_ok_and(|runs| good(runs))
     }
 
-    /// The outcome in words.
+    /// Describes the outcome in words.
     fn verdict(&self) -> String {
         match (&self.runs, self.lost()) {
             (Err(why), _) => why.clone(),
@@ -72,7 +72,7 @@ pub(super) fn good(runs: &[SteadyRun]) -> bool {
     runs.iter().all(within)
 }
 
-/// Starts a drive that has learned anew for each operating point.
+/// Starts a drive that has learned again for each operating point.
 pub(super) fn runs(
     learned: &Rig,
     config: &Config,
@@ -92,7 +92,7 @@ pub(super) fn runs(
     Ok(runs)
 }
 
-/// A machine drawn around the motor, whose drive knows the circuit.
+/// Returns a random machine around the motor; its drive knows the circuit.
 fn drawn(config: &Config, seed: u64) -> Config {
     let mut random = seeded(seed);
     let mut drawn = around(config, &mut random, config.spread.machine);
@@ -111,7 +111,7 @@ pub struct Machines {
 }
 
 impl Machines {
-    /// Configuration and seed of a machine.
+    /// Returns configuration and seed of a machine.
     fn drawn(&self, number: usize) -> (Config, u64) {
         let seed = seed_of(self.seed, number);
         (if self.draws { drawn(&self.config, seed) } else { self.config.clone() }, seed)

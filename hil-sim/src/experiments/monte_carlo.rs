@@ -6,7 +6,7 @@ use crate::prelude::*;
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
 pub const EXPERIMENT: Experiment = Experiment::new("monte-carlo", whole::<MonteCarlo>)
     .stands_for("the claim behind Figures 38 and 39")
-    .about("Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.")
+    .about("Random q-axis current (a seventh to six sevenths of the limit, both signs) and speed, and the errors of `spread.*`; `--set runs=N`.")
     .uses(&[
         BENCH,
         DRIVE,
@@ -17,11 +17,11 @@ pub const EXPERIMENT: Experiment = Experiment::new("monte-carlo", whole::<MonteC
     .not(&[FREE_SHAFT, SPEED_LOOP]);
 
 const RUNS: u32 = 200;
-/// How many of the worst runs are listed.
+/// Number of worst runs in the list.
 const WORST: usize = 10;
-/// Torque currents on the dissertation's motor, A.
+/// q-axis currents on the dissertation's motor, A.
 const IQ_A: (f64, f64) = (0.5, 3.0);
-/// Speeds up to here on four poles, rpm, unless `load.speed_rpm` says otherwise.
+/// Largest speed on four poles, rpm, unless `load.speed_rpm` sets another.
 const SPEED_RPM: f64 = 150.0;
 
 /// The runs.
@@ -49,7 +49,7 @@ impl Study for MonteCarlo {
     }
 
     fn run(&self, number: usize) -> Result<SteadyRun, Error> {
-        // A generator of its own for every run: each can be repeated alone by its seed.
+        // Every run has its own random generator, so that each can be repeated alone by its seed.
         let seed = seed_of(self.seed, number);
         let mut random = seeded(seed);
         let (least, most) = (self.config.amperes(IQ_A.0), self.config.amperes(IQ_A.1));
@@ -93,7 +93,7 @@ impl Study for MonteCarlo {
             .with(Series::points("largest", points(|r| r.error.largest())))
             .with(Series::points("rms", points(|r| r.error.rms())))
             .with(Series::points("mean", points(|r| r.error.mean())));
-        let title = "Angle error of every run over its torque current";
+        let title = "Angle error of every run over its q-axis current";
         outcome.figures.push(Figure::new("runs", title, "").panel(panel));
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(format!(
@@ -105,7 +105,7 @@ impl Study for MonteCarlo {
     }
 }
 
-/// The configuration with the errors of `spread` drawn at random.
+/// Returns the configuration with random errors of the sizes in `spread`.
 fn spread(config: &Config, random: &mut impl Rng) -> Config {
     let mut drawn = config.clone();
     let mut factor = |largest: f64| 1.0 + random.random_range(-largest..=largest);

@@ -1,4 +1,4 @@
-//! Field orientation with the encoder: where the drive believes the flux to be, and the torque.
+//! Field orientation with the encoder: the error of the drive's flux angle, and the torque.
 
 use crate::prelude::*;
 
@@ -52,7 +52,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(figure.panel(panel));
     outcome.remark(
         "The current is measured 1.53 samples late by the low-pass and 0.18 by the analog filter; \
-         left in, the frame is turned by that many samples times the speed.",
+         if the delays are left in, the frame is rotated by that many samples times the speed.",
     );
     Ok(outcome)
 }

@@ -1,4 +1,4 @@
-//! The record: the torque limit at zero stator frequency for minutes, and a slow reversal of the speed under the same torque.
+//! The endurance test: the torque limit at zero stator frequency for minutes, and a slow reversal of the speed under the same torque.
 
 mod held;
 
@@ -17,10 +17,10 @@ pub const EXPERIMENT: Experiment = Experiment::new("record", run)
 
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
 const SETTLING_S: f64 = 12.0;
-/// Speed from which, and to whose opposite, the shaft goes, rpm on four poles.
+/// Initial speed of the reversal, rpm on four poles; the final speed is its opposite.
 const REVERSAL_RPM: f64 = 150.0;
 
-/// What is done at the torque limit.
+/// A test at the torque limit.
 #[derive(PartialEq)]
 struct Course {
     key: &'static str,
@@ -29,7 +29,7 @@ struct Course {
 
 const STANDSTILL: Course = Course { key: "hold", name: "zero stator frequency" };
 const REVERSAL: Course = Course { key: "reversal", name: "reversal of the speed" };
-/// Each with either sign.
+/// All tests, each with either sign.
 const COURSES: [(Course, f64); 4] =
     [(STANDSTILL, 1.0), (STANDSTILL, -1.0), (REVERSAL, 1.0), (REVERSAL, -1.0)];
 
@@ -39,7 +39,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut rig = prepared(&config, context.seed)?;
     let after = config.after_learning()?;
     if plant_settings(&after) != plant_settings(&config) {
-        // The drive is off, and the motor at rest without flux: another one takes its place.
+        // The drive is off, and the motor at rest without flux: another motor replaces it.
         rig.plant = Plant::new(&plant_settings(&after), context.seed).map_err(Error::refused)?;
         rig.plant.set_open_phase(open_phase(&after)).map_err(Error::refused)?;
     }
@@ -85,13 +85,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks = assumptions(&config);
     outcome.remarks.push(torque.text(&config));
     outcome.remark(
-        "Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux stands at record.flux_deg \
+        "Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux is fixed at record.flux_deg \
          from phase a.",
     );
     Ok(outcome)
 }
 
-/// Starts the drive, gives it its torque, and watches.
+/// Starts the drive, commands its torque, and watches.
 fn hold(config: &Config, mut rig: Rig, course: &Course, i_q: f64) -> Result<Held, Error> {
     let reverses = *course == REVERSAL;
     let rpm = if reverses { config.rpm(REVERSAL_RPM) } else { 0.0 };

@@ -1,7 +1,7 @@
-//! Runs over time: what the drive is asked for part by part, what turns its shaft, what is recorded and how it is judged.
+//! Runs over time: the commands to the drive part by part, the motion of its shaft, the recorded quantities and the judgement.
 //!
-//! A scenario is a TOML file, or the rows of a CSV file, the experiment `profile`. `hil-sim/scenarios/` has the files of the program;
-//! its `README.md` describes their keys.
+//! A scenario is a TOML file, or, for the experiment `profile`, the rows of a CSV file. `hil-sim/scenarios/` has the
+//! files of the program; its `README.md` describes their keys.
 
 mod file;
 mod quantity;
@@ -14,8 +14,8 @@ pub use record::Record;
 use self::file::{Ramp, Text};
 use crate::prelude::*;
 
-/// Experiments that are scenarios of the program, each with the name of its file, what it stands for, the keys that it uses,
-/// those that it does not, and a sentence about it.
+/// Defines experiments that are scenarios of the program. Each has the name of its file, the part of the source that it
+/// reproduces, the keys that it uses, the keys that it does not use, and a description.
 macro_rules! shipped {
     ($($place:ident $name:literal $stands_for:literal $uses:expr, $not:expr; $about:literal)+) => {$(
         #[doc = $about]
@@ -36,14 +36,14 @@ shipped! {
     RAMP "torque-ramp" "Figure 39, Eq. 4.4" STEPS.uses, STEPS.not;
     "Torque ramp with a locked shaft and no position sensor: `reference.iq_a` to twice that and back."
     REVERSAL "torque-reversal" "section 5.2" &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]], STEPS.not;
-    "Sudden steps of the torque current up to full reversal, without a position sensor."
+    "Sudden steps of the q-axis current up to full reversal, without a position sensor."
     SPEED "speed-profile" "section 5.2" &[BENCH, DRIVE, &["load.torque_nm", "prepare.learn", "seconds"]], &[];
     "Speed steps with a reversal through standstill and a load, with the angle source as set."
     POSITION "position-step" "Figure 37, Eq. 4.1 to 4.3" &[BENCH, DRIVE, &["load.", "seconds"]], &[TRACKING, &["angle_source"]];
     "A position step of five turns with the encoder and a free shaft."
 }
 
-/// References and a load in rows.
+/// An experiment with references and a load in the rows of a CSV file.
 pub const PROFILE: Experiment = Experiment::new("profile", |context| {
     super::check_file(&PROFILE, context.file)?;
     Scenario::of_csv(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
@@ -51,7 +51,7 @@ pub const PROFILE: Experiment = Experiment::new("profile", |context| {
 .stands_for("a profile of the user")
 .about("References and load over time from a CSV file: `run profile --input FILE.csv`.")
 .uses(REVERSAL.uses);
-/// A TOML file of the user.
+/// An experiment in a TOML file of the user.
 const OWN: Experiment = Experiment::new("scenario", |context| {
     Scenario::read(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
 })
@@ -59,14 +59,15 @@ const OWN: Experiment = Experiment::new("scenario", |context| {
 .about("Parts, shaft, columns and judge of a TOML file.")
 .uses(STEPS.uses);
 
-/// The scenario that a TOML file is, with the name of the file; none for another name. The name lasts as long as the program.
+/// Returns the scenario of a TOML file, with the name of the file; none for a name that is not a TOML file. The name
+/// lasts as long as the program.
 pub fn own(name: &str) -> Option<Experiment> {
     let stem = Path::new(name.strip_suffix(".toml")?).file_name()?.to_string_lossy();
     Some(Experiment { name: stem.into_owned().leak(), ..OWN })
 }
 
-/// The step of five turns with an encoder, for the comparison with one without: the settings of the scenario count for the
-/// encoder alone.
+/// Records the step of five turns with an encoder, for the comparison with one without. The settings of the scenario
+/// apply only to the run with the encoder.
 ///
 /// # Errors
 /// As [`Scenario::record`].
@@ -88,7 +89,7 @@ struct Reference {
     actual: fn(&Point) -> f64,
 }
 
-/// The three of which a run has one.
+/// The three regulated quantities, of which a run uses one.
 #[rustfmt::skip] // one a line
 static REFERENCES: [Reference; 3] = [
     Reference { column: "torque_current_a", mode: Mode::Torque, command: Command::Torque, actual: |p| p.iq },
@@ -99,7 +100,7 @@ static REFERENCES: [Reference; 3] = [
 /// The shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Shaft {
-    /// As the configuration says.
+    /// As the configuration sets it.
     #[default]
     AsSet,
     /// Free against a torque, Nm.
@@ -111,19 +112,19 @@ enum Shaft {
 /// A part of a run, in the units of the drive.
 #[derive(Clone, Copy, Debug, Default)]
 struct Part {
-    /// Beginning and length, s; a step has no length.
+    /// Beginning and duration, s; the duration of a step is zero.
     begin: f64,
     seconds: f64,
     reference: Ramp,
     /// Torque or speed of the shaft.
     load: Ramp,
-    /// Given at the beginning.
+    /// Stop command at the beginning.
     stop: Option<Stop>,
     start: bool,
 }
 
 impl Part {
-    /// A value of the part at a time; the last one holds afterwards.
+    /// Returns a value of the part at a time; after the end the last value holds.
     fn at(&self, Ramp(from, to): Ramp, t: f64) -> f64 {
         let share = (t - self.begin) / self.seconds;
         if share < 1.0 { from + share * (to - from) } else { to }
@@ -133,15 +134,15 @@ impl Part {
 /// A scenario.
 #[derive(Default)]
 pub struct Scenario {
-    /// A scenario that is read has one.
+    /// The regulated quantity; a scenario from a file always has one.
     reference: Option<&'static Reference>,
     shaft: Shaft,
     parts: Vec<Part>,
-    /// Settings that hold where the configuration has the default.
+    /// Settings that apply where the configuration has the default.
     settings: Vec<(String, Value)>,
-    /// Whether it comes from rows: `--seconds` cuts or holds it, instead of stretching it.
+    /// Whether it comes from rows: then `--seconds` cuts or extends it, instead of stretching it.
     from_rows: bool,
-    /// Figures, metrics and judge.
+    /// Figures, metrics and judgement.
     text: Text,
 }
 
@@ -150,7 +151,7 @@ impl Scenario {
         self.reference.unwrap_or(&REFERENCES[0])
     }
 
-    /// The configuration with the settings of the scenario.
+    /// Returns the configuration with the settings of the scenario.
     fn configured(&self, config: &Config) -> Result<Config, Error> {
         let (defaults, mut config) = (Config::default(), config.clone());
         for (name, value) in &self.settings {
@@ -169,7 +170,7 @@ impl Scenario {
         Ok(config)
     }
 
-    /// The parts in a time of this many seconds, and the time of all, s.
+    /// Returns the parts for this total time in seconds, and the total time, s.
     fn course(&self, seconds: Option<f64>) -> (Vec<Part>, f64) {
         let whole: f64 = self.parts.iter().map(|part| part.seconds).sum();
         let stretch = seconds.filter(|_| !self.from_rows).map_or(1.0, |seconds| seconds / whole);
@@ -180,7 +181,7 @@ impl Scenario {
         (self.parts.iter().map(stretched).collect(), seconds.unwrap_or(whole))
     }
 
-    /// The value of a column in the unit of the drive.
+    /// Returns the value of a column in the unit of the drive.
     fn scaled(&self, config: &Config, column: &str, value: f64) -> f64 {
         match column {
             "torque_current" => config.iq_a() * value,
@@ -193,13 +194,13 @@ impl Scenario {
         }
     }
 
-    /// The load whose multiples the parts give, Nm.
+    /// Returns the load, Nm, whose multiples the parts state.
     fn load_nm(&self, config: &Config) -> f64 {
         let own = || self.scaled(config, "load_nm", self.text.load_nm);
         config.load.torque_nm.unwrap_or_else(own)
     }
 
-    /// A text of the file with the values of the keys that it names in braces.
+    /// Returns a text of the file, in which the keys in braces are replaced with their values.
     fn filled(&self, text: &str, config: &Config) -> String {
         let load = text.replace("{load_nm}", &format!("{:.2}", self.load_nm(config)));
         Key::all().fold(load, |text, key| {
@@ -221,10 +222,10 @@ impl Scenario {
         }
     }
 
-    /// Runs it.
+    /// Runs the scenario.
     ///
     /// # Errors
-    /// When the configuration is refused, or the drive refuses a command or does not start.
+    /// If the configuration is refused, or the drive refuses a command or does not start.
     pub fn outcome(&self, context: &Context<'_>) -> Result<Outcome, Error> {
         let record = self.record(context)?;
         let mut outcome = Outcome::default();

@@ -1,11 +1,11 @@
-//! Position without an encoder: the step of section 4.1, and how far the position drifts.
+//! Position control without an encoder: the step of section 4.1, and the drift of the position.
 
 use super::learning;
 use super::scenario::{Metric, Record, Statistic, position_step};
 use crate::prelude::*;
 use crate::stats::StraightLine;
 
-/// The aim that section 5.2 states.
+/// The objective that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment::new("sensorless-position", run)
     .stands_for("section 4.1 without its encoder, section 5.2")
     .about(
@@ -14,18 +14,18 @@ pub const EXPERIMENT: Experiment = Experiment::new("sensorless-position", run)
     .uses(&[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]])
     .not(&[&["angle_source"]]);
 
-/// Time of the step, s: long enough for both to arrive.
+/// Duration of the step, s: long enough for both drives to arrive.
 const STEP_S: f64 = 6.0;
 /// Time over which the position is held for the drift, s.
 const HOLD_S: f64 = 60.0;
-/// Loads under which it is held, Nm.
+/// Loads under which the position is held, Nm.
 const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
-/// True rotor resistance over the believed one, and whether the drive has learned the reference of the
-/// saliency with this wrong resistance, the shaft locked. Otherwise it uses its default, learned with
-/// the resistance known.
+/// True rotor resistance divided by the one the drive assumes, and whether the drive has done the saliency
+/// self-commissioning with this wrong resistance and a locked shaft. Otherwise it uses its default, learned with the
+/// right resistance.
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
-/// A load, Nm, and what the drive believes.
+/// A load, Nm, and the assumptions of the drive.
 type Case = (f64, (f64, bool));
 
 /// A position held under a load.
@@ -33,9 +33,9 @@ type Case = (f64, (f64, bool));
 struct HeldPosition {
     load_nm: f64,
     belief: (f64, bool),
-    /// Time and mechanical degrees, ten a second.
+    /// Time and mechanical degrees, ten points per second.
     track: Vec<(f64, f64)>,
-    /// Mean torque current, A.
+    /// Mean q-axis current, A.
     iq: f64,
     angle_error: Stats,
     fault: Option<String>,
@@ -54,7 +54,7 @@ impl HeldPosition {
     }
 }
 
-/// Holds position zero for some seconds, once the load stands.
+/// Holds position zero for some seconds, after the load has settled.
 fn hold(config: &Config, seed: u64, case: Case, seconds: f64) -> Result<HeldPosition, Error> {
     let ((load_nm, belief), mut config) = (case, config.clone());
     config.drive.angle_source = AngleSource::Injection;
@@ -110,7 +110,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let m = &mut outcome.metrics;
     for (record, suffix) in [(&without, ""), (&with, "_encoder")] {
         let mut set = |name: &str, unit: &str, of: &str, statistic: Statistic| {
-            // It has arrived within one mechanical degree.
+            // It has arrived when it is within one mechanical degree.
             let metric = Metric { within: 1.0 / 360.0, ..Metric::of(name, of, statistic) };
             m.set(format!("{name}{suffix}_{unit}"), record.statistic(&metric));
         };
@@ -126,7 +126,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let drift = |belief| of(belief).map(|h| h.drift().abs()).fold(0.0, f64::max);
     m.set("drift_no_load_deg_per_min", held[0].drift());
     m.set("drift_max_deg_per_min", drift(BELIEFS[0]));
-    // Odd in the load: the error of the believed rotor resistance.
+    // The part that is odd in the load: the error of the assumed rotor resistance.
     let per_ampere = |belief| {
         let sum = |term: fn(&HeldPosition) -> f64| of(belief).map(term).sum::<f64>();
         sum(|h| h.drift() * h.iq) / sum(|h| h.iq * h.iq)
@@ -151,24 +151,24 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     ];
     let table = Table::of("Drift of a position that is held", &columns, held.iter().enumerate());
     outcome.tables.push(table.note(
-        "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \
+        "Mechanical degrees; the drive holds its estimate of position 0, a free shaft turns against \
          the load.",
     ));
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     outcome.remarks = assumptions(config);
     outcome.remark(
-        "The position is the flux angle less the integral of the slip. The injection observes the \
+        "The position is the flux angle minus the integral of the slip. The injection observes the \
          flux; nothing observes the rotor inside it, so an error of the slip, i_q/(τ_r i_d), is an \
          error of the speed: at 1 A, 1 % of rotor resistance is 2.2 mechanical degrees per second, \
-         whatever the estimator. What is not of the resistance comes from the angle error: by one \
+         with any estimator. The rest of the drift comes from the angle error: by one \
          degree at 1 A the slip is 16 electrical degrees per second off.",
     );
     outcome.remark(
-        "Learning with the shaft locked takes the error of the resistance out: the slip that is \
-         asked for is then the slip there is, and the reference makes the tracking loop find the same \
-         orientation again, with an angle error but without a drift. What remains is what the \
-         resistance changes by afterwards, about 0.4 % a kelvin.",
+        "Learning with the shaft locked removes the error of the resistance: the commanded \
+         slip is then the actual slip, and the saliency offset makes the tracking loop find the same \
+         orientation again, with an angle error but without a drift. The resistance still changes \
+         afterwards, by about 0.4 % a kelvin.",
     );
     Ok(outcome)
 }
@@ -189,7 +189,7 @@ fn step_figure(without: &Record, with: &Record) -> Figure {
 }
 
 fn drift_figure(held: &[HeldPosition]) -> Figure {
-    let title = "Rotor position while the drive holds what it takes for zero";
+    let title = "Rotor position while the drive holds its estimate of zero";
     let mut figure = Figure::new("drift", title, "");
     for belief in BELIEFS {
         let pct = (belief.0 - 1.0) * 100.0;

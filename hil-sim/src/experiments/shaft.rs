@@ -1,4 +1,4 @@
-//! How far the speed of a free shaft falls when a load comes, beside an encoder and beside what the delay of the loop allows.
+//! Drop of a free shaft's speed at a load step, compared with an encoder and with the bound that the delay of the loop sets.
 
 use crate::prelude::*;
 
@@ -10,17 +10,17 @@ pub const EXPERIMENT: Experiment = Experiment::new("shaft", run)
     .uses(&[BENCH, DRIVE])
     .not(&[&["angle_source", "shaft.load_inertia", "shaft.stiffness", "shaft.damping", "motor.inertia"]]);
 
-/// Full load at most, as a share of the torque that the drive allows.
+/// Largest full load, as a share of the torque that the drive allows.
 const SHARE_OF_ALLOWED_TORQUE: f64 = 0.9;
-/// Loads as shares of the full load, the rated torque at most; speeds as shares of the rated speed.
+/// Loads as shares of the full load, which is at most the rated torque; speeds as shares of the rated speed.
 const LOADS: [f64; 4] = [0.5, -0.5, 1.0, -1.0];
 const SPEEDS: [f64; 4] = [0.0, 0.05, 0.2, 0.8];
-/// Inertias relative to the one that the drive has in its settings.
+/// Inertias relative to the inertia in the drive's settings.
 const INERTIAS: [f64; 3] = [0.5, 2.0, 10.0];
 /// Resonances of a coupling between two equal inertias, Hz, and its damping ratio.
 const COUPLINGS_HZ: [f64; 3] = [15.0, 30.0, 60.0];
 const DAMPING: f64 = 0.007;
-/// Time in which the load of a hoist comes, time before the load, and time that is looked at from its beginning on, s.
+/// Rise time of the load of a hoist, time before the load, and observed time from the beginning of the load, s.
 const HOIST_S: f64 = 2.0;
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 3.0;
@@ -28,25 +28,25 @@ const AFTER_S: f64 = 3.0;
 const RUN_UP_S: f64 = 60.0;
 /// Band within which the speed has recovered, as a share of the rated speed.
 const RECOVERED: f64 = 0.02;
-/// Speed and torque are looked at as means over a period of the injection, s.
+/// Period of the injection, s, over which means of speed and torque are taken.
 const MEAN_S: f64 = 10.0 / RATE_HZ;
 
 /// A load on a shaft.
 #[derive(Clone, Copy, Debug)]
 struct Case {
-    /// Share of the load, the time in which it comes, s, and speed, in rated speeds.
+    /// Share of the load, its rise time, s, and the speed as a share of the rated speed.
     load: f64,
     ramp_s: f64,
     speed: f64,
-    /// True inertia relative to that of the settings; resonance of the coupling, Hz.
+    /// True inertia relative to the inertia in the settings; resonance of the coupling, Hz.
     inertia: f64,
     coupling_hz: Option<f64>,
 }
 
-/// Response of the speed to a load; a run that ends in a fault, or does not start, has no figures.
+/// Response of the speed to a load; a run that ends in a fault, or does not start, has no numbers.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// Largest deviation, rpm, and its area, percent of the rated speed times s; both positive in the direction of the load.
+    /// Largest deviation, rpm, and its area, percent of the rated speed times s; both are positive in the direction of the load.
     dip_rpm: f64,
     area_pct_s: f64,
     /// Time after which the speed stays within the band, s.
@@ -55,19 +55,19 @@ struct Response {
     noise_pct: [f64; 2],
     /// Largest angle error, degrees.
     angle_deg: f64,
-    /// The load, in rated torques.
+    /// The load as a share of the rated torque.
     load: f64,
     fault: Option<Fault>,
 }
 
 impl Response {
-    /// The same number in each place.
+    /// Puts the same number in each place.
     fn of(x: f64) -> Self {
         let (noise_pct, load, fault) = ([x; 2], x, None);
         Self { dip_rpm: x, area_pct_s: x, recovery_s: x, noise_pct, angle_deg: x, load, fault }
     }
 
-    /// How the run ended.
+    /// Describes how the run ended.
     fn end(&self) -> String {
         self.fault.map_or("runs".to_owned(), |fault| format!("fault {}", fault.code()))
     }
@@ -76,7 +76,7 @@ impl Response {
 impl Case {
     const STEP: Self = Self { load: 0.5, ramp_s: 0.0, speed: 0.8, inertia: 1.0, coupling_hz: None };
 
-    /// All cases.
+    /// Returns all cases.
     fn all() -> Vec<Self> {
         let speeds = |case: Self| SPEEDS.map(|speed| Self { speed, ..case });
         let steps = LOADS.iter().flat_map(|&load| speeds(Self { load, ..Self::STEP }));
@@ -97,11 +97,11 @@ impl Case {
         }
     }
 
-    /// The bench: its load acts behind the coupling.
+    /// Makes the bench; its load acts behind the coupling.
     fn bench(&self, config: &Config, source: AngleSource) -> Config {
         let mut config = config.clone();
         config.drive.angle_source = source;
-        // Its rule is far lower with an encoder.
+        // The rule for this limit gives a far lower value with an encoder.
         config.drive.speed.limit_rpm.get_or_insert(config.drive.nameplate.speed_rpm);
         config.prepare.learn = true;
         config.load.mode = LoadMode::Free;
@@ -110,14 +110,14 @@ impl Case {
         if let Some(hz) = self.coupling_hz {
             let (half, omega) = (0.5 * config.motor.inertia, TAU * hz);
             (config.motor.inertia, config.shaft.load_inertia) = (half, half);
-            // Of two halves against each other.
+            // Stiffness for two equal halves that oscillate against each other.
             config.shaft.stiffness = 0.5 * half * omega * omega;
             config.shaft.damping = DAMPING * half * omega;
         }
         config
     }
 
-    /// The response of a drive with this source of the angle.
+    /// Computes the response of a drive with this angle source.
     fn response(&self, config: &Config, source: AngleSource, seed: u64) -> Result<Response, Error> {
         let (rated_nm, rated_rpm) = (config.rated_nm(), rated_rpm(config));
         let mut rig = Rig::from_config(&self.bench(config, source), seed)?;
@@ -190,7 +190,7 @@ impl Mean {
     }
 }
 
-/// A dash for what is not known.
+/// Returns a number, or a dash if it is not known.
 fn known(value: f64, decimals: usize) -> Cell {
     Cell::fixed_or_dash((!value.is_nan()).then_some(value), decimals)
 }
@@ -216,7 +216,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
     let loops = config.drive.motion_loops().map_err(Error::refused)?;
     let rated_rpm = rated_rpm(config);
-    // Torque and inertia of the settings: s from rest to the rated speed.
+    // Starting time from torque and inertia of the settings: s from rest to the rated speed.
     let mechanical_s =
         f64::from(config.drive.motor.inertia) * rated_rpm * TAU / 60.0 / config.rated_nm();
     let bound_rpm = |(case, [seen, _]): &(&Case, &[Response; 2])| {
@@ -241,7 +241,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "with an encoder" => Cell::from(pair.1[1].end());
     ];
     let table = Table::of("Load on a free shaft", &columns, pairs.iter().enumerate()).note(
-        "Bound: load times delay of the speed loop over the time in which the rated torque brings the inertia to the rated speed. Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
+        "Bound: load times delay of the speed loop, divided by the time in which the rated torque accelerates the inertia to the rated speed. Loads in percent of the rated torque, or of 90 % of the torque that the drive allows if that is smaller.",
     );
     outcome.tables.push(table);
     outcome.faults.extend(pairs.iter().filter_map(|(case, [seen, _])| {

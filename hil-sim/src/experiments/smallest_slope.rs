@@ -1,5 +1,5 @@
-//! The smallest slope of the saliency signal at which a drive that has learned still works: the source of the motor's
-//! saliency is weakened step by step, and the battery runs at each.
+//! The smallest saliency sensitivity at which a drive that has learned still works: the source of the motor's saliency
+//! is weakened step by step, and the stress test runs at each step.
 
 use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
@@ -8,25 +8,25 @@ use crate::prelude::*;
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment::new("smallest-slope", whole::<SmallestSlope>)
     .stands_for("what section 5.2 leaves open")
-    .about("The battery with ever weaker saliency of the motor: slope dq/de and what the drive does; `runs` at each.")
+    .about("The stress test with decreasing saliency of the motor: sensitivity dq/de and behaviour of the drive; `runs` at each.")
     .uses(&[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]]);
 
-/// The shares of the saliency's source, from the strongest on.
+/// Number of steps of the saliency's share, starting with the strongest.
 const STEPS: u32 = 20;
 const LEAST_SHARE: f64 = 0.05;
-/// Runs at each, unless `runs` says otherwise: two of each kind.
+/// Runs at each step, unless `runs` sets another number: two of each kind.
 const RUNS: u32 = 24;
 
-/// What a motor does whose saliency has a share of its source.
+/// Results for a motor whose saliency has a share of its full strength.
 struct Step<'a> {
     share: f64,
-    /// Slope dq/de without load at the drive's magnetising current, 1/rad.
+    /// Saliency sensitivity dq/de without load at the drive's magnetising current, 1/rad.
     slope: Option<f64>,
     summary: Summary<'a>,
 }
 
 impl Step<'_> {
-    /// Whether each run was accepted, and none was lost, silently wrong or stopped.
+    /// Whether each run was accepted, and none was lost, had an undetected error or stopped.
     fn works(&self) -> bool {
         let fails = |trial: &Trial| {
             let ended = trial.refused_by().is_some() || trial.trip.is_some();
@@ -38,9 +38,9 @@ impl Step<'_> {
 
 /// The runs of all steps, one step after the other.
 pub struct SmallestSlope {
-    /// Share, configuration and battery of each step.
+    /// Share, configuration and stress test of each step.
     steps: Vec<(f64, Config, Battery)>,
-    /// Runs of each step.
+    /// Number of runs of each step.
     each: usize,
 }
 
@@ -89,9 +89,9 @@ impl Study for SmallestSlope {
             head.into_iter().chain(step.summary.cells())
         };
         let mut outcome = Outcome::default();
-        outcome.tables.push(Table::new("Ever weaker saliency", &[]).records(steps.iter().map(row)).note(
+        outcome.tables.push(Table::new("Decreasing saliency", &[]).records(steps.iter().map(row)).note(
             "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
-             of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
+             of the motor, from its equations. A step works if every run is accepted and none is lost, wrong without detection, or stopped.",
         ));
         let m = &mut outcome.metrics;
         if let Some(last) = steps.iter().take_while(|step| step.works()).last() {
@@ -110,14 +110,14 @@ impl Study for SmallestSlope {
             .with(points("largest", |s| s.error().largest()))
             .with(points("99 %", |s| s.p99_deg()))
             .with(points("rms", |s| s.error().rms()));
-        let title = "Angle error over the slope of the saliency signal";
+        let title = "Angle error over the saliency sensitivity";
         outcome.figures.push(Figure::new("slope", title, "").panel(panel));
         outcome.remarks = assumptions(context.config);
         Ok(outcome)
     }
 }
 
-/// The same motor with a share of what its saliency comes from.
+/// Returns the same motor with a share of the source of its saliency.
 fn weakened(config: &Config, share: f64) -> Config {
     let (mut weaker, plant) = (config.clone(), plant_settings(config));
     match plant.iron {
@@ -135,8 +135,8 @@ mod tests {
     use super::*;
     use crate::config::Value;
 
-    /// The slope of model A at rest is twice its saliency; that of linear teeth and of the saturation goes down with its
-    /// source.
+    /// The sensitivity of model A at standstill is twice its saliency; with linear teeth and with saturation it
+    /// decreases with its source.
     #[test]
     fn a_weaker_source_is_a_smaller_slope() {
         let slope = |plant: &str, share: f64| {

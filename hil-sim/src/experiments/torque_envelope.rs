@@ -1,4 +1,4 @@
-//! The largest torque over speed and dc link, motoring and generating, as the drive gives it.
+//! The largest torque over speed and dc-link voltage, motoring and generating, as the drive gives it.
 
 use super::battery::held;
 use super::full_range::{I_D_A, for_the_range};
@@ -15,9 +15,9 @@ pub const EXPERIMENT: Experiment = Experiment::new("torque-envelope", run)
 /// Speeds, rpm on four poles.
 const STEP_RPM: f64 = 300.0;
 const STEPS: u32 = 12;
-/// Voltages of the dc link in relation to the nominal one: 230, 270 and 311 V.
+/// Voltages of the dc link relative to the nominal one: 230, 270 and 311 V.
 const LINKS: [f64; 3] = [230.0 / 311.0, 270.0 / 311.0, 1.0];
-/// Time under torque before it is measured, s: field weakening and its trim have settled; and the time of the mean.
+/// Time under torque before the measurement, s, in which field weakening and its trim settle; and the time of the mean.
 const SETTLING_S: f64 = 2.0;
 const MEAN_S: f64 = 0.5;
 /// Signs of the torque, and their names.
@@ -32,7 +32,7 @@ struct Point {
     sign: f64,
 }
 
-/// What was measured there; none where the drive did not regulate to the end.
+/// Result of the measurement; none if the drive did not regulate to the end.
 type Measured = Option<(f64, f64)>;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -48,7 +48,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome(&config, &limit, &points.into_iter().zip(measured).collect::<Vec<_>>()))
 }
 
-/// Mean torque, Nm, in the direction asked for, and largest phase current, A.
+/// Mean torque, Nm, in the commanded direction, and largest phase current, A.
 fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Measured, Error> {
     let Some(mut bench) = held(config, drive, point.rpm, seed)? else { return Ok(None) };
     let volts = config.inverter.dc_link_v * point.link;
@@ -110,7 +110,7 @@ fn outcome(config: &Config, limit: &TorqueLimit, measured: &[(Point, Measured)])
     outcome.remarks = assumptions(config);
     outcome.remarks.push(limit.text(config));
     outcome.remarks.push(format!(
-        "Where neither `sequence.i_d` nor `sequence.flux=high` is set, this experiment sets the direct current with plant a to \
+        "Where neither `sequence.i_d` nor `sequence.flux=high` is set, this experiment sets the magnetising current with plant a to \
          {:.2} A.",
         config.amperes(I_D_A)
     ));

@@ -1,4 +1,4 @@
-//! The largest torque of a drive at rest: how much it is, which limit binds, and what raises it.
+//! The largest torque of a drive at standstill: its value, the limiting factor, and the remedies.
 
 use std::f64::consts::SQRT_2;
 
@@ -6,32 +6,32 @@ use super::battery::{allowed_a, torque_limit_a, torque_nm};
 use super::full_range::learned_drive;
 use crate::prelude::*;
 
-/// Values that differ by less, relatively, are the same limit.
+/// Relative difference below which two values are the same limit.
 const SAME: f64 = 2e-3;
-/// A direct current below this share of the most useful one is the first thing to raise.
+/// Share of the most useful magnetising current below which a larger one is the first remedy.
 const LOW_FLUX: f64 = 0.9;
-/// A torque current beyond all limits, A on the dissertation's motor: the drive takes as much as it can.
+/// A q-axis current beyond all limits, A on the dissertation's motor: the drive gives as much as it can.
 pub const BEYOND_A: f64 = 100.0;
 
 /// A torque limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TorqueLimit {
-    /// Torque current, A peak.
+    /// q-axis current, A peak.
     pub i_q: f64,
     /// Torque at the right angle, Nm.
     pub nm: f64,
-    /// Torque in % of the rated one.
+    /// Torque in % of the rated torque.
     pub percent: f64,
-    /// Which limit binds, in words.
+    /// The limiting factor, in words.
     pub binds: String,
-    /// How to get more, in words.
+    /// Remedies that increase the torque, in words.
     pub more: String,
 }
 
-/// The drive of a configuration, off, which has learned where it can, and its torque limit.
+/// Returns the drive of a configuration, off, which has learned if it can, and its torque limit.
 ///
 /// # Errors
-/// When settings or plant are refused, or the drive does not learn.
+/// If settings or plant are refused, or the drive does not learn.
 pub fn learned_limit(config: &Config, seed: u64) -> Result<(Drive, TorqueLimit), Error> {
     let drive = learned_drive(config, seed)?;
     let drive = drive
@@ -41,7 +41,7 @@ pub fn learned_limit(config: &Config, seed: u64) -> Result<(Drive, TorqueLimit),
 }
 
 impl TorqueLimit {
-    /// That of a drive which takes at most this torque current, A peak.
+    /// Computes the limit of a drive with at most this q-axis current, A peak.
     pub fn new(config: &Config, i_q: f64) -> Self {
         let nm = torque_nm(config, i_q);
         let (binds, by_current) = binding(config, i_q);
@@ -49,7 +49,7 @@ impl TorqueLimit {
         Self { i_q, nm, percent: 100.0 * nm / config.rated_nm(), binds, more }
     }
 
-    /// This limit, or the smaller one of so much of the rated torque, %.
+    /// Returns this limit, or the limit of this share of the rated torque, %, if that is smaller.
     pub fn at_most(self, percent: f64) -> Self {
         let share = (percent / self.percent).min(1.0);
         let Self { i_q, nm, binds, more, .. } = self;
@@ -57,19 +57,19 @@ impl TorqueLimit {
         Self { i_q: share * i_q, nm: share * nm, percent: self.percent.min(percent), binds, more }
     }
 
-    /// In words.
+    /// Describes the limit in words.
     pub fn text(&self, config: &Config) -> String {
         let Self { i_q, nm, percent, binds, more } = self;
         format!(
-            "Torque limit at rest: {nm:.2} Nm, {percent:.0} % of the rated torque of {:.1} Nm, by {i_q:.2} A of torque current \
-             beside {:.2} A of direct current. Binds: {binds}. {more}",
+            "Torque limit at rest: {nm:.2} Nm, {percent:.0} % of the rated torque of {:.1} Nm, by {i_q:.2} A of q-axis current \
+             at {:.2} A of magnetising current. Limited by: {binds}. {more}",
             config.rated_nm(),
             config.drive.i_d()
         )
     }
 }
 
-/// What binds, and whether a larger `limits.current_a` raises that.
+/// Returns the limiting factor, and whether a larger `limits.current_a` raises it.
 fn binding(config: &Config, i_q: f64) -> (String, bool) {
     let drive = &config.drive;
     let (limit, largest) = (f64::from(drive.current_limit_a()), torque_limit_a(config));
@@ -79,15 +79,15 @@ fn binding(config: &Config, i_q: f64) -> (String, bool) {
         let range = f64::from(drive.sensor_range_a());
         let what = match drive.better_sensors() {
             Some(_) => format!(
-                "the current limit of {limit:.2} A, which is that of the sensors (`measurement.range_a` = {range:.2} A)"
+                "the current limit of {limit:.2} A, which comes from the sensors (`measurement.range_a` = {range:.2} A)"
             ),
             None => format!("the current limit of {limit:.2} A (`limits.current_a`)"),
         };
         (what, true)
     } else if is((largest / step).floor() * step) {
-        ("the last learned torque current, by `limits.current_a`".to_owned(), true)
+        ("the last learned q-axis current, by `limits.current_a`".to_owned(), true)
     } else {
-        ("the learned slope of the saliency, which is too small beyond".to_owned(), false)
+        ("the learned saliency sensitivity (slope), which is too small beyond".to_owned(), false)
     }
 }
 
@@ -109,7 +109,7 @@ fn more(config: &Config, by_current: bool) -> String {
     }
     let how = if by_rule { "" } else { "`sequence.flux=high` with `sequence.i_d=auto`, or " };
     format!(
-        "More: a larger direct current, which is {:.0} % of that of the rated flux: {how}a larger `sequence.i_d`.",
+        "More: a larger magnetising current, which is {:.0} % of that of the rated flux: {how}a larger `sequence.i_d`.",
         100.0 * i_d / of_rated_flux
     )
 }

@@ -1,4 +1,4 @@
-//! How fast the torque follows a step, over speed and sign, beside what the voltage allows.
+//! Response time of the torque to a step, over speed and sign, compared with the limit that the voltage sets.
 
 mod rise;
 
@@ -17,10 +17,10 @@ pub const EXPERIMENT: Experiment = Experiment::new("torque-rise", run)
     .uses(&[BENCH, DRIVE])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
 
-/// Speeds, rpm on four poles, and the one from which on there is no carrier.
+/// Speeds, rpm on four poles, and the speed above which there is no injection.
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 600.0, 800.0, 1200.0, 1800.0, 2100.0, 2700.0, 3600.0];
 const WITHOUT_CARRIER_RPM: f64 = 780.0;
-/// Height of the step, as a share of the largest torque current that drive and voltage permit before it.
+/// Height of the step, as a share of the largest q-axis current that drive and voltage permit before it.
 const STEP_SHARE: f64 = 0.9;
 /// Share of the voltage that the compensation of the dead time leaves.
 const USABLE: f64 = 0.97;
@@ -50,7 +50,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// One step at speed.
+/// Does one step at speed.
 fn step(config: &Config, rig: &Rig, (rpm, sign): Case) -> Result<Seen, Error> {
     let mut rig = rig.clone();
     bring_up(&mut rig, rpm)?;
@@ -76,32 +76,32 @@ fn step(config: &Config, rig: &Rig, (rpm, sign): Case) -> Result<Seen, Error> {
     Ok((Rise::measured(&rig, i_q)?, limit_ms))
 }
 
-/// The motor to its stator voltage while the flux stands: `L di/dt = v - (R + jw L) i - jw psi`, |v| at most `voltage`.
+/// The motor at its stator voltage while the flux is constant: `L di/dt = v - (R + jw L) i - jw psi`, |v| at most `voltage`.
 struct Physical {
     resistance: f64,
     leakage: f64,
-    /// Electrical, rad/s.
+    /// Electrical speed, rad/s.
     speed: f64,
     flux: f64,
     voltage: f64,
 }
 
 impl Physical {
-    /// Voltage of a current that stands, V.
+    /// Voltage of a constant current, V.
     fn steady(&self, i: Complex64) -> Complex64 {
         let j_w = Complex64::new(0.0, self.speed);
         (j_w * self.leakage + self.resistance) * i + j_w * self.flux
     }
 
-    /// The largest share of the torque current `i_q`, in steps of a hundredth, that [`USABLE`] of the voltage sustains at this flux, A.
+    /// The largest share of the q-axis current `i_q`, in steps of a hundredth, that [`USABLE`] of the voltage sustains at this flux, A.
     fn borne(&self, i_d: f64, i_q: f64) -> f64 {
         let bears =
             |i_q: &f64| self.steady(Complex64::new(i_d, *i_q)).norm() <= USABLE * self.voltage;
         (0..=100).rev().map(|n| 0.01 * f64::from(n) * i_q).find(bears).unwrap_or(0.0)
     }
 
-    /// The least time in which the torque current gets from zero to `i_q`, s; the direct current is free. By the maximum
-    /// principle the voltage of a time T is V e^(j(+-pi/2 + w (T - t))).
+    /// The shortest time in which the q-axis current rises from zero to `i_q`, s; the d-axis current is free. By the
+    /// maximum principle the voltage of a time T is V e^(j(+-pi/2 + w (T - t))).
     fn least_s(&self, i_d: f64, i_q: f64) -> f64 {
         const STEP_S: f64 = 5e-6;
         let reaches = |steps: &u32| {
@@ -146,9 +146,9 @@ fn table(config: &Config, cases: &[Case], seen: &[Seen], m: &mut Metrics) -> Tab
     m.set("peak_pct_of_trip", 100.0 * largest(&|rise| rise.peak_a / trip));
     m.set("angle_error_max_deg", largest(&|rise| rise.angle_deg));
     Table::of("Torque steps over the speed", &columns, seen.iter().enumerate()).note(
-        "Means over steps at all ten samples of a carrier period. Limit: the least time in which the voltage of the dc link drives \
-         the torque current, with the direct current free, and 1.5 periods. A negative torque generates. Beyond: the measured time \
-         less 1.5 times the limit.",
+        "Means over steps at all ten samples of an injection period. Limit: the shortest time in which the voltage of the dc link drives \
+         the q-axis current, with the d-axis current free, and 1.5 periods. A negative torque generates. Beyond: the measured time \
+         minus 1.5 times the limit.",
     )
 }
 
@@ -160,7 +160,7 @@ fn figure(cases: &[Case], seen: &[Seen]) -> Figure {
             panel.with(share(&format!("{rpm:.0} rpm"), &seen.0.current))
         })
     };
-    Figure::new("rise", "Torque current after the command, share of the final value", "")
+    Figure::new("rise", "q-axis current after the command, share of the final value", "")
         .panel(panel(1.0, "motoring"))
         .panel(panel(-1.0, "generating"))
 }
@@ -175,8 +175,8 @@ fn share(name: &str, response: &Response) -> Series {
 mod tests {
     use super::*;
 
-    /// Without speed and resistance the current rises linearly, in L i/V. At speed the optimal voltage is faster than every voltage of
-    /// constant direction in the frame of the flux, by less than a tenth.
+    /// Without speed and resistance the current rises linearly, in L i/V. At speed the optimal voltage is faster than
+    /// every voltage of constant direction in the frame of the flux, by less than a tenth.
     #[test]
     fn the_physical_limit_is_that_of_simple_cases() {
         let still =
@@ -184,7 +184,7 @@ mod tests {
         assert!((still.least_s(1.4, 3.0) - 0.02 * 3.0 / 180.0).abs() < 1e-5);
         assert!((still.least_s(1.4, -3.0) - 0.02 * 3.0 / 180.0).abs() < 1e-5);
         let turning = Physical { resistance: 3.0, speed: 400.0, ..still };
-        // Any direction that stands in the frame of the flux is slower.
+        // Any direction that is fixed in the frame of the flux is slower.
         let best = (-90..=90)
             .map(|degrees| {
                 let v = Complex64::from_polar(180.0, FRAC_PI_2 + f64::from(degrees).to_radians());
@@ -199,7 +199,7 @@ mod tests {
             .fold(f64::INFINITY, f64::min);
         let least = turning.least_s(1.4, 3.0);
         assert!(least <= best + 1e-5 && least > 0.9 * best, "{least} {best}");
-        // Against the induced voltage it takes longer than with it.
+        // Against the back-EMF it takes longer than with it.
         assert!(least > turning.least_s(1.4, -3.0));
     }
 }

@@ -1,19 +1,20 @@
-//! The evidence: a TOML file that says which board did what, step by step. It is written whole before and after every step.
+//! The test record (evidence): a TOML file with the results of a board, step by step. The whole file is written before
+//! and after every step.
 
 use crate::prelude::*;
 
 /// Version of the file.
 pub const SCHEMA: u32 = 1;
 
-/// Evidence of a first light.
+/// Test record of a first power-up.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evidence {
     /// Version of the file.
     pub schema: u32,
-    /// Who and what: instruments, supply, motor; an emulated board says so.
+    /// Bench: instruments, supply, motor; for an emulated board it says so.
     pub bench: String,
-    /// The board that the image was built for.
+    /// The board for which the image was built.
     pub board: String,
     /// Build of the image.
     pub build: String,
@@ -28,17 +29,17 @@ pub struct Evidence {
 pub struct Record {
     /// Name of the step.
     pub name: String,
-    /// When it began, UTC.
+    /// Time of its beginning, UTC.
     pub began: String,
-    /// How it ended.
+    /// Its result.
     pub verdict: Verdict,
-    /// Why it was not passed.
+    /// Reason why it was not passed.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
-    /// What was asked, read or calculated, with answer and limits.
+    /// Questions, readings and calculated values, with answers and limits.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub found: Vec<String>,
-    /// The lines of the console: those that were sent behind `> `, a trace among them.
+    /// The lines of the console, including a trace; lines that were sent begin with `> `.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub console: String,
 }
@@ -47,9 +48,9 @@ pub struct Record {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// All was as it should be.
+    /// Everything was as it should be.
     Passed,
-    /// It was not, or there was doubt.
+    /// Something was wrong, or there was doubt.
     Stopped,
     /// It was left out on purpose.
     Skipped,
@@ -58,7 +59,7 @@ pub enum Verdict {
 }
 
 impl Record {
-    /// An attempt that begins now.
+    /// Makes an attempt that begins now.
     pub fn new(name: &str, verdict: Verdict) -> Self {
         let began = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S").to_string();
         let (why, found, console) = Default::default();
@@ -67,26 +68,26 @@ impl Record {
 }
 
 impl Evidence {
-    /// The last verdict on a step.
+    /// Returns the last verdict on a step.
     pub fn verdict(&self, step: &str) -> Option<Verdict> {
         self.steps.iter().rev().find(|record| record.name == step).map(|record| record.verdict)
     }
 
-    /// Whether it is of this board and build.
+    /// Checks that the record belongs to this board and build.
     ///
     /// # Errors
     /// The text for the person.
     pub fn is_of(&self, found: &str) -> Result<(), String> {
         let own = format!("board {}, build {}", self.board, self.build);
-        let other = "another image begins with a new evidence file";
+        let other = "for another image, begin a new test record";
         let refused = || Err(format!("{found}: allowed is {}; {other}", cut(&own)));
         if found == own { Ok(()) } else { refused() }
     }
 
-    /// The last attempt.
+    /// Returns the last attempt.
     ///
     /// # Panics
-    /// Before the first one.
+    /// Before the first attempt.
     pub fn record(&mut self) -> &mut Record {
         let last = self.steps.len() - 1;
         &mut self.steps[last]
@@ -95,7 +96,7 @@ impl Evidence {
     /// Reads a file; none if it does not exist.
     ///
     /// # Errors
-    /// [`Error::Refused`] when it cannot be read, or is none of this version.
+    /// [`Error::Refused`] if it cannot be read, or is not of this version.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
         if !path.exists() {
             return Ok(None);
@@ -109,7 +110,7 @@ impl Evidence {
         }
     }
 
-    /// Writes it.
+    /// Writes the file.
     ///
     /// # Errors
     /// [`Error::Write`].

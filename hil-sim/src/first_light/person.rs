@@ -4,15 +4,15 @@ use rustyline::DefaultEditor;
 
 use crate::error::Error;
 
-/// Somebody who does, sees and measures. `None` ends the session: the person has gone, or has pressed Ctrl-C or Ctrl-D.
+/// A person who acts, looks and measures. `None` ends the session: the person has left, or has pressed Ctrl-C or Ctrl-D.
 pub trait Person {
     /// Shows a text.
     fn tell(&mut self, text: &str);
-    /// Does something.
+    /// Asks the person to do something.
     fn hand(&mut self, what: &str) -> Option<()>;
-    /// Looks whether something is so.
+    /// Asks whether something is so.
     fn see(&mut self, what: &str) -> Option<bool>;
-    /// Measures something, or reads a nameplate.
+    /// Asks for a measured value, or for a value of a nameplate.
     fn measure(&mut self, what: &str, unit: &str) -> Option<f64>;
 }
 
@@ -20,7 +20,7 @@ pub trait Person {
 pub struct Terminal(DefaultEditor);
 
 impl Terminal {
-    /// Of this process.
+    /// Opens the terminal of this process.
     ///
     /// # Errors
     /// [`Error::Internal`].

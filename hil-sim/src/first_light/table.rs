@@ -1,11 +1,11 @@
-//! The steps as data. [`Table::next`] alone hands out a step to walk through, so that nothing switches the stage on before gates and
-//! fault input were judged.
+//! The steps as data. Only [`Table::next`] hands out a step to walk through, so that nothing switches the power stage
+//! on before gates and fault input were judged.
 
 use super::evidence::{Evidence, Verdict};
 
 use crate::prelude::*;
 
-/// First words of the lines after which every gate stays off. Any other line counts as one that switches the stage on.
+/// First words of the lines after which every gate stays off. Any other line counts as one that switches the power stage on.
 #[rustfmt::skip]
 const HARMLESS: [&str; 13] = [
     "status", "version", "faults", "board", "get", "set", "save", "clear", "trace", "stop", "backup", "accept", "reboot",
@@ -26,9 +26,9 @@ pub struct Table {
 /// A board with its values.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Board {
-    /// Its name, as the firmware says it.
+    /// Its name, as the firmware reports it.
     pub name: String,
-    /// By name, in capitals.
+    /// Its values by name, in capitals.
     #[serde(flatten)]
     pub values: BTreeMap<String, String>,
 }
@@ -50,9 +50,9 @@ pub struct Part {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Step {
-    /// Its name in the evidence.
+    /// Its name in the test record.
     pub name: String,
-    /// Whether it judges gates or fault input: the stage stays off until all such steps were passed.
+    /// Whether it judges gates or fault input: the power stage stays off until all such steps were passed.
     #[serde(default)]
     pub judges: bool,
     /// Whether it may be skipped.
@@ -61,15 +61,15 @@ pub struct Step {
     /// Whether it is for boards with three current sensors.
     #[serde(default)]
     pub third: bool,
-    /// Longest wait for what has to be heard, s.
+    /// Longest wait for an expected line, s.
     pub patience_s: Option<f64>,
-    /// In order.
+    /// Its actions, in order.
     pub acts: Vec<Act>,
-    /// Where to look if it does not give what it should.
+    /// Causes to check if it does not give the expected result.
     pub otherwise: String,
 }
 
-/// One thing to do, to hear or to measure; `steps.toml` explains them.
+/// One thing to do, to hear or to measure; `steps.toml` explains the kinds.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[expect(missing_docs, reason = "the head of the table explains them to those who write it")]
@@ -88,27 +88,27 @@ pub enum Act {
     Noise(String),
 }
 
-/// The two ends of the allowed numbers, as expressions.
+/// Lower and upper limit of the allowed numbers, as expressions.
 pub type Limits = [String; 2];
 
 /// A number in an answer.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
-    /// It stands behind this text.
+    /// The text that precedes the number.
     pub after: Option<String>,
-    /// It stands before this text.
+    /// The text that follows the number.
     pub before: Option<String>,
     /// Its unit.
     pub unit: String,
-    /// Whether the limits are relative to the reading before.
+    /// Whether the limits are relative to the previous reading.
     #[serde(default)]
     pub rise: bool,
-    /// Where it has to be.
+    /// The allowed range.
     pub is: Limits,
 }
 
-/// A step that may be walked through now. [`Table::next`] makes it.
+/// A step that may be walked through now. Only [`Table::next`] makes it.
 pub struct Ready<'a> {
     number: usize,
     part: &'a Part,
@@ -116,7 +116,7 @@ pub struct Ready<'a> {
 }
 
 impl<'a> Ready<'a> {
-    /// Its number, the step, and its part where it is the first of it.
+    /// Returns its number, the step, and its part if it is the first step of that part.
     pub fn place(&self) -> (usize, &'a Step, Option<&'a Part>) {
         let first = self.part.steps.first().is_some_and(|first| first.name == self.step.name);
         (self.number, self.step, first.then_some(self.part))
@@ -124,15 +124,15 @@ impl<'a> Ready<'a> {
 }
 
 impl Table {
-    /// The table of this program.
+    /// Returns the table of this program.
     ///
     /// # Errors
-    /// [`Error::Internal`] for a table that is none; a test reads it.
+    /// [`Error::Internal`] for an invalid table; a test reads it.
     pub fn read() -> Result<Self, Error> {
         toml::from_str(include_str!("steps.toml")).map_err(|why| Error::Internal(why.to_string()))
     }
 
-    /// The board of a name.
+    /// Returns the board of a name.
     ///
     /// # Errors
     /// [`Error::Unknown`].
@@ -142,15 +142,15 @@ impl Table {
         found.ok_or_else(|| Error::unknown("board", name, names))
     }
 
-    /// All steps with their parts, in order.
+    /// Returns all steps with their parts, in order.
     pub fn steps(&self) -> impl Iterator<Item = (&Part, &Step)> {
         self.parts.iter().flat_map(|part| part.steps.iter().map(move |step| (part, step)))
     }
 
-    /// The first step that the evidence does not have; none at the end.
+    /// Returns the first step that the test record does not have; none at the end.
     ///
     /// # Errors
-    /// [`Error::Refused`] for a step that would switch the stage on before every step that judges gates and fault input was passed.
+    /// [`Error::Refused`] for a step that would switch the power stage on before every step that judges gates and fault input was passed.
     pub fn next(&self, evidence: &Evidence) -> Result<Option<Ready<'_>>, Error> {
         let third = self.board(&evidence.board)?.has_third_sensor();
         let passed = |step: &Step| evidence.verdict(&step.name) == Some(Verdict::Passed);
@@ -183,17 +183,17 @@ impl Step {
 }
 
 impl Board {
-    /// A text with the board's values in place of their names, and its own in place of NAME.
+    /// Replaces the names of the board's values in a text by the values, and NAME by the board's name.
     pub fn fill(&self, text: &str) -> String {
-        // From the last to the first: a name comes before the one that it is the beginning of.
+        // From the last to the first, because a name comes before another one that is its beginning.
         let text = text.replace("NAME", &self.name);
         self.values.iter().rev().fold(text, |text, (name, value)| text.replace(name, value))
     }
 
-    /// The value of an expression; what is none is not a number, and no reading is within it.
+    /// Returns the value of an expression. An invalid one gives a value that is not a number, and no reading lies within it.
     pub fn number(&self, expression: &str) -> f64 {
         let text = self.fill(expression);
-        // A sign at the beginning is no operator.
+        // A sign at the beginning is not an operator.
         let Some(at) = text.rfind(['+', '-', '*']).filter(|at| *at > 0) else {
             return text.parse().unwrap_or(f64::NAN);
         };
@@ -205,19 +205,19 @@ impl Board {
         }
     }
 
-    /// Whether it has three current sensors.
+    /// Whether the board has three current sensors.
     pub fn has_third_sensor(&self) -> bool {
         self.number("SENSORS") == 3.0
     }
 }
 
 impl Read {
-    /// The text that it stands at.
+    /// Returns the text next to the number.
     pub fn place(&self) -> &str {
         self.after.as_deref().or(self.before.as_deref()).unwrap_or_default()
     }
 
-    /// The number in a line.
+    /// Returns the number in a line.
     pub fn of(&self, line: &str) -> Option<f64> {
         let (before, after) = line.split_once(self.place())?;
         let word = match self.after {

@@ -1,4 +1,4 @@
-//! Walks through the table: one step after the other, each judged, until one gives doubt.
+//! Walks through the table: one step after the other, each judged, until one leaves doubt.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,18 +10,18 @@ use super::table::{Act, Board, Limits, Read, Ready, Table};
 use super::wire::Wire;
 use crate::prelude::*;
 
-/// `command.timeout_s` while a step may switch the stage on: a drive that hears nothing for so long stops by itself.
+/// `command.timeout_s` while a step may switch the power stage on: a drive that receives nothing for this time stops by itself.
 pub const TIMEOUT_S: u32 = 2;
-/// Beginnings of lines that come unasked and end a step, unless the step waits for them.
+/// Beginnings of unsolicited lines that end a step, unless the step waits for them.
 const DOUBTS: [&str; 5] =
     ["* fault ", "* induction-drive", "* error", "* stopped: no command", "* refused"];
-/// Longest wait for what has to be heard, unless the step says otherwise, s.
+/// Longest wait for an expected line, unless the step sets another, s.
 const PATIENCE_S: f64 = 15.0;
-/// Longest time in which a controller that starts again answers, s.
+/// Longest time in which a controller answers after a restart, s.
 const STARTS_S: u32 = 20;
 /// Longest time until a drive is off after `stop`, s.
 const STOPS_S: u32 = 10;
-/// Time between two looks at what was said, s.
+/// Time between two checks of the received lines, s.
 const LOOK_S: f64 = 0.2;
 
 /// A walk through the table with a drive and a person.
@@ -32,18 +32,18 @@ pub struct Walk<'a, W, P> {
     person: P,
     options: Options,
     interrupted: Arc<AtomicBool>,
-    /// The last attempt is the one at the present step.
+    /// The test record; its last attempt is the one at the present step.
     evidence: Evidence,
-    /// Heard since the last line was sent.
+    /// Lines received since the last line was sent.
     said: Vec<String>,
-    /// Unasked lines that end the step, unless it waits for them.
+    /// Unsolicited lines that end the step, unless it waits for them.
     doubts: Vec<String>,
-    /// Last readings, by the text at which they stand.
+    /// Last readings, by the text next to them.
     readings: BTreeMap<String, f64>,
     patience_s: f64,
 }
 
-/// Why a step was not passed.
+/// Reason why a step was not passed.
 struct Failure(Verdict, String);
 type Checked<T = ()> = Result<T, Failure>;
 
@@ -51,16 +51,16 @@ fn doubt<T>(why: impl Into<String>) -> Checked<T> {
     Err(Failure(Verdict::Stopped, why.into()))
 }
 
-/// The answer of a person who is there.
+/// Returns the answer of a person who is present.
 fn there<T>(answer: Option<T>) -> Checked<T> {
     answer.ok_or_else(|| Failure(Verdict::Interrupted, "interrupted by the person".to_owned()))
 }
 
 impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
-    /// Begins, or goes on with the evidence of a file; `interrupted` ends it.
+    /// Begins, or continues the test record of a file; `interrupted` ends it.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the drive does not answer, or board or build are not those of options and evidence.
+    /// [`Error::Refused`] if the drive does not answer, or if board or build differ from those of options and test record.
     pub fn new(
         table: &'a Table,
         (mut wire, person): (W, P),
@@ -75,7 +75,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         let board = table.board(&evidence.board)?;
         if let Some(wanted) = options.board.as_ref().filter(|wanted| **wanted != board.name) {
             let image = &board.name;
-            return Err(Error::Refused(format!("--board {wanted}: the image is that of {image}")));
+            return Err(Error::Refused(format!("--board {wanted}: the image is for {image}")));
         }
         let (said, doubts, readings, patience_s) = Default::default();
         Ok(Self {
@@ -93,7 +93,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         })
     }
 
-    /// The evidence so far.
+    /// Returns the test record so far.
     pub fn evidence(&self) -> &Evidence {
         &self.evidence
     }
@@ -107,16 +107,16 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         Ok(())
     }
 
-    /// Walks through the next step; false when there is none.
+    /// Walks through the next step; returns false if there is none.
     ///
     /// # Errors
-    /// [`Error::Lost`] for a step that was not passed; those of the table and of the file.
+    /// [`Error::Lost`] for a step that was not passed; the errors of the table and of the file.
     pub fn step(&mut self) -> Result<bool, Error> {
         let Some(ready) = self.table.next(&self.evidence)? else { return Ok(false) };
         let (number, step, _) = ready.place();
         let skip = self.options.skip_learning && step.optional;
         let begun = if skip { Verdict::Skipped } else { Verdict::Interrupted };
-        // Before anything is done: what breaks off leaves a trace in the file.
+        // Written before anything is done, so that a step that breaks off leaves a trace in the file.
         self.evidence.steps.push(Record::new(&step.name, begun));
         self.evidence.write(&self.options.evidence)?;
         if skip {
@@ -157,9 +157,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         self.doubts.first().map_or(Ok(()), |line| doubt(line.clone()))
     }
 
-    /// `stop`, and the silence of the console may be as long as it likes again.
+    /// Sends `stop`, and removes the limit on the time without lines.
     fn switch_off(&mut self) -> Checked {
-        // Refused in a fault, where the outputs are off already.
+        // The drive refuses `stop` in a fault, in which the outputs are already off.
         let _ = self.send("stop");
         for _ in 0..STOPS_S {
             self.send("status")?;
@@ -238,7 +238,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         answer.error().map_or(Ok(()), |error| doubt(format!("`{line}`: {error}")))
     }
 
-    /// Takes what was said unasked.
+    /// Stores the unsolicited lines.
     fn drain(&mut self) {
         for line in self.wire.unasked() {
             self.person.tell(&format!("  {line}"));
@@ -250,13 +250,13 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         }
     }
 
-    /// Fails for an unasked line that nobody waits for, and when it is interrupted.
+    /// Fails for an unexpected unsolicited line, and if the person interrupts.
     fn look(&mut self) -> Checked {
         self.drain();
         if self.interrupted.load(Ordering::Relaxed) {
             return there(None);
         }
-        // A later act may wait for a fault.
+        // A later action may wait for a fault.
         match self.doubts.first() {
             Some(line) if !line.starts_with("* fault ") => doubt(line.clone()),
             _ => Ok(()),
@@ -274,7 +274,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             if let Some(line) = self.doubts.first() {
                 return doubt(line.clone());
             }
-            // An answer that is no `ok` is whole.
+            // An answer without an `ok` is already complete.
             let waits = self.said.iter().any(|line| line.starts_with("ok"));
             if !waits || left <= 0.0 {
                 return doubt(format!("not `{text}`, but `{}`", self.said.join("; ")));
@@ -298,7 +298,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         doubt(format!("the controller does not answer within {STARTS_S} s"))
     }
 
-    /// A number in the last answer.
+    /// Reads a number in the last answer.
     fn read(&mut self, read: &Read) -> Checked {
         let place = read.place();
         let Some(value) = self.said.iter().find_map(|line| read.of(line)) else {
@@ -309,7 +309,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         self.judge(place, value, &read.unit, &read.is, from)
     }
 
-    /// Whether a number is between its limits, which count from `from`.
+    /// Checks that a number is between its limits, which are relative to `from`.
     fn judge(&mut self, what: &str, value: f64, unit: &str, is: &Limits, from: f64) -> Checked {
         let [least, most] = is.each_ref().map(|end| from + self.board.number(end));
         let what = what.trim_matches([' ', ',']);
@@ -318,7 +318,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         if (least..=most).contains(&value) { Ok(()) } else { doubt(found) }
     }
 
-    /// Mean and noise of a signal in the trace that was printed.
+    /// Judges mean and noise of a signal in the printed trace.
     fn noise(&mut self, signal: &str) -> Checked {
         let mut rows = self.said.iter().map(|line| line.split(',').collect::<Vec<_>>());
         let column = rows.by_ref().find_map(|row| row.iter().position(|name| *name == signal));
@@ -332,7 +332,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     }
 }
 
-/// Board and build of a drive.
+/// Returns board and build of a drive.
 fn identity(wire: &mut impl Wire) -> Result<(String, String), String> {
     let mut ask = |line: &str| wire.ask(line).map_err(|why| why.to_string());
     let said = [ask("board")?, ask("version")?].map(|answer| answer.lines.join("\n"));

@@ -1,4 +1,4 @@
-//! The way to the drive.
+//! The connection to the drive.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -9,24 +9,24 @@ use crate::prelude::*;
 
 /// Time between two signs of life: a quarter of the time after which the drive stops ([`super::walk::TIMEOUT_S`]).
 const ALIVE: Duration = Duration::from_millis(500);
-/// Longest time that a port is away while the controller starts again.
+/// Longest time for which a port is absent while the controller restarts.
 const AWAY: Duration = Duration::from_secs(60);
 
-/// A drive, and the time beside it.
+/// A drive, together with a clock.
 pub trait Wire {
-    /// Sends a line and hears its answer.
+    /// Sends a line and receives its answer.
     ///
     /// # Errors
-    /// There is no whole answer.
+    /// There is no complete answer.
     fn ask(&mut self, line: &str) -> Result<Answer, LinkError>;
     /// Lets some seconds pass.
     fn wait(&mut self, seconds: f64);
-    /// The lines that came unasked since the last call.
+    /// Returns the unsolicited lines since the last call.
     fn unasked(&mut self) -> Vec<String>;
-    /// The controller starts again: opens the port once more.
+    /// Opens the port again after a restart of the controller.
     ///
     /// # Errors
-    /// It does not come back.
+    /// The port does not come back.
     fn reopen(&mut self) -> Result<(), Error>;
 }
 
@@ -43,7 +43,7 @@ impl Port {
     /// Opens a port.
     ///
     /// # Errors
-    /// [`Error::Refused`] when it cannot be opened.
+    /// [`Error::Refused`] if it cannot be opened.
     pub fn new(path: &str, baud: u32, interrupted: Arc<AtomicBool>) -> Result<Self, Error> {
         let unasked = Arc::default();
         let link = connect(path, baud, &unasked)?;
@@ -52,10 +52,10 @@ impl Port {
         std::thread::spawn(move || {
             let mut told = false;
             while let Some(urgent) = alive.upgrade() {
-                // Once: a second one would cut the answers short that the walk waits for.
+                // Only once: a second `stop` would cut short the answers for which the walk waits.
                 let stops = !told && interrupted.load(Ordering::Relaxed);
                 told |= stops;
-                // A port that is gone is found so by the next request.
+                // The next request detects a port that is closed.
                 let _ = locked(&urgent).send(if stops { "stop" } else { "" });
                 drop(urgent);
                 std::thread::sleep(ALIVE);

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::outcome::{Cell, Metrics, Outcome, Table};
 
-/// The levels, tables, metrics and remarks of an outcome, and whether the drive was lost.
+/// Returns the current levels, tables, metrics and remarks of an outcome, and whether the run failed.
 pub fn text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if let Some(steps) = &outcome.steps {
@@ -21,7 +21,7 @@ pub fn text(outcome: &Outcome) -> String {
     text
 }
 
-/// Names, which end in their unit, and values, in as many columns as fit.
+/// Writes names, which end in their unit, and values, in as many columns as fit.
 fn write_metrics(text: &mut String, metrics: &Metrics) {
     let cells: Vec<_> =
         metrics.iter().map(|(name, value)| (name, Metrics::cell(name, value))).collect();
@@ -45,7 +45,7 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
     }
 }
 
-/// A table with aligned columns, its title above and its note below.
+/// Returns a table with aligned columns, with its title above and its note below.
 pub fn table(table: &Table) -> String {
     let (mut text, count) = (String::new(), table.columns.len());
     let width = |column: usize| {
@@ -84,13 +84,13 @@ pub fn table(table: &Table) -> String {
 /// Longest line of a paragraph, characters.
 const WIDTH: usize = 100;
 
-/// A paragraph in lines of at most 100 characters, indented by `indent` columns.
+/// Returns a paragraph in lines of at most 100 characters, indented by `indent` columns.
 pub fn paragraph(text: &str, indent: usize) -> String {
     let indent = " ".repeat(indent);
     wrap(text, &indent, &indent)
 }
 
-/// Breaks a paragraph into lines of at most 100 characters, each behind one of the two indents.
+/// Breaks a paragraph into lines of at most 100 characters, each after one of the two indents.
 fn wrap(paragraph: &str, first: &str, others: &str) -> String {
     let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(others);
     let options = options.word_splitter(textwrap::WordSplitter::NoHyphenation).break_words(false);

@@ -6,11 +6,11 @@ use std::iter::once;
 use crate::outcome::name::{snake, unique};
 use sim_bench::prelude::*;
 
-/// The files of an outcome, each with its name without folder and without the experiment's name: one a figure,
-/// `levels.csv`, and one a table, `table-1.csv` and so on.
+/// Returns the files of an outcome, each with its name without folder and without the experiment's name: one per
+/// figure, `levels.csv`, and one per table, `table-1.csv` and so on.
 ///
 /// # Errors
-/// [`Error::Internal`] when a file cannot be put together.
+/// [`Error::Internal`] if a file cannot be made.
 pub fn csv(outcome: &Outcome) -> Result<Vec<(String, String)>, Error> {
     let mut files = Vec::new();
     for figure in &outcome.figures {
@@ -28,8 +28,8 @@ pub fn csv(outcome: &Outcome) -> Result<Vec<(String, String)>, Error> {
     Ok(files)
 }
 
-/// Columns of one length. Curves with the same x stand behind one column of it; where curves have x of their
-/// own, these columns follow (`time_s_2`). Shorter columns are filled up with empty cells.
+/// Writes columns of equal length. Curves with the same x follow one column of x. Curves with other x have their own x
+/// columns (`time_s_2`). Shorter columns are filled with empty cells.
 fn of_figure(figure: &Figure) -> Result<String, Error> {
     let mut groups: HashMap<Vec<u64>, usize> = HashMap::new();
     let mut columns: Vec<Vec<(String, Vec<f64>)>> = Vec::new();
@@ -51,7 +51,7 @@ fn of_figure(figure: &Figure) -> Result<String, Error> {
     written(once(heads).chain((0..length).map(row)))
 }
 
-/// A table.
+/// Writes a table.
 ///
 /// # Errors
 /// As [`csv()`].
@@ -69,12 +69,12 @@ pub fn of_table(table: &Table) -> Result<String, Error> {
     written(once(heads).chain(table.rows.iter().map(|row| row.iter().map(text).collect())))
 }
 
-/// A number with all its digits; nothing for what is not finite.
+/// Returns a number with all its digits; an empty text if it is not finite.
 fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
-/// Records whose fields are the columns, or lists of cells.
+/// Writes records whose fields are the columns, or lists of cells.
 fn written(records: impl IntoIterator<Item: Serialize>) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for record in records {

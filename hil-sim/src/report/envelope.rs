@@ -1,9 +1,9 @@
 //! Reduces the points of a line without changing its picture.
 
-/// The envelope of a line for a plot that is `columns` pixels wide: the lowest and the highest point
-/// of each column, in their order, and both ends.
+/// Returns the envelope of a line for a plot that is `columns` pixels wide: the lowest and the highest point of each
+/// column, in their order, and both ends.
 ///
-/// A line with few points, or one whose x does not increase, is returned as it is.
+/// A line with few points, or one whose x does not increase, is returned unchanged.
 pub fn envelope(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     let increasing = points.windows(2).all(|pair| pair[0].0 <= pair[1].0);
     let (Some(&first), Some(&last)) = (points.first(), points.last()) else {

@@ -21,11 +21,11 @@ pub struct Section<'a> {
     pub outcome: &'a Outcome,
 }
 
-/// The page with these sections, whose outcomes have one origin. It states the program's version, the date,
+/// Makes the page with these sections, whose outcomes have a common origin. It states the program's version, the date,
 /// seed and settings.
 ///
 /// # Errors
-/// [`Error::Internal`] when a figure cannot be drawn.
+/// [`Error::Internal`] if a figure cannot be drawn.
 pub fn page(title: &str, origin: &Origin, sections: &[Section<'_>]) -> Result<String, Error> {
     let mut body = String::new();
     let folded = sections.len() > 1;
@@ -66,7 +66,7 @@ fn settings(changed: &[(String, String)]) -> String {
     }
 }
 
-/// A row for each experiment, those that failed first.
+/// Writes a row for each experiment, failed ones first.
 fn write_results(body: &mut String, sections: &[Section<'_>]) {
     body.push_str(
         "<nav><h2>Results</h2>\n<table>\n<thead><tr><th>experiment</th><th>what it shows</th>\
@@ -94,10 +94,10 @@ fn write_results(body: &mut String, sections: &[Section<'_>]) {
     body.push_str("</tbody></table></nav>\n");
 }
 
-/// Metrics before the figures; the rest is folded.
+/// Number of metrics before the figures; the rest is folded.
 const FIRST_METRICS: usize = 5;
 
-/// A section; with `folded` all but its head opens on request.
+/// Writes a section; with `folded` everything but its head opens on request.
 fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Result<(), Error> {
     let outcome = section.outcome;
     let (name, about) = (escape(section.name), prose(section.about));
@@ -115,7 +115,7 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
     }
     if folded {
         let (plots, tables) = (outcome.figures.len(), outcome.tables.len());
-        // What no command repeats is the head of others.
+        // A section without a command is the head of other sections.
         let open = if command.is_empty() { " open" } else { "" };
         let _ = writeln!(body, "<details{open}><summary>{plots} plots, {tables} tables</summary>");
     }
@@ -153,7 +153,7 @@ fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Resu
     Ok(())
 }
 
-/// Names in words, and values.
+/// Writes names in words, and values.
 fn write_metrics(body: &mut String, metrics: &Metrics) {
     if metrics.is_empty() {
         return;
@@ -173,7 +173,7 @@ fn write_metrics(body: &mut String, metrics: &Metrics) {
     body.push_str(if all > FIRST_METRICS { "</dl>\n</details>\n" } else { "</dl>\n" });
 }
 
-/// A cell as HTML.
+/// Returns a cell as HTML.
 fn shown(cell: &Cell) -> String {
     if cell.is_number() { number(cell.text()) } else { prose(cell.text()) }
 }

@@ -18,13 +18,13 @@ use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legen
 pub use colours::style;
 use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
 
-/// Drawing units per pixel of the page. plotters draws in whole units: finer ones keep curves smooth.
+/// Drawing units per pixel of the page. plotters draws in whole units, so finer ones keep curves smooth.
 const SCALE: i32 = 4;
 /// Width of a figure; plotters' areas are measured in drawing units.
 const WIDE: i32 = 760 * SCALE;
-/// That for a narrow page.
+/// Width of a figure for a narrow page.
 const NARROW: i32 = 380 * SCALE;
-/// Height of a plot area; twice that where both axes have the same scale.
+/// Height of a plot area; twice this if both axes have the same scale.
 const HEIGHT: i32 = 190 * SCALE;
 /// Space left of a plot area, for the labels of the vertical axis, and right of it.
 const LEFT: i32 = 72 * SCALE;
@@ -40,10 +40,10 @@ const ABOVE: i32 = 8 * SCALE;
 type Failure = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The figure as one `<svg>` element, a file of its own: white, and dark where the reader prefers that.
+/// Draws the figure as one `<svg>` element, which can be a file: white, or dark if the reader prefers that.
 ///
 /// # Errors
-/// [`Error::Internal`] with the figure's name when plotters fails.
+/// [`Error::Internal`] with the figure's name if plotters fails.
 pub fn svg(figure: &Figure) -> Result<String, Error> {
     let mut text = String::new();
     let (mut height, width) = (0, WIDE);
@@ -55,8 +55,8 @@ pub fn svg(figure: &Figure) -> Result<String, Error> {
     Ok(Part { text: style + &text, height, width }.element("plot"))
 }
 
-/// The panels of the figure as `<svg>` elements that belong below each other, so that a printed page can end
-/// between them; each twice, for a wide page and for a narrow one. [`style`] belongs into the style of the page.
+/// Draws the panels of the figure as `<svg>` elements that lie below each other, so that a printed page can end between
+/// them. Each is drawn twice, for a wide and for a narrow page. [`style`] belongs in the style of the page.
 ///
 /// # Errors
 /// As [`svg`].
@@ -76,7 +76,7 @@ struct Part {
 }
 
 impl Part {
-    /// The page decides how large the element is; the view box keeps its shape.
+    /// Returns the element; the page sets its size, and the view box keeps its shape.
     fn element(&self, class: &str) -> String {
         let Self { text, height, width } = self;
         format!(
@@ -103,7 +103,7 @@ fn draw(figure: &Figure, width: i32) -> Result<Vec<Part>, Failure> {
         let (x, y) = ranges(panel, if shared { &panels[..] } else { &panels[k..=k] }, width);
         let frame = Frame {
             width,
-            // A legend is not repeated below one that says the same.
+            // A legend is not repeated below an equal one.
             legend: match legend(panel) {
                 same if shared && k > 0 && same == legend(panels[k - 1]) => Vec::new(),
                 entries => entries,
@@ -126,7 +126,7 @@ struct Frame<'a> {
     has_x_labels: bool,
 }
 
-/// A panel with its legend and the names of the events.
+/// Draws a panel with its legend and the names of the events.
 fn draw_part(
     panel: &Panel,
     frame: &Frame<'_>,
@@ -137,7 +137,7 @@ fn draw_part(
     let below = if frame.has_x_labels { LABELS } else { GAP };
     let width = frame.width;
     let (legend, labels) = (legend_height(&frame.legend, width), labels_height(&frame.labels));
-    // The lines of the events go on to the plot.
+    // The lines of the events continue into the plot.
     let above = if frame.labels.is_empty() { ABOVE } else { 0 };
     let height = legend + labels + above + plot + below;
     let mut text = String::new();
@@ -162,12 +162,12 @@ fn draw_part(
         }
         area.present()?;
     }
-    // Only what is inside of plotters' element.
+    // Only the content of plotters' element.
     let inside = text.split_once(">\n").and_then(|(_, text)| text.rsplit_once("</svg>"));
     Ok(Part { text: titled(inside.map_or("", |(text, _)| text), panel, frame), height, width })
 }
 
-/// The drawing with the value of each mark as its title.
+/// Adds the value of each mark to the drawing as its title.
 fn titled(drawing: &str, panel: &Panel, frame: &Frame<'_>) -> String {
     let marks = || panel.series.iter().filter(|series| series.style == Style::Points);
     let keys = frame.legend.iter().filter(|entry| entry.1 == Style::Points);
@@ -186,7 +186,7 @@ fn titled(drawing: &str, panel: &Panel, frame: &Frame<'_>) -> String {
     text
 }
 
-/// The ranges of the two axes of a panel; that of the horizontal one covers all panels that share it.
+/// Returns the ranges of the two axes of a panel; the horizontal one covers all panels that share it.
 fn ranges(panel: &Panel, sharing: &[&Panel], width: i32) -> (Range<f64>, Range<f64>) {
     let range = |panels: &[&Panel], coordinate: fn((f64, f64)) -> f64, air: f64| {
         let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
@@ -224,7 +224,7 @@ fn is_drawn(panel: &Panel, point: (f64, f64)) -> bool {
     is_on_axes(panel, point) && inside
 }
 
-/// The axes of a panel, the events and the series.
+/// Draws the axes of a panel, the events and the series.
 fn draw_plot<X>(
     chart: &mut ChartBuilder<'_, '_, SVGBackend<'_>>,
     panel: &Panel,
@@ -264,7 +264,7 @@ where
     for (place, series) in below.into_iter().chain(above) {
         let mut pen = pen_of(series.style, place);
         if has_reference && series.style == Style::Line {
-            // The reference shows on it.
+            // The reference must stay visible on it.
             pen.color = pen.color.mix(0.6);
         }
         for part in series.points.split(|p| !is_drawn(panel, *p)) {
@@ -282,7 +282,7 @@ where
     Ok(())
 }
 
-/// A label of an axis, with at most six decimals.
+/// Returns a label of an axis, with at most six decimals.
 fn number(value: &f64) -> String {
     let text = format!("{value:.6}");
     match text.trim_end_matches('0').trim_end_matches('.') {
@@ -291,12 +291,12 @@ fn number(value: &f64) -> String {
     }
 }
 
-/// A font of this size in pixels; plotters writes its sizes divided by 1.24.
+/// Returns a font of this size in pixels; plotters writes its sizes divided by 1.24.
 fn font(size: f64) -> TextStyle<'static> {
     ("sans-serif", 1.24 * size * f64::from(SCALE)).into_font().color(&INK)
 }
 
-/// The font of a label beside a plot: smaller than others where a long text has no room otherwise.
+/// Returns the font of a label beside a plot; it is smaller if a long text has no space otherwise.
 fn font_beside(text: &str) -> TextStyle<'static> {
     const ROOM_PX: f64 = 204.0;
     const WIDTH_OF_LETTER: f64 = 0.6;
@@ -312,7 +312,7 @@ mod tests {
         svg(&figure).unwrap()
     }
 
-    /// The texts of a figure, as they are drawn.
+    /// Returns the texts of a figure, as they are drawn.
     fn texts(svg: &str) -> Vec<&str> {
         svg.split("</text>").filter_map(|part| part.trim_end().rsplit('\n').next()).collect()
     }
@@ -347,7 +347,7 @@ mod tests {
         let svg = svg_of([panel(0.0), panel(1.0)]);
         let count = |wanted| texts(&svg).iter().filter(|text| **text == wanted).count();
         assert_eq!((count("time (s)"), count("a"), count("y")), (1, 1, 2));
-        // The range covers the points that one of them does not show.
+        // The range covers the points that one of the panels does not show.
         let limited = Panel::new("time (s)", "z").y_range(0.0, 1.0);
         let limited = limited.with(Series::line("a", vec![(0.0, 0.5), (80.0, 0.5), (90.0, 3.0)]));
         let svg = svg_of([panel(0.0), limited]);

@@ -1,11 +1,11 @@
-//! Plain text as HTML: signs, powers and indices as they are set in print.
+//! Plain text as HTML, with signs, powers and indices as in print.
 
 /// Escapes a text and changes nothing else.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A text with code between backticks, minus signs, indices (`i_q`, `V_dc`) and powers (`L_m^2`).
+/// Formats a text with code between backticks, minus signs, indices (`i_q`, `V_dc`) and powers (`L_m^2`).
 pub fn prose(text: &str) -> String {
     let parts = text.split('`').enumerate().map(|(number, part)| match number % 2 {
         1 => format!("<code>{}</code>", escape(part)),
@@ -14,7 +14,7 @@ pub fn prose(text: &str) -> String {
     parts.collect()
 }
 
-/// A rounded number: minus sign, and a power of ten for an exponent.
+/// Formats a rounded number: minus sign, and a power of ten for an exponent.
 pub fn number(text: &str) -> String {
     match text.split_once('e') {
         Some((digits, power)) if power.parse::<i32>().is_ok() => {
@@ -24,7 +24,7 @@ pub fn number(text: &str) -> String {
     }
 }
 
-/// Names of parameters, where they stand alone, as the symbols that they are.
+/// Replaces names of parameters that stand alone with their symbols.
 fn symbols(text: &str) -> String {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let words = text.split_inclusive(|c| !is_word(c)).map(|piece| {
@@ -40,7 +40,7 @@ fn symbols(text: &str) -> String {
     words.collect()
 }
 
-/// Hyphens that stand for a minus: before a digit and not behind a word, or between two spaces.
+/// Replaces hyphens that stand for a minus: before a digit and not after a word, or between two spaces.
 pub fn signs(text: &str) -> String {
     let letters: Vec<char> = text.chars().collect();
     let signed = letters.iter().enumerate().map(|(k, &letter)| {
@@ -53,7 +53,7 @@ pub fn signs(text: &str) -> String {
     signed.collect()
 }
 
-/// Signs, indices and powers of an escaped text.
+/// Formats signs, indices and powers of an escaped text.
 fn typeset(text: &str) -> String {
     let letters: Vec<char> = signs(&symbols(text)).chars().collect();
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
@@ -70,7 +70,7 @@ fn typeset(text: &str) -> String {
         let length = index.chars().count();
         let is_index = matches!(letter, '_' | '^')
             && before(k, 1).is_alphabetic()
-            // Only behind a single letter: other words with an underscore are names.
+            // Only after a single letter: other words with an underscore are names.
             && (letter == '^' || !is_word(before(k, 2)))
             && (1..=3).contains(&length)
             && rest.get(length) != Some(&'_');

@@ -1,4 +1,4 @@
-//! What runs must have in common to belong together.
+//! Data that must be equal in runs that belong together.
 
 use serde_json::Value as Json;
 
@@ -13,13 +13,13 @@ pub struct Header {
     pub schema_version: u32,
     /// Version of the program.
     pub version: String,
-    /// Number of the sources of the program.
+    /// Hash of the sources of the program.
     pub sources: String,
     /// The experiment.
     pub experiment: String,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// The settings that were changed.
+    /// The changed settings.
     pub settings: BTreeMap<String, Json>,
     /// The shard.
     pub shard: Shard,
@@ -28,10 +28,10 @@ pub struct Header {
 }
 
 impl Header {
-    /// That of a shard of an experiment with `runs` runs in all.
+    /// Makes the header of a shard of an experiment with `runs` runs in all.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the settings do not give the configuration again.
+    /// [`Error::Internal`] if the settings do not give the configuration again.
     pub fn new(
         experiment: &str,
         config: &Config,
@@ -56,13 +56,13 @@ impl Header {
         Ok(header)
     }
 
-    /// The configuration that the settings describe.
+    /// Returns the configuration that the settings describe.
     ///
     /// # Errors
     /// As [`Config::set`].
     pub fn config(&self) -> Result<Config, Error> {
         let mut config = Config::default();
-        // A key of the bench may set one of the drive, which comes later in the list.
+        // A key of the bench may set a key of the drive, which comes later in the list.
         let listed: Vec<String> = Key::all().chain(Key::after()).map(Key::assigned_name).collect();
         let place = |name: &String| listed.iter().position(|known| known == name);
         let mut settings: Vec<_> = self.settings.iter().collect();
@@ -78,7 +78,7 @@ impl Header {
         run.run < self.runs && self.shard.has(run.run)
     }
 
-    /// The first difference between runs of two headers that do not belong together, `NAME is ..., there ...`.
+    /// Returns the first difference between two headers whose runs do not belong together, `NAME is ..., there ...`.
     pub fn difference(&self, there: &Self) -> Option<String> {
         let fields = [
             ("schema_version", self.schema_version.to_string(), there.schema_version.to_string()),
@@ -104,7 +104,7 @@ impl Header {
     }
 }
 
-/// A setting as a configuration takes it.
+/// Converts a setting to a value of a configuration.
 fn setting(value: &Json) -> Value {
     match value {
         Json::Number(number) => number.as_f64().map_or(Value::Unset, Value::Number),

@@ -1,5 +1,5 @@
-//! Files of runs as JSON Lines: a head, then a line a run. A shard is printed so, and `--resume` keeps finished runs so; a process
-//! that is killed while it writes leaves a torn last line.
+//! Files of runs as JSON Lines: a head, followed by one line per run. Shards are printed in this form, and `--resume`
+//! stores finished runs in it. A process that is killed while it writes leaves a torn last line.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Seek as _, SeekFrom, Write as _};
@@ -8,20 +8,20 @@ use std::sync::{Mutex, PoisonError};
 use super::{Header, Run};
 use crate::prelude::*;
 
-/// A file that is read.
+/// The contents of a file.
 pub struct Lines {
-    /// Its head.
+    /// The head.
     pub header: Header,
-    /// The runs that it has.
+    /// The runs in the file.
     pub runs: Vec<Run>,
-    /// The last line, if it is torn.
+    /// Number of the last line, if it is torn.
     pub torn: Option<u64>,
-    /// Length of what is before that, bytes.
+    /// Length of the contents before the torn line, bytes.
     good: u64,
 }
 
 impl Lines {
-    /// Reads what is in a file.
+    /// Parses the contents of a file.
     ///
     /// # Errors
     /// [`Error::Data`] with the line that is no record of a run of the shard.
@@ -47,7 +47,7 @@ impl Lines {
                 }
                 _ => {
                     let problem =
-                        "no record of a run of this shard; give another file, or take the line out";
+                        "no record of a run of this shard; give another file, or remove the line";
                     return Err(Error::data(path, Some(number), problem));
                 }
             }
@@ -63,13 +63,13 @@ pub struct Journal {
     pub path: PathBuf,
     /// The runs that it had when it was opened.
     pub runs: Vec<Run>,
-    /// The line that was torn.
+    /// Number of the line that was torn.
     pub torn: Option<u64>,
     file: Mutex<File>,
 }
 
 impl Journal {
-    /// The file that `--resume PATH` names: the path itself, or in a folder a file with the name of the run.
+    /// Returns the file for `--resume PATH`: the path itself, or, in a folder, a file with the name of the run.
     pub fn place(path: &Path, header: &Header) -> PathBuf {
         let text = path.to_string_lossy();
         if path.is_dir() || text.ends_with(std::path::is_separator) {
@@ -80,11 +80,11 @@ impl Journal {
         }
     }
 
-    /// Opens a file, or makes it, for the runs of a shard, and takes a torn last line away. No other process can open it meanwhile.
+    /// Opens or makes a file for the runs of a shard, and removes a torn last line. No other process can open it at the same time.
     ///
     /// # Errors
-    /// [`Error::Write`] when it cannot be read or written; [`Error::Refused`] while another process writes it;
-    /// as `Lines::of`; [`Error::Data`] when it is of another run. It stays as it is then.
+    /// [`Error::Write`] if it cannot be read or written; [`Error::Refused`] while another process writes it; as
+    /// `Lines::of`; [`Error::Data`] if it belongs to another run. On an error the file is unchanged.
     pub fn open(path: &Path, header: &Header) -> Result<Self, Error> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder {
@@ -122,7 +122,7 @@ impl Journal {
         Ok(Self { path: path.to_owned(), file: Mutex::new(file), runs, torn: read.torn })
     }
 
-    /// Adds a run, at once.
+    /// Adds a run at once.
     ///
     /// # Errors
     /// [`Error::Write`].
@@ -133,7 +133,7 @@ impl Journal {
     }
 }
 
-/// A head or a run as a line.
+/// Writes a head or a run as a line.
 pub fn line(of: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     let mut line = serde_json::to_vec(of).map_err(|e| Error::Internal(e.to_string()))?;
     line.push(b'\n');

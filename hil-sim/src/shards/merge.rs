@@ -7,7 +7,7 @@ use super::journal::Lines;
 use crate::experiments::statistical;
 use crate::prelude::*;
 
-/// A whole run, put together.
+/// A whole run, merged from its shards.
 pub struct Merged {
     /// The experiment.
     pub experiment: &'static Experiment,
@@ -15,15 +15,15 @@ pub struct Merged {
     pub config: Config,
     /// Its seed.
     pub seed: u64,
-    /// Its outcome, the same as that of a run in one piece.
+    /// Its outcome, which equals that of a run in one piece.
     pub outcome: Outcome,
 }
 
 /// Merges the shards of one run; the order of the files does not matter.
 ///
 /// # Errors
-/// [`Error::Data`] with the file that is no shard, torn, of another run, or there twice; [`Error::Refused`] with the
-/// shards that are missing.
+/// [`Error::Data`] with the file that is no shard, torn, from another run, or given twice; [`Error::Refused`] with the
+/// missing shards.
 pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
     let mut files: Vec<(&Path, Lines)> = Vec::new();
     for path in paths {
@@ -54,7 +54,7 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
         }
         records.extend(file.runs.into_iter().map(|run| (run.run, run.record)));
         let missing = shard.numbers(header.runs).filter(|run| !records.contains_key(run));
-        // As many as are listed: the number of runs is that of the file.
+        // Only as many as are listed, because the number of runs comes from the file.
         let missing = missing.map(|run| run.to_string()).take(LISTED + 1).collect::<Vec<_>>();
         if !missing.is_empty() {
             return Err(data(path, format!("shard {shard} has not its runs {}", listed(&missing))));
@@ -74,16 +74,16 @@ pub fn merge(paths: &[PathBuf]) -> Result<Merged, Error> {
     Ok(Merged { experiment: statistical.experiment, config, seed, outcome })
 }
 
-/// Missing shards and runs that a message lists.
+/// Largest number of missing shards and runs in a message.
 const LISTED: usize = 10;
 
-/// The first of these.
+/// Joins the first of these.
 fn listed(all: &[String]) -> String {
     let more = if all.len() > LISTED { ", ..." } else { "" };
     format!("{}{more}", all[..all.len().min(LISTED)].join(", "))
 }
 
-/// Checks that this program is the one that made the shards: the outcome is computed here.
+/// Checks that this program made the shards, because it computes the outcome here.
 fn check_program(path: &Path, header: &Header, config: &Config) -> Result<(), Error> {
     let own = Header::new(&header.experiment, config, header.seed, header.shard, header.runs)?;
     let what = "not made by this program, which has to merge it";

@@ -1,4 +1,4 @@
-//! Runs as one flat table, a row a run.
+//! Runs as one flat table, with one row per run.
 
 use serde_json::Value;
 
@@ -6,9 +6,9 @@ use super::Run;
 
 use crate::prelude::*;
 
-/// The table: the number of the run, and the fields of its record by their names; fields of fields behind an underscore, values
-/// of a list with their number from 1. Statistics are those of the angle error, in degrees. Lists of lists, which are curves and
-/// texts, are left out.
+/// Makes the table: the number of the run, and the fields of its record by their names. Names of inner fields follow an
+/// underscore, and values of a list have their number from 1. Statistics are those of the angle error, in degrees.
+/// Lists of lists, which are curves and texts, are left out.
 pub fn rows(runs: &[Run]) -> Table {
     let flat = |run: &Run| {
         let mut cells = vec![("run".to_owned(), Cell::from(run.run.to_string()))];

@@ -8,7 +8,7 @@ pub fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
     command.current_dir(folder).args(arguments).output().expect("the binary runs")
 }
 
-/// An empty folder of its own for each test.
+/// Returns an empty folder for a test.
 pub fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -25,7 +25,7 @@ pub fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).expect("UTF-8")
 }
 
-/// The JSON on standard output.
+/// Parses the JSON on standard output.
 pub fn object(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("one object")
 }

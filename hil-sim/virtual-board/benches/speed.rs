@@ -1,5 +1,5 @@
-//! Processor time per simulated second of the drive regulating torque, motor in the loop; the aims are
-//! 0.12 s without and 0.2 s with counting of cycles.
+//! Processor time per simulated second while the drive regulates torque, with the motor in the loop; the goals are 0.12
+//! s without and 0.2 s with counting of cycles.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use hil_sim::Config;
 use rustix::time::{ClockId, clock_gettime};
 use virtual_board::{Counting, Image, Options, Pair};
 
-/// Processor time of this process: other programs do not count.
+/// Processor time of this process, so that other programs do not count.
 fn processor_time() -> Duration {
     Duration::try_from(clock_gettime(ClockId::ProcessCPUTime)).expect("is not negative")
 }

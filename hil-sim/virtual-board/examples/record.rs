@@ -1,8 +1,8 @@
-//! Records the runs of the board that `tests/replay/` gives to a host drive: `tests/recorded/NAME.samples` and
-//! `NAME.orders`; see the README there.
+//! Records runs of the board: `tests/recorded/NAME.samples` and `NAME.orders`, which `tests/replay/` feeds to a host
+//! drive; see the README there.
 //!
-//! `cargo run --release --example record` in `hil-sim/virtual-board`, after `cargo firmware` and with the path that it prints in
-//! `INDUCTION_DRIVE_ELF`.
+//! Run it with `cargo run --release --example record` in `hil-sim/virtual-board`, after `cargo firmware` and with the
+//! path that it prints in `INDUCTION_DRIVE_ELF`.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use drive_core::State;
 use hil_sim::{Config, config::LoadMode};
 use virtual_board::{Image, Options, Pair, Period};
 
-/// A typed line, the state that is waited for, and the periods that follow.
+/// A typed line, the state to wait for, and the periods that follow.
 type Step = (&'static str, Option<State>, u64);
 
 const SENSORLESS: [Step; 10] = [
@@ -36,13 +36,13 @@ const ENCODER: [Step; 5] = [
     ("stop", Some(State::Off), 0),
 ];
 
-/// The samples of consecutive interrupts, and the orders that the drive took between them.
+/// The samples of consecutive interrupts, and the requests that the drive took between them.
 #[derive(Default)]
 struct Record {
     samples: Vec<u8>,
     orders: String,
     interrupts: u64,
-    /// Orders that were given and not taken yet.
+    /// Requests that were given but not taken yet.
     given: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! The memory layout of cortex-m-rt, with the memory.x of embassy-stm32.
+//! Supplies the memory layout for cortex-m-rt: the memory.x of embassy-stm32.
 
 fn main() {
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

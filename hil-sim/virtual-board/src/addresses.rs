@@ -1,5 +1,5 @@
-//! The addresses that the firmware publishes in one table: its symbol is all that the virtual board knows of the
-//! firmware's data. `src/task/control/addresses.rs` writes the table and documents it.
+//! The addresses that the firmware publishes in one table. The symbol of that table is everything that the virtual
+//! board knows of the firmware's data. `src/task/control/addresses.rs` writes the table and documents it.
 
 use anyhow::{Context, Result, ensure};
 
@@ -7,7 +7,7 @@ use crate::{image::Image, memory::Region};
 
 /// Name of the table.
 const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";
-/// Version of its layout that this crate reads.
+/// Version of the layout that this crate reads.
 const VERSION: u32 = 4;
 
 /// The table.
@@ -17,23 +17,23 @@ pub struct Addresses {
     pub control: Region,
     /// The drive's coefficients.
     pub coefficients: Region,
-    /// The state of the drive that changes while it regulates.
+    /// The part of the drive's state that changes while it regulates.
     pub state: Region,
-    /// A pointer to the mailbox of orders.
+    /// A pointer to the mailbox of requests.
     pub orders: u32,
-    /// Offset in it of a byte that is not 0 while an order waits.
+    /// Offset in the mailbox of a byte that is not 0 while a request waits.
     pub order_waits: u32,
     /// The telemetry of the drive.
     pub telemetry: u32,
-    /// The word of its phase.
+    /// The word with its phase.
     pub phase: u32,
 }
 
 impl Addresses {
-    /// The table of an image that has one.
+    /// Returns the table of an image, if it has one.
     ///
     /// # Errors
-    /// It is of another version.
+    /// The table is of another version.
     pub fn find(image: &Image) -> Result<Option<Self>> {
         if image.symbol(SYMBOL).is_err() {
             return Ok(None);

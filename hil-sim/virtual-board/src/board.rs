@@ -1,4 +1,4 @@
-//! The board: the core, its chip, and the motor, from one period to the next.
+//! The board: the core, its chip, and the motor, simulated from one period to the next.
 
 pub mod confirmed;
 mod control;
@@ -32,10 +32,10 @@ use crate::{
 };
 use control::RunningInterrupt;
 
-/// Periods after which the log is fetched, before its buffer in RAM is full.
+/// Number of periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
 
-/// Turns of the loop without time passing: exceptions nest a few deep.
+/// Largest number of loop turns in which no time passes: exceptions nest a few levels deep.
 const IDLE_LIMIT: u32 = 100_000;
 
 /// The board.
@@ -52,46 +52,45 @@ pub struct Board {
     addresses: Option<Addresses>,
     /// ST's boot loader, while it runs.
     pub loader: Option<rom::Loader>,
-    /// Changes every sample, if wanted.
+    /// Changes every sample, if set.
     pub disturb: Option<Disturbance>,
-    /// The check that control interrupts leave the preempted code intact, if wanted.
+    /// The check that control interrupts leave the preempted code intact, if set.
     pub poison: Option<poison::Poison>,
-    /// When the outputs went off last, ticks.
+    /// Time at which the outputs last went off, ticks.
     pub went_off: Option<u64>,
-    /// Pulses below the minimum, where they are counted instead of refused; see [`Board::forgive`].
+    /// Number of pulses below the minimum, if they are counted instead of refused; see [`Board::forgive`].
     pub short_pulses: u64,
     /// Resets since power-on, in order.
     pub resets: Vec<(u64, Reset)>,
-    /// The longest control interrupt, when cycles are counted.
+    /// The longest control interrupt, if cycles are counted.
     pub longest: LongestPath,
-    /// The longest way to the compare values.
+    /// The longest path to the compare values.
     pub longest_to_compares: LongestPath,
-    /// Longest from there to its first instruction, ticks.
+    /// Longest time from its request to its first instruction, ticks.
     pub latest_start: u64,
-    /// Simulated time that snapshots took back, ticks.
+    /// Simulated time that was undone by going back to snapshots, ticks.
     gone_back: u64,
 }
 
-/// What passes while a board runs.
+/// Progress while a board runs.
 #[derive(Default)]
 struct Progress {
     sleeping: bool,
     hung: bool,
     entered: Option<RunningInterrupt>,
-    /// Control interrupts and lines of the log that were not asked for yet.
+    /// Control interrupts and lines of the log that the caller has not fetched yet.
     periods: VecDeque<Period>,
     lines: Vec<String>,
-    /// Periods since the log was fetched.
+    /// Number of periods since the log was fetched.
     since_log: u32,
-    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    /// Time at which [`Board::pend`] requested the control interrupt, ticks.
     pended: Option<u64>,
-    /// The core is stopped before the n-th instruction in the flash from here on, if set, and
-    /// [`Board::run_ticks`] returns.
+    /// If set, the core stops before the n-th instruction in the flash from here, and [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
 }
 
 impl Board {
-    /// A board that has just been powered, with this image in its flash.
+    /// Makes a board that has just been powered up, with this image in its flash.
     ///
     /// # Errors
     /// A fault of the image or of the plant's settings.
@@ -138,7 +137,7 @@ impl Board {
         chip.dc_link.source = options.dc_link_pin;
         chip.fault_pull_ohm = options.fault_pull_ohm;
         board.show_sample();
-        // The dc link is there before the first period. (A copy, so that the noise of the periods is the same.)
+        // The dc link is charged before the first period. (A copy is used, so that the noise of the periods is the same.)
         let dc_link = board.plant.clone().sample().dc_link;
         board.chip().compare(0, 0, dc_link);
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
@@ -147,50 +146,50 @@ impl Board {
         Ok(board)
     }
 
-    /// Addresses of the firmware's data; all zero of an image without the table.
+    /// Returns the addresses of the firmware's data; all zero for an image without the table.
     pub fn addresses(&self) -> Addresses {
         self.addresses.unwrap_or_default()
     }
 
-    /// The rules of the chip that the program has broken since power-on, in order.
+    /// Returns the rules of the chip that the program has broken since power-up, in order.
     pub fn violations(&self) -> &[Violation] {
         self.cpu.chip().rules.violations()
     }
 
-    /// From now on broken rules are only recorded and do not end a run.
+    /// Only records broken rules from now on, without ending a run.
     pub fn collect_violations(&mut self) {
         self.chip().rules.collecting = true;
     }
 
-    /// Telemetry of the drive after its last control interrupt with the outputs on.
+    /// Returns the telemetry of the drive after its last control interrupt with the outputs on.
     pub fn telemetry(&self) -> Telemetry {
         let mut bytes = [0; size_of::<Telemetry>()];
         self.cpu.read(self.addresses().telemetry, &mut bytes);
-        // SAFETY: 32-bit integers and floating-point numbers, of which every value is valid, and laid out as on the chip.
+        // SAFETY: 32-bit integers and floating-point numbers, for which every value is valid, with the same layout as on the chip.
         unsafe { bytes.as_ptr().cast::<Telemetry>().read_unaligned() }
     }
 
-    /// The chip.
+    /// Returns the chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()
     }
 
-    /// The last sample.
+    /// Returns the last sample.
     pub fn sample(&self) -> Sample {
         self.connection.sample
     }
 
-    /// Seconds since power-on.
+    /// Returns the seconds since power-up.
     pub fn time(&self) -> f64 {
         self.cpu.chip().now as f64 / TICKS_PER_S as f64
     }
 
-    /// The oldest control interrupt that has ended and was not asked for yet.
+    /// Returns the oldest finished control interrupt that was not fetched yet.
     pub fn next_period(&mut self) -> Option<Period> {
         self.progress.periods.pop_front()
     }
 
-    /// Resets the chip; RAM, flash and the motor stay, unless power was lost.
+    /// Resets the chip. RAM, flash and the motor keep their state, unless power was lost.
     pub fn reset(&mut self, cause: Reset) {
         let now = self.cpu.chip().now;
         self.advance_plant(now);
@@ -198,7 +197,7 @@ impl Board {
         self.resets.push((now, cause));
         if cause == Reset::Power {
             for (base, size) in memory::VOLATILE {
-                // Neither the old contents nor zeros.
+                // The RAM has neither its old contents nor zeros.
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }
         }
@@ -214,10 +213,10 @@ impl Board {
         }
     }
 
-    /// Goes on for a number of PWM periods.
+    /// Runs for a number of PWM periods.
     ///
     /// # Errors
-    /// The access, the gate signals or the fault that the model cannot go on with.
+    /// The access, the gate signals or the fault with which the model cannot continue.
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(TICKS_PER_PERIOD)?;
@@ -230,10 +229,10 @@ impl Board {
         Ok(())
     }
 
-    /// Goes on for a number of ticks of 170 MHz.
+    /// Runs for a number of ticks of 170 MHz.
     ///
     /// # Errors
-    /// The access, the gate signals or the fault that the model cannot go on with.
+    /// The access, the gate signals or the fault with which the model cannot continue.
     pub fn run_ticks(&mut self, ticks: u64) -> Result<()> {
         let end = self.cpu.chip().now + ticks;
         let (mut at, mut idle) = (self.cpu.chip().now, 0);
@@ -255,7 +254,7 @@ impl Board {
         Ok(())
     }
 
-    /// Lets due events happen.
+    /// Processes due events.
     fn events(&mut self) -> Result<()> {
         self.follow_outputs();
         self.serve_loader();

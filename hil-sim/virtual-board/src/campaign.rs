@@ -1,12 +1,12 @@
-//! A campaign of faults: thousands of them, each from a running board, each with a seed of its own.
+//! A fault campaign: thousands of faults, each injected into a running board with a seed of its own.
 //!
-//! The criterion: at every instant later than the bound of its class after the fault, outputs are off, or
-//! control is correct (angle error at most 15 degrees, phase currents below the trip); control stays correct, for
-//! example, when a bit flips that nothing depends on. In all classes a gate pattern that could short a leg is a
-//! failure, and so are more than one reset and an end without a reason in the log.
+//! The criterion: at every instant later than the bound of its class after the fault, the outputs are off, or the
+//! control is correct (angle error at most 15 degrees, phase currents below the trip). The control stays correct, for
+//! example, if a bit flips that nothing depends on. In all classes a gate pattern that could short a leg is a failure,
+//! and so are more than one reset and an end without a reason in the log.
 //!
-//! The reason is looked for in the log, which tells it first thing after a reset; one run in
-//! ten goes on until the console greets, as the design of the control takes seconds.
+//! The reason is looked for in the log, which reports it first after a reset. One run in ten continues until the
+//! greeting of the console, because the design of the control takes seconds.
 
 mod class;
 mod faults;
@@ -29,21 +29,21 @@ use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;
 
-/// One run in this number goes on after its reset until the console greets.
+/// One run in this number continues after its reset until the console greets.
 const WHOLE_STARTS: u64 = 10;
 /// Time of observation after the bound, ms.
 const AFTER_MS: f64 = 150.0;
-/// Latest fault after the snapshot, ticks: 20 ms.
+/// Latest time of the fault after the snapshot, ticks: 20 ms.
 const LATEST: u64 = 20 * 170_000;
-/// Longest time of `save`, periods.
+/// Longest duration of `save`, periods.
 const SAVE: u64 = 1200;
-/// Speeds of a campaign at speed, rpm on four poles: the carrier is off from some 800 rpm on, and a drive turns up to 3600.
+/// Speeds of a campaign at speed, rpm on four poles: the injection is off above about 800 rpm, and a drive turns up to 3600.
 const SPEEDS_RPM: RangeInclusive<f64> = 850.0..=3500.0;
 
-/// Seeds and ends of the runs of each class, by its place.
+/// Seeds and outcomes of the runs of each class, by its index.
 type Runs = BTreeMap<usize, Vec<(u64, Result<Outcome>)>>;
 
-/// Changes a board before each fault, given its class and nothing, and after it, given its description too.
+/// A change to a board before each fault, called with the class and an empty text, and after the fault, called with the description too.
 pub type Without = fn(&mut Board, &str, &str);
 
 /// The faults of a campaign.
@@ -51,25 +51,25 @@ pub type Without = fn(&mut Board, &str, &str);
 pub struct Selection {
     /// Their number.
     pub count: u64,
-    /// Seed of the first; each has the next one that is chosen.
+    /// Seed of the first fault; each following one has the next selected seed.
     pub seed: u64,
-    /// Only of the classes whose name contains this, or one of several texts with `|` between them.
+    /// Restricts the campaign to classes whose name contains this text, or one of several texts separated by `|`.
     pub class: String,
-    /// Speed of the shaft, rpm on four poles: 850 to 3500, where the observer alone gives the angle. None: the shaft is
-    /// locked without the encoder, and at 300 and 900 rpm with it.
+    /// Speed of the shaft, rpm on four poles: 850 to 3500, where the angle comes from the observer alone. None: the
+    /// shaft is locked without the encoder, and at 300 and 900 rpm with it.
     pub rpm: Option<f64>,
     /// Assignments `KEY=VALUE` to the configuration.
     pub set: Vec<String>,
-    /// The power stage that the image was built for.
+    /// The power stage for which the image was built.
     pub stage: &'static PowerStage,
-    /// All faults are injected once with each of these changes, which take protections out to see that their classes fail.
+    /// Changes that remove protections, to check that their classes then fail. All faults are injected once with each of them.
     pub without: Vec<Without>,
 }
 
-/// A campaign of faults; `open` opens the image. Gives for each change the table, or an error with the table and its failures.
+/// Runs a fault campaign; `open` opens the image. Returns for each change the table, or an error with the table and its failures.
 ///
 /// # Errors
-/// A board does not start; no class has that name.
+/// A board does not start, or no class has that name.
 pub fn run(
     open: impl Fn() -> Result<Image> + Sync,
     selection: &Selection,
@@ -98,13 +98,13 @@ pub fn run(
         let mut scene = Scene::new(open()?, stage, set, rpm)?;
         scene.board.forgive();
         loop {
-            // A seed says all: a campaign of one with the seed of a failure repeats it.
+            // The seed determines everything, so a campaign of one fault with the seed of a failure repeats it.
             let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
             let Some((change, seed)) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
             let outcome = one(&mut scene, &all[which], seed / classes, seed, without[change]);
             let outcome = outcome.and_then(|outcome| {
-                // A damaged program may break the chip's rules; one that is whole may not.
+                // A damaged program may break the chip's rules; an intact one may not.
                 let whole = !matches!(all[which].run, Run::Regulating);
                 let broken = scene.board.violations().first().filter(|_| whole);
                 broken.map_or(Ok(outcome), |broken| Err(anyhow!("{broken}")))
@@ -116,7 +116,7 @@ pub fn run(
             runs[change].entry(which).or_default().push((seed, outcome));
         }
     };
-    // Each worker starts a board of its own, which takes as long as 25 faults.
+    // Each worker starts its own board, which takes as long as 25 faults.
     let most = (count as usize * without.len() / 100).max(1);
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(most);
     std::thread::scope(|scope| {
@@ -135,7 +135,7 @@ pub fn run(
     Ok(judged.collect())
 }
 
-/// Why a run has failed, if it has.
+/// Returns the reason why a run has failed, if it has.
 fn failure(class: &Class, end: &Result<Outcome>) -> Option<String> {
     // Over-current is judged in every class.
     let bound = if class.bound.0.is_finite() { class.bound.0 } else { 0.0 };
@@ -148,7 +148,7 @@ fn failure(class: &Class, end: &Result<Outcome>) -> Option<String> {
     }
 }
 
-/// One fault.
+/// Runs one fault.
 fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> Result<Outcome> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let source = class.sources[(turn % class.sources.len() as u64) as usize];
@@ -157,7 +157,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
         Run::Regulating => {
             scene.regulating(source, turn)?;
             cut(&mut scene.board, &class.name, "");
-            // Whole periods, for the truth is compared once in each, and a part of one for the fault.
+            // First whole periods, because the true values are compared once in each, and then a part of one until the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
             let what = class.inject(&mut scene.board, &scene.target, &mut rng)?;
             cut(&mut scene.board, &class.name, &what);
@@ -178,7 +178,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
             Ok(outcome)
         }
         Run::Saving => {
-            // Each in turn, in one slot and the other.
+            // The two slots take turns.
             let slot = (turn % 2) as usize;
             let operations = operations(scene, slot)?;
             lose_power(scene, slot, turn / 2 % operations)?;
@@ -200,7 +200,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
             scene.board.went_off = None;
             scene.board.reset(Reset::Pin);
             ensure!(!scene.board.chip().tim1.outputs_on(), "outputs on after a reset");
-            // Once more while it starts.
+            // Another reset while it starts.
             scene.board.run_ticks(rng.random_range(0..LATEST))?;
             scene.board.reset(Reset::Pin);
             after_power(scene, whole_start)
@@ -208,8 +208,8 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> 
     }
 }
 
-/// Loses the power in every operation of a `save`, to each of the two slots: the old or the new set counts,
-/// and it starts with it. Gives how many operations there are.
+/// Interrupts the power in every operation of a `save`, to each of the two slots: the old or the new set must be valid,
+/// and the board must start with it. Returns the number of operations.
 ///
 /// # Errors
 /// The slot and the operation of the first failure.
@@ -228,13 +228,13 @@ pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
     Ok(counts)
 }
 
-/// The power goes in an operation of a `save`, counted from 0.
+/// Interrupts the power in an operation of a `save`, counted from 0.
 fn lose_power(scene: &mut Scene, slot: usize, operation: u64) -> Result<()> {
     scene.off(slot)?;
     let flash = &mut scene.board.chip().flash;
     flash.power_loss_at = Some(flash.operations + 1 + operation);
     scene.board.type_line("save");
-    // Not further than the reset: a start takes as long as on a chip.
+    // Only until the reset, because a start takes as long as on a chip.
     for _ in 0..SAVE / 10 {
         scene.board.run_periods(10)?;
         if !scene.board.resets.is_empty() {
@@ -244,7 +244,7 @@ fn lose_power(scene: &mut Scene, slot: usize, operation: u64) -> Result<()> {
     bail!("the power did not go")
 }
 
-/// How many operations of the flash a `save` takes.
+/// Returns the number of flash operations of a `save`.
 fn operations(scene: &mut Scene, slot: usize) -> Result<u64> {
     scene.off(slot)?;
     let before = scene.board.chip().flash.operations;
@@ -257,14 +257,14 @@ fn operations(scene: &mut Scene, slot: usize) -> Result<u64> {
     Ok(scene.board.chip().flash.operations - before)
 }
 
-/// The settings in the flash are the old ones or the new ones.
+/// Checks that the settings in the flash are the old ones or the new ones.
 fn one_set_counts(scene: &mut Scene) -> Result<()> {
     let settings = scene::saved_settings(&mut scene.board)?;
     ensure!(scene.settings.contains(&settings), "neither the old settings nor the new ones");
     Ok(())
 }
 
-/// It starts, with one of the sets, and says why it was reset.
+/// Checks that the board starts with one of the sets, and reports why it was reset.
 fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     let board = &mut scene.board;
     let reset = board.resets.last().map(|reset| reset.1).context("no reset")?;
@@ -285,7 +285,7 @@ fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     Ok(Outcome { off_ms: Some(0.0), ..Outcome::default() })
 }
 
-/// The table, and how many runs have failed.
+/// Returns the table, and the number of failed runs.
 fn table(all: &[Class], runs: &Runs) -> (String, usize) {
     let mut text = String::from(
         "| class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed |\n\
@@ -312,7 +312,7 @@ fn table(all: &[Class], runs: &Runs) -> (String, usize) {
     (text + &failures.concat(), failures.len())
 }
 
-/// The bounds and their reasons, at speed or not.
+/// Returns the bounds and their reasons, at speed or not.
 pub fn bounds(at_speed: bool) -> String {
     let row = |c: &Class| format!("{} | {:.3} | {}\n", c.name, c.bound.0, c.bound.1);
     let rows: String = Class::all(at_speed).iter().map(row).collect();

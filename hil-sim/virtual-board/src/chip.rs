@@ -1,7 +1,6 @@
 //! The chip around the core: time, registers, events.
 //!
-//! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
-//! its PLL.
+//! Time is counted in ticks of 170 MHz, the clock of core and timers after the firmware has started its PLL.
 
 mod bus;
 mod clocked;
@@ -29,93 +28,93 @@ pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
 use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 use nets::DcLinkNet;
 
-/// Longest time that the core runs on without being looked at, ticks.
+/// Longest time for which the core runs without a check, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
-/// Code that the reference inside the chip had in the factory, beside 3.0 V: 1.212 V (datasheet, typical).
+/// ADC counts of the chip's internal reference as measured in the factory, at 3.0 V: 1.212 V (datasheet, typical).
 const OWN_REFERENCE_CODE: u16 = 1655;
-/// Positions in the vector table, from the first peripheral.
+/// Positions in the vector table, counted from the first peripheral.
 const IRQ_ADC1_2: u16 = 18;
 const IRQ_USART3: u16 = 39;
 const IRQ_LPUART: u16 = 91;
-/// Exception number of the control interrupt, which is the converters'.
+/// Exception number of the control interrupt, which is that of the ADCs.
 pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 
-/// Damage inside the chip to the over-voltage protection: DAC3, comparator 1, its way to the break of TIM1. It lasts over
-/// resets.
+/// Damage inside the chip to the over-voltage protection: DAC3, comparator 1, or its connection to the break of TIM1.
+/// It persists over resets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
-    /// DAC3 gives this code whatever it is told.
+    /// DAC3 outputs these counts regardless of its data.
     Level(u16),
-    /// The comparator does not see its pin.
+    /// The comparator is not connected to its pin.
     Input,
-    /// The output of the comparator stays low, whatever its polarity.
+    /// The output of the comparator stays low, regardless of its polarity.
     Comparator,
-    /// The break sees no comparator.
+    /// The break is not connected to a comparator.
     Break,
 }
 
 defaults! {
-    /// The chip but for its core and memories; by default after power-on, with its flash erased.
+    /// The chip without its core and memories; by default after power-up, with its flash erased.
     #[derive(Clone, Debug)]
     pub struct Chip {
         /// Time, ticks.
         pub now: u64,
         /// Time up to which the core may run.
         pub deadline: u64,
-        /// The core has just been let go.
+        /// Whether the core has just been released.
         pub first: bool,
-        /// Something to be done before the core goes on.
+        /// Whether something has to be done before the core continues.
         pub attention: bool,
         /// The first access that the model does not know.
         pub unknown: Option<Unknown>,
-        /// The core executes nothing before this.
+        /// Time before which the core executes nothing.
         pub stalled_until: u64,
         /// A reset that is due.
         pub reset: Option<Reset>,
-        /// Where the core was last seen.
+        /// Last known position of the core.
         pub at: u32,
-        /// Accesses to registers since power-on.
+        /// Number of accesses to registers since power-up.
         pub accesses: u64,
-        /// Instructions of the flash since power-on.
+        /// Number of instructions from the flash since power-up.
         pub instructions: u64,
-        /// Blocks executed in CCM since they were taken, while asked for.
+        /// Blocks executed in CCM since the last fetch, if requested.
         pub blocks: Vec<Block>,
-        /// Whether blocks are kept.
+        /// Whether blocks are stored.
         pub keep_blocks: bool,
-        /// Blocks and accesses up to the compare value of a leg that was written last.
+        /// Number of blocks and accesses up to the last write of a leg's compare value.
         pub compared: (usize, u64),
         /// A function of the main loop whose calls are counted, if there is one.
         pub watched: Option<Watched>,
-        /// Whether registers that are not known read as 0.
+        /// Whether unknown registers read as 0.
         pub forgiving: bool,
         /// Rules of the chip that the program has broken.
         pub rules: Rules,
-        /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
-        /// states, prefetch and caches is expected to take.
+        /// Cycles of an instruction in the flash: 1 is the model for the tests of timing; a chip with 4 wait states,
+        /// prefetch and caches is expected to take 2 to 3.
         pub flash_cycles: u64 = 1,
-        /// The control interrupt runs, and its cycles are counted.
+        /// Whether the control interrupt runs and its cycles are counted.
         pub in_control: bool,
-        /// The emulated core is running, and its access that the memory protection denied.
+        /// Whether the emulated core is running; and its access that the memory protection denied.
         pub(crate) core_runs: bool,
         pub(crate) guard_hit: Option<u32>,
-        /// A debugger has halted the core.
+        /// State of the halt, if a debugger has halted the core.
         pub(crate) halt: Option<Halt>,
         /// Damage to the over-voltage protection.
         pub damage: Option<Damage>,
-        /// Error of the core clock, as a share, and of the reference of the converters.
+        /// Error of the core clock, as a share, and error of the reference of the ADCs.
         clock_error: f64,
         pub(crate) reference_error: f64,
-        /// Outputs came back with the core, and are looked at then.
+        /// Time at which outputs that came back with the core are checked.
         pub(crate) back_on: Option<u64>,
-        /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
+        /// System and bus clock at the last check, and the time at which the system clock rose above 80 MHz.
         system_hz: u64 = 16_000_000,
         bus_hz: u64 = 16_000_000,
         system_rose: u64,
-        /// Codes at the pins of current a, current b, dc link.
+        /// ADC counts at the pins of current a, current b, dc link.
         analog: [u16; 3],
         pub(crate) dc_link: DcLinkNet = DcLinkNet::new(power_stage::REFERENCE.dc_link_pin),
-        /// Codes that an input must be above the level of a comparator: offset of this part, and zero error of its DAC.
+        /// Counts by which an input must exceed the level of a comparator: offset of this part, and zero error of its DAC.
         pub comparator_offset: u16,
         /// Resistor from the fault input to the supply, ohm, and whether the power stage pulls the input low.
         pub(crate) fault_pull_ohm: f64 = power_stage::REFERENCE.fault_pull_ohm,
@@ -147,7 +146,7 @@ defaults! {
         pub tim2: EncoderTimer,
         /// Time base.
         pub tim5: TimeBase,
-        /// Converters of the control.
+        /// ADCs of the control.
         pub adc: Adc,
         /// ADC3 and ADC4.
         pub slow_adc: Adc = Adc::from(2),
@@ -181,10 +180,10 @@ macro_rules! keep {
 }
 
 impl Chip {
-    /// After a reset: registers at their values, flash contents and the world outside as before.
+    /// Resets the chip: registers get their reset values; flash contents and the outside world are unchanged.
     pub fn reset(&mut self, cause: Reset) {
         let mut old = std::mem::take(self);
-        // Only power-on clears the flags of resets and resets the debug support.
+        // Only power-up clears the flags of resets and resets the debug support.
         if cause == Reset::Power {
             old.rcc.flags = 0;
         } else {
@@ -203,7 +202,7 @@ impl Chip {
         self.look_at_gates();
     }
 
-    /// The core clock is off by a share, and the LSI oscillator has this frequency, Hz; 0: it stands.
+    /// Sets the error of the core clock, as a share, and the frequency of the LSI oscillator, Hz; 0 stops it.
     pub fn set_clocks(&mut self, error: f64, lsi_hz: f64) {
         self.clock_error = error;
         let ticks = self.ticks_per_s() / lsi_hz;
@@ -211,39 +210,39 @@ impl Chip {
         self.iwdg.clock = (ticks as u64).min(NEVER >> 32);
     }
 
-    /// Ticks in a second outside the chip.
+    /// Number of ticks per second outside the chip.
     pub fn ticks_per_s(&self) -> f64 {
         TICKS_PER_S as f64 * (1.0 + self.clock_error)
     }
 
-    /// The reference of the converters is off by a share: all voltages have other codes.
+    /// Sets the error of the ADCs' reference, as a share: all voltages then have other counts.
     pub fn set_reference(&mut self, error: f64) {
         self.reference_error = error;
         let code = f64::from(OWN_REFERENCE_CODE) * 3.0 / (power_stage::REFERENCE_V * (1.0 + error));
         self.adc.own_reference = code.round() as u16;
     }
 
-    /// The core locks up: to the break of TIM1, if the firmware wants that.
+    /// Locks the core up, which acts on the break of TIM1 if the firmware has enabled that.
     pub fn lock_up(&mut self) {
         if self.syscfg.get(plain::CFGR2) & plain::CLL != 0 {
             self.system_break();
         }
     }
 
-    /// A fault inside the chip pulls the breaks.
+    /// Pulls the breaks because of a fault inside the chip.
     fn system_break(&mut self) {
         self.tim1.system_break();
         self.tim8.system_break();
     }
 
-    /// Interrupt requests that are levels.
+    /// Updates level-sensitive interrupt requests.
     pub fn update_lines(&mut self) {
         self.scs.set_line(IRQ_ADC1_2, self.adc.requests());
         self.scs.set_line(IRQ_LPUART, self.lpuart.requests());
         self.scs.set_line(IRQ_USART3, self.usart3.requests());
     }
 
-    /// Time of the next event.
+    /// Returns the time of the next event.
     pub fn next_event(&self) -> u64 {
         [
             self.tim1.next_event(),
@@ -266,14 +265,14 @@ impl Chip {
         .unwrap_or(NEVER)
     }
 
-    /// Looks at the gates: whenever a pin or the timer's outputs may have changed.
+    /// Checks the gates; called whenever a pin or the timer's outputs may have changed.
     pub fn look_at_gates(&mut self) {
         self.gates.look(&self.gpio, &self.tim1, self.at, self.now);
     }
 
-    /// Lets events happen that are due by now, up to the top of the PWM counter, or to its 0 if the converters sample there,
-    /// too: the time, and whether it is the top, if it was reached, where the world outside moves on before anything later
-    /// happens.
+    /// Processes events that are due, up to the top of the PWM counter, or also to its 0 if the ADCs sample there. If
+    /// it was reached, returns the time, and whether it is the top, at which the outside world advances before anything
+    /// later happens.
     pub fn catch_up(&mut self) -> Option<(u64, bool)> {
         let now = self.now;
         self.attention = false;

@@ -1,19 +1,19 @@
-//! Cycles of instructions on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
-//! DDI0439), and the wait states of code in the flash.
+//! Cycles of instructions on a Cortex-M4F from memory without wait states (Cortex-M4 TRM, DDI0439), and the wait states
+//! of code in the flash.
 //!
-//! A static count of a block: an instruction that its IT condition skips counts as executed, an
-//! integer division as 6, and a floating-point result that the next instruction needs costs one
-//! more. An estimate: no board has confirmed it.
+//! The count of a block is static: an instruction that its IT condition skips counts as executed, an integer division
+//! as 6, and a floating-point result that the next instruction needs costs one more. It is an estimate that no board
+//! has confirmed.
 
 use induction_drive::board::WAIT_STATES;
 
-/// More cycles for a branch that is taken: the pipeline fills again.
+/// Further cycles for a branch that is taken, because the pipeline is filled again.
 pub const TAKEN: u32 = 2;
-/// Exception entry and exit, with the saving and the restoring of the floating-point registers.
+/// Exception entry and exit, including saving and restoring the floating-point registers.
 pub const ENTRY: u32 = 12 + 18;
 /// See [`ENTRY`].
 pub const EXIT: u32 = 12 + 17;
-/// More cycles for an access to a peripheral register: its bus.
+/// Further cycles for an access to a peripheral register, because of its bus.
 pub const BUS: u32 = 3;
 
 /// An executed block of instructions and its cycles.
@@ -21,7 +21,7 @@ pub const BUS: u32 = 3;
 pub struct Block {
     /// Address of its first instruction.
     pub address: u32,
-    /// Bytes.
+    /// Size in bytes.
     pub size: u32,
     /// Cycles with its last branch not taken.
     pub cycles: u32,
@@ -29,41 +29,41 @@ pub struct Block {
     pub taken: bool,
 }
 
-/// Cycles that the core waits for a block of code in the flash: [`WAIT_STATES`] for every line of 8 bytes (dual bank). An upper
-/// bound: prefetch and instruction cache hide a part.
+/// Returns the cycles that the core waits for a block of code in the flash: [`WAIT_STATES`] for every line of 8 bytes
+/// (dual bank). It is an upper bound, because prefetch and instruction cache hide a part.
 pub fn waits(address: u32, size: u32) -> u32 {
     let lines = ((address + size - 1) / 8 + 1).saturating_sub(address / 8);
     u32::from(WAIT_STATES) * lines
 }
 
-/// Cycles of blocks, with the branches that were taken.
+/// Returns the cycles of blocks, including the branches that were taken.
 pub fn of(blocks: &[Block]) -> u32 {
     blocks.iter().map(|block| block.cycles + if block.taken { TAKEN } else { 0 }).sum()
 }
 
-/// Costs of blocks of a memory, learnt when they are first executed.
+/// Costs of the blocks of a memory, computed when they are first executed.
 #[derive(Debug)]
 pub struct Costs {
     base: u32,
     of: fn(Instruction) -> u32,
-    /// By half-words of the memory: size in bytes and cost.
+    /// Size in bytes and cost, by half-words of the memory.
     blocks: Vec<(u16, u16)>,
 }
 
 impl Costs {
-    /// Costs of a memory of `size` bytes from `base` on, by the cost `of` an instruction.
+    /// Makes the costs of a memory of `size` bytes from `base`; `of` is the cost of an instruction.
     pub fn new(base: u32, size: u32, of: fn(Instruction) -> u32) -> Self {
         Self { base, of, blocks: vec![(0, 0); size as usize / 2] }
     }
 
-    /// Cost of a block that was learnt with this size.
+    /// Returns the cost of a block that was learned with this size.
     #[inline]
     pub fn known(&self, address: u32, size: u32) -> Option<u32> {
         let (known, cost) = *self.blocks.get((address.wrapping_sub(self.base) / 2) as usize)?;
         (u32::from(known) == size && size > 0).then_some(u32::from(cost))
     }
 
-    /// Counts a block.
+    /// Computes the cost of a block.
     pub fn learn(&mut self, address: u32, code: &[u8]) -> u32 {
         let cost = instructions(code).map(self.of).sum();
         if let Some(place) = self.blocks.get_mut((address.wrapping_sub(self.base) / 2) as usize) {
@@ -76,13 +76,13 @@ impl Costs {
 /// One instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// Bytes from the beginning of the block.
+    /// Offset in bytes from the beginning of the block.
     pub offset: u32,
     /// Cycles, with a branch not taken.
     pub cycles: u32,
 }
 
-/// The instructions of a block.
+/// Returns the instructions of a block.
 pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
     let mut at = 0;
     let mut before = Previous::default();
@@ -102,15 +102,15 @@ pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
     })
 }
 
-/// The properties of the last instruction that matter for the next.
+/// The properties of the last instruction that matter for the next one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Previous {
     memory: bool,
-    /// Single-precision register that it computed.
+    /// Single-precision register that the instruction computed.
     result: Option<u16>,
 }
 
-/// A load takes one cycle when it follows a load or a store.
+/// A load takes one cycle if it follows a load or a store.
 fn load(before: &mut Previous) -> u32 {
     let cycles = if before.memory { 1 } else { 2 };
     *before = Previous { memory: true, result: None };

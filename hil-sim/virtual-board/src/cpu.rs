@@ -1,9 +1,9 @@
 //! The core: Unicorn 2.1.3 as a Cortex-M4F, with the chip around it.
 //!
-//! Properties of the emulator: the mode is THUMB without MCLASS and the model is set to Cortex-M4 (with MCLASS
-//! it would be an M33). The translator knows of handler mode only after a write to the flags that follows the
-//! write to IPSR. Hooks stop the core before the instruction they are called for. The model of a register must
-//! not stop the core: it would do its access again.
+//! Properties of the emulator: the mode is THUMB without MCLASS and the model is set to Cortex-M4 (with MCLASS it would
+//! be an M33). The translator learns about handler mode only from a write to the flags that follows the write to IPSR.
+//! Hooks stop the core before the instruction for which they are called. The model of a register must not stop the
+//! core, because the core would repeat its access.
 
 mod frame;
 mod guard;
@@ -24,31 +24,31 @@ use frame::BASIC;
 
 /// Index of the Cortex-M4 among the emulator's 32-bit models.
 const CORTEX_M4: i32 = 9;
-/// Program counters from here on are EXC_RETURN.
+/// Lowest program counter that is an EXC_RETURN.
 const EXC_RETURN: u32 = 0xffff_ffe0;
 /// The reason for which the core stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// It waits for an interrupt.
+    /// The core waits for an interrupt.
     Wait,
-    /// The chip wants to be looked at: time of an event, a pended exception, a failure.
+    /// The chip needs attention: time of an event, a pended exception, a failure.
     Asked,
-    /// It branched to this EXC_RETURN.
+    /// The core branched to this EXC_RETURN.
     Return(u32),
-    /// It accessed this address, where nothing is.
+    /// The core accessed this address, at which nothing exists.
     Access(u32),
-    /// It accessed this address, which the memory protection denies.
+    /// The core accessed this address, which the memory protection denies.
     Denied(u32),
-    /// No such instruction, or a fetch from where none is.
+    /// An undefined instruction, or a fetch from an address without memory.
     Instruction,
 }
 
-/// Counting, at the price of speed.
+/// Options for counting, which cost speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counting {
-    /// Cycles of the code in CCM. Without, it takes no time.
+    /// Counts the cycles of the code in CCM. Otherwise that code takes no time.
     pub cycles: bool,
-    /// The core can be stopped at every instruction in the flash, not only where a block begins.
+    /// Allows the core to stop at every instruction in the flash, not only at the beginning of a block.
     pub every_instruction: bool,
 }
 
@@ -58,13 +58,13 @@ pub struct Cpu {
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
     guard: Option<guard::Guard>,
-    /// Set where a block has to begin anew, see [`is_stale`].
+    /// Set when a block has to begin again, see [`is_stale`].
     again: Rc<Cell<bool>>,
-    /// The hook of reads from the flash of the code.
+    /// The hook for reads from the code area of the flash.
     flash_reads: Option<UcHookId>,
 }
 
-/// State of the IT block in XPSR.
+/// The state of the IT block in XPSR.
 const IT_STATE: u32 = 0x0600_fc00;
 
 /// Registers and memories of a stopped core.
@@ -73,17 +73,17 @@ pub struct CoreState {
     memories: [(u32, Vec<u8>); 2],
 }
 
-/// Size of the pieces, bytes, that are compared before they are written: written code is translated anew.
+/// Size of the pieces, bytes, that are compared before they are written, because written code is translated again.
 const PIECE: usize = 256;
-/// After an operation of the flash the next may come within this time, ticks: 100 ms.
+/// Longest time between two operations of the flash, ticks: 100 ms.
 const WRITES: u64 = 100 * 170_000;
 /// End of the code in CCM.
 const CCM_END: u32 = memory::CCM + memory::CCM_SIZE;
-/// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
+/// Exceptions of the emulator that mean a branch to EXC_RETURN: the documented one, and a fetch from there.
 const EXCEPTION_EXIT: [u32; 2] = [8, 3];
 
 impl Cpu {
-    /// A core with this chip around it and the memory of the STM32G474RE.
+    /// Makes a core with this chip and the memory of the STM32G474RE.
     pub fn new(chip: Chip, counting: Counting) -> Result<Self, uc_error> {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, chip)?;
         uc.ctl_set_cpu_model(CORTEX_M4)?;
@@ -108,7 +108,7 @@ impl Cpu {
                 }
             }
         }
-        // CCM appears twice.
+        // CCM appears at two addresses.
         uc.mmio_map(
             u64::from(memory::CCM_ALIAS),
             memory::CCM_SIZE as usize,
@@ -124,7 +124,7 @@ impl Cpu {
         )?;
 
         let end = u64::from(memory::RAM + memory::RAM_SIZE - 1);
-        // One hook for all code: the emulator asks each hook at every block whether the block is in its range.
+        // A single hook for all code, because the emulator asks each hook at every block whether the block is in its range.
         let from = if counting.every_instruction {
             let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
             uc.add_code_hook(flash.0, flash.1, |uc, address, size| {
@@ -141,7 +141,7 @@ impl Cpu {
         let mut costs = Costs::new(memory::FLASH, flash_size, |instruction| instruction.cycles);
         let mut fast = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
         let mut last = 0;
-        // Since the last block a page was looked up, and the block that has begun is one that must begin anew.
+        // Whether a page was looked up since the last block, and whether the begun block must begin again.
         let (looked_up, again) = (Rc::new(Cell::new(false)), Rc::new(Cell::new(false)));
         let (page, stale) = (Rc::clone(&looked_up), Rc::clone(&again));
         uc.add_block_hook(from.into(), end, move |uc, address, size| {
@@ -162,7 +162,7 @@ impl Cpu {
                         uc.get_data_mut().block(address, size, cycles);
                         return;
                     }
-                    // Main loop and slow interrupts: a cycle per instruction.
+                    // Main loop and slow interrupts: one cycle per instruction.
                     let instructions = cost_of(&mut lengths, uc, address, size);
                     uc.get_data_mut().instructions(u64::from(instructions));
                     if uc.get_data().watched.is_some() {
@@ -177,7 +177,7 @@ impl Cpu {
                     let cycles = cost_of(&mut fast, uc, address, size);
                     uc.get_data_mut().block(address, size, cycles);
                 }
-                // No code of the firmware is in RAM: who executes there is lost, but time goes on.
+                // No firmware code is in RAM: a program that executes there is lost, but time continues.
                 memory::RAM.. if !stopped(uc, address) => {
                     uc.get_data_mut().instructions(u64::from(size / 2).max(1));
                 }
@@ -187,13 +187,13 @@ impl Cpu {
         let trapped = Rc::new(Cell::new(false));
         let trap = Rc::clone(&trapped);
         uc.add_intr_hook(move |uc, number| {
-            // Undefined instructions, calls of a supervisor, breakpoints.
+            // Undefined instructions, supervisor calls, breakpoints.
             trap.set(!EXCEPTION_EXIT.contains(&number));
             uc.emu_stop().ok();
         })?;
         let faulted = Rc::new(Cell::new(None));
-        // The emulator writes slowly to a page with a hook, even one of this kind, and to a page that it takes for executable. So this
-        // hook leaves RAM out, and a page becomes executable with its first fetch.
+        // The emulator writes slowly to a page with a hook, even one of this kind, and to a page that it regards as
+        // executable. This hook therefore excludes RAM, and a page becomes executable at its first fetch.
         for (from, to) in [(0, u64::from(memory::RAM - 1)), (end + 1, u64::MAX)] {
             let note = Rc::clone(&faulted);
             uc.add_mem_hook(HookType::MEM_INVALID, from, to, move |_, _, address, _, _| {
@@ -211,7 +211,7 @@ impl Cpu {
         Ok(Self { uc, faulted, trapped, again, guard: None, flash_reads: None })
     }
 
-    /// Follows the flash: reads of data from the part of the code are looked at only while it is written or has a bad word, since
+    /// Follows the flash: data reads from the code area are checked only while it is written or has a bad word, because
     /// all memory is slower meanwhile.
     ///
     /// # Errors
@@ -235,11 +235,11 @@ impl Cpu {
                 },
             )?),
         };
-        // Whether memory is looked at is decided where code is translated.
+        // The translation of code decides whether memory accesses are checked.
         self.uc.ctl_flush_tb()
     }
 
-    /// Keeps registers and memories; the flash of the code is not changed by anything.
+    /// Stores registers and memories; nothing changes the code area of the flash.
     ///
     /// # Errors
     /// An error of the emulator.
@@ -252,7 +252,7 @@ impl Cpu {
         Ok(CoreState { registers, memories })
     }
 
-    /// Goes back to a state that was kept.
+    /// Goes back to a stored state.
     ///
     /// # Errors
     /// An error of the emulator.
@@ -270,17 +270,17 @@ impl Cpu {
         self.uc.context_restore(&to.registers)
     }
 
-    /// The chip.
+    /// Returns the chip.
     pub fn chip(&self) -> &Chip {
         self.uc.get_data()
     }
 
-    /// The chip, to change it.
+    /// Returns the chip for changes.
     pub fn chip_mut(&mut self) -> &mut Chip {
         self.uc.get_data_mut()
     }
 
-    /// Runs from the program counter until something stops it.
+    /// Runs from the program counter until something stops the core.
     pub fn run(&mut self) -> Stop {
         self.faulted.set(None);
         self.trapped.set(false);
@@ -304,8 +304,8 @@ impl Cpu {
         }
         match result {
             Ok(()) if self.trapped.get() => Stop::Instruction,
-            // A jump to where no memory is, for example by a return address from the modelled page of the guard, which the
-            // emulator does not report.
+            // A jump to an address without memory, for example by a return address from the modelled page of the guard,
+            // which the emulator does not report.
             Ok(()) if self.word(pc & !3).is_none() => Stop::Instruction,
             Ok(()) if self.chip().wants_attention() => Stop::Asked,
             Ok(()) => Stop::Wait,
@@ -313,7 +313,7 @@ impl Cpu {
         }
     }
 
-    /// A register.
+    /// Returns a register.
     pub fn get(&self, register: Register) -> u32 {
         self.uc.reg_read(register).unwrap_or(0) as u32
     }
@@ -323,24 +323,24 @@ impl Cpu {
         self.uc.reg_write(register, u64::from(value)).ok();
     }
 
-    /// Reads memory, not registers; `false` where there is none.
+    /// Reads memory, but no registers; returns `false` if there is no memory.
     pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
         self.uc.mem_read(u64::from(address), bytes).is_ok()
     }
 
-    /// A byte of memory.
+    /// Returns a byte of memory.
     pub fn byte(&self, address: u32) -> Option<u8> {
         let mut byte = [0];
         self.read(address, &mut byte).then_some(byte[0])
     }
 
-    /// A word of memory.
+    /// Returns a word of memory.
     pub fn word(&self, address: u32) -> Option<u32> {
         let mut bytes = [0; 4];
         self.read(address, &mut bytes).then(|| u32::from_le_bytes(bytes))
     }
 
-    /// Writes memory, flash included; `false` where there is none.
+    /// Writes memory, including flash; returns `false` if there is no memory.
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
         let done = self.uc.mem_write(u64::from(address), bytes).is_ok();
         // Code may have been written.
@@ -349,7 +349,7 @@ impl Cpu {
         done
     }
 
-    /// Sets the registers as after a reset, stack pointer and program counter from the vector table.
+    /// Sets the registers as after a reset, with stack pointer and program counter from the vector table.
     pub fn reset(&mut self, vectors: u32) {
         use Register::{BASEPRI, CONTROL, FAULTMASK, FPSCR, PRIMASK};
         for register in BASIC[..6].iter().chain(&[CONTROL, PRIMASK, BASEPRI, FAULTMASK, FPSCR]) {
@@ -362,8 +362,8 @@ impl Cpu {
     }
 }
 
-/// Stops the core where the chip wants attention: before the block that begins here, which is met again, and
-/// then counted, when the core goes on.
+/// Stops the core if the chip needs attention: before the block that begins here, which is reached again, and then
+/// counted, when the core continues.
 #[inline(always)]
 fn stopped(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     let chip = uc.get_data_mut();
@@ -375,19 +375,19 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     stops
 }
 
-/// Whether the emulator takes the first instructions of a block for those of an IT block that has ended: it does if an access in that
-/// block, the conditional one, was the first to a page since it has forgotten its pages.
+/// Whether the emulator mistakes the first instructions of a block for those of a finished IT block. This happens if
+/// the conditional access in that block was the first one to a page since the emulator dropped its pages.
 #[cold]
 fn is_stale(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     if uc.reg_read(Register::XPSR).unwrap_or(0) as u32 & IT_STATE == 0 {
         return false;
     }
-    // An IT block has four instructions at most: one that the block lies in begins within 18 bytes before it.
+    // An IT block has at most four instructions, so one that contains the block begins within 18 bytes before it.
     let before = uc.mem_read_as_vec(u64::from(address) - 18, 18).unwrap_or_default();
     !before.chunks_exact(2).any(|code| code[1] == 0xbf && code[0] & 0xf != 0)
 }
 
-/// The same of code in the flash, which may have to wait for the flash.
+/// As above for code in the flash, which may have to wait for the flash.
 #[inline(always)]
 fn fetched(uc: &mut Unicorn<Chip>, address: u32, size: u32) -> bool {
     if uc.get_data_mut().fetch(address, size) {
@@ -397,7 +397,7 @@ fn fetched(uc: &mut Unicorn<Chip>, address: u32, size: u32) -> bool {
     stopped(uc, address)
 }
 
-/// Executes at once the rounds of a delay loop, `subs rN, #1` and `bne` to it, that begin before the next event; all but the last.
+/// Executes at once the rounds of a delay loop, `subs rN, #1` and `bne` to it, that begin before the next event; all but the last one.
 fn skip_delay(uc: &mut Unicorn<Chip>, address: u32) {
     let code = uc.mem_read_as_vec(address.into(), 4);
     if let Ok([1, subtract @ 0x38..=0x3f, 0xfd, 0xd1]) = code.as_deref() {
@@ -409,7 +409,7 @@ fn skip_delay(uc: &mut Unicorn<Chip>, address: u32) {
     }
 }
 
-/// Cycles of a block.
+/// Returns the cycles of a block.
 #[inline(always)]
 fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
     match costs.known(address, size) {

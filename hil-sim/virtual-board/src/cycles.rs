@@ -1,9 +1,9 @@
 //! Cycles of the control interrupt by block, on the longest path of whole runs: from its entry to the last compare
-//! value, and the whole interrupt; the cycles of the states that run from the flash; and those of a control period in the
-//! identification.
+//! value, and of the whole interrupt. Also the cycles of the states that run from the flash, and those of a control
+//! period in the identification.
 //!
-//! A block is a part of [`drive_core::Drive::step`]. An instruction belongs to the outermost of the functions
-//! around it, inlined ones included, that is in a block.
+//! A block is a part of [`drive_core::Drive::step`]. An instruction belongs to the outermost function around it,
+//! including inlined ones, that is in a block.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::chip::{TICKS_PER_PERIOD, Watched};
 use crate::cost::{self, BUS, TAKEN, instructions};
 use crate::{image::Image, memory, pair::Pair};
 
-/// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
+/// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match applies.
 const BLOCKS: [(&str, &str); 12] = [
     ("sensing", "drive_core::front_end chip::adc chip::encoder"),
     ("protection", "Coefficients>::protect protect::plausibility protect::lock_monitor"),
@@ -34,24 +34,24 @@ const BLOCKS: [(&str, &str); 12] = [
 ];
 /// The block of instructions outside all others: the timer.
 const REST: &str = "firmware";
-/// Exception entry with its saving of registers, waiting for the bus of the peripherals, and for the flash.
+/// Exception entry including its saving of registers, waiting for the bus of the peripherals, and waiting for the flash.
 const OVERHEAD: [&str; 3] = ["exception", "bus", "flash"];
 
 /// Core cycles in a control period.
 const PERIOD: u32 = TICKS_PER_PERIOD as u32;
-/// Most cycles of an interrupt in the states that run from the flash, a start among them: what the window watchdog allows.
+/// Largest number of cycles of an interrupt in the states that run from the flash, including a start: the limit of the window watchdog.
 const COLD: u32 = LONGEST_INTERRUPT_CYCLES;
 
-/// The function of the main loop that takes a control period into the identification.
+/// The function of the main loop that passes a control period to the identification.
 const IDENTIFICATION: &str = "induction_drive_rotor_id::online::Online::sample";
-/// Control periods in which it is watched, three seconds: the filters settle within one.
+/// Number of control periods for which it is observed, three seconds: the filters settle within one.
 const WATCHED_PERIODS: u64 = 18_000;
 
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// `sensored` or `sensorless`: the control interrupt; `identification`: a control period in the main
-    /// loop, the longest with a sample of the recursive least squares in it, the median without.
+    /// `sensored` or `sensorless`: the control interrupt. `identification`: a control period in the main loop; the
+    /// longest contains a sample of the recursive least squares, the median does not.
     pub name: &'static str,
     /// Instructions on the longest path to the last compare value.
     pub instructions: u32,
@@ -59,9 +59,9 @@ pub struct Row {
     pub cycles: u32,
     /// Median of the estimated cycles to the last compare value while the drive regulates.
     pub median: u32,
-    /// Estimated cycles of the longest interrupt, with report, trace and orders after the compare values.
+    /// Estimated cycles of the longest interrupt, including report, trace and requests after the compare values.
     pub whole: u32,
-    /// Most cycles to the last compare value in each of the ten samples of a carrier period.
+    /// Largest number of cycles to the last compare value in each of the ten samples of an injection period.
     pub by_turn: [u32; 10],
     /// Cycles by block.
     pub blocks: BTreeMap<&'static str, u32>,
@@ -69,11 +69,11 @@ pub struct Row {
     pub functions: BTreeMap<(&'static str, String), u32>,
 }
 
-/// Runs whole scenarios on the board: start, magnetising, torque steps, a reversal, the current limit, stop,
-/// with the console busy.
+/// Runs whole scenarios on the board: start, magnetising, torque steps, a reversal, the current limit, stop, with a
+/// busy console.
 ///
 /// # Errors
-/// The board cannot go on, or does not compute what the host computes; a path of a block matches no function.
+/// The board cannot continue, or its results differ from those of the host; or a path of a block matches no function.
 pub fn measure(image: impl Fn() -> Result<Image>) -> Result<Vec<Row>> {
     check_paths(&image()?)?;
     let mut rows = vec![sensored(image()?)?, sensorless(image()?)?, identification(image()?)?];
@@ -90,7 +90,7 @@ const COLD_SCENES: [(&str, &[&str], LoadMode); 4] = [
     ("learning", &["learn"], LoadMode::Locked),
     ("commissioning", &["commission"], LoadMode::Locked),
 ];
-/// Speed of the turning shaft, rpm.
+/// Speed of the rotating shaft, rpm.
 const TURNING_RPM: f64 = 900.0;
 /// Control periods after each of these lines: three seconds.
 const COLD_PERIODS: u64 = 18_000;
@@ -117,7 +117,7 @@ fn cold(image: Image, (name, lines, load): (&'static str, &[&str], LoadMode)) ->
     row(name, &board, &path, cost::ENTRY + cost::EXIT, cycles, path.cycles)
 }
 
-/// The number of a control period and its cycles to the last compare value. Periods between those that are measured count.
+/// Returns the number of a control period and its cycles to the last compare value. Periods between the measured ones count as well.
 fn in_turn(period: &Period) -> (usize, u32) {
     ((period.began / TICKS_PER_PERIOD) as usize, period.to_compares)
 }
@@ -138,7 +138,7 @@ fn check_paths(image: &Image) -> Result<()> {
     bail!("the image has no function with these paths: {}", unmatched.join(", "))
 }
 
-/// Runs the drive with the rotor time constant tracked.
+/// Runs the drive with tracking of the rotor time constant.
 fn identification(image: Image) -> Result<Row> {
     let watched = Watched::new(image.symbol(IDENTIFICATION)?);
     let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
@@ -174,14 +174,14 @@ fn sensored(image: Image) -> Result<Row> {
     regulate(&mut pair, "sensored", &["position 2", "position -1", "position 0"])
 }
 
-/// Gives the orders, a second each, and measures the run from its start to off.
+/// Sends the requests, one per second, and measures the run from its start to off.
 fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Row> {
     let mut cycles = Vec::new();
-    // Without the time before: a drive that is off is configured in as many cycles as that takes.
+    // Without the time before, because configuring a drive that is off may take any number of cycles.
     pair.board.longest = LongestPath::default();
     pair.board.longest_to_compares = LongestPath::default();
     for line in orders {
-        // Accepted, or taken as far as the limits allow.
+        // The drive accepts the request, or limits it.
         pair.say(line)?;
         pair.board.type_line("trace 500 2");
         pair.run(6000, |_, period| cycles.push(in_turn(period)))?;
@@ -195,7 +195,7 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Row>
     row(name, &pair.board, &path, cost::ENTRY, cycles, whole)
 }
 
-/// The row of a path that was entered in `entry` cycles; `all` are the cycles of all calls.
+/// Returns the row of a path that was entered in `entry` cycles; `all` holds the cycles of all calls.
 fn row(
     name: &'static str,
     board: &Board,
@@ -229,7 +229,7 @@ fn row(
         if let (true, Some(last)) = (block.taken, list.last_mut()) {
             last.cycles += TAKEN;
         }
-        // The identification is counted as if the flash had no wait states: interrupts come between.
+        // The identification is counted as if the flash had no wait states, because interrupts come in between.
         if entry > 0 && block.address < memory::CCM {
             *row.blocks.entry(OVERHEAD[2]).or_default() += cost::waits(block.address, block.size);
         }
@@ -246,10 +246,10 @@ fn row(
     Ok(row)
 }
 
-/// The block of an instruction, and the innermost function around it.
+/// Returns the block of an instruction, and the innermost function around it.
 fn block_of(image: &Image, address: u32) -> (&'static str, String) {
     let frames = image.frames(address);
-    // From the outermost inwards; what no other block claims belongs to the sequence.
+    // From the outermost function inwards; functions that no other block claims belong to the sequence.
     let (named, sequence) = BLOCKS.split_at(BLOCKS.len() - 1);
     let find = |blocks: &[(&'static str, &str)]| {
         frames.iter().rev().find_map(|frame| {
@@ -261,11 +261,11 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
     (block, frames.first().map_or_else(String::new, |frame| frame.function.clone()))
 }
 
-/// Checks the rows against these budgets of the control interrupt, cycles: to the last compare value, and whole. A state that runs
-/// from the flash may take what the window watchdog allows.
+/// Checks the rows against these budgets of the control interrupt, cycles: to the last compare value, and whole. A
+/// state that runs from the flash may take as long as the window watchdog allows.
 ///
 /// # Errors
-/// The row that is above a budget, and the budget.
+/// The row that exceeds a budget, and the budget.
 pub fn check(rows: &[Row], to_compares: u32, whole: u32) -> Result<()> {
     for row in rows {
         let name = row.name;
@@ -281,7 +281,7 @@ pub fn check(rows: &[Row], to_compares: u32, whole: u32) -> Result<()> {
     Ok(())
 }
 
-/// The rows as a table; the share is that of the whole in the control period.
+/// Returns the rows as a table; the share is that of the whole interrupt in the control period.
 pub fn table(rows: &[Row]) -> String {
     let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(OVERHEAD);
     let mut text = format!(
@@ -296,7 +296,7 @@ pub fn table(rows: &[Row]) -> String {
         let cycles = |block| row.blocks.get(block).copied().unwrap_or(0);
         text.extend(blocks().map(|block| format!("{:>17}", cycles(block))));
     }
-    text += "\n\nto the last compare value, by sample of the carrier period";
+    text += "\n\nto the last compare value, by sample of the injection period";
     for row in rows {
         let turns = row.by_turn.map(|cycles| format!("{cycles:>6}")).concat();
         text += &format!("\n{:<16}{turns}", row.name);
@@ -304,7 +304,7 @@ pub fn table(rows: &[Row]) -> String {
     text + "\n"
 }
 
-/// Cycles of every function of every block on the longest path, the largest first.
+/// Returns the cycles of every function of every block on the longest path, largest first.
 pub fn functions(row: &Row) -> String {
     let mut list: Vec<_> = row.functions.iter().collect();
     list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));

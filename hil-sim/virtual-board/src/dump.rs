@@ -4,17 +4,17 @@ use anyhow::{Context, Result};
 
 use crate::{Board, Image, Options, PowerStage};
 
-/// The time after which every start is over, control periods.
+/// Time after which every start is over, control periods.
 const STARTED: u64 = 30_000;
 
-/// The registers of a board some seconds after power-on, a line each: name, address, value, and the bits to compare, all
-/// in hexadecimal.
+/// Returns the registers of a board some seconds after power-up, one per line: name, address, value, and the bits to
+/// compare, all in hexadecimal.
 ///
 /// # Errors
 /// A failure of the board.
 pub fn lines(image: Image, stage: &'static PowerStage) -> Result<Vec<String>> {
     let mut options = Options::on(stage, &stage.config()?, 1);
-    // As a board is that nobody has confirmed: its gates are not connected.
+    // As on a board that nobody has confirmed: its gates are not connected.
     options.confirmed = false;
     let mut board = Board::new(image, options)?;
     board.run_periods(STARTED)?;
@@ -26,10 +26,10 @@ pub fn lines(image: Image, stage: &'static PowerStage) -> Result<Vec<String>> {
     Ok(registers()?.into_iter().map(line).collect())
 }
 
-/// Name, address and bits to compare of each register.
+/// Returns name, address and bits to compare of each register.
 ///
 /// # Errors
-/// A row of the table that is none.
+/// An invalid row of the table.
 pub fn registers() -> Result<Vec<(String, u32, u32)>> {
     let mut all = Vec::new();
     let rows = include_str!("dump.txt").lines().filter(|row| !row.starts_with('#'));

@@ -12,18 +12,18 @@ use crate::{memory::Region, power_stage::REFERENCE};
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 
-/// Environment variable that names the ELF.
+/// Environment variable with the path of the ELF.
 pub const ELF: &str = "INDUCTION_DRIVE_ELF";
-/// Environment variable that names the folder with the ELFs of the other boards.
+/// Environment variable with the folder that contains the ELFs of the other boards.
 const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
-/// Where `cargo firmware` puts it in the target directory, with rustup's and with Debian's compiler.
+/// Folders in the target directory in which `cargo firmware` puts the ELF, with rustup's and with Debian's compiler.
 const PLACES: [&str; 2] = ["", "debian"];
 const INSIDE: &str = "thumbv7em-none-eabihf/firmware/induction-drive";
 
 /// A segment of the flash.
 #[derive(Clone, Debug)]
 pub struct Segment {
-    /// Where it lies in the flash.
+    /// Its address in the flash.
     pub address: u32,
     /// Contents.
     pub bytes: Vec<u8>,
@@ -45,7 +45,7 @@ pub struct Image {
     lines: addr2line::Context<Slice>,
 }
 
-/// A function at an address, the innermost first where functions are inlined.
+/// A function at an address; with inlined functions, the innermost comes first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Its name with its path.
@@ -54,7 +54,7 @@ pub struct Frame {
     pub place: String,
 }
 
-/// The target directory.
+/// Returns the target directory.
 fn target() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from)
@@ -64,16 +64,16 @@ impl Image {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// The file is not there, or is no ELF for this chip.
+    /// The file does not exist, or it is not an ELF for this chip.
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
         Self::parse(bytes).with_context(|| path.display().to_string())
     }
 
-    /// The image that `cargo firmware` built last, or the one that the environment names.
+    /// Opens the image that `cargo firmware` built last, or the one that the environment names.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no image.
     pub fn built() -> Result<Self> {
         if let Some(path) = std::env::var_os(ELF) {
             return Self::open(Path::new(&path));
@@ -84,11 +84,11 @@ impl Image {
         Self::open(&newest.context("no firmware image: type `cargo firmware`")?.1)
     }
 
-    /// The image that `cargo firmware --board NAME` built last for a board, or that in the folder that the environment
-    /// names, with one folder a board. Of the reference, [`Image::built`].
+    /// Opens the image that `cargo firmware --board NAME` built last for a board, or the one in the folder that the
+    /// environment names, which has one folder per board. For the reference board it is [`Image::built`].
     ///
     /// # Errors
-    /// There is none.
+    /// There is no image.
     pub fn built_for(board: &str) -> Result<Self> {
         if board == REFERENCE.name {
             return Self::built();
@@ -99,15 +99,15 @@ impl Image {
             .with_context(|| format!("no image of {board}: type `cargo firmware --board {board}`"))
     }
 
-    /// Understands the contents of an ELF file.
+    /// Parses the contents of an ELF file.
     ///
     /// # Errors
-    /// The file is no ELF for this chip.
+    /// The contents are not an ELF for this chip.
     pub fn parse(bytes: Vec<u8>) -> Result<Self> {
         let segments = segments(&bytes)?;
         let file = object::File::parse(&*bytes)?;
         let mut symbols: Vec<_> = file.symbols().filter_map(|symbol| named(&symbol)).collect();
-        // Of several symbols at one address the largest comes last.
+        // If several symbols have one address, the largest comes last.
         symbols.sort_unstable_by_key(|symbol| (symbol.region.address, symbol.region.size));
         let endian = RunTimeEndian::Little;
         let section = |id: gimli::SectionId| -> Result<Slice> {
@@ -121,10 +121,10 @@ impl Image {
         Ok(Self { segments, symbols, lines, bytes })
     }
 
-    /// Address and size of the symbol with exactly this name, demangled and without angle brackets.
+    /// Returns address and size of the symbol with exactly this name, demangled and without angle brackets.
     ///
     /// # Errors
-    /// There is none, or more than one.
+    /// There is no such symbol, or more than one.
     pub fn symbol(&self, name: &str) -> Result<Region> {
         let mut found = self.symbols.iter().filter(|symbol| symbol.name == name);
         match (found.next(), found.next()) {
@@ -134,7 +134,7 @@ impl Image {
         }
     }
 
-    /// Words of a constant in the flash.
+    /// Returns the words of a constant in the flash.
     ///
     /// # Errors
     /// There is no such symbol, or it is not in the flash.
@@ -148,13 +148,13 @@ impl Image {
         Ok(words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect())
     }
 
-    /// Every second address of the code: an instruction begins at each or at the one before.
+    /// Returns every second address of the code: an instruction begins at each of them or at the one before.
     pub fn code(&self) -> impl Iterator<Item = u32> {
         let functions = self.symbols.iter().filter(|symbol| symbol.is_code);
         functions.flat_map(|f| (f.region.address..f.region.end()).step_by(2))
     }
 
-    /// The functions at an address of code, inlined ones first.
+    /// Returns the functions at an address of code, inlined ones first.
     pub fn frames(&self, address: u32) -> Vec<Frame> {
         let mut frames = Vec::new();
         if let Ok(mut found) = self.lines.find_frames(u64::from(address)).skip_all_loads() {
@@ -173,7 +173,7 @@ impl Image {
         frames
     }
 
-    /// Where an address of code is, for people.
+    /// Describes the position of an address of code.
     pub fn location(&self, address: u32) -> String {
         let mut text = format!("{address:#010x}");
         let above = self.symbols.partition_point(|symbol| symbol.region.address <= address);
@@ -189,11 +189,11 @@ impl Image {
     }
 }
 
-/// A symbol with a name that is not the assembler's own.
+/// Returns a symbol whose name is not the assembler's own.
 fn named<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Symbol> {
     let mangled = symbol.name().ok().filter(|name| !name.is_empty() && !name.starts_with('$'))?;
     let name = addr2line::demangle_auto(Cow::Borrowed(mangled), Some(gimli::DW_LANG_Rust));
-    // The lowest bit of a function's address says Thumb.
+    // The lowest bit of a function's address is the Thumb bit.
     let region = Region { address: symbol.address() as u32 & !1, size: symbol.size() as u32 };
     let is_code = symbol.kind() == SymbolKind::Text;
     Some(Symbol { region, name: name.replace(['<', '>'], ""), is_code })

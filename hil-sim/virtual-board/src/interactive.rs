@@ -1,5 +1,5 @@
-//! The board for people and scripts: a pseudo-terminal as its serial port, the log on the terminal, and a
-//! page with plots at the end.
+//! The board for people and scripts: a pseudo-terminal as its serial port, the log on the terminal, and a page with
+//! plots at the end.
 #![deny(clippy::use_debug)]
 
 pub mod flash_file;

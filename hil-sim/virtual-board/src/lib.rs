@@ -1,31 +1,31 @@
-//! Runs the flashed ELF on an emulated Cortex-M4F with modelled STM32G474 registers, and closes the loop
-//! with the simulated inverter, motor and sensors of `hil-sim`.
+//! Runs the flashed ELF on an emulated Cortex-M4F with modelled STM32G474 registers, and closes the loop with the
+//! simulated inverter, motor and sensors of `hil-sim`.
 //!
-//! The emulator is Unicorn, inside [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
-//! shipped links it, and its binaries are never distributed.
+//! The emulator is Unicorn, inside [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is shipped links
+//! it, and its binaries are never distributed.
 //!
 //! # Extent of the model
-//! * Registers that the firmware uses ([`periph`], [`scs`]); an access to any other fails the run with the
+//! * Registers that the firmware uses ([`periph`], [`scs`]); an access to any other register fails the run with the
 //!   address and the place in the source.
-//! * Time: an instruction in the flash takes one cycle (no wait states), one in CCM as many as
-//!   [`cost`] counts. Exceptions are taken between instructions in the flash and at the end of the
-//!   control interrupt's blocks; entry and exit take no time.
-//! * Exceptions with priorities, nesting and masks; one stack; no traps for unaligned accesses and
-//!   divisions by zero. Of the MPU a region in RAM without any access, 4 KiB at most. Bus faults are taken at once and
+//! * Time: an instruction in the flash takes one cycle (no wait states), one in CCM as many as [`cost`] counts.
+//!   Exceptions are taken between instructions in the flash and at the end of the control interrupt's blocks; entry and
+//!   exit take no time.
+//! * Exceptions with priorities, nesting and masks; one stack; no traps for unaligned accesses and divisions by zero.
+//!   The MPU is modelled with a region in RAM without any access, of 4 KiB at most. Bus faults are taken at once and
 //!   become hard faults, as in the firmware.
-//! * Oscillators and PLL are ready at once; converters, references and comparators take their time.
-//! * What the chip would drop or do wrong in silence is recorded and fails the run ([`rules`]): clocks of peripherals,
-//!   voltage range, wait states, locks, order and times of converters, busy registers, pins. A debugger can halt the core
-//!   ([`chip::debugger`]); the supply can sag ([`chip::Chip::set_supply`]).
-//! * The gates are those behind the drivers of a [`power_stage`]: levels follow from pins, timer and resistors, and are
+//! * Oscillators and PLL are ready at once; ADCs, DACs and comparators take their time.
+//! * Accesses that the chip would drop or process wrongly without an error are recorded and fail the run ([`rules`]):
+//!   clocks of peripherals, voltage range, wait states, locks, order and times of ADCs, busy registers, pins. A debugger
+//!   can halt the core ([`chip::debugger`]); the supply can sag ([`chip::Chip::set_supply`]).
+//! * The gates are those after the drivers of a [`power_stage`]: levels follow from pins, timer and resistors, and are
 //!   judged whenever one of them may change. Transients within a dead time are not modelled.
-//! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
-//!   take effect when they do, with the mean voltage of the period until then. It has no model for a bridge of which only
-//!   some legs are driven: such a bridge counts as off, which the judgement at the gates does not do.
-//! * Shunts see the mean current of the period between two tops, and after a top its slope in the zero vector; the ripple
-//!   of the other vectors is not modelled.
+//! * The motor is advanced between the tops of the PWM counter. If outputs go off between two of them, they take effect
+//!   at that time, with the mean voltage of the period until then. There is no model for a bridge of which only some
+//!   legs are driven: such a bridge counts as off at the motor, but not in the judgement at the gates.
+//! * Shunts show the mean current of the period between two tops, and after a top its slope in the zero vector; the
+//!   ripple of the other vectors is not modelled.
 
-/// A structure with the values that its fields have by default; a field without one has the default of its type.
+/// Defines a structure with default values for its fields; a field without one has the default of its type.
 macro_rules! defaults {
     (@value) => { Default::default() };
     (@value $value:expr) => { $value };

@@ -6,7 +6,7 @@ use defmt_decoder::{DecodeError, Table};
 use crate::memory::{self, Region};
 use crate::{cpu::Cpu, image::Image};
 
-/// Up-buffer 0 in the control block: after its ID and two counts.
+/// Offset of up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;
 
 /// Reads and decodes the log.
@@ -17,10 +17,10 @@ pub struct Log {
 }
 
 impl Log {
-    /// The log of an image that has one.
+    /// Returns the log of an image, if it has one.
     ///
     /// # Errors
-    /// It cannot be decoded.
+    /// The log cannot be decoded.
     pub fn find(image: &Image) -> Result<Option<Self>> {
         let Ok(Region { address: control_block, .. }) = image.symbol("_SEGGER_RTT") else {
             return Ok(None);
@@ -30,12 +30,12 @@ impl Log {
         Ok(Some(Self { table, control_block, bytes: Vec::new() }))
     }
 
-    /// Forgets the beginning of a frame.
+    /// Discards the beginning of a frame.
     pub fn forget(&mut self) {
         self.bytes.clear();
     }
 
-    /// The firmware's log since the last call.
+    /// Returns the firmware's log since the last call.
     ///
     /// # Errors
     /// The log cannot be decoded.
@@ -63,7 +63,7 @@ impl Log {
 
     fn decode(&mut self) -> Result<Vec<String>> {
         let mut lines = Vec::new();
-        // A frame ends with a zero; the rest is the beginning of one that is still being written.
+        // A frame ends with a zero; the rest is the beginning of a frame that is still being written.
         let whole = self.bytes.iter().rposition(|byte| *byte == 0).map_or(0, |end| end + 1);
         let mut decoder = self.table.new_stream_decoder();
         decoder.received(&self.bytes[..whole]);

@@ -11,17 +11,17 @@ use virtual_board::{Image, PowerStage, campaign, cycles, dump};
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
 enum Task {
-    /// Injects faults; after each, outputs go off in time or control is correct.
+    /// Injects faults and checks that after each one outputs go off in time or control is correct.
     Campaign {
         /// The ELF.
         elf: PathBuf,
         /// Number of faults.
         #[arg(default_value_t = 2000)]
         count: u64,
-        /// Seed of the first fault; each has the next one.
+        /// Seed of the first fault; each following fault has the next one.
         #[arg(default_value_t = 1)]
         seed: u64,
-        /// Only the classes whose name contains this.
+        /// Restricts the campaign to classes whose name contains this text.
         #[arg(long, default_value = "")]
         class: String,
         /// Speed of the shaft, rpm on four poles: 850 to 3500.
@@ -30,19 +30,19 @@ enum Task {
         /// An assignment KEY=VALUE to the configuration; repeatable.
         #[arg(long)]
         set: Vec<String>,
-        /// The board that the ELF was built for; it has a motor that suits it.
+        /// The board for which the ELF was built, with a motor that suits it.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
     },
-    /// Prints the registers of a board that has started, a line each: name, address, value, bits to compare.
+    /// Prints the registers of a board that has started, one per line: name, address, value, bits to compare.
     Dump {
         /// The ELF.
         elf: PathBuf,
-        /// The board that the ELF was built for.
+        /// The board for which the ELF was built.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
     },
-    /// Counts the cycles of the control interrupt; fails above its budgets.
+    /// Counts the cycles of the control interrupt; fails if they exceed the budgets.
     Cycles {
         /// The ELF.
         elf: PathBuf,

@@ -10,16 +10,16 @@ pub struct Region {
 }
 
 impl Region {
-    /// The first address behind it.
+    /// Returns the first address after it.
     pub fn end(self) -> u32 {
         self.address + self.size
     }
 }
 
-/// The kind of memory behind an address.
+/// The kind of memory at an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backing {
-    /// Read and executed; written by its controller only.
+    /// Read and executed; written only by its controller.
     Flash,
     /// Read, written and executed.
     Ram,
@@ -33,8 +33,8 @@ pub const FLASH: u32 = 0x0800_0000;
 pub const FLASH_SIZE: u32 = 512 * 1024;
 /// The second bank. It begins with the control code's copy.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
-/// The last quarter of it, which the firmware writes. It goes through the model of the flash, so that half-written words
-/// can be told from data. No code lies in it.
+/// The last quarter of the second bank, which the firmware writes. Its accesses go through the model of the flash, so
+/// that half-written words can be distinguished from data. It contains no code.
 pub const STORED: u32 = FLASH + FLASH_SIZE / 8 * 7;
 /// First address of SRAM1 and SRAM2.
 pub const RAM: u32 = 0x2000_0000;
@@ -42,23 +42,23 @@ pub const RAM: u32 = 0x2000_0000;
 pub const RAM_SIZE: u32 = 96 * 1024;
 /// CCM SRAM.
 pub const CCM: u32 = 0x1000_0000;
-/// Its other address.
+/// The other address of CCM SRAM.
 pub const CCM_ALIAS: u32 = RAM + RAM_SIZE;
 /// CCM SRAM, bytes.
 pub const CCM_SIZE: u32 = 32 * 1024;
-/// The memories that a loss of power empties: first address, bytes.
+/// The memories that a loss of power clears: first address, bytes.
 pub const VOLATILE: [(u32, u32); 2] = [(RAM, RAM_SIZE), (CCM, CCM_SIZE)];
 /// The smallest piece of memory that the emulator maps, bytes.
 pub const GUARD_PAGE: u32 = 4096;
-/// Where single bits of peripheral registers appear as words.
+/// Address at which single bits of peripheral registers appear as words.
 pub const BIT_BAND: u32 = 0x4200_0000;
-/// Peripheral registers that have such an alias.
+/// Address of the peripheral registers that have such an alias.
 pub const PERIPHERALS: u32 = 0x4000_0000;
 
 /// The system memory, with ST's boot loader.
 pub const SYSTEM: u32 = 0x1fff_0000;
 
-/// All regions but the alias of CCM: first address, bytes, kind.
+/// All regions except the alias of CCM: first address, bytes, kind.
 pub const MAP: [(u32, u32, Backing); 11] = [
     (SYSTEM, 0x7000, Backing::Flash),
     (FLASH, STORED - FLASH, Backing::Flash),
@@ -73,8 +73,8 @@ pub const MAP: [(u32, u32, Backing); 11] = [
     (0xe000_0000, 0x10_0000, Backing::Registers),
 ];
 
-/// Whether the chip has nothing at an address, so that an access is a fault of the processor. (Not:
-/// registers that exist but are not modelled.)
+/// Whether the chip has nothing at an address, so that an access is a fault of the processor. (Registers that exist but
+/// are not modelled do not count.)
 pub fn is_reserved(address: u32) -> bool {
     let inside = |base: u32, size: u32| (base..base + size).contains(&address);
     let memories = MAP.iter().any(|(base, size, _)| inside(*base, *size));

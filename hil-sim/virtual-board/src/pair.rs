@@ -1,5 +1,4 @@
-//! A board beside its shadow: the compare values of both are compared, and the shadow knows the state of the
-//! drive.
+//! A board and its shadow: the compare values of both are compared, and the shadow knows the state of the drive.
 
 use anyhow::{Result, bail};
 use drive_core::State;
@@ -8,11 +7,11 @@ use induction_drive::console::line::UNASKED;
 use crate::board::{Board, Options, Period};
 use crate::{image::Image, shadow::Shadow};
 
-/// Longest that the firmware takes from reset to its greeting, or to an answer, periods.
+/// Longest time of the firmware from reset to its greeting, or to an answer, periods.
 const LONGEST_ANSWER: u64 = 30_000;
-/// Longest that an announcement takes on the wire, periods.
+/// Longest duration of an announcement on the wire, periods.
 const QUIET: u64 = 120;
-/// Longest from a start to regulating, or from a stop to off, periods.
+/// Longest time from a start to regulating, or from a stop to off, periods.
 const LONGEST_START: u64 = 60_000;
 
 /// A board and its shadow.
@@ -24,7 +23,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// A board that has started and waits for orders.
+    /// Makes a board that has started and waits for requests.
     ///
     /// # Errors
     /// The board does not start.
@@ -36,10 +35,10 @@ impl Pair {
         Ok(pair)
     }
 
-    /// Goes on for some periods; `look` is called after each control interrupt.
+    /// Runs for some periods; `look` is called after each control interrupt.
     ///
     /// # Errors
-    /// A failure of the board; compare values that differ.
+    /// A failure of the board, or compare values that differ.
     pub fn run(&mut self, periods: u64, mut look: impl FnMut(&Self, &Period)) -> Result<()> {
         for _ in 0..periods {
             self.board.run_periods(1)?;
@@ -51,10 +50,10 @@ impl Pair {
         Ok(())
     }
 
-    /// Goes on until something is so, for `periods` at most.
+    /// Runs until a condition holds, for at most `periods`.
     ///
     /// # Errors
-    /// As [`Pair::run`]; it does not happen in time.
+    /// As [`Pair::run`]; also if the condition does not hold in time.
     pub fn until(
         &mut self,
         what: &str,
@@ -72,12 +71,12 @@ impl Pair {
         bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
     }
 
-    /// Types a line and waits for its answer: the first line that is no announcement, and what came behind it.
+    /// Types a line and waits for its answer; returns the first line that is no announcement, and the lines after it.
     ///
     /// # Errors
     /// As [`Pair::until`].
     pub fn say(&mut self, line: &str) -> Result<String> {
-        // What it was saying ends first.
+        // First the drive finishes its current output.
         self.run(QUIET, |_, _| {})?;
         self.board.take_console();
         self.board.type_line(line);
@@ -95,10 +94,10 @@ impl Pair {
         Ok(answer.trim_end().to_owned())
     }
 
-    /// Types a line that must be taken.
+    /// Types a line that the drive must accept.
     ///
     /// # Errors
-    /// As [`Pair::until`]; the answer is not `ok`.
+    /// As [`Pair::until`]; also if the answer is not `ok`.
     pub fn order(&mut self, line: &str) -> Result<()> {
         match self.say(line)?.as_str() {
             answer if answer.starts_with("ok") => Ok(()),
@@ -106,7 +105,7 @@ impl Pair {
         }
     }
 
-    /// Goes on until the drive is in this state.
+    /// Runs until the drive is in this state.
     ///
     /// # Errors
     /// As [`Pair::until`].

@@ -1,4 +1,4 @@
-//! Models of the peripherals, one file each, after RM0440. `None` is a register that is not modelled.
+//! Models of the peripherals, one file each, according to RM0440. `None` is a register that is not modelled.
 
 pub mod adc;
 pub mod analog;
@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::LazyLock;
 
-/// Time of an event that does not come, ticks.
+/// Time of an event that never comes, ticks.
 pub const NEVER: u64 = u64::MAX;
 
 /// Cause of a reset.
@@ -39,7 +39,7 @@ pub enum Reset {
     Window,
 }
 
-/// As the firmware's log names it.
+/// Named as in the firmware's log.
 impl fmt::Display for Reset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let causes = ["power-on", "reset pin", "software", "watchdog", "window watchdog"];
@@ -50,30 +50,30 @@ impl fmt::Display for Reset {
 /// The effect of a write beyond its register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// Nothing.
+    /// No further effect.
     None,
     /// Requests or events may have changed.
     Look,
-    /// A reset is asked for.
+    /// A reset is requested.
     Reset,
 }
 
-/// Offsets of registers.
+/// Defines offsets of registers.
 macro_rules! offsets {
     ($($name:ident = $offset:literal),*) => { $(pub(crate) const $name: u32 = $offset;)* };
 }
 use offsets;
 
-/// Bits of a register, each by its number.
+/// Defines bits of a register, each by its number.
 macro_rules! bits {
     ($($seen:vis $name:ident = $number:literal),*) => { $($seen const $name: u32 = 1 << $number;)* };
 }
 pub(crate) use bits;
 
-/// A register whose value is kept: offset, value, and the bits that can be written.
+/// A register that stores its value: offset, value, and the writable bits.
 type Register = (u32, u32, u32);
 
-/// All of them after a reset, by peripheral and name.
+/// All registers after a reset, by peripheral and name.
 static AT_RESET: LazyLock<BTreeMap<String, BTreeMap<String, Register>>> = LazyLock::new(|| {
     toml::from_str(include_str!("periph/registers.toml")).expect("the table of registers")
 });
@@ -83,7 +83,7 @@ static AT_RESET: LazyLock<BTreeMap<String, BTreeMap<String, Register>>> = LazyLo
 pub struct Store(Vec<Register>);
 
 impl Store {
-    /// The registers of a peripheral of `periph/registers.toml` as after reset.
+    /// Returns the registers of a peripheral of `periph/registers.toml` as after reset.
     pub fn of(peripheral: &str) -> Self {
         let mut registers: Vec<_> = AT_RESET[peripheral].values().copied().collect();
         registers.sort_unstable();
@@ -94,12 +94,12 @@ impl Store {
         self.0.binary_search_by_key(&offset, |register| register.0).ok()
     }
 
-    /// Reads one.
+    /// Reads a register.
     pub fn read(&self, offset: u32) -> Option<u32> {
         self.place(offset).map(|place| self.0[place].1)
     }
 
-    /// Writes one.
+    /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
         let place = self.place(offset)?;
         let (_, kept, mask) = &mut self.0[place];
@@ -107,7 +107,7 @@ impl Store {
         Some(Effect::None)
     }
 
-    /// Its value, or 0.
+    /// Returns the value of a register, or 0.
     pub fn get(&self, offset: u32) -> u32 {
         self.read(offset).unwrap_or(0)
     }

@@ -1,7 +1,7 @@
-//! The power stages that the chip can be mounted on: gate drivers, current sensors and dc link.
+//! The power stages on which the chip can be mounted: gate drivers, current sensors and dc link.
 //!
-//! A [`PowerStage`] is a statement about hardware with sources of its own. It is not read from the board file of the
-//! firmware: the two are independent, and the tests find where they differ.
+//! A [`PowerStage`] is a description of hardware with its own sources. It is not read from the board file of the
+//! firmware: the two are independent, and the tests find their differences.
 
 mod boards;
 pub mod bridge;
@@ -20,13 +20,14 @@ use driver::Driver;
 use shunts::Shunts;
 
 /// The six inputs of the drivers at the chip: port (0 is A) and number of the pins of the high and the low side of the
-/// legs a, b and c. ST's morpho connector for motor control, the same on all boards here: PA8, PA7; PA9, PB0; PA10, PB1.
+/// legs a, b and c. This is ST's morpho connector for motor control, which is the same on all boards here: PA8, PA7;
+/// PA9, PB0; PA10, PB1.
 pub const GATE_PINS: [[(usize, u32); 2]; 3] =
     [[(0, 8), (0, 7)], [(0, 9), (1, 0)], [(0, 10), (1, 1)]];
 /// Alternate function that connects these pins with TIM1 (datasheet).
 pub const GATE_FUNCTION: u32 = 6;
 
-/// The analog signals at the chip, by their channel of ADC1 and ADC2 alike: PA0, PC1, PC0, PA1, PC2 (datasheet).
+/// Channels of the analog signals, the same for ADC1 and ADC2: PA0, PC1, PC0, PA1, PC2 (datasheet).
 pub mod channel {
     /// Currents of a, b and c.
     pub const CURRENTS: [usize; 3] = [1, 7, 6];
@@ -36,15 +37,15 @@ pub mod channel {
     pub const HEAT_SINK: usize = 8;
 }
 
-/// Reference voltage of the converters, V: the 3.3 V supply of the Nucleo board.
+/// Reference voltage of the ADCs, V: the 3.3 V supply of the Nucleo board.
 pub const REFERENCE_V: f64 = 3.3;
-/// Codes of the converters.
+/// Number of ADC counts.
 pub const CODES: f64 = 4096.0;
 
 /// Limits of the gate signals, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GateLimits {
-    /// Shortest time in which both switches of a leg are off at a change.
+    /// Shortest time for which both switches of a leg are off at a change.
     pub dead_time_s: f64,
     /// Shortest pulse that the drivers pass on.
     pub pulse_s: f64,
@@ -55,13 +56,13 @@ pub struct GateLimits {
 pub struct Switches {
     /// Absolute maximum, drain to source or collector to emitter, V.
     pub rated_v: f64,
-    /// What a turn-off adds to the dc link, V per ampere that it switches off: the inductance of the loop over the time in which
-    /// the current falls.
+    /// Voltage that a turn-off adds to the dc link, V per ampere that is switched off: the inductance of the loop
+    /// divided by the time in which the current falls.
     pub ringing_v_per_a: f64,
 }
 
 impl Switches {
-    /// Highest voltage at a switch beside this dc link, V, with these currents of the legs or none, A.
+    /// Returns the highest voltage at a switch for this dc-link voltage, V, with these currents of the legs or none, A.
     pub fn stress_v(&self, dc_link: f64, currents: [f64; 3]) -> f64 {
         let largest = currents.into_iter().fold(0.0, |most, current| current.abs().max(most));
         dc_link + self.ringing_v_per_a * largest
@@ -71,65 +72,65 @@ impl Switches {
 /// The sensors of the phase currents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensors {
-    /// In the lines a and b, as the configuration of the plant describes them.
+    /// Sensors in the lines a and b, as the configuration of the plant describes them.
     InLine,
-    /// Below the three low sides.
+    /// Shunts below the three low sides.
     LowSide(Shunts),
 }
 
-/// What the pin of the dc link is connected to.
+/// The circuit at the pin of the dc link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DcLinkPin {
     /// A divider with this resistance, seen from the pin, and a capacitor to ground.
     Divider {
-        /// Ohm.
+        /// Resistance, ohm.
         ohm: f64,
-        /// Farad.
+        /// Capacitance, F.
         farad: f64,
     },
-    /// An amplifier or an isolated sensor drives it: a pull of the chip does not move it.
+    /// An amplifier or an isolated sensor drives the pin: a pull resistor of the chip does not change its level.
     Driven,
 }
 
 /// A power stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerStage {
-    /// Name at the command line, that of the firmware's board.
+    /// Name on the command line, which is that of the firmware's board.
     pub name: &'static str,
     /// The drivers of the gates.
     pub driver: Driver,
-    /// The signals that the switches stand.
+    /// Limits of the gate signals that the switches permit.
     pub limits: GateLimits,
-    /// The voltage that they stand.
+    /// Voltage limits of the switches.
     pub switches: Switches,
-    /// The pin of the dc link.
+    /// The circuit at the pin of the dc link.
     pub dc_link_pin: DcLinkPin,
     /// Resistor from the fault input to the supply of the chip, ohm.
     pub fault_pull_ohm: f64,
-    /// Pins, as in [`GATE_PINS`], that it ties to nets of others: they stay analog.
+    /// Pins, as in [`GATE_PINS`], that the board ties to nets of other signals: they stay analog.
     pub analog_only: &'static [(usize, u32)],
-    /// Pins of the terminal strip, as in "A8 - C0", `-` for none: contacts to ground, outputs, and its analog inputs with that
-    /// of the motor's sensor.
+    /// Pins of the terminal strip, as in "A8 - C0", with `-` for none: contacts to ground, outputs, and analog inputs
+    /// including that of the motor's sensor.
     pub terminals: [&'static str; 3],
     /// Thermistor of the heat sink.
     pub ntc: Ntc,
     /// The current sensors.
     pub sensors: Sensors,
-    /// Voltage at the dc link for each volt at the chip's pin; none as the configuration says.
+    /// Dc-link voltage per volt at the chip's pin; if none, as in the configuration.
     pub dc_link_divider: Option<f64>,
-    /// Delay of the drivers, s, and drop of a switch against the current, V; none as the configuration says.
+    /// Delay of the drivers, s, and voltage drop of a switch against the current, V; if none, as in the configuration.
     pub delay_and_drop: Option<(f64, f64)>,
-    /// A motor that suits it, by the name of its file; none is the dissertation's.
+    /// A suitable motor, by the name of its file; if none, the dissertation's motor.
     pub motor: Option<&'static str>,
-    /// Supply of the dc link, V; none as the motor's file says.
+    /// Supply voltage of the dc link, V; if none, as in the motor's file.
     pub supply_v: Option<f64>,
 }
 
 impl PowerStage {
-    /// The power stage with this name.
+    /// Returns the power stage with this name.
     ///
     /// # Errors
-    /// [`Error::Refused`] with the names of all.
+    /// [`Error::Refused`] with the names of all power stages.
     pub fn named(name: &str) -> Result<&'static Self, Error> {
         ALL.into_iter().find(|stage| stage.name == name).ok_or_else(|| {
             let names = ALL.map(|stage| stage.name).join(", ");
@@ -137,26 +138,26 @@ impl PowerStage {
         })
     }
 
-    /// The board of the firmware with this name.
+    /// Returns the board of the firmware with this name.
     pub fn board(&self) -> &'static Board {
-        // A test finds one for each power stage.
+        // A test checks that each power stage has one.
         boards_of_the_firmware::find(self.name).unwrap_or(boards_of_the_firmware::SELECTED)
     }
 
-    /// The settings that the image for this board starts with.
+    /// Returns the settings with which the image for this board starts.
     pub fn firmware_settings(&self) -> Settings {
         induction_drive::board::settings_of(self.board())
     }
 
-    /// The configuration with a motor and a dc link that suit it.
+    /// Returns the configuration with a suitable motor and dc link.
     ///
     /// # Errors
-    /// The motor's file is not there, or the voltage is out of its range.
+    /// The motor's file does not exist, or the voltage is out of its range.
     pub fn config(&self) -> Result<Config, Error> {
         Config::load(self.motor, None, &self.assignments())
     }
 
-    /// Gives a session the motor and the dc link that suit it, unless it has a motor.
+    /// Gives a session the suitable motor and dc link, unless it has a motor.
     pub fn suit(&self, input: &mut Input) {
         if input.motor.is_none() {
             input.motor = self.motor.map(str::to_owned);
@@ -164,7 +165,7 @@ impl PowerStage {
         }
     }
 
-    /// What its switches stand, V. A stage whose divider the configuration states has switches that suit it.
+    /// Returns the voltage rating of its switches, V. If the configuration states the divider of a stage, its switches suit it.
     pub fn rated_v(&self, plant: &PlantSettings) -> f64 {
         let own = MeasurementSettings::default().dc_link_v;
         let scale = self.dc_link_divider.map_or(plant.measurement.dc_link_v / own, |_| 1.0);

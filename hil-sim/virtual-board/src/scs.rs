@@ -13,7 +13,7 @@ pub const HARD_FAULT: u16 = 3;
 pub const PEND_SV: u16 = 14;
 /// See [`NMI`].
 pub const SYSTICK: u16 = 15;
-/// Exceptions with those of the peripherals.
+/// Number of exceptions, including those of the peripherals.
 const EXCEPTIONS: usize = 16 + 102;
 /// The priority of a core that runs no exception.
 pub const THREAD: i16 = 256;
@@ -24,22 +24,22 @@ pub struct SysTick {
     control: u32,
     reload: u32,
     expires: u64,
-    /// Ticks of a cycle of the core.
+    /// Ticks per cycle of the core.
     pub cycle: u64,
 }
 
 impl SysTick {
-    /// Ticks from one zero to the next.
+    /// Returns the ticks from one zero to the next.
     fn period(&self) -> u64 {
         (u64::from(self.reload) + 1) * self.cycle.max(1)
     }
 
-    /// When it next counts to zero.
+    /// Returns the time at which it next counts to zero.
     pub fn next_event(&self) -> u64 {
         if self.control & 1 != 0 { self.expires } else { u64::MAX }
     }
 
-    /// Counts; whether it asks for its exception.
+    /// Counts; returns whether it requests its exception.
     pub fn happen(&mut self, now: u64) -> bool {
         if now < self.next_event() {
             return false;
@@ -54,7 +54,7 @@ defaults! {
     /// The registers; by default after a reset, on the internal oscillator.
     #[derive(Clone, Debug)]
     pub struct Scs {
-        /// A bit for each exception: pending, enabled, asked for by its peripheral.
+        /// A bit for each exception: pending, enabled, requested by its peripheral.
         pending: u128,
         enabled: u128 = 0xffff,
         line: u128,
@@ -74,7 +74,7 @@ defaults! {
         pub mpu: Mpu,
         demcr: u32,
         dwt_control: u32,
-        /// The cycle counter is this less than time.
+        /// Difference by which the cycle counter is behind time.
         cycles_from: u64,
         cycles_held: u32,
         /// SysTick.
@@ -83,7 +83,7 @@ defaults! {
 }
 
 impl Scs {
-    /// The vector of an exception.
+    /// Returns the vector of an exception.
     pub fn vector(&self, exception: u16) -> u32 {
         self.vtor + 4 * u32::from(exception)
     }
@@ -93,7 +93,7 @@ impl Scs {
         self.pending |= 1 << exception;
     }
 
-    /// The level of a peripheral's request: pending while high and not being served.
+    /// Sets the level of a peripheral's request: the exception is pending while the level is high and it is not being served.
     pub fn set_line(&mut self, irq: u16, high: bool) {
         let exception = irq + 16;
         self.line = self.line & !(1 << exception) | u128::from(high) << exception;
@@ -107,22 +107,22 @@ impl Scs {
             1 => -3,
             NMI => -2,
             HARD_FAULT => -1,
-            // Four bits are there.
+            // Four bits are implemented.
             _ => i16::from(self.priority[usize::from(exception)] & 0xf0),
         }
     }
 
-    /// Part of a priority that decides about preemption.
+    /// Returns the part of a priority that decides about preemption.
     fn group(&self, priority: i16) -> i16 {
         if priority < 0 { priority } else { priority >> (self.grouping + 1) << (self.grouping + 1) }
     }
 
-    /// The priority that the core runs at, without its masks.
+    /// Returns the priority at which the core runs, without its masks.
     pub fn running(&self) -> i16 {
         self.active.iter().map(|e| self.group(self.priority_of(*e))).min().unwrap_or(THREAD)
     }
 
-    /// The exception that is due next with these masks.
+    /// Returns the exception that is due next with these masks.
     pub fn due(&self, primask: u32, basepri: u32) -> Option<u16> {
         let (best, priority) = self.best()?;
         let mut running = self.running();
@@ -135,27 +135,27 @@ impl Scs {
         (self.group(priority) < running).then_some(best)
     }
 
-    /// Whether something enabled is pending that only a mask keeps out; it would wake the core, whatever PRIMASK says.
+    /// Whether an enabled exception is pending that only a mask blocks; it would wake the core regardless of PRIMASK.
     pub fn wakes(&self) -> bool {
         self.best().is_some_and(|(_, priority)| self.group(priority) < self.running())
     }
 
     fn best(&self) -> Option<(u16, i16)> {
         let due = self.pending & self.enabled;
-        // Mostly none is.
+        // Usually no exception is due.
         (due.trailing_zeros() as u16..EXCEPTIONS as u16)
             .filter(|n| due >> n & 1 != 0)
             .map(|n| (n, self.priority_of(n)))
             .min_by_key(|(n, priority)| (*priority, *n))
     }
 
-    /// The core takes an exception.
+    /// Begins an exception.
     pub fn begin(&mut self, exception: u16) {
         self.pending &= !(1 << exception);
         self.active.push(exception);
     }
 
-    /// The core returns from the innermost exception.
+    /// Returns from the innermost exception.
     pub fn end(&mut self) -> Option<u16> {
         let exception = self.active.pop()?;
         if self.line >> exception & 1 != 0 {
@@ -164,18 +164,18 @@ impl Scs {
         Some(exception)
     }
 
-    /// The cycle counter.
+    /// Returns the cycle counter.
     pub fn cycles(&self, now: u64) -> u32 {
         if self.counting() { now.wrapping_sub(self.cycles_from) as u32 } else { self.cycles_held }
     }
 
-    /// Whether the memory protection denies every access to an address now.
+    /// Whether the memory protection now denies every access to an address.
     pub fn denies(&self, address: u32) -> bool {
         let inside = self.mpu.guard().is_some_and(|g| (g.address..g.end()).contains(&address));
         inside && (self.running() >= 0 || self.mpu.holds_in_faults())
     }
 
-    /// The cycle counter stood still for some ticks.
+    /// Accounts for a stop of the cycle counter for some ticks.
     pub fn stand_still(&mut self, ticks: u64) {
         self.cycles_from = self.cycles_from.wrapping_add(ticks);
     }
@@ -184,7 +184,7 @@ impl Scs {
         self.dwt_control & 1 != 0 && self.demcr & 1 << 24 != 0
     }
 
-    /// Reads a register; `None` if it is not known.
+    /// Reads a register; `None` if it is not modelled.
     pub fn read(&self, address: u32, now: u64) -> Option<u32> {
         let bits = |flags: u128| (flags >> (16 + 8 * (address & 0x7f))) as u32;
         Some(match address {
@@ -226,7 +226,7 @@ impl Scs {
         })
     }
 
-    /// Writes a register; `None` if it is not known.
+    /// Writes a register; `None` if it is not modelled.
     pub fn write(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
         // The upper of two registers clears.
         let set = |flags: &mut u128| {
@@ -290,7 +290,7 @@ impl Scs {
     }
 }
 
-/// The exception whose priority a register holds in its lowest byte.
+/// Returns the exception whose priority a register holds in its lowest byte.
 fn first_priority(address: u32) -> usize {
     let first = if address < 0xe000_ed00 { address - 0xe000_e3f0 } else { address - 0xe000_ed14 };
     first as usize

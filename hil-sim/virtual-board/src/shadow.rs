@@ -1,5 +1,5 @@
-//! The drive on the host beside the one on the board: given the same samples and commands, it must put
-//! out the same compare values.
+//! The drive on the host beside the one on the board: with the same samples and commands, it must put out the same
+//! compare values.
 
 use std::collections::VecDeque;
 
@@ -17,7 +17,7 @@ use induction_drive::{
     settings::FirmwareSettings, settings::bus::Commander, settings::keys::Key, store::FlashError,
 };
 
-/// A drive with the settings of the board, and a desk of its own.
+/// A drive with the settings of the board, and its own command arbiter.
 pub struct Shadow {
     /// The drive.
     pub drive: Drive,
@@ -27,18 +27,18 @@ pub struct Shadow {
     desk: Desk,
     orders: Orders,
     tracking: Option<Tracking>,
-    /// Rotor time constant that the main loop is about to order, s.
+    /// Rotor time constant that the main loop is about to request, s.
     tau_r: Option<f32>,
-    /// Control interrupts compared so far.
+    /// Number of control interrupts compared so far.
     pub compared: u64,
 }
 
-/// The shadow's drive as its desk sees it: commands wait until the interrupt of the board takes one.
+/// The shadow's drive as its command arbiter sees it: commands wait until the interrupt of the board takes one.
 struct Orders {
     waiting: VecDeque<Command>,
     state: State,
     periods: u32,
-    /// What the timer makes since its start.
+    /// Values that the timer uses since its start.
     timer: Timer,
     learned: Option<Learned>,
     session: Session,
@@ -77,17 +77,17 @@ impl DriveHandle for Orders {
 }
 
 impl Shadow {
-    /// The drive that the image starts with.
+    /// Makes the drive with which the image starts.
     ///
     /// # Errors
-    /// Its settings make no drive.
+    /// No drive can be made from its settings.
     pub fn new(options: &Options) -> Result<Self> {
         let settings = confirmed::settings(options)?;
         let fresh = FirmwareSettings::of(settings.board);
         Self::with(if options.confirmed { settings } else { fresh }, 0)
     }
 
-    /// The drive of a board that starts with these settings, after so many control interrupts.
+    /// Makes the drive of a board that starts with these settings, after this number of control interrupts.
     fn with(mut settings: FirmwareSettings, compared: u64) -> Result<Self> {
         let timer = Timer::of(&settings.drive.inverter);
         let session = Session::new(&settings.drive);
@@ -104,7 +104,7 @@ impl Shadow {
         })
     }
 
-    /// Its settings, with dead time and carrier that the timer makes.
+    /// Returns its settings, with the dead time and the switching frequency of the timer.
     pub fn settings(&self) -> Settings {
         let mut settings = self.firmware_settings().drive;
         let Timer { dead_time_s, carrier_khz, .. } = self.orders.timer;
@@ -112,7 +112,7 @@ impl Shadow {
         settings
     }
 
-    /// A line that was typed at the console of the board. A refused order gives the drive no command, here and there.
+    /// Processes a line that was typed at the console of the board. A refused request gives the drive no command, on the board and here.
     ///
     /// # Errors
     /// The line is invalid.
@@ -132,16 +132,16 @@ impl Shadow {
         Ok(())
     }
 
-    /// The board was reset: it has these settings, which were saved, and starts anew.
+    /// Restarts after a reset of the board, with these settings, which were saved.
     ///
     /// # Errors
-    /// They make no drive.
+    /// No drive can be made from them.
     pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
         *self = Self::with(settings, self.compared)?;
         Ok(())
     }
 
-    /// All settings, with the learned table.
+    /// Returns all settings, with the learned table.
     pub fn firmware_settings(&self) -> &FirmwareSettings {
         self.desk.settings().in_force()
     }
@@ -173,7 +173,7 @@ impl Shadow {
         (self.orders.state, self.orders.periods) = (self.drive.state(), self.compared as u32);
         self.desk.poll_drive(&mut self.orders, self.compared as u32 / 6);
         if period.took_order {
-            // The main loop looks after the tracking first; of a line, it may not have heard yet.
+            // The main loop first takes care of the tracking; it may not have received a line yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);
             let order = tracked.or_else(|| self.orders.waiting.pop_front());
             let Some(order) = order else { bail!("an order that was not given") };
@@ -182,7 +182,7 @@ impl Shadow {
                 self.tracking = Tracking::new(&self.firmware_settings().drive);
             }
         }
-        // As the firmware's main loop.
+        // As in the firmware's main loop.
         if self.drive.tracks_rotor()
             && let Some(tracking) = &mut self.tracking
         {

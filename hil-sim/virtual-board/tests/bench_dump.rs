@@ -1,11 +1,12 @@
-//! The registers of a real board, through its debug probe, beside those of the virtual one. `cargo xtask bench-dump` runs this.
+//! Compares the registers of a real board, read through its debug probe, with those of the virtual board. `cargo xtask
+//! bench-dump` runs this.
 
 use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
 use virtual_board::{Image, PowerStage, dump};
 
-/// Name, address, value, and bits to compare, from a line of the virtual board.
+/// Parses name, address, value, and bits to compare from a line of the virtual board.
 fn register(line: &str) -> Result<(&str, u32, u32, u32)> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [name, address, value, mask] = words[..] else { bail!("not a register: {line}") };
@@ -13,14 +14,14 @@ fn register(line: &str) -> Result<(&str, u32, u32, u32)> {
     Ok((name, number(address)?, number(value)?, number(mask)?))
 }
 
-/// The word that `probe-rs read b32` prints.
+/// Parses the word that `probe-rs read b32` prints.
 fn word(output: &str) -> Result<u32> {
     let word = output.split_whitespace().next_back().context("probe-rs printed nothing")?;
     let digits = word.trim_start_matches("0x");
     u32::from_str_radix(digits, 16).with_context(|| format!("probe-rs printed {output:?}"))
 }
 
-/// The difference of a register, if there is one.
+/// Returns the difference of a register, if there is one.
 fn difference(line: &str, found: u32) -> Result<Option<String>> {
     let (name, _, value, mask) = register(line)?;
     let bits = (found ^ value) & mask;
@@ -32,7 +33,7 @@ fn difference(line: &str, found: u32) -> Result<Option<String>> {
     Ok((bits != 0).then(text))
 }
 
-/// Reads without halting the core. The variables: `BOARD`, its name, and `CHIP`, as probe-rs calls it.
+/// Reads without halting the core. The variables are `BOARD`, its name, and `CHIP`, its name for probe-rs.
 #[test]
 #[ignore = "needs a board at a debug probe; cargo xtask bench-dump runs it"]
 fn every_register_of_the_board_is_that_of_the_virtual_board() -> Result<()> {

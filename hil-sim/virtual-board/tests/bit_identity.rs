@@ -7,8 +7,8 @@ use drive_settings::Carrier;
 use hil_sim::Config;
 use virtual_board::{Image, Options, Pair};
 
-/// A start, magnetising, torque steps, a reversal and a stop, sensorless: every compare value of every
-/// control interrupt is compared where it is written (see `Shadow::follow`).
+/// A start, magnetising, torque steps, a reversal and a stop, sensorless: every compare value of every control
+/// interrupt is compared where it is written (see `Shadow::follow`).
 #[test]
 fn sixty_thousand_interrupts_of_a_sensorless_run_are_the_same() -> Result<()> {
     let mut pair = common::regulating(11)?;
@@ -24,8 +24,8 @@ fn sixty_thousand_interrupts_of_a_sensorless_run_are_the_same() -> Result<()> {
     Ok(())
 }
 
-/// The same with the encoder, after settings were changed at the console: the coefficients are designed
-/// on both sides, with the same functions.
+/// The same with the encoder, after settings were changed at the console: both sides design the coefficients with the
+/// same functions.
 #[test]
 fn a_drive_that_was_configured_at_the_console_is_the_same() -> Result<()> {
     let mut config = Config::default();
@@ -46,8 +46,8 @@ fn a_drive_that_was_configured_at_the_console_is_the_same() -> Result<()> {
     Ok(())
 }
 
-/// Two and three pulses in a control period: the interrupt still comes once in it, the torque is the one asked for within 5 %,
-/// and the compare values are those of the host; the same with the currents of both zero vectors.
+/// Two and three pulses in a control period: the interrupt still comes once per period, the torque is the commanded one
+/// within 5 %, and the compare values are those of the host. This also holds with the currents of both zero vectors.
 #[test]
 fn a_drive_with_a_quiet_carrier_is_the_same() -> Result<()> {
     for (carrier_khz, seed) in [(Carrier::Khz12, 13), (Carrier::Khz18, 14)] {
@@ -91,7 +91,7 @@ fn with_pulses(pair: &mut Pair, carrier_khz: Carrier) -> Result<()> {
     pair.until_state(State::Off)
 }
 
-/// The address that the image publishes leads to the telemetry of the host's drive.
+/// The published address of the image leads to the telemetry of the host's drive.
 fn compare_telemetry(pair: &Pair) {
     let read = pair.board.telemetry();
     assert_ne!(read.rotor_freq, 0.0);

@@ -1,4 +1,4 @@
-//! The image on the board: its start, its messages, and its ends.
+//! The image on the board: its start, its messages, and the ways in which it ends.
 
 use crate::common;
 use anyhow::{Context, Result};
@@ -9,10 +9,10 @@ use virtual_board::memory;
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
-/// Periods that the firmware needs from reset to its greeting, at most.
+/// Largest number of periods that the firmware needs from reset to its greeting.
 const START: u64 = 15_000;
 
-/// Periods between two reports of the control to the console.
+/// Number of periods between two reports of the control to the console.
 const REPORT: u64 = 601;
 
 #[test]
@@ -28,8 +28,8 @@ fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
     Ok(())
 }
 
-/// A hanging core is reset by the window watchdog, which takes the outputs off; the motor is not hurt, and the
-/// next run says why it is there.
+/// The window watchdog resets a hanging core, which switches the outputs off; the motor is not harmed, and the next run
+/// reports the reason.
 #[test]
 fn a_hanging_core_is_off_within_three_periods() -> Result<()> {
     let mut pair = common::regulating(2)?;
@@ -50,22 +50,22 @@ fn a_hanging_core_is_off_within_three_periods() -> Result<()> {
     common::until_said(&mut pair.board, "last run: reset by window watchdog").map(drop)
 }
 
-/// A main loop that hangs while the control interrupt goes on: the independent watchdog is not fed.
+/// The main loop hangs while the control interrupt continues: the independent watchdog is not fed.
 #[test]
 fn a_hanging_main_loop_is_off_within_six_milliseconds() -> Result<()> {
     hang_main_loop(|at| at)
 }
 
-/// The same where no code is: time goes on there too.
+/// The same at an address without code: time continues there too.
 #[test]
 fn a_main_loop_lost_in_ram_is_off_within_six_milliseconds() -> Result<()> {
     hang_main_loop(|_| memory::RAM + memory::RAM_SIZE - 4096)
 }
 
-/// Hangs the main loop by a jump to itself at this place, given the address where the loop is.
+/// Makes the main loop hang by a jump to itself at the place that `place` computes from the address of the loop.
 fn hang_main_loop(place: impl Fn(u32) -> u32) -> Result<()> {
     let mut board = common::regulating(2)?.board;
-    // Where the main loop sleeps, or would go on.
+    // The place where the main loop sleeps, or would continue.
     let sleep = board.image.symbol("induction_drive::chip::sleep::until_interrupt")?;
     let mut at = 0;
     for _ in 0..100_000 {
@@ -87,7 +87,7 @@ fn hang_main_loop(place: impl Fn(u32) -> u32) -> Result<()> {
     Ok(())
 }
 
-/// A pull at the break pin takes the outputs off in hardware, before the firmware knows.
+/// The break pin switches the outputs off in hardware, before the firmware is informed.
 #[test]
 fn a_break_switches_off_and_is_reported() -> Result<()> {
     let mut pair = common::regulating(3)?;
@@ -95,7 +95,7 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.run(2, |_, _| {})?;
     assert_eq!(pair.shadow.drive.state(), State::Fault(drive_core::Fault::Break));
-    // The console hears of it with the next report, and says so: 0.2 s at most.
+    // The console learns of it with the next report, and says so within 0.2 s.
     pair.run(REPORT + 1200, |_, _| {})?;
     assert!(pair.board.take_console().contains("fault 20"));
     let faults = pair.say("faults")?;
@@ -103,8 +103,8 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
     Ok(())
 }
 
-/// The crystal stops: the chip takes the outputs off, and the firmware starts again from its internal
-/// oscillator and says so.
+/// If the crystal stops, the chip switches the outputs off; the firmware restarts from its internal oscillator and says
+/// so.
 #[test]
 fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     let mut pair = common::regulating(4)?;
@@ -118,8 +118,8 @@ fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     Ok(())
 }
 
-/// A timer that never triggers the converters: one look at start, no reset after the other, and the console
-/// says that the drive does not run.
+/// If a timer never triggers the ADCs, there is one check at start and no repeated reset, and the console reports that
+/// the drive does not run.
 #[test]
 fn without_the_control_interrupt_it_stays_off() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 5))?;
@@ -140,8 +140,8 @@ fn without_the_control_interrupt_it_stays_off() -> Result<()> {
     Ok(())
 }
 
-/// A bit that flips in the control's code, and one that flips in its coefficients: outputs off within
-/// 20 ms, and the next run knows why.
+/// A bit flips in the control's code, or in its coefficients: the outputs are off within 20 ms, and the next run
+/// reports the reason.
 #[test]
 fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
     let mut pair = common::regulating(6)?;
@@ -150,14 +150,14 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
         [(true, "74 code of the control"), (false, "75 coefficients of the control")]
     {
         pair.board.go_back(&running)?;
-        // The last word of the code, which is padding or never executed here; the direct current, by its value.
+        // The last word of the code, which is padding or never executed here; or the magnetising current, found by its value.
         let address = if code {
             pair.board.image.symbol("__eccm")?.address - 4
         } else {
             let region = pair.board.addresses().coefficients;
             let i_d = Some(pair.shadow.settings().i_d().to_bits());
             let mut words = (region.address..region.end()).step_by(4);
-            words.find(|at| pair.board.cpu.word(*at) == i_d).context("no direct current")?
+            words.find(|at| pair.board.cpu.word(*at) == i_d).context("no magnetising current")?
         };
         let word = pair.board.cpu.word(address).unwrap_or(0) ^ 1 << 20;
         pair.board.cpu.write(address, &word.to_le_bytes());

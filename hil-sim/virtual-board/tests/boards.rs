@@ -15,15 +15,15 @@ use virtual_board::{Board, Image, Options, Pair, PowerStage};
 
 use crate::common::until_said as said;
 
-/// Something that ends a run.
+/// An action that ends a run.
 type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
 
-/// Periods from a reset to the greeting, at most.
+/// Largest number of periods from a reset to the greeting.
 const START: u64 = 30_000;
-/// Periods between two reports of the control to the console.
+/// Number of periods between two reports of the control to the console.
 const REPORT: u64 = 601;
 
-/// A board set up for the motor that suits it, with the encoder.
+/// Returns a board that is set up for its motor, with the encoder.
 fn pair(stage: &'static PowerStage) -> Result<Pair> {
     let mut config = stage.config()?;
     config.load.mode = LoadMode::Locked;
@@ -40,7 +40,7 @@ fn start(pair: &mut Pair) -> Result<()> {
     Ok(())
 }
 
-/// Goes on for some periods, in which every gate is off, whatever the chip does.
+/// Runs for some periods and checks that every gate is off in them.
 fn off_for(board: &mut Board, periods: u64) -> Result<()> {
     for _ in 0..periods {
         assert!(!board.gates().any_on(), "{:.3} s", board.time());
@@ -50,7 +50,7 @@ fn off_for(board: &mut Board, periods: u64) -> Result<()> {
     Ok(())
 }
 
-/// The firmware's file of a board and the model of its hardware say the same, each from its own sources.
+/// The firmware's file of a board and the model of its hardware agree, each based on its own sources.
 #[test]
 fn the_firmware_and_the_power_stage_agree() {
     assert_eq!(ALL.map(|stage| stage.name), boards::NAMES);
@@ -65,7 +65,7 @@ fn the_firmware_and_the_power_stage_agree() {
         for (on_at, input) in inputs {
             assert_eq!(on_at == Level::High, input.on_at_high, "{name}");
         }
-        // The timer's dead time; single precision has seven digits.
+        // Dead time of the timer; single precision has seven digits.
         let dead_time = f64::from(board.dead_time_s.value);
         assert!(dead_time > (1.0 - 1e-6) * stage.limits.dead_time_s, "{name}: {dead_time} s");
         // Pins.
@@ -92,7 +92,7 @@ fn the_firmware_and_the_power_stage_agree() {
             stage.switches.rated_v,
             "{name}"
         );
-        // Dc link, 1 %.
+        // Dc-link voltage, 1 %.
         if let Some(divider) = stage.dc_link_divider {
             let volts = 2000.0 / CODES * REFERENCE_V * divider;
             let seen = f64::from(settings.scales.dc_link.at(2000));
@@ -115,7 +115,7 @@ fn the_firmware_and_the_power_stage_agree() {
                         );
                     }
                 }
-                // Less than 1 % of a step is left.
+                // Less than 1 % of a step remains.
                 assert!(f64::from(settle_s.value) > 4.6 * shunts.settling_s, "{name}");
             }
             _ => panic!("{name}: sensors of different kinds"),
@@ -123,7 +123,7 @@ fn the_firmware_and_the_power_stage_agree() {
     }
 }
 
-/// From power-on to the greeting and behind it, a board whose bench steps were not confirmed refuses to start, and its
+/// From power-up to the greeting and after it, a board whose bench steps were not confirmed refuses to start, and its
 /// drivers are off.
 #[test]
 fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
@@ -148,8 +148,8 @@ fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
     Ok(())
 }
 
-/// The image of each board on each other one, with the settings of that board saved and confirmed, and on a blank one: no gate is on, for
-/// the pins stay as after a reset, and the console names both boards and the ways out.
+/// The image of each board on each other board, with the settings of that board saved and confirmed, and on a blank
+/// one: no gate is on, because the pins stay as after a reset, and the console names both boards and the remedies.
 #[test]
 fn the_image_of_another_board_drives_no_gate() -> Result<()> {
     for (n, stage) in ALL.into_iter().enumerate() {
@@ -159,7 +159,7 @@ fn the_image_of_another_board_drives_no_gate() -> Result<()> {
             let mut board = Board::new(Image::built_for(of.name)?, options)?;
             off_for(&mut board, 3000)?;
             assert!(board.resets.is_empty() && board.violations().is_empty(), "{}", of.name);
-            // The messages to the user, with one foreign image for each board.
+            // The messages to the user, with one third-party image for each board.
             if of.name != ALL[(n + 1) % ALL.len()].name {
                 continue;
             }
@@ -179,7 +179,7 @@ fn the_image_of_another_board_drives_no_gate() -> Result<()> {
     Ok(())
 }
 
-/// The gates of a blank board are connected by `confirm board`, driven to off, and stay connected over a reset.
+/// `confirm board` connects the gates of a blank board and drives them to off; they stay connected over a reset.
 #[test]
 fn a_confirmation_connects_the_gates() -> Result<()> {
     for stage in ALL {
@@ -203,7 +203,7 @@ fn a_confirmation_connects_the_gates() -> Result<()> {
         board.type_line("confirm board");
         said(&mut board, "ok")?;
         assert!(connected(&mut board), "{}", stage.name);
-        // The check of the registers goes round.
+        // The check of the registers goes through all of them.
         off_for(&mut board, 1200)?;
         board.reset(Reset::Pin);
         said(&mut board, "last run: ")?;
@@ -213,8 +213,8 @@ fn a_confirmation_connects_the_gates() -> Result<()> {
     Ok(())
 }
 
-/// The check of the wiring, and steps of the torque with the encoder at 300 rpm: the motor's true torque is what the drive
-/// was asked for.
+/// The check of the wiring, and steps of the torque with the encoder at 300 rpm: the motor's true torque equals the
+/// command.
 fn torque_steps(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     let config = stage.config()?;
     pair.board.take_log()?;
@@ -242,12 +242,12 @@ fn torque_steps(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     off_for(&mut pair.board, REPORT)
 }
 
-/// A turn with the encoder and a free shaft.
+/// One revolution with the encoder and a free shaft.
 fn position_step(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     pair.board.plant.set_load(Load::Locked)?;
     pair.run(1, |_, _| {})?;
     pair.board.plant.set_load(Load::Free { torque: 0.0 })?;
-    // Magnetising turns a free shaft a little; the position counts from where it was.
+    // Magnetising turns a free shaft a little; the position counts from the initial one.
     let from = pair.board.plant.mechanical_angle();
     pair.order("start position")?;
     pair.until_state(State::Position)?;
@@ -263,7 +263,7 @@ fn position_step(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     off_for(&mut pair.board, REPORT)
 }
 
-/// Off by the fault input, by a probe that halts and lets go, by the watchdog, by a supply that fails, by the
+/// Off by the fault input, by a probe that halts and continues the core, by the watchdog, by a failing supply, by the
 /// reset pin and while another image is written: every gate is off then, and stays off.
 fn every_end_leaves_every_gate_off(pair: &mut Pair, stage: &'static PowerStage) -> Result<()> {
     pair.board.plant.set_load(Load::Locked)?;
@@ -283,7 +283,7 @@ fn every_end_leaves_every_gate_off(pair: &mut Pair, stage: &'static PowerStage) 
             assert!(!board.gates().any_on());
             board.halt(20.0)?;
             board.resume();
-            // The watchdog goes on while the core is halted, or the first interrupt notices.
+            // The watchdog runs on while the core is halted, or the first interrupt detects it.
             board.run_periods(3)
         }),
         ("watchdog", &|board| {

@@ -1,4 +1,4 @@
-//! Currents sampled in both zero vectors: less noise, the same bits on the host, and the protections see both conversions.
+//! Currents sampled in both zero vectors: less noise, the same bits as on the host, and protections that check both conversions.
 
 use crate::common;
 use std::cell::Cell;
@@ -15,13 +15,13 @@ const YES: &str = "set scales.both_zero_vectors yes";
 /// Cycles of a control interrupt.
 #[derive(Debug, Default)]
 struct Cycles {
-    /// Most to the last compare value.
+    /// Largest number up to the last compare value.
     to_compares: u32,
-    /// Mean of the whole interrupt: its longest depends on the sample in which a report or a command comes.
+    /// Mean of the whole interrupt; the longest one depends on the sample in which a report or a command comes.
     whole: f64,
 }
 
-/// A start without a sensor, torque in both directions, and a stop: the true torque is the one asked for, within 5 %.
+/// A start without a sensor, torque in both directions, and a stop: the true torque is the commanded one, within 5 %.
 fn torque(pair: &mut Pair) -> Result<Cycles> {
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
@@ -51,7 +51,7 @@ fn reading(pair: &mut Pair) -> Result<[f64; 2]> {
     let scales = pair.shadow.settings().scales;
     let line = scales.of_code(scales.current_a);
     let mut readings = Vec::new();
-    // The current of the run ends.
+    // The current of the run has decayed by then.
     pair.run(10, |_, _| {})?;
     pair.run(12_000, |_, period| readings.push(f64::from(line.at(period.sample.current_a))))?;
     let mean = |of: &dyn Fn(f64) -> f64| {
@@ -61,9 +61,9 @@ fn reading(pair: &mut Pair) -> Result<[f64; 2]> {
     Ok([middle, mean(&|r| (r - middle).powi(2)).sqrt()])
 }
 
-/// Switched on and off again at the console, with a run in each: every compare value is that of the host's drive (see
-/// `Shadow::follow`), and two conversions have the noise of one over the root of 2. (One has 5 mA and the steps of its code;
-/// the deviation of 12 000 readings is good to 0.6 %.)
+/// Switched on and off again at the console, with a run in each state: every compare value is that of the host's drive
+/// (see `Shadow::follow`), and two conversions have the noise of one divided by the root of 2. (One has 5 mA and the
+/// steps of its counts; the deviation of 12 000 readings is accurate to 0.6 %.)
 #[test]
 fn both_zero_vectors_halve_the_variance_and_the_host_computes_the_same() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 41)?;
@@ -88,7 +88,7 @@ fn both_zero_vectors_halve_the_variance_and_the_host_computes_the_same() -> Resu
     Ok(())
 }
 
-/// A board that was saved with the setting on, and regulates torque.
+/// Returns a board that was saved with the setting on, and regulates torque.
 fn regulating(seed: u64) -> Result<Pair> {
     let mut config = Config::default();
     config.measurement.both_zero_vectors = true;
@@ -119,7 +119,7 @@ fn the_analog_watchdogs_see_the_upper_zero_vector() -> Result<()> {
             sample.current_a = 4000;
         }
     }));
-    // From a top on, behind its sample: the next one is that of the upper zero vector.
+    // After the sample at a top, the next sample is that of the upper zero vector.
     let at = asked.get();
     while asked.get() == at || goes_up(&mut pair) {
         pair.board.run_ticks(100)?;
@@ -137,7 +137,7 @@ fn the_analog_watchdogs_see_the_upper_zero_vector() -> Result<()> {
     Ok(())
 }
 
-/// A trigger that one converter loses in the upper zero vector is noticed at the next top: its old code is not used again.
+/// A trigger that one ADC loses in the upper zero vector is detected at the next top: its old counts are not used again.
 #[test]
 fn a_conversion_that_is_missing_in_the_upper_zero_vector_is_noticed() -> Result<()> {
     for lost in [[1, 0], [0, 1]] {
@@ -153,7 +153,7 @@ fn a_conversion_that_is_missing_in_the_upper_zero_vector_is_noticed() -> Result<
     Ok(())
 }
 
-/// Shunts below the low sides see nothing there: their boards refuse the setting by name, and go on as before.
+/// Shunts below the low sides carry no current there: their boards refuse the setting by name, and continue as before.
 #[test]
 fn a_board_with_shunts_refuses_it() -> Result<()> {
     for stage in ALL.into_iter().filter(|stage| **stage != REFERENCE) {

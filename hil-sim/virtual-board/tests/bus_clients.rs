@@ -1,5 +1,5 @@
-//! Programs of others, unmodified, start, run, read and stop the drive over the bus of the virtual board. `cargo xtask
-//! bus` gets them and runs this.
+//! Third-party programs, unmodified, start, run, read and stop the drive over the bus of the virtual board. `cargo
+//! xtask bus` gets them and runs this.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::common::program::{command, folder};
 
-/// Frequency asked for: 5 Hz, 150 rpm of two pole pairs; and the tolerance of the speed, rpm, as a sensorless drive reaches.
+/// Commanded frequency: 5 Hz, 150 rpm with two pole pairs; and the tolerance of the speed, rpm, that a sensorless drive reaches.
 const HUNDREDTHS: &str = "500";
 const RPM: (f64, f64) = (150.0, 8.0);
 /// Time to magnetise and to run up.
@@ -20,7 +20,7 @@ const RUN_UP: Duration = Duration::from_millis(4500);
 /// The longest wait for a line of the board.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The virtual board in real time, whose bus commands.
+/// The virtual board in real time, commanded by its bus.
 struct Board {
     child: Child,
     lines: Receiver<String>,
@@ -51,7 +51,7 @@ impl Board {
         Ok(board)
     }
 
-    /// The next line with this text.
+    /// Returns the next line with this text.
     fn until(&mut self, text: &str) -> Result<String> {
         loop {
             let line = self.lines.recv_timeout(PATIENCE);
@@ -90,7 +90,7 @@ fn clients_start_run_read_and_stop_the_drive() -> Result<()> {
     Ok(())
 }
 
-/// The output of a command that must succeed.
+/// Returns the output of a command that must succeed.
 fn said(command: &mut Command) -> Result<String> {
     let output = command.output().with_context(|| format!("cannot run: {command:?}"))?;
     let [text, errors] = [output.stdout, output.stderr]
@@ -112,7 +112,7 @@ fn mbpoll(bus: &str, _: &Path) -> Result<f64> {
         said(command.args(options).arg(bus).arg("--").args(words))
     };
     ask(&["-r", "8192"], &["1"])?;
-    // The drive stops when nothing is written for two seconds: reads do not count.
+    // The drive stops if nothing is written for two seconds; reads do not count.
     for _ in 0..RUN_UP.as_millis() / 500 {
         ask(&["-r", "8192"], &["18", HUNDREDTHS])?;
         thread::sleep(Duration::from_millis(500));
@@ -176,7 +176,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
         Ok(rpm.parse()?)
     };
     let rpm = session();
-    // Asked to end, so that it gives its name in the HAL back.
+    // It is asked to end, so that it releases its name in the HAL.
     let _ = said(Command::new("kill").arg(component.id().to_string()));
     component.wait()?;
     rpm

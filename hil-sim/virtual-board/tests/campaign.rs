@@ -1,5 +1,5 @@
-//! The campaign of faults: each class that looks at a protection of its own fails without that protection, and passes with it;
-//! and the page of its results lists every class.
+//! The fault campaign: each class with a protection of its own fails without that protection, and passes with it; and
+//! the page of its results lists every class.
 
 use anyhow::{Context, Result};
 use induction_drive::monitor::register_check::control;
@@ -8,7 +8,7 @@ use virtual_board::power_stage::REFERENCE;
 use virtual_board::{Board, Image};
 
 const PAGE: &str = include_str!("../../../docs/campaign.md");
-/// `movs r0, #0; bx lr`: a function that finds nothing.
+/// `movs r0, #0; bx lr`: a function that detects nothing.
 const FINDS_NOTHING: [u8; 4] = [0x00, 0x20, 0x70, 0x47];
 const SYSCFG_CFGR2: u32 = 0x4001_001c;
 const ECCL: u32 = 1 << 3;
@@ -33,7 +33,7 @@ enum Protection {
     Flash,
 }
 
-/// A function finds nothing from now on, or it is as in the image again.
+/// Makes a function detect nothing, or restores it from the image.
 fn cut(board: &mut Board, function: &str, is_cut: bool) {
     let address = board.image.symbol(function).expect("it is in the image").address;
     let sound = board.image.segments.iter().find_map(|segment| {
@@ -44,7 +44,7 @@ fn cut(board: &mut Board, function: &str, is_cut: bool) {
     board.cpu.write(address, if is_cut { &FINDS_NOTHING } else { &sound });
 }
 
-/// The check of registers expects of one what it holds.
+/// Makes the check of registers expect the present value of a register.
 fn expect_as_it_is(board: &mut Board, address: u32) {
     let table = "induction_drive::task::check::Check::new::{closure#0}::VAR";
     let table = board.image.symbol(table).expect("it is in the image").address;
@@ -54,10 +54,10 @@ fn expect_as_it_is(board: &mut Board, address: u32) {
     }
 }
 
-/// Takes the protection of a class out, and no other.
+/// Removes the protection of a class, and no other.
 fn without(board: &mut Board, class: &str, fault: &str) {
     let (_, protection) = PROTECTED.into_iter().find(|(name, _)| *name == class).expect(class);
-    // The comparison of clocks and references; the interrupt by which an error of the flash ends the run.
+    // The comparison of clocks and references; or the interrupt by which an error of the flash ends the run.
     let sources = "induction_drive::task::sources::Sources::measure";
     cut(board, sources, protection == Protection::Sources);
     cut(board, "NonMaskableInt", protection == Protection::Flash);
@@ -73,7 +73,7 @@ fn without(board: &mut Board, class: &str, fault: &str) {
             let (_, address) = fault.split_once(" of 0x").expect("a place");
             expect_as_it_is(board, u32::from_str_radix(address, 16).expect("an address"));
         }
-        // And the break by an error of the flash.
+        // Also the break by an error of the flash.
         Protection::Flash if !fault.is_empty() => {
             let breaks = board.chip().read(SYSCFG_CFGR2, 4);
             board.chip().write(SYSCFG_CFGR2, 4, breaks & !ECCL);
@@ -85,7 +85,7 @@ fn without(board: &mut Board, class: &str, fault: &str) {
 #[test]
 fn a_class_fails_without_its_protection() -> Result<()> {
     let class = PROTECTED.map(|(name, _)| name).join("|");
-    // Four of each class: some bits matter to nothing, and without the encoder another protection finds a wrong crystal.
+    // Four of each class: some bits affect nothing, and without the encoder another protection detects a wrong crystal.
     let count = 4 * PROTECTED.len() as u64;
     let (rpm, set, stage) = (None, Vec::new(), &REFERENCE);
     let both: Vec<Without> = vec![|_, _, _| (), without];
@@ -100,7 +100,7 @@ fn a_class_fails_without_its_protection() -> Result<()> {
     Ok(())
 }
 
-/// The table of the page has a row for every class with its bound, and no other; at speed the bounds are the same.
+/// The table of the page has a row for every class with its bound, and no other rows; at speed the bounds are the same.
 #[test]
 fn the_page_lists_every_class() {
     let two = |line: &str| line.split(" | ").take(2).collect::<Vec<_>>().join(" | ");

@@ -6,12 +6,12 @@ use hil_sim::experiments::drawn_machine::{Circuit, drawn};
 use virtual_board::board::simulated;
 use virtual_board::{Board, Image, Options};
 
-/// Machines, unless the environment gives another `MACHINES`.
+/// Number of machines, unless the environment variable `MACHINES` sets another.
 const MACHINES: u64 = 2;
-/// Longest that a commissioning or a learning takes, control periods: 100 s.
+/// Longest duration of a commissioning or a saliency self-commissioning, control periods: 100 s.
 const LONGEST: u64 = 600_000;
 
-/// A board and what it says.
+/// A board and its output.
 struct Console {
     board: Board,
     said: String,
@@ -24,14 +24,14 @@ impl Console {
         let mut console =
             Self { board: Board::new(Image::built()?, options)?, said: String::new() };
         console.until("last run")?;
-        // Nothing at the start masks the interrupts for long.
+        // No action at the start masks the interrupts for long.
         console.board.run_periods(1200)?;
         let log = console.board.take_log()?;
         assert!(!log.iter().any(|line| line.starts_with("WARN")), "{log:#?}");
         Ok(console)
     }
 
-    /// Goes on until a line has come that contains a text; what was said up to its end.
+    /// Runs until a line has come that contains a text; returns the output up to the end of that line.
     fn until(&mut self, text: &str) -> Result<String> {
         for _ in 0..LONGEST / 100 {
             self.board.run_periods(100)?;
@@ -60,7 +60,7 @@ fn value(console: &mut Console, key: &str) -> Result<f64> {
     word.with_context(|| answer.clone())?.parse().with_context(|| answer.clone())
 }
 
-/// The parameters in force, as those of the inverse-Gamma circuit.
+/// Returns the parameters in force, as those of the inverse-Gamma circuit.
 fn in_force(console: &mut Console) -> Result<Circuit> {
     let mut parameters = [0.0; 5];
     for (place, key) in parameters.iter_mut().zip(["r_s", "r_r", "l_ls", "l_lr", "l_m"]) {
@@ -69,7 +69,7 @@ fn in_force(console: &mut Console) -> Result<Circuit> {
     Ok(Circuit::of(parameters))
 }
 
-/// Largest error in percent, and that of each parameter in words.
+/// Returns the largest error in percent, and the error of each parameter in words.
 fn commissioned(seed: u64) -> Result<(f64, String)> {
     let config = drawn(&Config::default(), seed);
     let mut console = Console::new(&config, seed)?;
@@ -78,7 +78,7 @@ fn commissioned(seed: u64) -> Result<(f64, String)> {
     if !sound {
         bail!("machine {seed}: {told}");
     }
-    // Saved as well: what is in force after the power was off is what was found.
+    // The settings are saved as well: after a power cycle the identified values are in force.
     console.say("accept", "\nok")?;
     console.board.reset(virtual_board::periph::Reset::Power);
     console.until("last run")?;
@@ -90,8 +90,8 @@ fn commissioned(seed: u64) -> Result<(f64, String)> {
     Ok((worst, format!("{seed}: {errors:.2?}")))
 }
 
-/// Each parameter times 0.5 to 2, shaft free; the sensors' gains are 0.5 % wrong, which the resistances carry. On the
-/// host 95 % of 500 such machines are within 1 %.
+/// Each parameter times 0.5 to 2, shaft free. The sensors' gains are 0.5 % wrong, which appears in the resistances. On
+/// the host 95 % of 500 such machines are within 1 %.
 #[test]
 fn random_machines_are_commissioned_by_the_image() {
     let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
@@ -111,7 +111,7 @@ fn random_machines_are_commissioned_by_the_image() {
     }
     worst.sort_by(f64::total_cmp);
     println!("largest errors: {worst:.2?}");
-    // All but one of twenty, and all.
+    // The limit for all but one of twenty, and the limit for all.
     let most = worst.len() - 1 - worst.len() / 20;
     assert!(worst[most] < 1.5 && worst.iter().all(|error| *error < 3.0), "{worst:?}");
 }
@@ -129,14 +129,14 @@ fn a_stop_or_a_new_setting_leaves_everything_as_it_was() -> Result<()> {
     assert!(console.say("status", "\n")?.starts_with("off"));
     let after = in_force(&mut console)?;
     assert_eq!(before.values().map(|(_, x)| x), after.values().map(|(_, x)| x));
-    // One step alone needs those before it.
+    // A single step needs the steps before it.
     let told = console.say("commission leakage", "commissioning: ended")?;
     assert!(told.contains("leakage: refused"), "{told}");
     Ok(())
 }
 
-/// The searches take most of the time of the watchdog: a host that says much must not add to it. (It reset the chip while the
-/// outputs were on.)
+/// The searches take most of the time of the watchdog, so a host that sends many lines must not add to it. (Once this
+/// reset the chip while the outputs were on.)
 #[test]
 fn a_host_that_says_much_resets_nothing() -> Result<()> {
     let mut console = Console::new(&Config::default(), 1)?;
@@ -170,7 +170,7 @@ fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
     console.say("accept", "\nok")?;
     let inertia = value(&mut console, "motor.inertia")?;
     assert!((inertia / 0.02 - 1.0).abs() < 0.05, "{inertia}");
-    // Turned by the drive, and at rest again with the outputs off.
+    // The drive has turned the shaft, which is at rest again with the outputs off.
     assert!(console.say("status", "\n")?.starts_with("off"));
     Ok(())
 }
@@ -196,7 +196,7 @@ fn the_image_identifies_the_plants_of_the_current_loop_on_request() -> Result<()
     Ok(())
 }
 
-/// The session of the manual, from the nameplate to torque; with `--nocapture` it prints what the console says.
+/// The session of the manual, from the nameplate to torque; with `--nocapture` it prints the output of the console.
 #[test]
 fn the_image_goes_from_the_nameplate_to_torque() -> Result<()> {
     let mut config = Config::default();
@@ -221,7 +221,7 @@ fn the_image_goes_from_the_nameplate_to_torque() -> Result<()> {
             // 0.707 of the 3.27 A that the sensors leave for both currents: 3/2 P L_M i_d i_q = 2.46 Nm.
             assert!(said.contains("learned: trackable from -2.4"), "{said}");
             assert!(said.contains("the range of the sensors"), "{said}");
-            // Of 14 currents, up to the limit.
+            // The duration with 14 currents, up to the limit.
             assert!(seconds < 80.0, "{seconds} s");
         }
     }

@@ -47,7 +47,7 @@ fn an_interrupt_above_a_budget_is_refused_by_its_figure() {
         refused(2650, 3701, false).is_some_and(|why| why.contains("3701 cycles, 3700 allowed"))
     );
     assert!(refused(2651, 3700, false).is_some_and(|w| w.contains("2651") && w.contains("2650")));
-    // States that run from the flash have what the window watchdog allows.
+    // States that run from the flash may take as long as the window watchdog allows.
     let most = induction_drive::board::LONGEST_INTERRUPT_CYCLES;
     assert_eq!(refused(most, most, true), None);
     assert!(refused(most, most + 1, true).is_some_and(|why| why.contains("12001")));

@@ -18,7 +18,7 @@ const TRIP_V: f64 = 400.0;
 /// The first double word of the history.
 const HISTORY: u32 = 0x0807_c000;
 
-/// A drive with encoder and brake resistor, and this dc link.
+/// Returns a drive with encoder and brake resistor, and this dc link.
 fn braked(change: impl Fn(&mut Config), more: &[&str]) -> Result<Pair> {
     let mut config = Config::default();
     config.dc_link.chopper = OHM;
@@ -26,7 +26,7 @@ fn braked(change: impl Fn(&mut Config), more: &[&str]) -> Result<Pair> {
     ordered(common::pair(&config, 41)?, more)
 }
 
-/// The same from a board that waits for orders.
+/// Sets such a drive up on a board that waits for requests.
 fn ordered(mut pair: Pair, more: &[&str]) -> Result<Pair> {
     pair.order("angle encoder")?;
     pair.order(&format!("set braking.ohm {OHM}"))?;
@@ -36,9 +36,9 @@ fn ordered(mut pair: Pair, more: &[&str]) -> Result<Pair> {
     Ok(pair)
 }
 
-/// Capacitor behind a rectifier, which takes no energy back, and twice the inertia: 296 J at 1500 rpm. With 1.93 Nm the shaft
-/// stops in 2 s; above 570 rpm it gives more than the 115 W that the copper takes, 114 J in all, of which 11 J fit into the
-/// capacitor up to 378 V.
+/// A capacitor behind a rectifier, which cannot feed energy back, and twice the inertia: 296 J at 1500 rpm. With 1.93
+/// Nm the shaft stops in 2 s. Above 570 rpm it gives more than the 115 W that the copper takes, 114 J in all, of which
+/// 11 J fit into the capacitor up to 378 V.
 #[test]
 fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     let link = |config: &mut Config| {
@@ -63,9 +63,9 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     while rpm(&pair) > 50.0 {
         pair.run(1, |_, _| {})?;
         let (v, duty) = (pair.board.plant.dc_link(), pair.board.chip().chopper_duty());
-        // The timer's pulse is what the core of the drive asks for, to half a tick.
+        // The timer's pulse equals the request of the drive's core, to half a tick.
         let asked = f64::from(pair.shadow.output.chopper);
-        assert!((duty - asked).abs() < 1e-3, "{duty} at the pin, {asked} asked for");
+        assert!((duty - asked).abs() < 1e-3, "{duty} at the pin, {asked} requested");
         (highest, most) = (highest.max(v), most.max(duty));
         burnt += duty * v * v / OHM / 6000.0;
         n += 1;
@@ -74,15 +74,15 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     println!("{:.2} s, {highest:.1} V, duty up to {most:.2}, {burnt:.0} J", n as f64 / 6000.0);
     assert_eq!(pair.shadow.drive.state(), State::Speed);
     assert!(highest < TRIP_V - 5.0, "{highest} V");
-    // Magnetic energy and slip are not in the estimate.
+    // The estimate does not include magnetic energy and slip.
     assert!(most > 0.05 && (60.0..140.0).contains(&burnt), "{most}, {burnt} J");
     Ok(())
 }
 
-/// An end of a run.
+/// An action that ends a run.
 type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
 
-/// A stiff link at 385 V, where the chopper conducts for most of the time while the drive regulates.
+/// A stiff link at 385 V, at which the chopper conducts for most of the time while the drive regulates.
 #[test]
 fn every_end_takes_the_chopper_off() -> Result<()> {
     let mut pair = braked(|_| {}, &["start torque"])?;
@@ -131,7 +131,7 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
         pair.board.set_fault_pin(true);
         pair.board.chip().set_supply(3.3);
     }
-    // A handler that ends the run: a flipped bit in the control's code, found by the main loop.
+    // A handler that ends the run: the main loop finds a flipped bit in the control's code.
     pair.board.go_back(&running)?;
     let address = pair.board.image.symbol("__eccm")?.address - 4;
     let word = pair.board.cpu.word(address).unwrap_or(0) ^ 1 << 20;
@@ -142,7 +142,7 @@ fn every_end_takes_the_chopper_off() -> Result<()> {
     Ok(())
 }
 
-/// Brakes at a stiff link of 385 V: the share of time that the chopper conducts.
+/// Brakes at a stiff link of 385 V; returns the share of time for which the chopper conducts.
 fn brakes(pair: &mut Pair) -> Result<f64> {
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
@@ -151,7 +151,7 @@ fn brakes(pair: &mut Pair) -> Result<f64> {
     Ok(pair.board.chip().chopper_duty())
 }
 
-/// A break inside the chip takes the chopper off; it comes back once the cause is gone and the drive is off.
+/// A break inside the chip switches the chopper off; it comes back after the cause is gone and the drive is off.
 #[test]
 fn the_chopper_survives_a_dip_of_the_supply() -> Result<()> {
     let dip = |pair: &mut Pair| {
@@ -171,7 +171,7 @@ fn the_chopper_survives_a_dip_of_the_supply() -> Result<()> {
     pair.order("clear")?;
     let duty = brakes(&mut pair)?;
     assert!((0.5..0.8).contains(&duty), "{duty} after a dip with the outputs on");
-    // Off alone, while the drive counts on it.
+    // Only the chopper is off, while the drive relies on it.
     pair.board.chip().tim8.system_break();
     pair.run(2, |_, _| {})?;
     assert_eq!(pair.shadow.drive.state(), State::Fault(Fault::ChopperOff));
@@ -195,7 +195,7 @@ fn without_a_resistor_a_lost_chopper_stops_nothing() -> Result<()> {
     Ok(())
 }
 
-/// A power failure has torn a word of the history: reading it at the next start is an error of the flash, and forgiven.
+/// A power failure has torn a word of the history: reading it at the next start is an error of the flash, which is tolerated.
 #[test]
 fn the_chopper_survives_a_torn_word_of_the_history() -> Result<()> {
     let mut config = Config::default();
@@ -214,8 +214,8 @@ fn the_chopper_survives_a_torn_word_of_the_history() -> Result<()> {
     Ok(())
 }
 
-/// The link begins at 50 V and is charged through 200 ohm: 94 ms of time constant. A start is refused in words until it
-/// is steady, and the relay opens when the mains are gone.
+/// The link begins at 50 V and is charged through 200 ohm with a time constant of 94 ms. A start is refused in words
+/// until the voltage is steady, and the relay opens when the mains are off.
 #[test]
 fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     let link = |config: &mut Config| {
@@ -225,7 +225,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     };
     let mut pair = braked(link, &["set supply.relay_s 0.3", "apply"])?;
     let mains = 311.0;
-    // The mains go, and the other loads empty the capacitor.
+    // The mains are switched off, and the other loads discharge the capacitor.
     pair.board.plant.set_mains(0.0)?;
     pair.until("an empty link", 60_000, |pair, _| pair.board.plant.dc_link() < 50.0)?;
     assert!(!pair.board.chip().relay_pin());
@@ -243,7 +243,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     }
     let (v, took) = (pair.board.plant.dc_link(), f64::from(n) / 6000.0);
     println!("closed after {took:.3} s at {v:.1} V");
-    // Behind 200 ohm the load of 5 W costs 3.3 V; 5 V of band and 0.3 s leave 5 / (e^3.2 - 1) V more.
+    // With 200 ohm the load of 5 W costs 3.3 V; 5 V of band and 0.3 s leave 5 / (e^3.2 - 1) V more.
     assert!(v > mains - 5.0 && took > 0.3, "{v} V after {took} s");
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
@@ -251,7 +251,7 @@ fn the_relay_closes_on_a_steady_link_and_a_start_waits_for_it() -> Result<()> {
     pair.order("stop")?;
     pair.until_state(State::Off)?;
     assert!(pair.board.chip().relay_pin(), "a stop leaves the link charged");
-    // A handler that ends the run opens it.
+    // A handler that ends the run opens the relay.
     let running = pair.board.keep()?;
     pair.board.hang();
     pair.board.run_periods(40)?;

@@ -1,4 +1,4 @@
-//! The gates behind the drivers of every board, and the shunts, with register scripts: no firmware.
+//! The gates after the drivers of every board, and the shunts, with register scripts and without firmware.
 
 use crate::common::script::*;
 use anyhow::Result;
@@ -10,7 +10,7 @@ use virtual_board::power_stage::{ALL, PowerStage, Sensors};
 
 const MIDDLE: [u32; 3] = [TOP / 2; 3];
 
-/// Ticks of a period in which a switch of a leg is on.
+/// Returns the ticks of a period in which a switch of a leg is on.
 fn on(leg: &Leg, side: usize) -> u32 {
     leg.pieces.iter().filter(|piece| piece.on[side]).map(|piece| piece.ticks).sum()
 }
@@ -19,7 +19,7 @@ fn st_boards() -> impl Iterator<Item = &'static PowerStage> {
     ALL.into_iter().filter(|stage| !stage.driver.low.on_at_high)
 }
 
-/// With the polarity of the board, the gates are off in every state but on, and there they alternate with the dead time.
+/// With the polarity of the board, the gates are off in every state but on, in which they alternate with the dead time.
 #[test]
 fn the_right_set_up_is_off_unless_it_is_on() -> Result<()> {
     for stage in ALL {
@@ -62,8 +62,8 @@ fn the_right_set_up_is_off_unless_it_is_on() -> Result<()> {
     Ok(())
 }
 
-/// A board whose low sides are on at a low level, driven active high: when the pins become the timer's, every low side
-/// goes on and the motor is shorted.
+/// A board whose low sides are on at a low level, driven active high: when the timer takes the pins over, every low
+/// side goes on and the motor is shorted.
 #[test]
 fn an_idle_level_that_is_on_shorts_the_motor_and_is_caught() -> Result<()> {
     for stage in st_boards() {
@@ -72,7 +72,7 @@ fn an_idle_level_that_is_on_shorts_the_motor_and_is_caught() -> Result<()> {
         let seen = violation(script.pins());
         let on = BadGates::OnWhileOff { leg: 0, side: 1, undefined: false };
         assert!(is(&seen, on), "{}: {seen}", stage.name);
-        // The script goes on regardless: the motor sees three low sides on.
+        // The script continues regardless: at the motor, three low sides are on.
         script.regardless = true;
         script.pins()?;
         assert_eq!(script.applied(), Compare::LOW_SIDES_ON, "{}", stage.name);
@@ -80,7 +80,7 @@ fn an_idle_level_that_is_on_shorts_the_motor_and_is_caught() -> Result<()> {
     Ok(())
 }
 
-/// A motor that turns with its flux is braked by low sides that are on, and coasts with open switches.
+/// Low sides that are on brake a motor that rotates with its flux; with open switches it coasts.
 #[test]
 fn the_short_carries_current() -> Result<()> {
     for stage in st_boards() {
@@ -95,13 +95,13 @@ fn the_short_carries_current() -> Result<()> {
             script.modify(TIM1 + CR2, 0x3f00, setup.idle)?;
             let result = script.outputs(false);
             assert_eq!(result.is_err(), setup.idle == 0, "{}", stage.name);
-            // 3 ms: the diodes have fed the current back into the dc link long since.
+            // 3 ms: the diodes have long since fed the current back into the dc link.
             script.regardless = true;
             script.wait(18 * PERIOD)?;
             currents.push(script.board.plant.phase_currents()[0].abs() / loaded);
         }
         let [off, shorted] = currents[..] else { panic!("two runs") };
-        println!("{}: of the current are left {off:.4} off, {shorted:.3} shorted", stage.name);
+        println!("{}: share of the current left: {off:.4} off, {shorted:.3} shorted", stage.name);
         assert!(off < 1e-6 && shorted > 0.2, "{}: {currents:?}", stage.name);
     }
     Ok(())
@@ -137,13 +137,13 @@ fn a_wrong_polarity_is_caught_at_the_first_pulse() -> Result<()> {
         caught(stage, 0x8, &together(0))?;
         caught(stage, 0x80, &together(1))?;
         caught(stage, 0x200, &together(2))?;
-        // Both of leg a: they alternate, but where the timer makes its dead time both are on.
+        // Both of leg a: they alternate, but during the dead time of the timer both are on.
         caught(stage, 0xa, &together(0))?;
     }
     Ok(())
 }
 
-/// A driver with an interlock does not turn the motor that is driven with the wrong polarity.
+/// A driver with an interlock does not turn the motor if it is driven with the wrong polarity.
 #[test]
 fn an_interlock_leaves_the_motor_without_voltage() -> Result<()> {
     for stage in st_boards() {
@@ -160,7 +160,7 @@ fn an_interlock_leaves_the_motor_without_voltage() -> Result<()> {
     Ok(())
 }
 
-/// Dead time: of the timer, of the driver where the timer's is shorter, of none.
+/// Dead time: of the timer, of the driver if the timer's is shorter, of none.
 #[test]
 fn the_dead_time_at_the_gates_is_the_longer_one() -> Result<()> {
     for stage in ALL {
@@ -197,7 +197,7 @@ fn the_dead_time_at_the_gates_is_the_longer_one() -> Result<()> {
 fn a_pin_that_is_released_is_where_its_resistors_hold_it() -> Result<()> {
     for stage in ALL {
         let strong = stage.driver.low.on_at_high;
-        // OSSI = 0: without MOE the timer releases the pins; the chip's pull-downs, then its pull-ups.
+        // OSSI = 0: without MOE the timer releases the pins; with the chip's pull-downs, then its pull-ups.
         for (pull, safe) in [(0, true), (2, strong), (1, strong)] {
             let mut script = Script::new(stage)?;
             let right = Setup::of(stage);
@@ -214,7 +214,7 @@ fn a_pin_that_is_released_is_where_its_resistors_hold_it() -> Result<()> {
         script.modify(GPIOA + 0x20, 0xf << 28, 2 << 28)?;
         let seen = violation(script.modify(GPIOA + MODER, 0xc000, 0x8000));
         assert!(is(&seen, BadGates::OnWhileOff { leg: 0, side: 1, undefined: true }), "{seen}");
-        // A pin that software drives to the level that switches on.
+        // A pin that software drives to the level that switches the gate on.
         let mut script = Script::new(stage)?;
         let level = if stage.driver.low.on_at_high { 1 } else { 0 };
         script.write(GPIOB + ODR, 1 - level)?;
@@ -225,23 +225,23 @@ fn a_pin_that_is_released_is_where_its_resistors_hold_it() -> Result<()> {
     Ok(())
 }
 
-/// Current that a code stands for, without the errors of gain and offset, A.
+/// Returns the current that corresponds to ADC counts, without the errors of gain and offset, A.
 fn amperes(shunts: &Shunts, code: u16) -> f64 {
     (f64::from(code) * 3.3 / 4096.0 - shunts.zero_v) / shunts.volts_per_a
 }
 
-/// Largest error of a reading, A: gain 0.4 %, offset 2 mV, five times the noise and a code.
+/// Returns the largest error of a reading, A: gain 0.4 %, offset 2 mV, five times the noise and one count.
 fn allowed(shunts: &Shunts, current: f64) -> f64 {
     let volts = 2e-3 + 5.0 * shunts.noise_v + 3.3 / 4096.0;
     0.004 * current.abs() + volts / shunts.volts_per_a.abs()
 }
 
-/// A board with shunts whose motor carries a current, with a voltage across phase a and half the duty on average.
+/// Returns a board with shunts whose motor carries a current, with a voltage across phase a and half the duty on average.
 fn loaded(stage: &'static PowerStage, volts: f64) -> Result<Script> {
     let mut script = Script::new(stage)?;
     script.bring_up(Setup::of(stage))?;
     let dc_link = script.board.plant.dc_link();
-    // The dead time and the drop of the switches take as much of every phase, against its current.
+    // The dead time and the voltage drop of the switches reduce every phase voltage equally, against its current.
     let drop = stage.delay_and_drop.map_or(0.0, |(_, drop)| drop);
     let lost = (376.0 / PERIOD as f64 * dc_link + drop) * 4.0 / 3.0;
     let volts = volts + lost.copysign(volts);
@@ -260,14 +260,14 @@ fn shunts(stage: &PowerStage) -> Shunts {
     }
 }
 
-/// Volts at a phase that make a fraction of the shunts' range.
+/// Returns the voltage at a phase that causes a fraction of the shunts' range.
 fn volts_for(stage: &PowerStage, share: f64) -> Result<f64> {
     let range = 1.5 / shunts(stage).volts_per_a.abs();
     Ok(share * range * stage.config()?.motor.r_s)
 }
 
-/// At half the duty all three shunts show the currents of the motor, whichever converter asks, and the third one in a
-/// later rank as well.
+/// At half the duty all three shunts show the currents of the motor, with either ADC, and the third shunt in a later
+/// rank as well.
 #[test]
 fn shunts_show_the_currents_while_the_low_sides_conduct() -> Result<()> {
     for stage in st_boards() {
@@ -283,7 +283,7 @@ fn shunts_show_the_currents_while_the_low_sides_conduct() -> Result<()> {
                     for (channel, code) in channels[converter as usize].iter().zip(codes) {
                         let leg = [1, 7, 6].iter().position(|known| known == channel).unwrap();
                         let (true_a, seen) = (currents[leg], amperes(&shunts, code));
-                        // In the zero vector the motor's current moves a little until a later rank.
+                        // In the zero vector the motor's current changes a little until a later rank.
                         let error = (seen - true_a).abs();
                         assert!(
                             error < allowed(&shunts, true_a) + 0.01 * true_a.abs(),
@@ -300,14 +300,14 @@ fn shunts_show_the_currents_while_the_low_sides_conduct() -> Result<()> {
     Ok(())
 }
 
-/// A low side that does not conduct at the sampling instant shows nothing: with too much duty, and in a rank so late that
-/// the high side is on.
+/// A low side that does not conduct at the sampling instant shows nothing: with too much duty, and in a rank so late
+/// that the high side is on.
 #[test]
 fn outside_the_window_a_shunt_shows_garbage() -> Result<()> {
     for stage in st_boards() {
         let shunts = shunts(stage);
-        // A current out of the motor takes the high diode while both switches are off, and the low sides go on a few ticks
-        // before the top.
+        // A current out of the motor takes the high diode while both switches are off, and the low sides go on a few
+        // ticks before the top.
         let mut script = loaded(stage, -volts_for(stage, 0.3)?)?;
         script.converters([&[1], &[7]], 3)?;
         script.compare([TOP - 380; 3])?;
@@ -317,8 +317,8 @@ fn outside_the_window_a_shunt_shows_garbage() -> Result<()> {
         println!("{}: {seen:.3} A of {current:.3} A with full duty", stage.name);
         assert!(current < -0.1 && seen.abs() < 0.1 * current.abs() + allowed(&shunts, 0.0));
 
-        // Sampling of 640.5 clocks: a rank ends 15 us after the one before, the fourth 46 us after the top, where the high
-        // side of a leg with half the duty is on.
+        // Sampling of 640.5 clocks: a rank ends 15 us after the one before, the fourth 46 us after the top, when the
+        // high side of a leg with half the duty is on.
         let mut script = loaded(stage, volts_for(stage, 0.2)?)?;
         script.write(TIM1 + 0x40, TOP - 2562)?;
         script.converters([&[6, 7, 6, 1], &[6, 7, 6, 7]], 7)?;
@@ -335,7 +335,7 @@ fn outside_the_window_a_shunt_shows_garbage() -> Result<()> {
     Ok(())
 }
 
-/// Between the settled reading and none lies the time constant of the amplifier: the sampling instant moves towards the
+/// Between a settled reading and none lies the time constant of the amplifier: the sampling instant moves towards the
 /// beginning of the low side's pulse, and the reading follows 1 - exp(-t / tau).
 #[test]
 fn a_reading_settles_with_the_time_constant() -> Result<()> {
@@ -345,7 +345,7 @@ fn a_reading_settles_with_the_time_constant() -> Result<()> {
         for settled_us in [0.3, 0.6, 1.2, 4.0] {
             let mut script = loaded(stage, -volts_for(stage, 0.3)?)?;
             let currents = script.board.plant.phase_currents();
-            // The low side of leg a goes on at top - compare_a before the top, later by the dead time and the driver.
+            // The low side of leg a goes on at top - compare_a before the top, delayed by the dead time and the driver.
             let compare = u32::from(script.applied().a);
             let on = f64::from(TOP - compare) - 376.0 - delay * 170e6;
             let before_top = on - settled_us * 170.0;
@@ -355,7 +355,7 @@ fn a_reading_settles_with_the_time_constant() -> Result<()> {
             let seen = amperes(&shunts, script.results(0, 1)[0]);
             let expected = currents[0] * (1.0 - (-settled_us * 1e-6 / shunts.settling_s).exp());
             println!("{}: {settled_us} us: {seen:.3} A, expected {expected:.3}", stage.name);
-            // A tick moves the reading by 1.5 %.
+            // A tick changes the reading by 1.5 %.
             let error = allowed(&shunts, expected) + 0.02 * currents[0].abs();
             assert!((seen - expected).abs() < error, "{}: {seen} A, {expected} A", stage.name);
         }

@@ -1,5 +1,5 @@
-//! First light on the virtual board: a scripted person does with the model what `hil-sim/src/first_light/steps.toml` says, sees and
-//! measures what the model shows; and a defect stops the walk at the step that is there for it.
+//! First power-up on the virtual board: a scripted person does with the model what `hil-sim/src/first_light/steps.toml`
+//! says, and sees and measures what the model shows. A defect stops the walk at the step that is intended for it.
 
 use std::cell::{RefCell, RefMut};
 use std::io::{BufRead as _, BufReader};
@@ -32,13 +32,13 @@ use virtual_board::{Board, Counting, Image, Options, dump};
 
 use crate::common::program::{command, folder};
 
-/// Control periods of a second.
+/// Number of control periods per second.
 const SECOND: f64 = 6000.0;
-/// Longest silence within an answer, and longest wait that is not cut short, s.
+/// Longest wait for the next line of an answer, and longest wait that is not cut short, s.
 const PATIENCE_S: f64 = 8.0;
 const WAIT_S: f64 = 4.0;
 
-/// What is wrong with a board or its power stage.
+/// A defect of a board or its power stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Defect {
     None,
@@ -71,16 +71,16 @@ struct Bench {
     unasked: Vec<String>,
     sent: Vec<String>,
     log: String,
-    /// Whether an output was on since the last line, and whether all went off as they had to.
+    /// Whether an output was on since the last line, and whether all went off as required.
     pulses: bool,
     went_off: bool,
-    /// Whether a gate was on while the controller started again.
+    /// Whether a gate was on while the controller restarted.
     on_in_reset: bool,
     crystal_log: bool,
-    /// Whether the power stage is.
+    /// Whether the power stage is connected.
     connected: bool,
     motor: bool,
-    /// Periods since the last sign of life.
+    /// Number of periods since the last sign of life.
     silent: u64,
     gone: bool,
 }
@@ -89,7 +89,7 @@ struct Bench {
 struct Lab(Rc<RefCell<Bench>>);
 
 impl Lab {
-    /// A board with a defect; its power stage is connected if that is so, and confirmed.
+    /// Makes a board with a defect; its power stage may be connected, and then it is confirmed.
     fn new(
         stage: &'static PowerStage,
         defect: Defect,
@@ -120,7 +120,7 @@ impl Lab {
             silent: 0,
             gone: false,
         };
-        // Where nothing is connected the chip pulls the break input down.
+        // If nothing is connected, the chip pulls the break input down.
         bench.set_fault_pin(connected);
         bench.sensors(None);
         bench.starts()?;
@@ -131,7 +131,7 @@ impl Lab {
         self.0.borrow_mut()
     }
 
-    /// The board as it was when it had started, with this defect.
+    /// Restores the board to its state after the start, with this defect.
     fn again(&self, started: &Snapshot, defect: Defect) -> Result<()> {
         let mut bench = self.bench();
         bench.board.go_back(started)?;
@@ -164,7 +164,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The lines that came since the last call.
+    /// Returns the lines that came since the last call.
     fn lines(&mut self) -> Vec<String> {
         self.partial += &self.board.take_console();
         let rest = self.partial.rfind('\n').map_or(0, |at| at + 1);
@@ -173,7 +173,7 @@ impl Bench {
         lines.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
     }
 
-    /// Until the greeting after a reset.
+    /// Runs until the greeting after a reset.
     fn starts(&mut self) -> Result<()> {
         (self.on_in_reset, self.log) = (false, String::new());
         for _ in 0..80 {
@@ -222,7 +222,7 @@ impl Bench {
         Err(LinkError::Silence(line.to_owned(), PATIENCE_S as u64))
     }
 
-    /// The sensors as they are, with a current through one of them, A.
+    /// Sets the sensors to their present state, with a current through one of them, A.
     fn sensors(&mut self, through: Option<usize>) {
         let (defect, settings) = (self.defect, self.stage.firmware_settings());
         let scales = settings.scales;
@@ -334,7 +334,7 @@ impl Bench {
             let volts = what.split(' ').find_map(|word| word.parse().ok()).unwrap_or(0.0);
             self.board.plant.set_dc_link(volts)?;
             if !self.motor {
-                // Without a phase no current flows through a sensor: fault 30 comes as without a motor.
+                // With phase a open no current flows through a sensor, so fault 30 comes as without a motor.
                 self.board.plant.set_open_phase(Some(0))?;
             }
         } else if is("connect the motor") {
@@ -355,7 +355,7 @@ impl Bench {
     fn see(&mut self, what: &str) -> Result<bool> {
         println!("SEE {what}");
         let is = |text: &str| what.contains(text);
-        // The mean of a second: by voltage and frequency a shaft without a load swings, on one board between 68 and 128 rpm at 60.
+        // Mean over a second: with V/f control a shaft without a load oscillates, on one board between 68 and 128 rpm at 60.
         let from = self.board.plant.mechanical_angle();
         if is("forwards") || is("backwards") {
             self.run(1.0)?;
@@ -387,7 +387,7 @@ impl Bench {
         } else if is("all six off within") {
             self.went_off
         } else if is("pulses of 6 kHz") || is("never on together") {
-            // The board fails the run for two switches of a leg that are on.
+            // The board fails the run if two switches of a leg are on.
             self.pulses
         } else if is("forwards") {
             (30.0..150.0).contains(&rpm)
@@ -402,11 +402,11 @@ impl Bench {
         })
     }
 
-    /// Compares the registers with those of a board that nobody has touched.
+    /// Compares the registers with those of an untouched board.
     fn registers(&mut self) -> Result<bool> {
         let image = Image::built_for(self.stage.name)?;
         if self.defect == D::RegisterChanged {
-            // The counter's top, as of another frequency.
+            // The counter's top, as for another frequency.
             let old = self.board.chip().read(0x4001_2c2c, 4);
             self.board.chip().write(0x4001_2c2c, 4, old - 1);
         }
@@ -430,7 +430,7 @@ impl Bench {
             "PB8 to ground" => 10.0,
             what if what.starts_with("dead time") => {
                 let short = if self.defect == D::DeadTime { 1.0 } else { 0.0 };
-                // What the timer makes is never shorter than the value of the file, but for its rounding to single precision.
+                // The dead time of the timer is never shorter than the value of the file, except for its rounding to single precision.
                 f64::from(self.board.gates().dead_time) / 170.0 + 1e-4 - short
             }
             key => {
@@ -493,12 +493,12 @@ fn options(file: &Path) -> Light {
     Light { port, baud: 0, board: None, evidence, bench, skip_learning: true }
 }
 
-/// A walk of a lab.
+/// Returns a walk of a lab.
 fn walk<'a>(table: &'a Table, lab: &Lab, options: Light) -> Result<Walk<'a, Lab, Lab>, Error> {
     Walk::new(table, (lab.clone(), lab.clone()), options, Arc::default())
 }
 
-/// Every step of the table; learning and trace are left out where that is wanted.
+/// Walks through every step of the table; with `skip` it leaves out saliency self-commissioning and trace.
 fn whole(skip: bool) -> Result<PathBuf> {
     let table = Table::read()?;
     let file = folder(&format!("first-light-{skip}")).join("evidence.toml");
@@ -520,7 +520,7 @@ fn every_step_on_the_reference_board() -> Result<()> {
     whole(true).map(|_| ())
 }
 
-/// From the step that connects the power stage: those before it are of the controller, which is that of the reference board.
+/// Starts at the step that connects the power stage: the steps before it concern the controller, which is that of the reference board.
 fn every_step_of_the_power_stage(stage: &'static PowerStage) -> Result<()> {
     let begun = Begun::at(stage, "noise")?;
     walk(&begun.table, &begun.lab, options(&begun.file))?.run()?;
@@ -542,11 +542,11 @@ fn every_step_with_shunts_at_high_voltage() -> Result<()> {
     every_step_of_the_power_stage(ALL[2])
 }
 
-/// With learning and trace, which take minutes; writes the contributed file of the emulated board.
+/// Includes saliency self-commissioning and trace, which take minutes; writes the contributed file of the emulated board.
 #[test]
 #[ignore = "learning takes minutes; writes docs/evidence/emulated-reference.toml"]
 fn the_evidence_of_the_emulated_board() -> Result<()> {
-    // A file that a run has left unfinished is gone on with, by a confirmed board.
+    // An unfinished file of a previous run is continued, with a confirmed board.
     let file = match std::env::var_os("UNFINISHED") {
         None => whole(false)?,
         Some(file) => {
@@ -562,7 +562,7 @@ fn the_evidence_of_the_emulated_board() -> Result<()> {
     Ok(())
 }
 
-/// A board with a defect at a step: those before it were passed, by the file of the evidence.
+/// A board with a defect at a step; the steps before it are passed in the file of the test record.
 struct Begun {
     table: Table,
     lab: Lab,
@@ -579,11 +579,11 @@ impl Begun {
         Self::with(lab, step)
     }
 
-    /// The same with a board that has started.
+    /// Makes the same with a board that has started.
     fn with(lab: Lab, step: &str) -> Result<Self> {
         let table = Table::read()?;
         let bench = lab.bench();
-        // Tests of one step and defect run at once.
+        // Tests of one step and defect run at the same time.
         let test = simulated::test().replace("::", "-");
         let name = format!("{test}-{}-{:?}-{step}", bench.stage.name, bench.defect);
         drop(bench);
@@ -595,7 +595,7 @@ impl Begun {
         Ok(Self { table, lab, file })
     }
 
-    /// Walks on; the step that stops, and why.
+    /// Continues the walk; returns the step that stops, and the reason.
     fn stops(&self) -> Result<Record> {
         let end = walk(&self.table, &self.lab, options(&self.file))?.run();
         let why = end.err().context("no step stops")?.to_string();
@@ -606,8 +606,8 @@ impl Begun {
     }
 }
 
-/// A defect that is there from a step on stops the walk at the step that is for it, which is `expected`: the drive is off then,
-/// and only behind the steps that judge gates and fault input a line was sent that switches it on.
+/// A defect that is present from a step on stops the walk at the step that is intended for it, `expected`. The drive is
+/// off then, and a line that switches it on was sent only after the steps that judge gates and fault input.
 fn are_stopped(defects: &[(Defect, &str, &str)], switched_on: bool) -> Result<()> {
     let lab = Begun::at(&REFERENCE, defects[0].1)?.lab;
     let started = lab.bench().board.keep()?;
@@ -729,7 +729,7 @@ fn an_interrupted_step_is_noted_and_the_drive_is_stopped() -> Result<()> {
     Ok(())
 }
 
-/// The image of another board, and another build than that of the evidence, are refused before anything is done.
+/// The image of another board, and another build than that of the test record, are refused before anything is done.
 #[test]
 fn another_image_is_refused() -> Result<()> {
     let begun = Begun::at(&REFERENCE, "noise")?;
@@ -746,8 +746,8 @@ fn another_image_is_refused() -> Result<()> {
     refused(options(&begun.file), "0123456789abcdef")
 }
 
-/// A port that is lost, and a person who leaves, while the motor turns: the drive is off within seconds, by itself and by
-/// `stop`. Noted; a later run repeats the step and goes on.
+/// The port is lost, or the person leaves, while the motor turns: the drive is off within seconds, by itself or by
+/// `stop`. The record notes it; a later run repeats the step and continues.
 #[test]
 fn a_lost_port_and_a_lost_person_stop_the_drive_and_the_walk_goes_on() -> Result<()> {
     let lab = Begun::at(&REFERENCE, "turn-at-nominal")?.lab;

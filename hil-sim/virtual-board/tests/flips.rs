@@ -10,16 +10,16 @@ use virtual_board::{Board, Image, Pair};
 
 use crate::common;
 
-/// Periods behind a flip of the directed list: a start that a flip orders is through its preparation.
+/// Number of periods after a flip in the directed list: enough for the preparation of a start that a flip requests.
 const LONG: u64 = 6000;
-/// Periods behind a flip while the drive is on.
+/// Number of periods after a flip while the drive is on.
 const AFTER: u64 = 300;
-/// Periods behind a flip of any word of the interrupt: what acts without an order acts at once.
+/// Number of periods after a flip of any word of the interrupt: an effect without a request appears at once.
 const SHORT: u64 = 60;
-/// Memory of the trace, which lies behind all data of the main loop.
+/// Memory of the trace, which lies after all data of the main loop.
 const TRACE: &str = "induction_drive::task::bring_up::start_control::TRACE_MEMORY";
 
-/// A drive that has run with the injection and rests: off, and in the fault that ended it.
+/// Returns a drive that has run with the injection and is at rest: off, and in the fault that ended it.
 fn situations() -> Result<[(&'static str, Pair, Snapshot); 2]> {
     let mut off = common::regulating(61)?;
     off.order("stop")?;
@@ -45,15 +45,15 @@ fn flipped(board: &mut Board, to: &Snapshot, at: u32, bit: u32) -> Result<()> {
     Ok(())
 }
 
-/// The words that decide whether the drive is on: that of the phase, then the number of the fault; that of the mailbox, then the tag of
-/// its command.
+/// Returns the words that decide whether the drive is on: the word of the phase, then the number of the fault; the word
+/// of the mailbox, then the tag of its command.
 fn deciding(board: &Board) -> [u32; 5] {
     let Addresses { orders, order_waits, phase, .. } = board.addresses();
     let mailbox = board.cpu.word(orders).unwrap_or(0);
     [phase, phase + 4, mailbox + order_waits, mailbox, mailbox + 4]
 }
 
-/// Flips a bit, and goes on; an error if a gate is on at any time.
+/// Flips a bit and continues; fails if a gate is on at any time.
 fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Result<()> {
     flipped(board, to, at, bit)?;
     for _ in 0..periods {
@@ -64,8 +64,9 @@ fn flip(board: &mut Board, to: &Snapshot, at: u32, bit: u32, periods: u64) -> Re
     Ok(())
 }
 
-/// A flipped bit switches no gate on, whichever bit it is of the words that decide whether the drive is on: the phase of the drive with the
-/// number of its fault, and the mailbox of the commands with the last command in it. Each flip is followed for one second.
+/// A flipped bit switches no gate on, for all bits of the words that decide whether the drive is on: the phase of the
+/// drive with the number of its fault, and the mailbox of the commands with the last command in it. Each flip is
+/// followed for one second.
 #[test]
 fn no_bit_of_what_decides_switches_a_gate_on() -> Result<()> {
     for (name, mut pair, kept) in situations()? {
@@ -83,7 +84,7 @@ fn no_bit_of_what_decides_switches_a_gate_on() -> Result<()> {
     Ok(())
 }
 
-/// The same bits in each phase that has outputs: the drive goes on as it would have, or is off.
+/// The same bits in each phase that has outputs: the drive continues unchanged, or is off.
 #[test]
 fn no_bit_of_what_decides_leads_to_another_phase() -> Result<()> {
     let ways = [
@@ -120,7 +121,7 @@ fn no_bit_of_what_decides_leads_to_another_phase() -> Result<()> {
     Ok(())
 }
 
-/// Each bit of the interrupt's own data beside the drive: what it knows of timer, converters and reports.
+/// Each bit of the interrupt's own data besides the drive: its data on timer, ADCs and reports.
 #[test]
 fn no_bit_of_the_interrupt_switches_a_gate_on() -> Result<()> {
     for (name, mut pair, kept) in situations()? {
@@ -139,7 +140,7 @@ fn no_bit_of_the_interrupt_switches_a_gate_on() -> Result<()> {
     Ok(())
 }
 
-/// Each bit of the drive, a second each.
+/// Each bit of the drive, followed for a second each.
 #[test]
 #[ignore = "an hour: `cargo xtask prove image`"]
 fn no_bit_of_the_drive_switches_a_gate_on() -> Result<()> {
@@ -156,8 +157,8 @@ fn no_bit_of_the_drive_switches_a_gate_on() -> Result<()> {
     Ok(())
 }
 
-/// Each bit of the main loop: its stack, and all static data but the interrupt's and the trace. Whatever it does with it, the drive stays
-/// as it is; if not, a second passes without a gate.
+/// Each bit of the main loop: its stack, and all static data except the interrupt's and the trace. Whatever effect the
+/// bit has, the drive stays in its state; otherwise a second passes without a gate on.
 #[test]
 #[ignore = "an hour: `cargo xtask prove image`"]
 fn no_bit_of_the_main_loop_switches_a_gate_on() -> Result<()> {

@@ -1,5 +1,5 @@
-//! Programs of others on the virtual board: examples of `stm32g4xx-hal`, and ours on `embassy-stm32`. They run on
-//! chips; each rule that they break here, and each register that they need and the model does not have, is
+//! Third-party programs on the virtual board: examples of `stm32g4xx-hal`, and our programs on `embassy-stm32`. They
+//! run on chips. Each rule that they break here, and each register that they need and the model does not have, is
 //! explained below. `cargo xtask foreign` builds them and runs this.
 
 use std::path::PathBuf;
@@ -10,23 +10,23 @@ use virtual_board::periph::gpio::Pad;
 use virtual_board::rules::Rule;
 use virtual_board::{Board, Counting, Image, Options};
 
-/// Names the folder with the programs.
+/// Environment variable with the folder of the programs.
 const FOLDER: &str = "INDUCTION_DRIVE_FOREIGN";
 
-/// What is known of a program.
+/// Known properties of a program.
 struct Program {
     name: &'static str,
-    /// Periods that it runs.
+    /// Number of periods for which it runs.
     periods: u64,
-    /// The rules that it breaks, and why.
+    /// The rules that it breaks, and the reasons.
     breaks: &'static [(Rule, &'static str)],
-    /// Where the model ends, if it does: part of the error, and why.
+    /// The limit of the model, if the program reaches it: part of the error, and the reason.
     ends: Option<(&'static str, &'static str)>,
-    /// What it must have done.
+    /// Checks the work that it must have done.
     done: fn(&mut Board) -> Result<()>,
 }
 
-/// The HAL reads and writes PWR without its clock; on a chip reads give values, and the writes are of no use.
+/// The HAL reads and writes PWR without its clock; on a chip reads give values, and the writes have no effect.
 const POWER: (Rule, &str) =
     (Rule::ClockGate, "the HAL never switches the clock of PWR on: F1 of this firmware too");
 /// embassy-stm32 at 170 MHz with `boost`.
@@ -90,7 +90,7 @@ const PROGRAMS: &[Program] = &[
     },
 ];
 
-/// The code at all analog pins.
+/// ADC counts at all analog pins.
 const CODE: u16 = 1234;
 
 fn is(so: bool) -> Result<()> {

@@ -1,4 +1,4 @@
-//! The image against what may hurt its power stage: typed protections and scales, the boot pin, braking.
+//! The image against settings and events that may damage its power stage: typed protections and scales, the boot pin, braking.
 
 use anyhow::{Context, Result};
 use drive_core::{Fault, State};
@@ -20,7 +20,7 @@ fn board(stage: &'static PowerStage) -> Result<Board> {
     Ok(board)
 }
 
-/// Types a line; its answer begins so.
+/// Types a line, and checks the beginning of its answer.
 fn ask(board: &mut Board, line: &str, answer: &str) -> Result<String> {
     board.run_periods(120)?;
     board.take_console();
@@ -31,7 +31,7 @@ fn ask(board: &mut Board, line: &str, answer: &str) -> Result<String> {
 const REFUSED: &str =
     "error: the board's polarities, dead time and scales are assumed, or were changed";
 
-/// A dead time below that of the board is refused by its range; a longer one, a scale and a limit that trips end the
+/// A dead time below that of the board is refused by its range. A longer one, a scale and a limit that trips end the
 /// confirmation while they are staged.
 #[test]
 fn a_typed_protection_ends_the_confirmation() -> Result<()> {
@@ -47,7 +47,7 @@ fn a_typed_protection_ends_the_confirmation() -> Result<()> {
             ("scales.dc_link.gain", 1.1 * settings.scales.dc_link.gain),
             ("limits.trip_a", 0.99 * settings.trip_a()),
             ("limits.dc_over_v", 0.99 * settings.dc_over_v()),
-            // The trip is at most 2.2 times it.
+            // The trip is at most 2.2 times the rated current.
             ("nameplate.current_a", 0.5 * settings.nameplate.current_a),
         ] {
             ask(&mut board, &format!("set {name} {value}"), "ok: staged; ")?;
@@ -60,7 +60,7 @@ fn a_typed_protection_ends_the_confirmation() -> Result<()> {
     Ok(())
 }
 
-/// A scale in force and saved, until the board is confirmed with it.
+/// The scale is in force and saved, and the board must be confirmed again with it.
 #[test]
 fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {
     let mut board = board(&REFERENCE)?;
@@ -77,7 +77,7 @@ fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {
     Ok(())
 }
 
-/// The gates that ask for on, or may, of a chip that stands still.
+/// Returns the gates that are requested on, or may be, of a chip that stands still.
 fn gates_on(board: &mut Board) -> Vec<String> {
     let chip = board.chip();
     let driver = chip.gates.stage.driver;
@@ -95,8 +95,8 @@ fn gates_on(board: &mut Board) -> Vec<String> {
     on
 }
 
-/// PB8 high at a reset with the option bytes from the factory: ST's boot loader runs and holds gate pins. With nSWBOOT0 = 0 and
-/// nBOOT0 = 1 the pin does not count and the image starts with every gate off.
+/// With PB8 high at a reset and the option bytes from the factory, ST's boot loader runs and holds gate pins. With
+/// nSWBOOT0 = 0 and nBOOT0 = 1 the pin has no effect, and the image starts with every gate off.
 #[test]
 fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result<()> {
     let expected: [&[&str]; 3] = [
@@ -113,7 +113,7 @@ fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result
         assert_eq!(gates_on(&mut board), expected, "{}", stage.name);
         let why = board.run_periods(1).expect_err("nothing was noticed").to_string();
         assert!(why.contains("bad gate signals"), "{why}");
-        // Never the image.
+        // The image never starts.
         board.go_back(&started)?;
         board.chip().flash.options &= !(N_SWBOOT0 | N_BOOT0);
         assert!(board.reset_with_boot_pin(false));
@@ -129,7 +129,7 @@ fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result
     Ok(())
 }
 
-/// The console says whether the boot pin counts, with the command that ends it, and the confirmation holds for that state.
+/// The console reports whether the boot pin has an effect, with the command that disables it, and the confirmation applies to that state.
 #[test]
 fn the_option_bytes_are_part_of_what_is_confirmed() -> Result<()> {
     let mut board = board(&REFERENCE)?;
@@ -149,8 +149,8 @@ fn the_option_bytes_are_part_of_what_is_confirmed() -> Result<()> {
     Ok(())
 }
 
-/// Against the strongest pull of the chip, which the image sets towards a trip, the resistor of the stage makes a level that
-/// is sure. A weaker one does not, and is taken for a fault of the power stage: the drive stays off.
+/// Against the strongest pull of the chip, which the image sets towards a trip, the resistor of the stage gives a
+/// certain level. A weaker one does not, and the image takes this for a fault of the power stage: the drive stays off.
 #[test]
 fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
     const PULLED: &str = "the power stage pulls the break input";
@@ -169,8 +169,9 @@ fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
     Ok(())
 }
 
-/// The window watchdog is fed too early when the control interrupt comes three times as often as it should. (Up to some 2.3 times
-/// it may come: after a long interrupt the next begins as early.) Where the main loop checks that register just then, it is faster.
+/// The window watchdog is fed too early if the control interrupt comes three times too often. (Up to about 2.3 times it
+/// may come, because after a long interrupt the next one begins that early.) If the main loop checks that register just
+/// then, it is faster.
 #[test]
 fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
     const TIM1_ARR: u32 = 0x4001_2c2c;
@@ -186,7 +187,7 @@ fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
         board.run_ticks(later)?;
         assert!(board.gates().any_on() && board.resets.is_empty());
         let began = board.chip().now;
-        // And the compare value that triggers the converters, which the counter would not reach.
+        // Also the compare value that triggers the ADCs, which the counter would not reach.
         for register in [TIM1_ARR, TIM1_CCR4] {
             let value = board.chip().read(register, 4);
             board.chip().write(register, 4, value / 3);
@@ -206,8 +207,9 @@ fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
     Ok(())
 }
 
-/// A double word of the flash that its check code cannot correct: read as an instruction of the main loop, or as data by the
-/// check of the control's code. The outputs go off at once, by the break and without software; the image starts again.
+/// A double word of the flash that its check code cannot correct is read as an instruction of the main loop, or as data
+/// by the check of the control's code. The outputs go off at once, by the break and without software; the image
+/// restarts.
 #[test]
 fn a_bad_word_in_the_code_switches_off() -> Result<()> {
     let mut board = board(&REFERENCE)?;
@@ -218,7 +220,7 @@ fn a_bad_word_in_the_code_switches_off() -> Result<()> {
     while !(0x0800_0000..0x0804_0000).contains(&board.chip().at) {
         board.run_ticks(1)?;
     }
-    // Behind vectors and checksums of the copy.
+    // After vectors and checksums of the copy.
     for (what, bad) in [("code", board.chip().at & !7), ("data", 0x0804_1000)] {
         board.go_back(&regulating)?;
         assert!(board.gates().any_on());
@@ -239,8 +241,8 @@ fn a_bad_word_in_the_code_switches_off() -> Result<()> {
     Ok(())
 }
 
-/// A shaft that stops from 1400 rpm on the board with 60 V transistors, whose supply takes nothing back: the voltage of the link
-/// and that at the switches, V, and the state in which the drive ends.
+/// Stops a shaft from 1400 rpm on the board with 60 V transistors, whose supply takes no energy back; returns the
+/// voltage of the link and at the switches, V, and the final state of the drive.
 fn braking(capacitor_f: f64, rpm_per_s: f64) -> Result<(f64, f64, State)> {
     let stage = PowerStage::named("nucleo-g474re-ihm08m1")?;
     let mut config: Config = stage.config()?;
@@ -272,8 +274,8 @@ fn braking(capacitor_f: f64, rpm_per_s: f64) -> Result<(f64, f64, State)> {
     Ok((link_v, stress_v, pair.shadow.drive.state()))
 }
 
-/// The link with the ringing of every turn-off stays below what the transistors stand, whether the capacitor is large enough
-/// for the braking, or so small that the drive trips.
+/// The link voltage with the ringing of every turn-off stays below the rating of the transistors, whether the capacitor
+/// is large enough for the braking, or so small that the drive trips.
 #[test]
 fn braking_stays_below_what_the_transistors_stand() -> Result<()> {
     let rated_v = PowerStage::named("nucleo-g474re-ihm08m1")?.switches.rated_v;

@@ -15,7 +15,7 @@ fn the_image_finds_the_stop_and_counts_from_it() -> Result<()> {
         pair.order(line)?;
     }
     pair.until_state(State::Position)?;
-    // From here the image gives itself commands, of which its shadow on the host does not know.
+    // From here the image gives itself commands, which its shadow on the host does not know.
     let mut board = pair.board;
     let mut say = |line: &str, until: &str| {
         board.take_console();
@@ -34,7 +34,7 @@ fn the_image_finds_the_stop_and_counts_from_it() -> Result<()> {
     let (said, stop) = say("home 60 0.6 2", "homing: ")?;
     assert!(said.contains("homing: position 0 is at the stop"), "{said}");
     say("position -0.25", "ok")?;
-    // A stop by ramp waits until the shaft rests.
+    // A stop by ramp waits until the shaft is at rest.
     std::iter::repeat_n("status", 20).try_for_each(|line| say(line, "turns").map(|_| ()))?;
     let (said, end) = say("stop ramp", "off: ")?;
     let moved = (end - stop) / std::f64::consts::TAU;

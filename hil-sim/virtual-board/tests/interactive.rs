@@ -1,5 +1,4 @@
-//! `cargo sim board`: a program talks to the drive through the pseudo-terminal, and the rotor does what it
-//! was told.
+//! `cargo sim board`: a program talks to the drive through the pseudo-terminal, and the rotor follows the commands.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -21,7 +20,7 @@ const ANSWER: Duration = Duration::from_secs(20);
 /// Longest wait for a state: a start takes 2 s, a stop 1 s of simulated time.
 const STATE: Duration = Duration::from_secs(40);
 
-/// Lines of a reader, with a limit to waiting for them.
+/// Returns the lines of a reader, with a limit to the wait for each.
 fn lines(reader: impl std::io::Read + Send + 'static) -> Receiver<String> {
     let (send, receive) = channel();
     std::thread::spawn(move || {
@@ -43,7 +42,7 @@ struct Talk {
     said: Receiver<String>,
 }
 
-/// Starts a board: the process, its output, and its port.
+/// Starts a board; returns the process, its output, and its port.
 fn begin(mut command: Command) -> (Child, BufReader<ChildStdout>, File) {
     let mut board = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
     let mut shown = BufReader::new(board.stdout.take().unwrap());
@@ -88,7 +87,7 @@ impl Talk {
         }
     }
 
-    /// All that it showed, when it has ended well.
+    /// Returns all its output, after it has ended without an error.
     fn ended(mut self) -> String {
         let mut rest = String::new();
         std::io::Read::read_to_string(&mut self.shown, &mut rest).unwrap();
@@ -126,7 +125,7 @@ fn mean_within(series: &[(f64, f64)], from: f64, to: f64) -> f64 {
     inside.iter().sum::<f64>() / inside.len() as f64
 }
 
-/// The host knows the lines that the firmware says unasked.
+/// The host recognises the unsolicited lines of the firmware.
 #[test]
 fn host_and_firmware_mark_announcements_alike() {
     assert!(is_unasked(&format!("{}running: torque", induction_drive::console::line::UNASKED)));
@@ -149,7 +148,7 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     assert!(talk.say("start").starts_with("ok"));
     talk.until("regulating torque");
     assert_eq!(talk.say("torque 1"), "ok");
-    // 1.5 seconds of the board, on a machine that keeps a quarter of real time.
+    // 1.5 seconds of the board, on a machine that reaches a quarter of real time.
     std::thread::sleep(Duration::from_secs(6));
     // Garbage, half a command and a bad number change nothing.
     assert!(talk.say(b"\xff\x00stop\x07").starts_with("error:"));
@@ -174,14 +173,14 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     let torque = report.series("torque_nm");
     let outputs = report.series("outputs_on");
     let reference = report.series("quadrature_current_reference_a");
-    // From half a second after the reference is there: settled.
+    // From half a second after the reference is reached, the values have settled.
     let level: Vec<f64> = reference.iter().filter(|p| p.1 > 0.95).map(|p| p.0).collect();
     let (from, to) = (level[0] + 0.5, level[level.len() - 1]);
     assert!(to - from > 1.0, "{from} {to}");
     let error = report.series("angle_error_true_minus_estimated_flux_angle_electrical_deg");
     assert!(error.iter().filter(|p| p.0 > from && p.0 < to).all(|p| p.1.abs() < 15.0));
-    // 3/2 P L_m/L_r psi i_q (Eq. 4.4 for a true angle); 15 degrees of error are 4 % of it and some
-    // of the direct current besides.
+    // 3/2 P L_m/L_r psi i_q (Eq. 4.4 for a true angle); 15 degrees of error are 4 % of it, in addition to a part of the
+    // d-axis current.
     let config = Config::default();
     let m = &config.motor;
     let flux = mean_within(&report.series("rotor_flux_wb"), from, to);
@@ -197,8 +196,8 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     assert_eq!(report.metric("resets"), 0.0);
 }
 
-/// A free shaft: what the torque gives is what the rotor has (J dw/dt = T - B w); and the same seed gives
-/// the same session, to the last digit.
+/// A free shaft: the speed of the rotor follows from the torque (J dw/dt = T - B w). The same seed gives the same
+/// session, to the last digit.
 #[test]
 fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
     let script = "# a pulse of torque\n\
@@ -231,11 +230,11 @@ fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
     }
     let end = speed[speed.len() - 1].1.to_radians() * 6.0;
     println!("speed {end:.3} rad/s, by the torque {expected:.3} rad/s");
-    // The curves are means of ten periods; what is left is the rule of rectangles.
+    // The curves are means of ten periods; the remaining error is that of the rectangle rule.
     assert!(end > 3.0 && (end / expected - 1.0).abs() < 0.02, "{end} {expected}");
 }
 
-/// Ctrl-C ends it well, with the page; a held speed is held.
+/// Ctrl-C ends the session without an error, with the page; a held speed is held.
 #[test]
 fn an_interrupt_still_writes_the_page() {
     let folder = folder("interrupt");
@@ -282,8 +281,8 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&run(&["--script", &script]), 2, &["line 2", "at soon: stop", "0 to 3600 s"]);
     assert!(std::fs::read_dir(&folder).unwrap().count() == 2, "no page is written");
 
-    // Room for the ELF to be read, but not for both ends of a pseudo-terminal; also where a terminal hands descriptors
-    // down: one more below the limit would leave no room for the ELF.
+    // The limit allows reading the ELF, but not opening both ends of a pseudo-terminal. It also holds if a terminal
+    // passes descriptors on: one more below the limit would leave none for the ELF.
     let limited = "exec 3>&-; ulimit -n 4; exec \"$0\"";
     for inherited in ["", "exec 3</dev/null 7</dev/null; "] {
         let script = format!("{inherited}exec sh -c '{limited}' \"$0\"");

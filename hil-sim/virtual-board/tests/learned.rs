@@ -1,4 +1,4 @@
-//! The table that the drive learns on its motor outlasts the power.
+//! The table that the drive learns on its motor survives a loss of power.
 
 use anyhow::Result;
 use drive_core::State;
@@ -6,12 +6,12 @@ use hil_sim::Config;
 use virtual_board::periph::Reset;
 use virtual_board::{Counting, Image, Options, Pair};
 
-/// Longest that learning takes, periods: ten minutes.
+/// Longest duration of the saliency self-commissioning, periods: ten minutes.
 const LEARNING: u64 = 3_600_000;
-/// Longest from a reset to the greeting, and of a list, periods.
+/// Longest time from a reset to the greeting, and of a list, periods.
 const LISTED: u64 = 30_000;
 
-/// All lines of an answer that ends with `ok`.
+/// Returns all lines of an answer that ends with `ok`.
 fn list(pair: &mut Pair, line: &str) -> Result<Vec<String>> {
     let mut text = pair.say(line)? + "\r\n";
     pair.until("the end of the list", LISTED, |pair, _| {
@@ -21,7 +21,7 @@ fn list(pair: &mut Pair, line: &str) -> Result<Vec<String>> {
     Ok(text.lines().map(str::to_owned).collect())
 }
 
-/// The power goes and comes back.
+/// Interrupts the power.
 fn power_cycle(pair: &mut Pair) -> Result<()> {
     let settings = *pair.shadow.firmware_settings();
     pair.board.reset(Reset::Power);
@@ -29,8 +29,8 @@ fn power_cycle(pair: &mut Pair) -> Result<()> {
     pair.until("the greeting", LISTED, |pair, _| pair.board.take_console().ends_with('\n'))
 }
 
-/// Sensors whose gains differ by 1 % are learned, saved, and corrected after the power was off: board and
-/// host, which is given the same settings, then compute the same.
+/// The drive learns sensors whose gains differ by 1 %, saves them, and corrects them after a power cycle: the board and
+/// the host with the same settings then compute the same.
 #[test]
 fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     let mut config = Config::default();
@@ -45,7 +45,7 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     pair.order("learn")?;
     pair.until_state(State::Learning)?;
     pair.until("the end of learning", LEARNING, |_, state| state == State::Off)?;
-    // The console hears of it with the report.
+    // The console learns of it with the report.
     pair.run(10, |_, _| {})?;
 
     let learned = list(&mut pair, "learned")?;

@@ -1,4 +1,4 @@
-//! The tests of the image on the virtual board: one program, a module a subject.
+//! The tests of the image on the virtual board: one program, with one module for each subject.
 
 mod bench_dump;
 mod bit_identity;

@@ -1,5 +1,5 @@
-//! The field bus of the image: a master that these tests write starts, runs, reads and stops the drive, and the rotor of
-//! the simulated motor shows it.
+//! The field bus of the image: a master in these tests starts, runs, reads and stops the drive, and the rotor of the
+//! simulated motor shows it.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -15,16 +15,16 @@ use virtual_board::board::confirmed;
 use virtual_board::image::ELF;
 use virtual_board::{Board, Image, Options};
 
-/// Periods from a frame to the end of its answer: 8 bytes, 3.5 characters of silence, and 30 bytes at 19 200 bit/s are 27 ms.
+/// Number of periods from a frame to the end of its answer: 8 bytes, 3.5 characters of silence, and 30 bytes at 19 200 bit/s are 27 ms.
 const ANSWERED: u64 = 240;
-/// Periods from a frame to the end of its answer at 115 200 bit/s.
+/// Number of periods from a frame to the end of its answer at 115 200 bit/s.
 const ANSWERED_FAST: u64 = 60;
 /// Largest time from the end of a frame to the first byte of its answer, s: the silence of 2.03 ms, the interrupts, a
 /// pass of the main loop, and the byte itself, 0.57 ms.
 const LATEST_S: f64 = 0.004;
 const COMMAND: u16 = 0x2000;
 const STATUS: u16 = 0x2101;
-/// Operation enabled, by the bus.
+/// State "operation enabled", commanded by the bus.
 const RUNS: u16 = 0x503;
 const SERVER_FAILURE: u8 = 4;
 
@@ -57,7 +57,7 @@ struct Master {
 }
 
 impl Master {
-    /// A board that has started, and was told these lines.
+    /// Returns a board that has started and has received these lines.
     fn new(lines: &[&str]) -> Result<Self> {
         Self::with(options(&Config::default()), lines)
     }
@@ -85,14 +85,14 @@ impl Master {
         anyhow::bail!("no {text:?} in {said:?}")
     }
 
-    /// Sends bytes; what the board sends meanwhile.
+    /// Sends bytes; returns the bytes that the board sends meanwhile.
     fn send(&mut self, frame: &[u8]) -> Result<Vec<u8>> {
         self.board.send_bus(frame);
         self.board.run_periods(self.answered)?;
         Ok(self.board.take_bus())
     }
 
-    /// Sends a request to slave 1; its answer without address and checksum, which are checked.
+    /// Sends a request to slave 1; returns its answer without address and checksum, which are checked.
     fn ask(&mut self, pdu: &[u8]) -> Result<Vec<u8>> {
         let answer = self.send(&framed(&[&[1], pdu].concat()))?;
         let body = answer.len().checked_sub(2).context("no answer")?;
@@ -107,7 +107,7 @@ impl Master {
         Ok(answer[2..].chunks(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
     }
 
-    /// Writes a register: the exception, if there is one.
+    /// Writes a register; returns the exception, if there is one.
     fn write(&mut self, at: u16, word: u16) -> Result<Option<u8>> {
         let request = [&[6], &at.to_be_bytes()[..], &word.to_be_bytes()].concat();
         let answer = self.ask(&request)?;
@@ -115,7 +115,7 @@ impl Master {
         Ok((answer[0] == 0x86).then(|| answer[1]))
     }
 
-    /// Goes on for some time, while a write keeps the bus alive: the frequency that is asked for, again.
+    /// Runs for some time, while repeated writes of the commanded frequency keep the bus alive.
     fn run(&mut self, seconds: f64) -> Result<()> {
         for _ in 0..(seconds / 0.25) as u32 {
             let frequency = self.read(0x2001, 1)?[0];
@@ -129,7 +129,7 @@ impl Master {
         self.board.plant.mechanical_speed() * 60.0 / TAU
     }
 
-    /// The two registers of a setting or a signal.
+    /// Returns the value of a setting or a signal from its two registers.
     fn float(&mut self, at: u16) -> Result<f32> {
         let words = self.read(at, 2)?;
         Ok(f32::from_bits(u32::from(words[0]) << 16 | u32::from(words[1])))
@@ -142,12 +142,12 @@ impl Master {
 
 const BUS: [&str; 2] = ["set bus.commands bus", "save"];
 
-/// Start, run to speed, read, reverse, stop: 5 Hz of two pole pairs are 150 rpm. The speed of the simulated rotor within 3 % is
-/// what the drive reaches without a sensor; the registers agree with it within 3 % and a count.
+/// Start, run to speed, read, reverse, stop: 5 Hz with two pole pairs are 150 rpm. A sensorless drive reaches the speed
+/// of the simulated rotor within 3 %; the registers agree with it within 3 % and a count.
 #[test]
 fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let mut master = Master::new(&BUS)?;
-    // Ready to switch on, quick stop not active, dc link there, remote; after a reset nobody knows the speed.
+    // Ready to switch on, quick stop not active, dc link present, remote; after a reset the speed is unknown.
     assert_eq!(master.read(0x6041, 1)?, [0x4231]);
     // `speed.limit_rpm` of the image, 0.01 Hz.
     let settings = induction_drive::board::settings();
@@ -162,7 +162,7 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let page = master.read(0x2100, 13)?;
     println!("{rpm:.2} rpm at the rotor; 0x2100: {page:?}");
     assert_eq!((page[0], page[1], page[2]), (0, RUNS, 500));
-    // A single reading moves with the tracked angle.
+    // A single reading varies with the tracked angle.
     let mut frequency = 0.0;
     for _ in 0..8 {
         master.run(0.25)?;
@@ -173,7 +173,7 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     for n in [7, 12] {
         assert!((f64::from(page[n]) - rpm).abs() < 0.03 * rpm + 1.0, "{} rpm", page[n]);
     }
-    // Holes read as 0.
+    // Unused registers read as 0.
     assert_eq!(page[8..11], [0, 0, 0]);
     // Operation enabled, target reached.
     assert_eq!(master.read(0x6041, 1)?, [0x637]);
@@ -182,7 +182,7 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let rpm = master.rpm();
     assert!((rpm / -150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
     assert_eq!(master.read(STATUS, 1)?, [RUNS | 3 << 3]);
-    // Settings are not written meanwhile.
+    // Settings must not be written meanwhile.
     let set = [16, 0x40, 0, 0, 2, 4, 0x40, 0xb0, 0, 0];
     assert_eq!(master.ask(&set)?, [0x90, SERVER_FAILURE]);
     assert_eq!(master.write(COMMAND, 1)?, None);
@@ -194,8 +194,8 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     Ok(())
 }
 
-/// The answer begins within the bound behind the request, its bytes have no gap that ends a frame, and the line is free
-/// again behind it.
+/// The answer begins within the bound after the request, its bytes have no gap that ends a frame, and the line is free
+/// again after it.
 #[test]
 fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
     let mut master = Master::new(&[])?;
@@ -218,8 +218,8 @@ fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
     Ok(())
 }
 
-/// The console stops the drive although the bus commands, and a master that repeats its run command does not start it before
-/// it has written a stop. Without frames the drive stops after the time-out of commands.
+/// The console stops the drive although the bus commands. A master that repeats its run command does not start the
+/// drive before it has written a stop. Without frames the drive stops after the time-out of commands.
 #[test]
 fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
     let mut master = Master::new(&[])?;
@@ -238,7 +238,7 @@ fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
             master.board.type_line("stop");
             master.run(1.0)?;
         } else {
-            // The time-out of 1 s, then the torque goes to zero, at once without load.
+            // The time-out of 1 s passes, then the torque goes to zero, at once without load.
             master.board.run_periods(6000 * 3 / 4)?;
             assert!(master.outputs_on());
             master.board.run_periods(6000 * 3 / 4)?;
@@ -250,7 +250,7 @@ fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
     Ok(())
 }
 
-/// Rate, format and address are settings; what comes with another parity is not taken.
+/// Rate, format and address are settings; frames with another parity are ignored.
 #[test]
 fn rate_format_and_address_follow_the_settings() -> Result<()> {
     let mut master = Master::new(&["set bus.address 9 bus.baud 115200 bus.parity 8n2", "apply"])?;
@@ -266,12 +266,12 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
     chip.usart3.line.to_chip[3] |= virtual_board::periph::uart::WRONG_PARITY;
     chip.usart3.wake(chip.now);
     assert!(master.send(&[])?.is_empty());
-    // The next is.
+    // The next frame is accepted.
     assert_eq!(master.read(COMMAND, 1)?, [1]);
     Ok(())
 }
 
-/// Settings as floats: written, read back, refused out of range, put in force and saved; they outlast a reset.
+/// Settings as floats: written, read back, refused out of range, put into force and saved; they survive a reset.
 #[test]
 fn settings_are_written_and_saved() -> Result<()> {
     let mut master = Master::new(&BUS)?;
@@ -296,7 +296,7 @@ fn settings_are_written_and_saved() -> Result<()> {
     Ok(())
 }
 
-/// What a master writes that was set up with the image of version 0.1.0: addresses, and values that are not the default.
+/// Writes of a master that was set up with the image of version 0.1.0: addresses, and values that are not the default.
 const WRITTEN: [(u16, f32); 7] = [
     (0x400c, 0.013),
     (0x4084, 3.2),
@@ -307,8 +307,8 @@ const WRITTEN: [(u16, f32); 7] = [
     (0x40ce, 0.0),
 ];
 
-/// This image, or one with other names and more settings, has each setting of this program where its number says, with the value
-/// that was saved; it takes what a master has always written, keeps it over a reset, and runs.
+/// This image, or one with other names and more settings, has each setting of this program at its number, with the
+/// saved value. It accepts all writes of an older master, keeps them over a reset, and runs.
 #[test]
 fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
     let mut config = Config::default();
@@ -355,7 +355,7 @@ fn a_master_that_was_set_up_before_needs_no_other_numbers() -> Result<()> {
 #[ignore = "builds another image"]
 fn the_bus_with_20_settings_inserted_and_five_renamed() -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    // Outside of this tree, whose configuration would count twice.
+    // Outside of this tree, whose configuration would otherwise apply as well.
     let tree = env::temp_dir().join("induction-drive-numbers");
     let mut copy = Command::new("git");
     copy.args(["checkout-index", "--all", "--force"]).current_dir(root);
@@ -421,8 +421,8 @@ fn the_bus_with_20_settings_inserted_and_five_renamed() -> Result<()> {
     Ok(())
 }
 
-/// Frames of noise, and requests with changed bits, among valid requests: no reset; an invalid frame has no effect; a valid one
-/// is answered.
+/// Frames of noise, and requests with changed bits, among valid requests: no reset occurs, an invalid frame has no
+/// effect, and a valid one is answered.
 #[test]
 fn three_thousand_frames_of_noise() -> Result<()> {
     let mut master = Master::new(&["set bus.commands bus bus.baud 115200", "save"])?;
@@ -438,14 +438,14 @@ fn three_thousand_frames_of_noise() -> Result<()> {
         let mut frame = match n % 3 {
             0 => (0..random() % 60).map(|_| random() as u8).collect(),
             1 => framed(&[1, 3, 0x21, 0, 0, 1]),
-            // Would start the drive.
+            // This request would start the drive.
             _ => framed(&[1, 6, 0x20, 0, 0, 18]),
         };
         if n % 3 == 2 || (n % 3 == 1 && random() % 2 == 0) {
             let place = random() as usize % frame.len();
             frame[place] ^= 1 << (random() % 8);
         }
-        // Its bytes, a silence, and the longest answer.
+        // Time for its bytes, a silence, and the longest answer.
         master.answered = ANSWERED_FAST / 2 + frame.len() as u64 * 3 / 5;
         let body = frame.len().saturating_sub(2);
         let valid = body > 1 && frame[0] == 1 && frame[body..] == crc(&frame[..body]);

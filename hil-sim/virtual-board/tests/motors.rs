@@ -1,4 +1,4 @@
-//! The lines that a session prints for another motor fit the image to it and to the sensors of the board.
+//! The lines that a session prints for another motor adapt the image to it and to the sensors of the board.
 
 use drive_settings::find;
 use hil_sim::Config;
@@ -26,14 +26,14 @@ fn after_the_printed_lines_the_drive_reads_the_sensors_of_every_motor_right() {
         let scales = &settings.scales;
         let dc_link = f64::from(scales.dc_link.at(sample.dc_link));
         assert!((dc_link / config.inverter.dc_link_v - 1.0).abs() < 2e-3, "{name}: {dc_link} V");
-        // No current flows: noise of the sensor, and a code.
+        // No current flows: only noise of the sensor, and one count.
         let allowed = 6.0 * plant.measurement.noise_a + f64::from(scales.current_a.gain);
         for (line, code) in
             [(scales.current_a, sample.current_a), (scales.current_b, sample.current_b)]
         {
             assert!(f64::from(line.at(code)).abs() < allowed, "{name}: {} A", line.at(code));
         }
-        // The converters reach as far as the sensors do.
+        // The range of the ADCs covers that of the sensors.
         let end = f64::from(scales.current_a.at(board::ADC_FULL_SCALE));
         assert!(end >= config.measurement.range_a, "{name}: {end} A");
         settings.check().unwrap_or_else(|why| panic!("{name}: {why}"));

@@ -1,4 +1,4 @@
-//! Cycles of the control interrupts that take orders from the console.
+//! Cycles of the control interrupts that take requests from the console.
 
 use crate::common;
 use anyhow::{Context, Result};
@@ -8,14 +8,14 @@ use hil_sim::config::LoadMode;
 use induction_drive::board::{LONGEST_INTERRUPT_CYCLES, PWM_TOP};
 use virtual_board::{Board, Image, Options, Pair};
 
-/// Longest until an order is taken, periods: one that changes a setting runs the design rules first.
+/// Longest time until a request is taken, periods: one that changes a setting runs the design rules first.
 const LONGEST: usize = 30_000;
-/// Periods until it is answered.
+/// Number of periods until it is answered.
 const ANSWERED: u64 = 300;
 /// Cycles of a period.
 const PERIOD: u32 = 2 * PWM_TOP as u32;
 
-/// Cycles of the interrupt that takes the order of a line, and of the median one around it.
+/// Returns the cycles of the interrupt that takes the request of a line, and of the median interrupt around it.
 fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
     let (mut taken, mut all) = (None, Vec::new());
     pair.board.type_line(line);
@@ -39,8 +39,8 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
     Ok((taken, median))
 }
 
-/// While it regulates an order leaves four fifths of the period, whatever is ordered; while it is off, when
-/// much is made anew, half.
+/// While the drive regulates, a request of any kind leaves four fifths of the period; while it is off, when much is
+/// computed again, half.
 #[test]
 fn an_order_leaves_most_of_the_period() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 5)?;
@@ -60,8 +60,8 @@ fn an_order_leaves_most_of_the_period() -> Result<()> {
     Ok(())
 }
 
-/// With voltage and frequency there is no angle to find again: the order is refused and changes nothing. A quick stop brakes the
-/// shaft, faster than the ramp.
+/// With V/f control there is no angle to find again: the request is refused and changes nothing. A quick stop brakes
+/// the shaft faster than the ramp.
 #[test]
 fn with_voltage_and_frequency_an_angle_is_not_found_again_and_a_stop_brakes() -> Result<()> {
     let mut config = Config::default();

@@ -1,4 +1,4 @@
-//! Whatever the control interrupt preempts goes on as if nothing had been.
+//! Code that the control interrupt preempts continues undisturbed.
 
 use anyhow::{Context, Result};
 use drive_core::State;
@@ -10,22 +10,22 @@ use virtual_board::board::poison::Poison;
 use virtual_board::chip::CONTROL_INTERRUPT;
 use virtual_board::{Counting, Image, Options, Pair};
 
-/// Control interrupts that are looked at.
+/// Number of control interrupts that are checked.
 const INTERRUPTS: u64 = 100_000;
-/// Periods in which the log writes two lines at least.
+/// Number of periods in which the log writes at least two lines.
 const LOGGED: u64 = 12_100;
-/// Most instructions from one that is asked for to the next.
+/// Largest number of instructions between two requested interrupts.
 const APART: u64 = 3000;
 
 /// Latest start of the control interrupt here, ticks: 1 us. The firmware may be late by 10 us
-/// (`board::LATEST_START_US`); here an instruction in the flash takes a cycle, on the chip up to five, and
-/// twice the time is left for effects that are not modelled.
+/// (`board::LATEST_START_US`). Here an instruction in the flash takes one cycle, on the chip up to five, and a factor
+/// of two is left for effects that are not modelled.
 const LATEST_START: u64 = CYCLES_PER_US as u64;
 
-/// Main loop and serial interrupt are preempted before any instruction, by the interrupts of the
-/// converters and by others that are asked for at random, a hundred thousand in all, while the drive
-/// regulates and the console talks. Registers and stack are compared after each, with the
-/// floating-point registers poisoned inside; the log is whole. None of them waits for the code it preempts.
+/// Main loop and serial interrupt are preempted before any instruction, by the interrupts of the ADCs and by others
+/// that are requested at random, a hundred thousand in all, while the drive regulates and the console is busy.
+/// Registers and stack are compared after each, with the floating-point registers poisoned inside; the log is complete.
+/// No interrupt waits for the code that it preempts.
 #[test]
 fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log_intact()
 -> Result<()> {
@@ -60,7 +60,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     assert!(lines + 5 > replies, "{lines} answers to {replies} lines");
     let log = board.take_log()?;
     assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
-    // A line a second.
+    // One line per second.
     assert!(log.len() as u64 >= periods / 6000, "{} lines in {periods} periods", log.len());
     let mut latest =
         heard.lines().rev().filter_map(|line| line.split_once("latest start ")?.1.split_once(' '));
@@ -68,8 +68,8 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     let seen = board.latest_start;
     println!("the latest start {seen} cycles after it was asked for; {told} us by the status");
     assert!(seen <= LATEST_START, "{seen} cycles");
-    // By the firmware's own measure, with one decimal: once more for those that wait for one that was asked
-    // for in vain.
+    // By the firmware's own measurement, with one decimal: twice the bound, for interrupts that wait for one that was
+    // requested in vain.
     let bound = 2.0 * LATEST_START as f64 / f64::from(CYCLES_PER_US);
     assert!(told <= bound, "{told} us by the status");
     let floating = board.poison.as_ref().map_or(0, |poison| poison.in_floating_point);

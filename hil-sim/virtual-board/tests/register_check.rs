@@ -1,11 +1,11 @@
-//! Bits of configuration registers flip while the drive regulates: the outputs go off and the chip starts afresh.
+//! Bits of configuration registers flip while the drive regulates: the outputs go off and the chip restarts.
 
 use crate::common;
 use anyhow::{Result, ensure};
 use induction_drive::monitor::register_check::control;
 use virtual_board::periph::Reset;
 
-/// Registers and bits, one of each peripheral that the control depends on and that nothing else looks at.
+/// Registers and bits, one of each peripheral on which the control depends and that nothing else checks.
 const FLIPS: [(&str, u32, u32); 14] = [
     ("TIM1_CR1.CKD, on which the dead time depends", 0x4001_2c00, 8),
     ("TIM1_DIER.UDE", 0x4001_2c0c, 8),
@@ -38,7 +38,7 @@ fn a_flipped_bit_in_a_register_ends_the_run() -> Result<()> {
         let began = chip.now;
         let (mut off, mut slices) = (None, 0);
         while board.resets.is_empty() {
-            // A shorter dead time is at the gates at once.
+            // A shorter dead time acts on the gates at once.
             if let Err(error) = board.run_ticks(2000) {
                 ensure!(error.to_string().contains("dead time"), "{name}: {error:#}");
             }
@@ -49,7 +49,7 @@ fn a_flipped_bit_in_a_register_ends_the_run() -> Result<()> {
             slices += 1;
             assert!(slices < 25_000, "{name}: no reset");
         }
-        // Where a fault of the drive has come first, the reset follows when its entry of the history is written.
+        // If a fault of the drive has come first, the reset follows when its entry of the history is written.
         let (at, reset) = board.resets[0];
         let (off, ms) = (off.unwrap(), (at - began) as f64 / 170e3);
         println!("{name}: off after {off:.2} ms, reset after {ms:.2} ms");

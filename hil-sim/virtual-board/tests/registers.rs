@@ -1,4 +1,4 @@
-//! Second opinions on the registers: reset values and writable bits of every modelled register against the
+//! Independent checks of the registers: reset values and writable bits of every modelled register against the
 //! peripheral access crate `stm32g4` (ST's SVD with the corrections of stm32-rs; its source is read) and against the
 //! data of `stm32-metapac` (embassy); clocks and pins against the latter.
 
@@ -11,7 +11,7 @@ use anyhow::Result;
 use virtual_board::chip::{Chip, clock_of, pins};
 use virtual_board::dump;
 
-/// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is as ADC1.
+/// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is like ADC1.
 const BLOCKS: [(&str, &str, u32); 24] = [
     ("tim1", "TIM1", 0x4001_2c00),
     ("tim1", "TIM8", 0x4001_3400),
@@ -39,7 +39,7 @@ const BLOCKS: [(&str, &str, u32); 24] = [
     ("dbgmcu", "DBGMCU", 0xe004_2000),
 ];
 
-/// Registers in which access crate and model differ after reset: the value of the crate, and why the model's holds.
+/// Registers in which access crate and model differ after reset: the value of the crate, and the reason why the model's value is right.
 const RESETS: &[(&str, u32, &str)] = &[
     ("RCC_CR", 0x63, "MSI bits of another family; RM0440: HSION and HSIRDY"),
     ("FLASH_ACR", 0x600, "DBG_SWEN is set after reset (RM0440, FLASH_ACR: 0x0004_0600)"),
@@ -52,7 +52,7 @@ const RESETS: &[(&str, u32, &str)] = &[
     ("GPIOB_IDR", 0, "levels: NJTRST is pulled up"),
 ];
 
-/// Bits of a register that the model does not take although both sources call them fields, and why.
+/// Bits of a register that the model does not accept although both sources call them fields, and the reason.
 const READ_ONLY: &[(&str, u32, &str)] = &[
     ("TIM1_CR1", 0x10, "DIR is read-only in centre-aligned mode"),
     ("TIM1_SR", 0xf3_3fff, FLAGS),
@@ -91,12 +91,12 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
 const FLAGS: &str = "flags, cleared by a write";
 const KEY: &str = "locked until a key is written";
 const OPTIONS: &str = "option bytes: locked until a key is written, which is not modelled";
-const ACTIONS: &str = "set by a write under conditions, cleared by the converter";
+const ACTIONS: &str = "set by a write under conditions, cleared by the ADC";
 
-/// Bits that the model takes although neither source names them, and why.
+/// Bits that the model accepts although neither source names them, and the reason.
 const MODEL_ONLY: &[(&str, u32, &str)] = &[];
 
-/// A chip whose peripherals have their clocks.
+/// Returns a chip whose peripherals have their clocks.
 fn clocked() -> Chip {
     let mut chip = Chip::default();
     for (register, bits) in [
@@ -112,13 +112,13 @@ fn clocked() -> Chip {
     chip
 }
 
-/// The value of a register; `None` is not modelled.
+/// Returns the value of a register; `None` if it is not modelled.
 fn read(chip: &mut Chip, address: u32) -> Option<u32> {
     let value = chip.read(address, 4);
     chip.unknown.take().is_none().then_some(value)
 }
 
-/// Bits of a register that follow what is written.
+/// Returns the bits of a register that follow a write.
 fn writable(address: u32) -> u32 {
     let after = |value| {
         let mut chip = clocked();
@@ -137,7 +137,7 @@ fn reset_values_are_those_of_the_access_crate() -> Result<()> {
     for (module, peripheral, base) in BLOCKS {
         for register in svd::registers(module)? {
             let address = base + register.offset;
-            // Enable registers were written.
+            // The enable registers were written.
             let mut chip = if peripheral == "RCC" { Chip::default() } else { clocked() };
             let Some(value) = read(&mut chip, address) else { continue };
             compared += 1;
@@ -192,7 +192,7 @@ fn writable_bits_are_those_of_both_sources() -> Result<()> {
 /// The registers that are compared with those of a real board have the names and addresses of the access crate.
 #[test]
 fn compared_registers_are_those_of_the_access_crate() -> Result<()> {
-    // Other names there: C1CSR, APB1L_FZ, APB2_FZ; the protection of memory is the core's.
+    // The crate uses other names: C1CSR, APB1L_FZ, APB2_FZ; the memory protection belongs to the core.
     let elsewhere = ["COMP1_", "DBGMCU_", "MPU_"];
     let compared = dump::registers()?;
     for (name, address, _) in &compared {
@@ -204,7 +204,7 @@ fn compared_registers_are_those_of_the_access_crate() -> Result<()> {
         for (module, _, base) in BLOCKS {
             let offset = address.wrapping_sub(base);
             found |= svd::registers(module)?.iter().any(|known| {
-                // CCMR1 has two names there, for inputs and for outputs.
+                // CCMR1 has two names in the crate, for inputs and for outputs.
                 let name = known.name.trim_end_matches("_output");
                 known.offset == offset && name.eq_ignore_ascii_case(register)
             });
@@ -221,7 +221,7 @@ fn clocks_are_those_of_the_second_source() {
     for (_, peripheral, base) in BLOCKS {
         let ours = clock_of(base).map(|(_, register, bit)| (register, bit));
         let theirs = metapac::clock(peripheral);
-        // The comparators and the common registers of the converters have none of their own there.
+        // The comparators and the common registers of the ADCs have no clock of their own there.
         if let Some(theirs) = theirs {
             assert_eq!(ours, Some(theirs), "{peripheral}");
             compared += 1;

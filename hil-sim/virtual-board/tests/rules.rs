@@ -1,5 +1,5 @@
-//! The rules of the chip: for each a script of register accesses that breaks it and one that keeps it, through the bus
-//! and without firmware. One table, which makes the file long.
+//! The rules of the chip: for each one a script of register accesses that breaks it and one that keeps it, through the
+//! bus and without firmware. They form one table, which makes the file long.
 
 use virtual_board::chip::Chip;
 use virtual_board::periph::Reset;
@@ -46,18 +46,18 @@ const US: u64 = 170;
 enum Step {
     /// Writes a word, then waits ten cycles.
     Write(u32, u32),
-    /// The same without the wait.
+    /// Writes a word without the wait.
     Next(u32, u32),
     /// Reads a word.
     Read(u32),
     /// Lets time pass, ticks.
     Wait(u64),
-    /// A debugger halts the core for 10 ms and lets it go.
+    /// A debugger halts the core for 10 ms and continues it.
     Halt,
 }
 use Step::{Halt, Next, Read, Wait, Write};
 
-/// A chip after a script.
+/// Returns a chip after a script.
 fn after(script: &[Step]) -> Chip {
     let mut chip = Chip::default();
     let pass = |chip: &mut Chip, ticks: u64| {
@@ -97,20 +97,20 @@ fn after(script: &[Step]) -> Chip {
     chip
 }
 
-/// The rules that a script breaks.
+/// Returns the rules that a script breaks.
 fn broken(script: &[Step]) -> Vec<Rule> {
     let mut rules: Vec<_> = after(script).rules.violations().iter().map(|v| v.rule).collect();
     rules.dedup();
     rules
 }
 
-/// One script breaks exactly this rule, the other none.
+/// Checks that one script breaks exactly this rule, and the other none.
 fn twins(rule: Rule, breaks: &[&[Step]], keeps: &[&[Step]]) {
     assert_eq!(broken(&breaks.concat()), [rule], "breaks {rule:?}");
     assert_eq!(broken(&keeps.concat()), [], "keeps {rule:?}");
 }
 
-/// Converters 1 and 2 on the synchronous clock / 4, with their regulator.
+/// ADC1 and ADC2 on the synchronous clock / 4, with their regulator.
 const ADC_ON: &[Step] =
     &[Write(AHB2ENR, 1 << 13), Write(CCR, 3 << 16), Write(ADC1 + 8, 0), Write(ADC1 + 8, REGULATOR)];
 const CALIBRATED: &[Step] = &[Wait(20 * US), Write(ADC1 + 8, REGULATOR | CALIBRATE), Wait(10 * US)];
@@ -151,7 +151,7 @@ fn a_peripheral_without_its_clock_drops_writes_and_reads_as_after_reset() {
     let mut chip = after(&script);
     chip.write(APB1ENR1, 4, 1 << 28);
     assert_eq!((chip.read(PWR, 4), chip.read(PWR + 4, 4)), (0x200, 0));
-    // A value written stays hidden while the clock is off again.
+    // A written value stays hidden while the clock is off again.
     let mut chip = after(&[Write(APB1ENR1, 1 << 28), Write(PWR + 0x80, 0), Write(APB1ENR1, 0)]);
     assert_eq!(chip.read(PWR + 0x80, 4), 0x100);
     for address in [TIM2, LPUART1, SYSCFG, COMP1, TIM1, GPIOA, ADC1 + 8, DAC3] {
@@ -171,7 +171,7 @@ fn the_first_access_comes_two_cycles_after_the_clock() {
         &[&[enable, one_between, Write(CCR, 3 << 16)]],
         &[&[enable, Read(AHB2ENR), Write(CCR, 3 << 16)]],
     );
-    // Lost: the clock mode is as after reset.
+    // The write is lost: the clock mode is as after reset.
     let mut chip = after(&[enable, one_between, Write(CCR, 3 << 16)]);
     assert_eq!(chip.read(CCR, 4), 0);
 }
@@ -241,7 +241,7 @@ fn a_converter_needs_a_clock() {
     let own = [Write(CCIPR, 2 << 28)];
     twins(Rule::AdcClock, &[&without, CALIBRATED], &[&own, &without, CALIBRATED, READY]);
     assert_eq!(broken(&[ADC_ON, CALIBRATED, READY].concat()), []);
-    // The calibration never ends, and the converter never gets ready.
+    // The calibration never ends, and the ADC never gets ready.
     let mut chip = after(&[&without[..], CALIBRATED].concat());
     assert_ne!(chip.read(ADC1 + 8, 4) & CALIBRATE, 0);
 }
@@ -329,7 +329,7 @@ fn outputs_stay_off_after_a_halt() {
         &[&stop_timer, &on, &[Halt], &noticed],
         &[&stop_timer, &on, &[Halt], &off, &noticed],
     );
-    // Off as if MOE was reset, while the bit stays.
+    // Off as if MOE had been reset, while the bit stays.
     let mut chip = after(&[&stop_timer[..], &on].concat());
     assert!(chip.tim1.outputs_on());
     chip.halt();
@@ -346,7 +346,7 @@ fn a_halt_stops_what_dbgmcu_says() {
     let expires = |script: &[&[Step]]| after(&script.concat()).reset;
     assert_eq!(expires(&[&watchdog, &halts]), Some(Reset::Watchdog));
     assert_eq!(expires(&[&watchdog, &stop, &halts]), None);
-    // DBGMCU survives all resets but that of power-on.
+    // DBGMCU survives all resets except that of power-up.
     for (cause, kept) in [(Reset::Watchdog, 1 << 12), (Reset::Power, 0)] {
         let mut chip = after(&stop);
         chip.reset(cause);
@@ -398,7 +398,7 @@ fn a_level_is_set_up_in_order_and_waited_for() {
     assert!(high(&mut chip, 2000), "settled");
 }
 
-/// A converter that waits for TIM1, and its reference inside the chip as a regular channel, sampled for a code of the
+/// An ADC that waits for TIM1, with the chip's internal reference as a regular channel, sampled with this field of the
 /// sampling time.
 fn regular_beside_injected(sampling: u32) -> Vec<Step> {
     let triggered = 1 << 7;
@@ -426,7 +426,7 @@ fn regular_beside_injected(sampling: u32) -> Vec<Step> {
 fn a_trigger_finds_no_regular_conversion() {
     let begun = regular_beside_injected(6);
     let convert = |after| [Wait(after), Write(ADC1 + 8, REGULATOR | 1 << 2), Wait(10_000)];
-    // 260 clocks of the converter are 1040 ticks.
+    // 260 clocks of the ADC are 1040 ticks.
     twins(Rule::AdcDisturbed, &[&begun, &convert(13_300)], &[&begun, &convert(12_000)]);
 }
 

@@ -1,7 +1,7 @@
-//! The ELF on the board does with the motor what the drive on the host does.
+//! The ELF on the board has the same effect on the motor as the drive on the host.
 //!
-//! Same plant, same settings, same steps. The seeds are the same too, but not the noise: the board
-//! has drawn from it while it started, and an order comes some periods later.
+//! Plant, settings and steps are the same. The seeds are the same too, but not the noise: the board has used some of it
+//! while it started, and a request comes some periods later.
 
 use crate::common;
 use std::f64::consts::TAU;
@@ -27,7 +27,7 @@ struct Point {
     rpm: f64,
 }
 
-/// After a period, before the plant moves on: truth and telemetry of the same sample.
+/// The values after a period, before the plant advances: true values and telemetry of the same sample.
 fn point(plant: &Plant, drive: &Drive) -> Point {
     let t = drive.telemetry();
     Point {
@@ -40,7 +40,7 @@ fn point(plant: &Plant, drive: &Drive) -> Point {
     }
 }
 
-/// Runs the same profile on the board and on the host: orders, and for how many periods each holds.
+/// Runs the same profile on the board and on the host: requests, each for a number of periods.
 fn both(
     config: &Config,
     mode: Mode,
@@ -66,7 +66,7 @@ fn both(
     for (_, command, periods) in steps {
         rig.command(command)?;
         for _ in 0..*periods {
-            // The truth at the sample, before the plant moves on.
+            // The true values at the sample, before the plant advances.
             let before = rig.plant.clone();
             rig.step();
             host.push(point(&before, &rig.drive));
@@ -79,8 +79,8 @@ fn mean(points: &[Point], of: impl Fn(&Point) -> f64) -> Stats {
     Stats::of(points.iter().map(of))
 }
 
-/// Sensors without noise: with it the mean angle error of half a second differs by 0.6 degrees rms from
-/// one seed to the next, and the end of a position step by 0.1 degrees, which would hide the difference.
+/// Returns sensors without noise: with noise the mean angle error of half a second differs by 0.6 degrees rms from one
+/// seed to the next, and the end of a position step by 0.1 degrees, which would hide the difference.
 fn quiet() -> Config {
     let mut config = Config::default();
     config.measurement.noise_a = Some(0.0);
@@ -102,9 +102,9 @@ fn torque_steps() -> Result<()> {
     for (n, (board, host)) in
         board.chunks(LEVEL as usize).zip(host.chunks(LEVEL as usize)).enumerate()
     {
-        // The second half: settled. What is left between the two is where in the run the quantised
-        // samples fall: seen are 0.8 % of the torque, 0.32 degrees in the mean (each run wanders by 0.2
-        // degrees, which the quantisation makes), 0.06 in rms, 6 % of the current's rms.
+        // The second half has settled. The remaining difference depends on where in the run the quantised samples fall.
+        // The observed differences are 0.8 % of the torque, 0.32 degrees in the mean (each run varies by 0.2 degrees
+        // because of the quantisation), 0.06 in rms, and 6 % of the current's rms.
         let (b, h) = (&board[board.len() / 2..], &host[host.len() / 2..]);
         let torque = [mean(b, |p| p.torque).mean(), mean(h, |p| p.torque).mean()];
         let error = [mean(b, |p| p.error_deg), mean(h, |p| p.error_deg)];
@@ -150,9 +150,9 @@ fn position_step() -> Result<()> {
         "overshoot (turns), settling (s), end (deg), iq (A), rpm, error rms (deg): {figures:?}"
     );
     let [b, h] = figures;
-    // A thousandth of a turn; two counts of the encoder (0.036 degrees each, one of either run) where the
-    // position enters the last degree with 2 degrees a second; two counts; the quantisation of the currents;
-    // one percent of the speed. Noise of the sensors would move the end by three counts from seed to seed.
+    // A thousandth of a turn; two counts of the encoder (0.036 degrees each, one from either run) at the point where
+    // the position enters the last degree with 2 degrees a second; two counts; the quantisation of the currents; one
+    // percent of the speed. Noise of the sensors would move the end by three counts from seed to seed.
     for ((b, h), tolerance) in b.iter().zip(h).zip([1e-3, 0.036, 0.072, 0.1, 0.01 * h[4], 0.2]) {
         assert!((b - h).abs() < tolerance, "{figures:?}");
     }

@@ -1,4 +1,4 @@
-//! Scripts of the virtual board: times, texts that are waited for, and what makes them fail.
+//! Scripts of the virtual board: times, awaited texts, and failures.
 
 use virtual_board::interactive::script::{Due, Script};
 
@@ -30,7 +30,7 @@ fn scripts_keep_their_times_and_wait_for_texts() {
     }
 }
 
-/// What a strict script does, given lines that are said at their time.
+/// Plays a strict script with lines that come at given times; returns the typed lines and the result.
 fn play(text: &str, said: &[(f64, &str)]) -> (Vec<String>, Result<f64, String>) {
     let mut script = Script::parse(text).unwrap().strict();
     let (mut typed, mut said) = (Vec::new(), said.iter().peekable());
@@ -87,7 +87,7 @@ fn an_error_is_a_failure_unless_it_is_expected() {
     assert!(why.contains("line 1: `at 1: torque 99`: answered `error: no such command`"), "{why}");
     let why = failure(script, &[(1.2, error), (2.1, error)]);
     assert!(why.contains("line 3: `at 2: stop`"), "{why}");
-    // Lenient: it goes on, and missing texts are noted.
+    // A lenient script continues, and notes missing texts.
     let mut script = Script::parse("at 0: torque 99\nexpect 1s ok\nat 2: stop").unwrap();
     assert_eq!(script.due(0.0).unwrap(), Due::Type("torque 99".into()));
     script.hear(error);

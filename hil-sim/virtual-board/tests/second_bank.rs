@@ -1,6 +1,6 @@
-//! The second bank of the flash while it is written: a fetch or a read from it would stop the core, interrupts and all. No
-//! interrupt needs anything of it, nothing of it runs meanwhile, and no control period is missed or late. An interrupt that did
-//! need it would be late by the whole operation.
+//! The second bank of the flash while it is written: a fetch or a read from it would stop the core, including its
+//! interrupts. No interrupt needs anything from it, no code in it runs meanwhile, and no control period is missed or
+//! late. An interrupt that did need it would be late by the whole operation.
 
 use std::ops::Range;
 
@@ -12,11 +12,11 @@ use virtual_board::memory::{BANK_2, FLASH, STORED};
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
-/// Code of the second bank. Behind it lies what is stored.
+/// Code of the second bank. The settings area follows it.
 const SECOND: Range<u32> = BANK_2..STORED;
-/// The same without the copy of the control's code, which the main loop compares with the code in CCM all the time.
+/// The second bank without the copy of the control's code, which the main loop always compares with the code in CCM.
 const DESIGN: Range<u32> = 0x0804_8000..STORED;
-/// Latest start of a control period against the one before, ticks: 3 us.
+/// Largest jitter of a control period, ticks: 3 us.
 const LATE: u64 = 500;
 /// Ticks of a step, shorter than any interrupt.
 const STEP: u64 = 40;
@@ -30,7 +30,7 @@ fn greeted(seed: u64) -> Result<Board> {
     Ok(board)
 }
 
-/// The compare values of some control periods while these lines are typed, a part of the flash spoilt in every interrupt.
+/// Returns the compare values of some control periods while these lines are typed, with a part of the flash corrupted in every interrupt.
 fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
     let mut board = greeted(41)?;
     let place = spoilt.unwrap_or(FLASH..FLASH);
@@ -42,11 +42,11 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
         ["start torque", "torque 1", "torque -1", "stop", "start vf", "speed 300", "stop", "learn"];
     for line in lines {
         board.type_line(line);
-        // Read the state word and the speed, of the slave with the address 1.
+        // Reads the state word and the speed of the slave with the address 1.
         board.send_bus(&[1, 3, 0, 0, 0, 2, 0xc4, 0x0b]);
         let (end, mut is_spoilt) = (board.chip().now + 400 * TICKS_PER_PERIOD, false);
         while board.chip().now < end || is_spoilt {
-            // The end of an interrupt is met exactly: what it preempted needs the bank.
+            // The end of an interrupt must be met exactly, because the preempted code needs the bank.
             board.run_ticks(if is_spoilt { 1 } else { STEP })?;
             let interrupts = !board.chip().scs.active.is_empty();
             if interrupts != is_spoilt {
@@ -60,13 +60,13 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
         ensure!(board.resets.is_empty(), "{line}: {:?}", board.resets);
         answered += usize::from(!board.take_bus().is_empty());
     }
-    // A start designs before it reads the bus.
+    // A start runs the design before it reads the bus.
     ensure!(answered >= lines.len() - 2, "{answered} answers on the bus");
     Ok(seen)
 }
 
-/// Start, torque and V/f come out the same to the bit with rubbish in the second bank whenever an interrupt runs. In
-/// the first bank, where vectors, tables and slow states are, the same rubbish does not go unseen.
+/// Start, torque and V/f give exactly the same results with corrupted data in the second bank whenever an interrupt
+/// runs. In the first bank, which holds vectors, tables and slow states, the same corruption has an effect.
 #[test]
 fn no_interrupt_needs_the_second_bank() -> Result<()> {
     let whole = compares(None)?;
@@ -74,12 +74,12 @@ fn no_interrupt_needs_the_second_bank() -> Result<()> {
     assert!(whole.iter().any(|period| period.contains("enabled: true")));
     assert_eq!(compares(Some(DESIGN))?, whole);
     let first = compares(Some(FLASH..BANK_2));
-    assert!(first.is_err() || first.is_ok_and(|periods| periods != whole), "rubbish was not seen");
+    assert!(first.is_err() || first.is_ok_and(|periods| periods != whole), "corruption not seen");
     Ok(())
 }
 
-/// Two saves, an erasure of each slot, and an entry of the history: control periods come as ever, and while the flash is busy
-/// the core is in the first bank or in CCM, never in the second, which it uses at other times.
+/// Two saves, an erasure of each slot, and an entry of the history: control periods come as usual. While the flash is
+/// busy the core is in the first bank or in CCM, never in the second, which it uses at other times.
 #[test]
 fn no_control_period_waits_for_the_flash() -> Result<()> {
     let mut board = greeted(42)?;
@@ -127,11 +127,11 @@ fn no_control_period_waits_for_the_flash() -> Result<()> {
     Ok(())
 }
 
-/// Where nothing of the image lies, in the first bank and in the second.
+/// Addresses in the first and in the second bank that the image does not use.
 const FREE: [u32; 2] = [0x0803_ff00, 0x0805_ff00];
 
-/// Puts a piece of code before the control interrupt, as if the linker had left a part of it there: in the second bank, or in
-/// the first with a word of the second that it reads.
+/// Puts a piece of code before the control interrupt, as if the linker had left a part of it there: in the second bank,
+/// or in the first bank with a word of the second that it reads.
 fn before_the_control(board: &mut Board, reads: bool) {
     let vector = board.chip().scs.vector(CONTROL_INTERRUPT);
     let handler = board.cpu.word(vector).unwrap();
@@ -147,7 +147,7 @@ fn before_the_control(board: &mut Board, reads: bool) {
     board.cpu.write(vector, &(place | 1).to_le_bytes());
 }
 
-/// The control interrupt with a piece of code or a word in the second bank: as good as ever until the flash is written; then
+/// The control interrupt with a piece of code or a word in the second bank: it works until the flash is written. Then
 /// it does not come until the window watchdog ends the run.
 #[test]
 fn an_interrupt_that_needs_the_second_bank_waits_for_the_flash() -> Result<()> {

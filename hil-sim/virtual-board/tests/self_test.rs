@@ -1,5 +1,5 @@
-//! The self-test of the over-voltage protection at start: what it finds is said, `start` is refused for
-//! it, and no driver switches until it is mended.
+//! The self-test of the over-voltage protection at start: its findings are reported, `start` is refused because of
+//! them, and no driver switches until the fault is repaired.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use induction_drive::board::protection;
@@ -8,13 +8,13 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, DcLinkPin, REFERENCE};
 use virtual_board::{Board, Image, Options, PowerStage};
 
-/// Longest from a reset to the greeting, and from an order to its effect, periods.
+/// Longest time from a reset to the greeting, and from a request to its effect, periods.
 const START: u64 = 30_000;
 
 const NEVER_TRIPS: &str = "the over-voltage comparator does not trip at the level zero";
 const TRIPS_ALWAYS: &str = "the over-voltage comparator trips at its own level";
 
-/// Goes on for some periods, in which no gate is on at their ends. Between them a violation at the gates fails the run.
+/// Runs for some periods and checks that no gate is on at their ends. In between a violation at the gates fails the run.
 fn off_for(board: &mut Board, periods: u64) -> Result<()> {
     for _ in 0..periods {
         board.run_periods(1)?;
@@ -24,7 +24,7 @@ fn off_for(board: &mut Board, periods: u64) -> Result<()> {
     Ok(())
 }
 
-/// What the console says until `end` is in it; no gate is on before.
+/// Returns the output of the console up to `end`, and checks that no gate is on before.
 fn hear_off(board: &mut Board, end: &str) -> Result<String> {
     let mut heard = String::new();
     for _ in 0..START / 10 {
@@ -37,14 +37,14 @@ fn hear_off(board: &mut Board, end: &str) -> Result<String> {
     bail!("no {end:?}, but {heard:?}")
 }
 
-/// From power-on, `broken`: the board says why the drive is not started, refuses `start` for the same reason, and switches
-/// nothing. Mended and reset it starts.
+/// Checks from power-up with `broken` that the board reports why the drive is not started, refuses `start` for the same
+/// reason, and switches nothing; and that it starts after a repair and a reset.
 fn refused(stage: &'static PowerStage, why: &str, broken: impl Fn(&mut Board, bool)) -> Result<()> {
     let mut board = refuses(stage, why, &broken, true)?;
     mended(&mut board, broken)
 }
 
-/// The refusals; where they begin `at_boot`, greeting and log tell them, too.
+/// Checks the refusals; with `at_boot` greeting and log report them too.
 fn refuses(
     stage: &'static PowerStage,
     why: &str,
@@ -92,7 +92,7 @@ fn damaged(damage: Damage, why: &str) -> Result<()> {
     refused(&REFERENCE, why, |board, broken| board.chip().damage = broken.then_some(damage))
 }
 
-/// The dc link is above the level of the comparator from power-on: 441 V on the reference board, whose level is 430 V.
+/// The dc link is above the level of the comparator from power-up: 441 V on the reference board, whose level is 430 V.
 #[test]
 fn a_dc_link_above_the_level_is_not_started() -> Result<()> {
     for stage in ALL {
@@ -103,7 +103,7 @@ fn a_dc_link_above_the_level_is_not_started() -> Result<()> {
         refused(stage, TRIPS_ALWAYS, |board, broken| {
             let set = board.plant.set_dc_link(if broken { too_high } else { normal });
             set.expect("within the range of the plant");
-            // The counter, which else shows the samples, is at rest.
+            // The counter, which otherwise passes on the samples, is at rest.
             let dc_link = board.plant.clone().sample().dc_link;
             board.chip().compare(0, 0, dc_link);
         })?;
@@ -111,20 +111,20 @@ fn a_dc_link_above_the_level_is_not_started() -> Result<()> {
     Ok(())
 }
 
-/// DAC3 gives nothing: the comparator trips at every level.
+/// DAC3 outputs zero: the comparator trips at every level.
 #[test]
 fn a_level_that_stays_at_zero_is_not_started() -> Result<()> {
     damaged(Damage::Level(0), TRIPS_ALWAYS)
 }
 
-/// A comparator whose output stays low whatever its polarity.
+/// The output of the comparator stays low regardless of its polarity.
 #[test]
 fn a_comparator_whose_output_stays_low_is_not_started() -> Result<()> {
     damaged(Damage::Comparator, "the over-voltage comparator does not reach the break of TIM1")
 }
 
-/// A comparator that does not see its pin, or whose level stays at the top: it would never trip. It could be a sensor that drives the
-/// pin to ground: a start finds out by the dc link.
+/// The comparator is not connected to its pin, or its level stays at the top: it would never trip. It could also be a
+/// sensor that drives the pin to ground, so a start decides by the dc link.
 #[test]
 fn a_comparator_that_does_not_trip_is_not_started() -> Result<()> {
     let damages = ALL.map(|stage| (stage, Damage::Input));
@@ -137,7 +137,7 @@ fn a_comparator_that_does_not_trip_is_not_started() -> Result<()> {
     Ok(())
 }
 
-/// The comparator trips, and the timer does not see it; a break flag that the fault input left at start does not hide it.
+/// The comparator trips, but the timer does not see it; a break flag that the fault input left at start does not hide this.
 #[test]
 fn a_comparator_that_does_not_reach_the_timer_is_not_started() -> Result<()> {
     let why = "the over-voltage comparator does not reach the break of TIM1";
@@ -151,19 +151,20 @@ fn a_comparator_that_does_not_reach_the_timer_is_not_started() -> Result<()> {
     })
 }
 
-/// The worst part, codes: 9 mV of the comparator, and five codes of the DAC at its zero (datasheet, V_offset and the error at
-/// code 1 without buffer).
+/// The worst part, counts: 9 mV of the comparator, and five counts of the DAC at its zero (datasheet, V_offset and the
+/// error at code 1 without buffer).
 const OFFSET: u16 = 16;
 
-/// What the pin of the dc link of a stage may be connected to beside a bare divider: a capacitor of the usual size and of twice
-/// that, or an amplifier or an isolated sensor, which a pull of the chip does not move.
+/// Returns the circuits to which the pin of the dc link of a stage may be connected besides a plain divider: a
+/// capacitor of the usual size and of twice that, or an amplifier or an isolated sensor, whose level a pull resistor of
+/// the chip does not change.
 fn pins(stage: &PowerStage) -> [DcLinkPin; 3] {
     let DcLinkPin::Divider { ohm, .. } = stage.dc_link_pin else { panic!("{}", stage.name) };
     let capacitor = |farad| DcLinkPin::Divider { ohm, farad };
     [capacitor(100e-9), capacitor(220e-9), DcLinkPin::Driven]
 }
 
-/// A board with such a pin, before its dc link is there, and what it says as it starts.
+/// Returns a board with such a pin, before its dc link is charged, and its output as it starts.
 fn without_link(
     stage: &'static PowerStage,
     pin: DcLinkPin,
@@ -180,8 +181,9 @@ fn without_link(
     Ok((board, heard))
 }
 
-/// Without a dc link the self-test passes with a capacitor at the pin, which the chip's resistor charges in milliseconds, and
-/// with a pin that it cannot lift; with the dc link there the drive switches on. No pin is read in a mode that it must not have.
+/// Without a dc link the self-test passes with a capacitor at the pin, which the chip's resistor charges in
+/// milliseconds, and with a pin that it cannot lift; with a charged dc link the drive switches on. No pin is read in a
+/// mode that is not allowed.
 #[test]
 fn a_capacitor_or_a_driven_sensor_is_no_reason_to_refuse() -> Result<()> {
     for stage in ALL {
@@ -197,8 +199,9 @@ fn a_capacitor_or_a_driven_sensor_is_no_reason_to_refuse() -> Result<()> {
     Ok(())
 }
 
-/// A dead comparator is refused with either, without a dc link as well: its output stays low whatever its polarity, or the break
-/// does not see it. One that does not see its pin is refused by the start, with and without a dc link.
+/// A dead comparator is refused with either circuit, also without a dc link: its output stays low regardless of its
+/// polarity, or the break is not connected to it. A comparator without a connection to its pin is refused by the start,
+/// with and without a dc link.
 #[test]
 fn a_dead_comparator_behind_a_capacitor_or_a_driven_sensor_is_refused() -> Result<()> {
     let [_, capacitor, driven] = pins(&REFERENCE);

@@ -1,11 +1,11 @@
-//! `cargo sim board` with scripts: what a session keeps, shows and refuses.
+//! `cargo sim board` with scripts: the data that a session keeps, shows and refuses.
 
 use std::path::Path;
 use std::process::Stdio;
 
 use crate::common::program::{command, folder};
 
-/// A session with a script, as fast as it goes; exit code and all that it showed.
+/// Runs a session with a script, as fast as possible; returns the exit code and all its output.
 fn play(folder: &Path, script: &str, arguments: &[&str]) -> (Option<i32>, String) {
     let file = folder.join("script.txt");
     std::fs::write(&file, script).unwrap();
@@ -43,7 +43,7 @@ fn saved_settings_outlast_reset_power_and_session() {
     assert_eq!(code, Some(1), "without the file: {shown}");
 }
 
-/// A stream on the wire is no text of the session, and a new session says in which state its flash begins.
+/// A stream on the wire is no text of the session, and a new session reports the initial state of its flash.
 #[test]
 fn frames_of_a_stream_are_no_text_of_the_session() {
     let folder = folder("stream");
@@ -82,7 +82,7 @@ fn a_motor_with_other_sensors_is_told_its_settings() {
     let folder = folder("sensors");
     let keys = ["--set", "measurement.range_a=12", "--set", "inverter.dc_link_v=540"];
     let shown = play(&folder, "at 0.5: !help\n", &keys).1;
-    // 12 A over 4.4727 A times the image's 2.4332 mA a code; 450 V times 540 over 311.
+    // 12 A over 4.4727 A times the image's 2.4332 mA per count; 450 V times 540 over 311.
     for line in ["set inverter.dc_link_v 540", "set scales.current_a.offset -12", "!reset"] {
         assert!(shown.contains(line), "{line}: {shown}");
     }

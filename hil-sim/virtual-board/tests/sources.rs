@@ -1,5 +1,5 @@
-//! Core clock and reference voltage against the other clock and the other reference of the chip: at start and while the drive
-//! regulates.
+//! Core clock and reference voltage are compared with the other clock and the other reference of the chip: at start and
+//! while the drive regulates.
 
 use crate::common;
 use anyhow::Result;
@@ -14,10 +14,10 @@ use virtual_board::{Board, Image, Options};
 /// Changes clocks or reference.
 type Change = fn(&mut Board);
 
-/// Longest from the change to the outputs off, s.
+/// Longest time from the change to the switch-off of the outputs, s.
 const LATEST: f64 = 1.2;
 
-/// What the oscillators and the reference of a sound chip may be, at the ends of the data sheet's ranges.
+/// Permitted values of the oscillators and the reference of a healthy chip, at the ends of the data sheet's ranges.
 const SOUND: [(&str, Change); 4] = [
     ("slowest oscillator", |board| board.chip().set_clocks(0.001, 29.5e3)),
     ("fastest oscillator", |board| board.chip().set_clocks(-0.001, 34.0e3)),
@@ -25,7 +25,7 @@ const SOUND: [(&str, Change); 4] = [
     ("reference 2.5 % too high", |board| board.chip().set_reference(0.025)),
 ];
 
-/// What it is not, and the fault.
+/// Values that are not permitted, and the fault.
 const OFF: [(&str, Fault, Change); 7] = [
     ("oscillator at rest", Fault::WrongClock, |board| board.chip().set_clocks(0.0, 0.0)),
     ("oscillator too slow", Fault::WrongClock, |board| board.chip().set_clocks(0.0, 28.0e3)),
@@ -36,8 +36,9 @@ const OFF: [(&str, Fault, Change); 7] = [
     ("reference too high", Fault::WrongReference, |board| board.chip().set_reference(0.04)),
 ];
 
-/// Of the wrong ones the greeting says which, `start` is refused for it, and no gate goes on; after a reset without one
-/// of either the drive starts. On the internal oscillator, whose own error is larger, the same oscillators are sound.
+/// With a wrong clock or reference the greeting names it, `start` is refused because of it, and no gate goes on; after
+/// a reset with a right one the drive starts. On the internal oscillator, whose own error is larger, the same
+/// oscillators pass.
 #[test]
 fn a_wrong_clock_or_reference_is_not_started() -> Result<()> {
     let board = || Board::new(Image::built()?, Options::new(&Config::default(), 31));
@@ -77,11 +78,12 @@ fn a_wrong_clock_or_reference_is_not_started() -> Result<()> {
     Ok(())
 }
 
-/// While it regulates: sound ones change nothing; wrong ones take the outputs off in time, with the fault, and they stay off
-/// when it is cleared while the cause lasts. No rule of the chip is broken: the conversions of the control are not disturbed.
+/// While the drive regulates, permitted values change nothing. Wrong values switch the outputs off in time, with the
+/// fault, and they stay off if the fault is cleared while the cause lasts. No rule of the chip is broken: the
+/// conversions of the control are not disturbed.
 #[test]
 fn a_clock_or_reference_that_goes_wrong_switches_off() -> Result<()> {
-    // With the encoder: without it a step of the clock loses the lock first.
+    // With the encoder, because without it a step of the clock loses the lock first.
     let mut pair = common::pair(&Config::default(), 32)?;
     for line in ["angle encoder", "start torque"] {
         pair.order(line)?;
@@ -119,7 +121,7 @@ fn a_clock_or_reference_that_goes_wrong_switches_off() -> Result<()> {
         assert!(!board.chip().tim1.outputs_on(), "{name}: on again");
         let heard = board.take_console();
         assert!(heard.matches(&told).count() >= 2, "{name}: {heard}");
-        // A watchdog without its clock takes no writes, which the firmware waits for in vain when it writes the history.
+        // A watchdog without its clock accepts no writes, for which the firmware waits in vain when it writes the history.
         let mut broken = board.violations().iter().filter(|broken| broken.rule != Rule::IwdgBusy);
         assert!(board.resets.is_empty() && broken.next().is_none(), "{name}");
     }

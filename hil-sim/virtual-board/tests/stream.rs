@@ -1,4 +1,4 @@
-//! The stream on the image: its rate, its losses, its price, and the console beside it.
+//! The stream of the image: its rate, its losses, its cost, and the console beside it.
 
 use crate::common;
 use anyhow::{Context, Result, ensure};
@@ -7,9 +7,9 @@ use drive_stream::{Frame, Piece, Splitter};
 use hil_sim::Config;
 use virtual_board::Pair;
 
-/// Control periods of a second.
+/// Number of control periods per second.
 const SECOND: u64 = 6000;
-/// Signals of the fastest stream that is promised.
+/// Signals of the fastest stream that is guaranteed.
 const EIGHT: &str = "phi_deg i_d_a i_q_a v_d_v v_q_v speed_rpm dc_link_v turns";
 
 /// Lines and frames of a board.
@@ -34,7 +34,7 @@ impl Ear {
         }
     }
 
-    /// Goes on until a line has come, and gives it with the periods that it took; `None` after a second.
+    /// Runs until a line has come, and returns it with the number of periods; `None` after a second.
     fn line(&mut self, pair: &mut Pair) -> Result<Option<(String, u64)>> {
         for period in 1..=SECOND {
             pair.run(1, |_, _| {})?;
@@ -54,14 +54,14 @@ impl Ear {
         self.line(pair)?.with_context(|| format!("no answer to {line:?}"))
     }
 
-    /// Frames that the sequence numbers miss.
+    /// Returns the number of frames that are missing according to the sequence numbers.
     fn missing(&self) -> u32 {
         let gaps = self.frames.windows(2);
         gaps.map(|two| u32::from(two[1].sequence.wrapping_sub(two[0].sequence)) - 1).sum()
     }
 }
 
-/// Regulating, at 2 Mbaud, with the fastest stream.
+/// Returns a drive that regulates, at 2 Mbaud, with the fastest stream.
 fn streaming(seed: u64) -> Result<(Pair, Ear)> {
     let mut pair = common::regulating(seed)?;
     pair.order("torque 1")?;
@@ -72,7 +72,7 @@ fn streaming(seed: u64) -> Result<(Pair, Ear)> {
     Ok((pair, ear))
 }
 
-/// The bounds are those that the console's page promises: 1 % dropped, each counted; answers within 20 ms.
+/// The bounds are those that the console's page guarantees: 1 % dropped, each counted; answers within 20 ms.
 #[test]
 fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() -> Result<()> {
     let (mut pair, mut ear) = streaming(1)?;
@@ -100,13 +100,13 @@ fn two_thousand_frames_a_second_of_eight_signals_and_a_console_that_answers() ->
     ensure!(received as f64 > 0.99 * 2000.0 * seconds, "{received} frames in {seconds} s");
     ensure!(f64::from(missing) < 0.01 * received as f64, "{missing} missing");
     ensure!(slowest_ms < 20.0, "an answer after {slowest_ms} ms");
-    // What the receiver misses is what the firmware says it has dropped.
+    // The frames that the receiver misses are those that the firmware reports as dropped.
     let dropped = answer.split(", ").nth(2).and_then(|text| text.split(' ').next());
     ensure!(dropped.and_then(|text| text.parse().ok()) == Some(missing), "{answer}");
-    // Three periods apart, but for those that waited for a report of the control.
+    // Three periods apart, except for those that waited for a report of the control.
     let steps: Vec<_> = ear.frames.windows(2).map(|two| two[1].period - two[0].period).collect();
     ensure!(steps.iter().all(|step| (2..=4).contains(step) || missing > 0), "{steps:?}");
-    // The values are those of the drive: the current is regulated, the dc link is there.
+    // The values are those of the drive: the current is regulated, the dc link is charged.
     let last = &ear.frames[ear.frames.len() - 1].values;
     ensure!((last[2] - 1.0).abs() < 0.3 && (last[6] - 311.0).abs() < 20.0, "{last:?}");
     Ok(())
@@ -127,7 +127,7 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
     pair.board.send(b"\n");
     let began = pair.board.time();
     let stopped = loop {
-        // The shadow does not know of the stop: the board alone.
+        // The shadow does not know of the stop, so only the board runs.
         pair.board.run_periods(1)?;
         while pair.board.next_period().is_some() {}
         ear.hear(&mut pair);
@@ -151,7 +151,7 @@ fn a_lost_link_stops_the_drive_and_brings_the_rate_back() -> Result<()> {
     Ok(())
 }
 
-/// A line that is too slow for a stream is told; nothing is sent.
+/// A line that is too slow for a stream is reported; nothing is sent.
 #[test]
 fn a_stream_that_the_line_cannot_carry_is_refused() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 3)?;
@@ -160,21 +160,21 @@ fn a_stream_that_the_line_cannot_carry_is_refused() -> Result<()> {
     Ok(())
 }
 
-/// The longest control interrupt of a run with commands and a trace, and the latest start that the firmware reports, us.
+/// Returns the longest control interrupt of a run with commands and a trace, and the latest start that the firmware reports, us.
 fn longest(stream: bool) -> Result<(u32, f64)> {
     let (mut pair, mut ear) = streaming(4)?;
     if !stream {
         ear.ask(&mut pair, "stream off")?;
     }
     pair.board.longest = Default::default();
-    // Behind every sample of the carrier period, whose steps differ by more than a command with a stream does.
+    // After every sample of the injection period, because these differ by more than a command with a stream does.
     for (n, line) in (0..30).zip(["torque 1.5", "torque -1", "torque 1"].into_iter().cycle()) {
         ear.ask(&mut pair, line)?;
         pair.run(SECOND / 20 + n % 10, |_, _| {})?;
     }
     for line in ["torque 1.5", "torque -1", "torque 1"] {
         ear.ask(&mut pair, line)?;
-        // Every seventh period: some of them have a report as well, whenever the trace begins.
+        // Every seventh period: some of them have a report as well, independent of the beginning of the trace.
         pair.board.type_line("trace 500 7");
         pair.run(SECOND, |_, _| {})?;
         ear.hear(&mut pair);

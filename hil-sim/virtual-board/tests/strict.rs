@@ -1,5 +1,5 @@
 //! Images on the stricter board: ours breaks no rule of the chip, a halted core ends with the outputs off, and an old
-//! image with known faults is caught.
+//! image with known faults is detected.
 
 use crate::common;
 use std::path::Path;
@@ -13,12 +13,12 @@ use virtual_board::periph::flash::DBANK;
 use virtual_board::rules::{Rule, Violation};
 use virtual_board::{Board, Counting, Image, Options};
 
-/// Periods that an image needs from reset to its greeting, at most.
+/// Largest number of periods that an image needs from reset to its greeting.
 const START: u64 = 15_000;
-/// Names the image that [`the_old_image_is_caught`] runs.
+/// Environment variable with the image that [`the_old_image_is_caught`] runs.
 const OLD: &str = "INDUCTION_DRIVE_OLD_ELF";
 
-/// A board that stops at every instruction, so that the distance of two accesses is known.
+/// Returns a board that stops at every instruction, so that the distance of two accesses is known.
 fn exact(image: Image) -> Result<Board> {
     let mut options = Options::new(&Config::default(), 1);
     options.counting = Counting { cycles: true, every_instruction: true };
@@ -31,7 +31,7 @@ fn text(violations: &[Violation]) -> String {
     violations.iter().map(|violation| format!("{violation}, {} times\n", violation.count)).collect()
 }
 
-/// The outputs on.
+/// Runs until the outputs are on.
 fn started(board: &mut Board) -> Result<()> {
     board.type_line("start");
     for _ in 0..600 {
@@ -49,7 +49,7 @@ fn our_image_breaks_no_rule() -> Result<()> {
     let mut board = exact(Image::built()?)?;
     common::until_said(&mut board, "last run: ")?;
     board.type_line("confirm board");
-    // Changed and changed back, without a design: there is something to save.
+    // Changed and changed back, without a design, so that there is something to save.
     for line in ["set command.timeout_s 3", "save", "set command.timeout_s 0", "save"] {
         board.type_line(line);
         board.run_periods(1200)?;
@@ -62,8 +62,8 @@ fn our_image_breaks_no_rule() -> Result<()> {
     Ok(())
 }
 
-/// A debugger halts the core, for two periods or longer, and lets it go: the outputs are off then, and stay off. After the
-/// longer ones the watchdog has reset the chip, whatever the debugger stops during a halt.
+/// A debugger halts the core, for two periods or longer, and continues it: the outputs are off then, and stay off.
+/// After the longer halts the watchdog has reset the chip, regardless of what the debugger stops during a halt.
 #[test]
 fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
     let mut regulating = common::regulating(11)?.board;
@@ -75,13 +75,13 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
         board.go_back(&state)?;
         board.resets.clear();
         board.attach(debugger);
-        // A pass of the main loop.
+        // Time for a pass of the main loop.
         board.run_periods(2)?;
         board.halt(ms)?;
         let reset = board.resets.last().map(|reset| reset.1);
         assert!(ms < 5.0 || reset == Some(Reset::Window), "{debugger:?}, {ms} ms: {reset:?}");
         board.resume();
-        // For a period at most, if the watchdog has not reset the chip in the meantime.
+        // They may be on for a period at most, if the watchdog has not reset the chip in the meantime.
         let mut on = 0;
         for _ in 0..1200 {
             board.run_ticks(2000)?;
@@ -95,7 +95,7 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
     Ok(())
 }
 
-/// A probe that detaches clears `DBG_SLEEP`: the time base goes on.
+/// A probe that detaches clears `DBG_SLEEP`: the time base continues.
 #[test]
 fn a_detached_probe_changes_nothing() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 12))?;
@@ -107,8 +107,8 @@ fn a_detached_probe_changes_nothing() -> Result<()> {
     Ok(())
 }
 
-/// Code from the flash takes three cycles an instruction, as with wait states and missed caches: it starts, and the
-/// watchdog is fed. Prints the time of the start.
+/// Code from the flash takes three cycles an instruction, as with wait states and missed caches: the image starts, and
+/// the watchdog is fed. Prints the time of the start.
 #[test]
 fn it_starts_with_slow_flash() -> Result<()> {
     for cycles in [1, 3] {
@@ -138,7 +138,7 @@ fn a_sagging_supply_switches_off() -> Result<()> {
     common::until_said(&mut board, "last run: reset by power-on").map(drop)
 }
 
-/// A stack that has grown into the guard below it is a fault, and the next run knows it.
+/// A stack that has grown into the guard below it is a fault, and the next run reports it.
 #[test]
 fn a_stack_in_the_guard_faults() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 15))?;
@@ -150,8 +150,8 @@ fn a_stack_in_the_guard_faults() -> Result<()> {
     common::until_said(&mut board, "reset by software").map(drop)
 }
 
-/// A PLL that does not lock: the chip stays on its internal oscillator, and says why it does not start. (At the console only a
-/// terminal with 16/170 of the rate could read it.)
+/// The PLL does not lock: the chip stays on its internal oscillator, and reports why it does not start. (At the console
+/// only a terminal with 16/170 of the rate could read it.)
 #[test]
 fn a_pll_that_does_not_lock_is_refused() -> Result<()> {
     for crystal in [true, false] {
@@ -168,7 +168,7 @@ fn a_pll_that_does_not_lock_is_refused() -> Result<()> {
     Ok(())
 }
 
-/// A chip whose option bytes make one bank of the flash does not start.
+/// A chip whose option bytes select a single flash bank does not start.
 #[test]
 fn a_single_bank_chip_is_refused() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 16))?;
@@ -180,7 +180,7 @@ fn a_single_bank_chip_is_refused() -> Result<()> {
     Ok(())
 }
 
-/// The image of commit 1abee12, in which a review found faults F1 to F7, is caught for each:
+/// The image of commit 1abee12, in which a review found faults F1 to F7, fails for each of them:
 ///
 /// ```text
 /// git worktree add ../old 1abee12 && cd ../old && cargo xtask firmware && cd -
@@ -208,7 +208,7 @@ fn the_old_image_is_caught() -> Result<()> {
             assert!(broken(&board, *rule), "{finding}: {rule:?}");
         }
     }
-    // Without the distance of two accesses its converters start, and the rest can be seen.
+    // Without the check of the distance of two accesses its ADCs start, and the other faults can be seen.
     let running = || -> Result<Board> {
         let mut board = Board::new(image()?, Options::new(&Config::default(), 1))?;
         board.collect_violations();
@@ -216,7 +216,7 @@ fn the_old_image_is_caught() -> Result<()> {
         board.run_periods(START)?;
         Ok(board)
     };
-    // The watchdog's registers are busy for longer than it waits: reset while it saves, unless they are quick.
+    // The watchdog's registers are busy for longer than it waits: a reset while it saves, unless they are quick.
     let mut board = running()?;
     board.type_line("save");
     board.run_periods(1200)?;

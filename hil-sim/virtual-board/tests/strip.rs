@@ -5,13 +5,13 @@ use hil_sim::Config;
 use hil_sim::plant::Load;
 use virtual_board::{Board, Image, Options};
 
-/// Periods in a millisecond.
+/// Number of periods per millisecond.
 const MS: u64 = 6;
 
 struct Panel(Board);
 
 impl Panel {
-    /// A board whose strip commands.
+    /// Returns a board that its terminal strip commands.
     fn new() -> Result<Self> {
         let mut panel = Self(Board::new(Image::built()?, Options::new(&Config::default(), 3))?);
         panel.0.plant.set_load(Load::Free { torque: 0.0 })?;
@@ -42,7 +42,7 @@ impl Panel {
         Ok(())
     }
 
-    /// Until the console has said a text, ms at most.
+    /// Runs until the console has printed a text, for at most `ms`.
     fn hear(&mut self, text: &str, ms: u64) -> Result<String> {
         let mut heard = String::new();
         for _ in 0..ms / 10 {
@@ -55,13 +55,13 @@ impl Panel {
         anyhow::bail!("no {text:?} in {heard:?}")
     }
 
-    /// Milliseconds until the outputs are off, and whether the brake was closed at least 10 ms before.
+    /// Returns the milliseconds until the outputs are off, and whether the brake was closed at least 10 ms before.
     fn off(&mut self, ms: u64) -> Result<(u64, bool)> {
         let mut closed = None;
         for at in 0..ms {
             self.wait(1)?;
             if !self.0.chip().tim1.outputs_on() {
-                // Until that is reported.
+                // Time until that is reported.
                 self.wait(5)?;
                 return Ok((at, closed.is_some_and(|closed| at >= closed + 10)));
             }
@@ -89,7 +89,7 @@ impl Panel {
 #[test]
 fn a_panel_drives_the_motor() -> Result<()> {
     let mut panel = Panel::new()?;
-    // START alone, then ENABLE behind it.
+    // START alone, then ENABLE after it.
     panel.contact("START", true)?;
     panel.contact("ENABLE", true)?;
     ensure!(!panel.on(), "ENABLE starts");
@@ -101,23 +101,23 @@ fn a_panel_drives_the_motor() -> Result<()> {
     panel.0.set_reference([20.0; 2]);
     panel.wait(1500)?;
     assert!((panel.rpm() - 300.0).abs() < 15.0, "{} rpm", panel.rpm());
-    // By ramp: the brake closes before the torque goes.
+    // Stop by ramp: the brake closes before the torque ends.
     panel.0.set_contact("START", false)?;
     let (ms, closed_before) = panel.off(2000)?;
     assert!(ms > 150 && closed_before, "{ms} ms, {closed_before}");
     panel.wait(2000)?;
-    // By ENABLE, and no start as it comes back.
+    // Stop by ENABLE, and no start when it returns.
     panel.0.set_contact("START", true)?;
     panel.hear("running: speed", 4000)?;
     panel.0.set_contact("ENABLE", false)?;
     let (ms, closed_before) = panel.off(400)?;
-    // The brake closes first, and has 200 ms; then the torque goes by its own slope, in 150 ms at most.
+    // The brake closes first, and has 200 ms; then the torque goes to zero by its own slope, in 150 ms at most.
     assert!((200..=355).contains(&ms) && closed_before, "{ms} ms");
     assert_eq!(panel.0.terminal_outputs(), [false; 3]);
     panel.contact("ENABLE", true)?;
     panel.wait(1000)?;
     assert!(!panel.on());
-    // A broken loop.
+    // The current loop is broken.
     panel.contact("START", false)?;
     panel.wait(2000)?;
     panel.0.set_contact("START", true)?;
@@ -126,7 +126,7 @@ fn a_panel_drives_the_motor() -> Result<()> {
     panel.off(2000)?;
     panel.hear("below 3.6 mA", 100)?;
     assert_eq!(panel.0.terminal_outputs(), [false, true, false]);
-    // Nothing starts as the supply comes back, whatever is closed.
+    // Nothing starts when the supply returns, regardless of closed contacts.
     panel.0.set_reference([12.0; 2]);
     panel.0.unplug();
     let mut said = String::new();

@@ -1,4 +1,4 @@
-//! The rotor time constant is found and used while the image runs.
+//! The rotor time constant is identified and used while the image runs.
 
 use crate::common;
 use anyhow::Result;
@@ -7,7 +7,7 @@ use hil_sim::Config;
 use hil_sim::rig::wrapped_degrees;
 use virtual_board::Pair;
 
-/// Flux angle that the drive is wrong by, degrees: mean over some periods.
+/// Returns the error of the drive's flux angle, degrees: mean over some periods.
 fn angle_error(pair: &mut Pair, periods: u32) -> Result<f64> {
     let mut sum = 0.0;
     pair.run(periods.into(), |pair, _| {
@@ -17,7 +17,7 @@ fn angle_error(pair: &mut Pair, periods: u32) -> Result<f64> {
     Ok(sum / f64::from(periods))
 }
 
-/// Rotor time constant that the image says the drive uses, ms, and whether there is an estimate.
+/// Returns the rotor time constant that the image reports as used, ms, and whether there is an estimate.
 fn status(pair: &mut Pair) -> Result<(f64, bool)> {
     let status = pair.say("status")?;
     let used = status.rsplit_once("; used ").and_then(|(_, used)| used.strip_suffix(" ms"));
@@ -25,11 +25,11 @@ fn status(pair: &mut Pair) -> Result<(f64, bool)> {
     Ok((used.unwrap_or_else(|| panic!("{status}")), !status.contains("not found")))
 }
 
-/// The motor's rotor has 30 % more resistance than the drive believes, as if it were 75 degrees warmer.
-/// With the encoder and 2 A the time constant that the drive uses comes to the motor's, and so does the
-/// flux angle. All the while the host follows to the bit: it identifies the same values as the image,
-/// or the orders would differ, and then the compare values. The console prints traces meanwhile: were
-/// the main loop too slow, a period would be lost, which the host's ring does not lose.
+/// The motor's rotor has 30 % more resistance than the drive assumes, as if it were 75 degrees warmer. With the encoder
+/// and 2 A the time constant of the drive converges to the motor's, and so does the flux angle. The host stays
+/// identical to the bit: it identifies the same values as the image, otherwise the requests and then the compare values
+/// would differ. The console prints traces meanwhile: if the main loop were too slow, a period would be lost, which the
+/// host's ring does not lose.
 #[test]
 fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     let mut config = Config::default();
@@ -72,7 +72,7 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     let celsius: f64 = celsius.and_then(|number| number.parse().ok()).unwrap_or_default();
     assert!((celsius - 100.0).abs() < 20.0, "{warm}");
 
-    // Without torque the rotor does not show: the status says so, and the time constant in use stays.
+    // Without torque the rotor is not observable: the status reports this, and the time constant in use stays.
     pair.order("torque 0")?;
     pair.run(18_000, |_, _| {})?;
     let (kept, found) = status(&mut pair)?;

@@ -1,4 +1,4 @@
-//! The check sum of the image, `update`, and ST's boot loader behind it.
+//! The check sum of the image, `update`, and ST's boot loader that it starts.
 
 use anyhow::{Result, ensure};
 use hil_sim::Config;
@@ -9,14 +9,14 @@ use virtual_board::memory::FLASH;
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
-/// Control periods until the image greets, at most.
+/// Largest number of control periods until the image greets.
 const GREETING: u64 = 30_000;
 
 fn board() -> Result<Board> {
     Board::new(Image::built()?, Options::new(&Config::default(), 37))
 }
 
-/// Goes on until the console says this; all that it has said.
+/// Runs until the console prints this; returns all its output.
 fn until(board: &mut Board, text: &str, periods: u64) -> Result<String> {
     let mut said = String::new();
     for _ in 0..periods / 60 {
@@ -34,15 +34,15 @@ fn ask(board: &mut Board, line: &str) -> Result<String> {
     until(board, "\n", 3000)
 }
 
-/// The modes of all pins but PA2 and PA3.
+/// Returns the modes of all pins except PA2 and PA3.
 fn modes(board: &mut Board) -> Vec<u32> {
     let console = |port: usize| if port == 0 { 0xf0 } else { 0 };
     let gpio = board.chip().gpio.iter().enumerate();
     gpio.map(|(n, port)| port.read(0).unwrap_or(0) | console(n)).collect()
 }
 
-/// The greeting comes with a whole image. One bit that is wrong, anywhere outside of the start block, or a word that the flash
-/// cannot correct, leaves all pins alone but those of the console, which says why.
+/// The greeting comes with an intact image. One wrong bit anywhere outside of the start block, or a word that the flash
+/// cannot correct, leaves all pins alone except those of the console, which reports the reason.
 #[test]
 fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
     let mut board = board()?;
@@ -82,7 +82,7 @@ fn a_damaged_image_does_not_start_and_says_so() -> Result<()> {
     until(&mut board, "induction-drive", GREETING).map(drop)
 }
 
-/// The image as the `.bin` of `cargo firmware`, with another commit in its text and the sum of that, if wanted.
+/// Returns the image as the `.bin` of `cargo firmware`; with `other` it has another commit in its text and the sum of that.
 fn binary(board: &Board, other: bool) -> Vec<u8> {
     let mut bytes = Vec::new();
     for segment in &board.image.segments {
@@ -108,7 +108,8 @@ fn binary(board: &Board, other: bool) -> Vec<u8> {
     bytes
 }
 
-/// `cargo sim update` with these bytes, beside the board; what the new image says to `version`. Ends early when the power goes.
+/// Runs `cargo sim update` with these bytes while the board runs; returns the answer of the new image to `version`. It
+/// ends early if power fails.
 fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
     let image = update::Image::new(bytes).map_err(anyhow::Error::msg)?;
     let mut pty = Pty::open()?;
@@ -119,7 +120,7 @@ fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
         board.send(&pty.read()?);
         board.run_periods(if board.loader.is_some() { 1 } else { 6 })?;
         if board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power) {
-            // The program finds nobody at the line, and ends.
+            // The program gets no answer on the line, and ends.
             return Ok(None);
         }
         pty.write(&board.chip().lpuart.line.take())?;
@@ -128,7 +129,7 @@ fn update(board: &mut Board, bytes: Vec<u8>) -> Result<Option<String>> {
     Ok(Some(said?))
 }
 
-/// A board without voltage at its power stage.
+/// Returns a board without voltage at its power stage.
 fn unsupplied() -> Result<Board> {
     let mut board = board()?;
     board.supply_stage(false, 1.0)?;
@@ -136,8 +137,8 @@ fn unsupplied() -> Result<Board> {
     Ok(board)
 }
 
-/// Refused: without the word, with a charged dc link, with values that would be lost. With the supply of the drivers on, the judge
-/// of the gates sees what the loader does.
+/// Refused without the word, with a charged dc link, and with values that would be lost. With the supply of the drivers
+/// on, the check of the gates detects the effect of the loader.
 #[test]
 fn update_asks_for_the_conditions_that_the_loader_needs() -> Result<()> {
     let mut board = board()?;
@@ -171,7 +172,7 @@ fn the_program_writes_another_image_and_keeps_the_settings() -> Result<()> {
     Ok(())
 }
 
-/// What the program sends, without waiting for answers, until the power goes in an operation of the flash, counted from 1.
+/// Sends what the program sends, without waiting for answers, until power fails in an operation of the flash, counted from 1.
 fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
     let summed = |bytes: &[u8]| [bytes, &[bytes.iter().fold(0, |sum, byte| sum ^ byte)]].concat();
     board.type_line("update gates-off");
@@ -192,10 +193,10 @@ fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
             board.send(&[&[0x31, 0xce], &summed(&at)[..], &data[..]].concat());
         }
         while board.loader.as_ref().is_some_and(|loader| !loader.line.is_empty()) {
-            // What is said after the loss is heard from its beginning.
+            // Output after the loss is read from its beginning.
             board.run_periods(1)?;
         }
-        // What is left of the first page may reset the chip over and over.
+        // The rest of the first page may reset the chip over and over.
         if board.resets[resets..].iter().any(|(_, cause)| *cause == Reset::Power) {
             return Ok(());
         }
@@ -203,13 +204,13 @@ fn lose_power(board: &mut Board, bytes: &[u8], operation: u64) -> Result<()> {
     anyhow::bail!("{operation}: no loss of power")
 }
 
-/// The pages of an image that are not empty.
+/// Returns the pages of an image that are not empty.
 fn pages(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     bytes.chunks(2048).enumerate().filter(|(_, page)| page.iter().any(|byte| *byte != 0xff))
 }
 
-/// The power goes at drawn operations of the flash: afterwards the old or the new image runs, or the start block says why not and
-/// takes the update, or, while the first page is written, nothing starts.
+/// Power fails at random operations of the flash: afterwards the old or the new image runs, or the start block reports
+/// the reason and accepts the update, or, while the first page is written, nothing starts.
 fn power_losses(count: u32, first_page: u32) -> Result<()> {
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(37);
     let mut board = unsupplied()?;
@@ -221,7 +222,7 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
     let operations = pages(&next).count() as u64 * (1 + 256);
     let (mut started, mut told, mut silent) = (0, 0, 0);
     for n in 0..count + first_page {
-        // The image as it was, whole.
+        // The original image, complete.
         for (at, page) in pages(&old) {
             let at = FLASH + 2048 * at as u32;
             board.cpu.write(at, page);
@@ -245,7 +246,7 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
         println!("{n}: {at} of {operations}: {said:?}");
         match said.as_str() {
             text if text.contains("induction-drive") => started += 1,
-            // Its beginning may have been said while the loss was looked for.
+            // Its beginning may have been printed while the loss was looked for.
             text if text.contains(": the image is damaged") => {
                 told += 1;
                 ensure!(ask(&mut board, "update gates-off")?.starts_with("ok: ST's"), "{at}");
@@ -256,7 +257,7 @@ fn power_losses(count: u32, first_page: u32) -> Result<()> {
             text => anyhow::bail!("{at} of {operations}: {text:?}"),
         }
     }
-    println!("{operations} operations; {started} started, {told} told why not, {silent} silent");
+    println!("{operations} operations; {started} started, {told} told why not, {silent} did not");
     Ok(())
 }
 
@@ -265,15 +266,15 @@ fn a_loss_of_power_leaves_an_image_that_starts_or_says_why_not() -> Result<()> {
     power_losses(2, 1)
 }
 
-/// `cargo test --release --test image update::fifty -- --ignored --nocapture`
+/// Run with `cargo test --release --test image update::fifty -- --ignored --nocapture`.
 #[test]
 #[ignore = "long"]
 fn fifty_losses_of_power_and_ten_in_the_first_page() -> Result<()> {
     power_losses(50, 10)
 }
 
-/// An image names its board, and so does the drive at the port: each image fits its own board alone, and one of another is refused by the
-/// names of both.
+/// An image names its board, and so does the drive at the port. Each image fits only its own board, and the refusal of
+/// another one names both boards.
 #[test]
 fn an_image_of_another_board_is_not_written() -> Result<()> {
     let mut board = board()?;
@@ -301,7 +302,7 @@ fn an_image_of_another_board_is_not_written() -> Result<()> {
                 ensure!(stage.name != "reference" && both.iter().all(|part| why.contains(part)));
             }
         }
-        // Of a board that does not answer nothing is known.
+        // Nothing is known of a board that does not answer.
         ensure!(image.fits(None).is_ok());
     }
     Ok(())

@@ -1,8 +1,8 @@
-//! Old names of keys. They stay accepted.
+//! Old names of keys, which stay accepted.
 
 use super::{DRIVE, Value};
 
-/// Old names, those of today, and the value of today.
+/// Old names, the current names, and the conversion to the current value.
 type Alias = (&'static str, &'static str, fn(&Value) -> Value);
 
 static ALIASES: [Alias; 11] = [
@@ -19,9 +19,9 @@ static ALIASES: [Alias; 11] = [
     ("drive.learn", "prepare.learn", Value::clone),
 ];
 
-/// The name of today for a name, and the value for a value.
+/// Converts a name to its current name, and its value to the current value.
 pub fn today(name: &str, value: &Value) -> (String, Value) {
-    // The drive has the names of the motor, too.
+    // The drive has the names of the motor as well.
     let of_drive = name.starts_with("drive.motor.");
     let (prefix, bare) = name.split_at(if of_drive { DRIVE.len() } else { 0 });
     match ALIASES.iter().find(|(old, ..)| *old == bare) {

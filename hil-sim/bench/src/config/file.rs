@@ -19,7 +19,7 @@ pub struct FileAssignment {
     pub line: u64,
 }
 
-/// The assignments of a file, those of the drive alone last.
+/// Returns the assignments of a file; those for the drive alone come last.
 ///
 /// # Errors
 /// [`Error::Data`] when the file cannot be read or is not TOML.
@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
         .collect())
 }
 
-/// Names of the values in a table, and where their keys stand in the text.
+/// Finds the names of the values in a table, and the positions of their keys in the text.
 fn find(prefix: &str, table: &DeTable<'_>, into: &mut BTreeMap<String, usize>) {
     for (key, value) in table {
         let name = format!("{prefix}{}", key.get_ref());
@@ -53,11 +53,11 @@ fn find(prefix: &str, table: &DeTable<'_>, into: &mut BTreeMap<String, usize>) {
     }
 }
 
-/// Keys of the configuration as a file that [`read`] takes, with units and meanings as comments. A key that is not set is
-/// commented out.
+/// Writes keys of the configuration as a file that [`read`] accepts, with units and meanings as comments. Keys that are
+/// not set are commented out.
 pub fn toml(config: &Config, keys: &[Key]) -> String {
     let names: Vec<&str> = Key::all().map(Key::name).collect();
-    // A name that is also the beginning of others cannot be a table.
+    // A name that is also the beginning of other names cannot be a table.
     let table_of = |name: &str| {
         let split = name.split_once('.').filter(|(table, _)| !names.contains(table));
         split.map(|(table, rest)| (table.to_owned(), rest.to_owned()))
@@ -91,7 +91,7 @@ fn line(key: Key, name: &str, value: &Value) -> String {
     }
 }
 
-/// A value for a key that is not set.
+/// Returns an example value for a key that is not set.
 fn sample(key: Key) -> String {
     match key.allowed() {
         Allowed::Range { min, .. } => min.to_string(),

@@ -1,4 +1,4 @@
-//! A key of either table.
+//! A key of the bench or of the drive.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ pub enum Key {
     Bench(&'static BenchKey),
     /// A setting of the drive.
     Drive(&'static Entry<Settings>),
-    /// A key of the plant, as it is after the learning.
+    /// A key of the plant with its value after the saliency self-commissioning.
     After(&'static BenchKey),
 }
 
@@ -25,17 +25,17 @@ fn on_bench(name: &str) -> Option<&'static BenchKey> {
 }
 
 impl Key {
-    /// All keys of both tables, those of the bench first.
+    /// Returns all keys of both tables, the bench's first.
     pub fn all() -> impl Iterator<Item = Self> {
         BENCH.iter().map(Self::Bench).chain(SETTINGS.iter().map(Self::Drive))
     }
 
-    /// The keys of the plant, as they are after the learning.
+    /// Returns the keys of the plant with their values after the saliency self-commissioning.
     pub fn after() -> impl Iterator<Item = Self> {
         BENCH.iter().filter(|key| is_of_plant(key)).map(Self::After)
     }
 
-    /// The keys that an assignment to `name` sets, one or two.
+    /// Returns the keys that an assignment to `name` sets, one or two.
     ///
     /// # Errors
     /// [`Error::Unknown`] with the most similar name.
@@ -56,7 +56,7 @@ impl Key {
         Ok(keys)
     }
 
-    /// Name in its table.
+    /// Returns the name in the key's own table.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bench(key) => key.name,
@@ -65,7 +65,7 @@ impl Key {
         }
     }
 
-    /// The name to which an assignment sets this key alone, or with the bench's of the same name.
+    /// Returns the name under which an assignment sets this key, alone or together with the bench's key of the same name.
     pub fn assigned_name(self) -> String {
         match self {
             Self::Drive(entry) if on_bench(entry.name).is_some() => {
@@ -75,7 +75,7 @@ impl Key {
         }
     }
 
-    /// Unit, empty for a pure number.
+    /// Returns the unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Bench(key) | Self::After(key) => key.unit,
@@ -83,7 +83,7 @@ impl Key {
         }
     }
 
-    /// Meaning.
+    /// Returns the meaning.
     pub fn help(self) -> &'static str {
         match self {
             Self::Bench(key) | Self::After(key) => key.doc.trim().trim_end_matches('.'),
@@ -91,8 +91,8 @@ impl Key {
         }
     }
 
-    /// The values it can have. Those of the drive are checked beside the other settings when it is built; their range
-    /// here is that of the defaults.
+    /// Returns the allowed values. The drive's values are checked together with its other settings when it is built;
+    /// the range returned here holds with the defaults.
     pub fn allowed(self) -> Allowed {
         match self {
             Self::Bench(key) | Self::After(key) => key.allowed,
@@ -103,14 +103,14 @@ impl Key {
         }
     }
 
-    /// The values it can have, in words, with the unit.
+    /// Returns the allowed values in words, with the unit.
     pub fn allowed_text(self) -> String {
         let has_rule = matches!(self, Self::Drive(entry) if entry.has_rule());
         let auto = if has_rule { ", or auto" } else { "" };
         format!("{}{auto}", self.allowed().describe(self.unit()))
     }
 
-    /// Reads it.
+    /// Reads the value.
     pub fn get(self, config: &Config) -> Value {
         match self {
             Self::Bench(key) => (key.get)(config),
@@ -124,7 +124,7 @@ impl Key {
         }
     }
 
-    /// Writes it.
+    /// Sets the value.
     ///
     /// # Errors
     /// The reason why the value is not allowed.
@@ -150,16 +150,16 @@ fn reason(error: drive::ValueError) -> &'static str {
     }
 }
 
-/// Groups of the keys of the plant; the model and its flux level stay.
+/// Groups of the keys of the plant that may change; the model and its flux level stay.
 const PLANT: [&str; 8] =
     ["motor.", "saliency.", "iron.", "warming.", "inverter.", "dc_link.", "measurement.", "shaft."];
 
-/// Whether a key is one of the plant, which may change after the learning.
+/// Whether a key belongs to the plant and may change after the saliency self-commissioning.
 fn is_of_plant(key: &BenchKey) -> bool {
     PLANT.iter().any(|group| key.name.starts_with(group))
 }
 
-/// Sets a key to what it is after the learning, within the range that it always has.
+/// Sets the value that a key has after the saliency self-commissioning, within the usual range of the key.
 fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &'static str> {
     if *value == Value::Unset {
         config.after.remove(key.name);
@@ -171,10 +171,10 @@ fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &
     Ok(())
 }
 
-/// Refuses keys that do nothing with the chosen machine model.
+/// Refuses keys that have no effect with the chosen machine model.
 ///
 /// # Errors
-/// [`Error::Refused`] with the first of them.
+/// [`Error::Refused`] with the first such key.
 pub fn check_model(config: &Config) -> Result<(), Error> {
     let is_a = config.model.plant == PlantModel::A;
     let (other, remedy) =
@@ -193,7 +193,7 @@ pub fn check_model(config: &Config) -> Result<(), Error> {
 }
 
 impl Config {
-    /// The configuration after the learning: the bench has changed, the drive has not.
+    /// Returns the configuration after the saliency self-commissioning: the bench has changed, the drive has not.
     ///
     /// # Errors
     /// [`Error::Refused`] with the reason why a value is not allowed, or as [`check_model`].

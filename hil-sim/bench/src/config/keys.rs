@@ -1,8 +1,8 @@
 //! The table of the keys of the bench: motor, inverter, sensors, load, and how much is simulated. The keys of the drive
-//! are those of [`drive_settings::SETTINGS`].
+//! are in [`drive_settings::SETTINGS`].
 //!
-//! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from
-//! these two tables. To add a key, add a line. Behind `=>` stands the place in the settings of the plant that has the same value.
+//! The configuration types, their defaults, the checks, the error messages and the output of `keys` all come from these
+//! two tables. To add a key, add a line. After `=>` stands the field of the plant's settings that takes the same value.
 
 use std::collections::BTreeMap;
 
@@ -13,21 +13,21 @@ use super::value::{Allowed, CopyTo as _, Field, Value};
 pub use super::words::*;
 use crate::plant::{IronSettings, PlantSettings};
 
-/// A row of the table.
+/// A row of the table of keys.
 pub struct BenchKey {
-    /// How `--set` and TOML name it.
+    /// Name for `--set` and TOML.
     pub name: &'static str,
-    /// The name of the value that it takes after the learning, if it is one of the plant.
+    /// Name of the value that applies after the saliency self-commissioning, if the key belongs to the plant.
     pub after: &'static str,
     /// Unit, empty for a pure number.
     pub unit: &'static str,
-    /// The values it can have.
+    /// The allowed values.
     pub allowed: Allowed,
     /// Its meaning.
     pub doc: &'static str,
-    /// Reads it.
+    /// Reads the value.
     pub get: fn(&Config) -> Value,
-    /// Writes it; the error is the reason why the value is not allowed.
+    /// Sets the value; the error is the reason why the value is not allowed.
     pub set: fn(&mut Config, &Value) -> Result<(), &'static str>,
 }
 
@@ -73,7 +73,7 @@ macro_rules! keys {
             $(#[doc = $group_doc] pub $group: $type,)+
             /// The drive.
             pub drive: Settings,
-            /// Values that keys of the plant have after the learning, by the name of the key; the others keep theirs.
+            /// Values of plant keys after the saliency self-commissioning, by the name of the key; the others do not change.
             pub after: BTreeMap<&'static str, Value>,
         }
 
@@ -88,7 +88,7 @@ macro_rules! keys {
         }
 
         impl Config {
-            /// Gives the settings of the plant the values of the keys; those that are unset stay.
+            /// Copies the values of the keys to the settings of the plant; where a key is unset, the setting stays.
             pub(super) fn copy_to(&self, $plant: &mut PlantSettings, $iron: &mut IronSettings) {
                 $($($(self.$group.$field.copy_to(&mut $place);)?)+)+
             }
@@ -135,14 +135,14 @@ keys! {
     "saliency." saliency: SaliencyConfig {
         /// Saliency fixed to the rotor flux, at the flux psi_n.
         a_psi: f64 = -0.035, [-0.25 .. 0.25], "" => plant.saliency.a_psi;
-        /// Saliency that follows the stator current; unset: 0.036 1/A with the dissertation's motor, in inverse proportion
-        /// to the rated current.
+        /// Saliency that follows the stator current; unset: 0.036 1/A with the dissertation's motor, in inverse
+        /// proportion to the rated current.
         b1: Option<f64> = None, [-10 .. 10], "1/A" => plant.saliency.b1;
-        /// Current beyond which that part does not grow; unset: 5 A with the dissertation's motor, in proportion to the
-        /// rated current.
+        /// Current above which that part no longer grows; unset: 5 A with the dissertation's motor, in proportion to
+        /// the rated current.
         hold_a: Option<f64> = None, [0.01 .. 10000], "A" => plant.saliency.hold_a;
-        /// Flux at which a_psi holds; unset: that of 0.7 A with the dissertation's motor, of a current in proportion to
-        /// the rated one.
+        /// Flux at which a_psi holds; unset: the flux of 0.7 A with the dissertation's motor, of a current in
+        /// proportion to the rated current with others.
         psi_n: Option<f64> = None, [0.0001 .. 100], "Wb";
         /// Weight of the high-frequency rotor resistance of Eq. 3.8.
         chi: f64 = 0.0, [0 .. 10], "" => plant.saliency.chi;
@@ -153,49 +153,49 @@ keys! {
     }
     /// Choice of the machine model.
     "" model: ModelConfig {
-        /// Model of the motor: a for the assumed saliency of saliency.*, else the family of iron whose saliency emerges.
+        /// Model of the motor: a with the assumed saliency of saliency.*, otherwise a saturation model from which saliency emerges.
         plant: PlantModel = PlantModel::A, [PlantModel], "";
-        /// Flux at which the numbers of a family hold: low for that of 0.7 A with the dissertation's motor, high for the
-        /// smaller of the rated flux and that of 0.55 times the peak rated current.
+        /// Flux at which the numbers of a saturation model hold: low for the flux of 0.7 A with the dissertation's
+        /// motor, high for the smaller of the rated flux and the flux of 0.55 times the peak rated current.
         flux_level: FluxLevel = FluxLevel::Low, [FluxLevel], "";
     }
-    /// The iron, with plant other than a; unset: that of the family. A positive saliency is low inductance along the axis.
+    /// Magnetic saturation, with plant other than a; unset: as in the model. A positive saliency is low inductance along the axis.
     "iron." iron: IronConfig {
-        /// Flux at which saturation and teeth hold; unset: that of flux_level.
+        /// Flux at which saturation and teeth hold; unset: the flux of flux_level.
         psi_n: Option<f64> = None, [0.0001 .. 100], "Wb" => iron.psi_n;
         /// Unsaturated magnetising inductance over the chord inductance at psi_n.
         saturation: Option<f64> = None, [1 .. 10], "" => iron.saturation;
         /// Exponent of the main-flux curve.
         exponent: Option<u32> = None, [2 .. 12], "" => iron.exponent;
-        /// Whether motor.l_m is the chord inductance at psi_n; otherwise it is the unsaturated one.
+        /// Whether motor.l_m is the chord inductance at psi_n; otherwise it is the unsaturated inductance.
         chord: bool = true, [switch], "" => iron.chord;
         /// Saliency by saturated teeth at psi_n.
         teeth: Option<f64> = None, [-0.25 .. 0.25], "" => iron.teeth;
-        /// What the teeth follow: 0 rotor flux, 1 air-gap flux, between them part of the way.
+        /// Flux that the teeth follow: 0 rotor flux, 1 air-gap flux, a value in between a mixture of both.
         teeth_gap: Option<f64> = None, [0 .. 1], "" => iron.teeth_gap;
-        /// Constant turn of the axis of the teeth ahead of that flux.
+        /// Constant rotation of the axis of the teeth ahead of that flux.
         teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg" => iron.teeth_turn_deg;
-        /// Turn of the axis of the teeth by load, per torque current behind a lag of 20 Hz.
+        /// Rotation of the axis of the teeth by load, per q-axis current behind a lag of 20 Hz.
         teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A" => iron.teeth_turn_deg_per_a;
-        /// Peak current at which motor.l_ls and motor.l_lr are the leakages; 0: without current.
+        /// Peak current at which motor.l_ls and motor.l_lr are the leakage inductances; 0: without current.
         nominal_a: Option<f64> = None, [0 .. 10000], "A" => iron.nominal_a;
-        /// Relative loss of stator leakage inductance by current.
+        /// Relative decrease of the stator leakage inductance with current.
         leakage_saturation: Option<f64> = None, [0 .. 50], "1/A" => iron.leakage_saturation;
-        /// Relative loss of rotor leakage inductance by current.
+        /// Relative decrease of the rotor leakage inductance with current.
         rotor_leakage_saturation: Option<f64> = None, [0 .. 50], "1/A" => iron.rotor_leakage_saturation;
-        /// Rotor resistance at high frequency over that at slip frequency (deep bars).
+        /// Rotor resistance at high frequency divided by that at slip frequency (deep bars).
         skin_ratio: Option<f64> = None, [1 .. 20], "" => iron.skin_ratio;
-        /// Rotor leakage inductance lost at high frequency.
+        /// Decrease of the rotor leakage inductance at high frequency.
         skin_leakage: Option<f64> = None, [0 .. 10], "H" => iron.skin_leakage;
-        /// Saliency that turns with the bars of the rotor.
+        /// Saliency that rotates with the bars of the rotor.
         slots: f64 = 0.0, [-0.1 .. 0.1], "" => iron.slots;
-        /// Bars of the rotor.
+        /// Number of rotor bars.
         bars: u32 = 28, [4 .. 400], "" => iron.bars;
         /// Saliency fixed to the stator.
         stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "" => iron.stator_fixed;
         /// Axis of that saliency, electrical, from phase a.
         stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg" => iron.stator_fixed_deg;
-        /// Resistance of the iron losses across the main flux; unset: none.
+        /// Iron-loss resistance in parallel with the magnetising branch; unset: no iron losses.
         loss: Option<f64> = None, [1 .. 1e6], "ohm" => iron.loss;
     }
     /// Resistances that rise with time, towards their final value.
@@ -213,30 +213,30 @@ keys! {
         dc_link_v: f64 = 311.0, [10 .. 1000], "V" => plant.inverter.vdc;
         /// Time during which neither switch of a leg conducts, at each edge. The drive is set to the same value.
         dead_time_s: f64 = 2.2e-6, [0 .. 6e-6], "s";
-        /// Time from the command to the first switch (section 3.9).
+        /// Time from the command to the first switching (section 3.9).
         propagation_us: f64 = 2.2, [0 .. 10], "us" => plant.inverter.propagation_us;
-        /// Further voltage per phase that goes with the sign of the current and that no compensation
-        /// knows of; unset: 1.64 V at 311 V, 40 % of the dead time's (assumed), in proportion to the dc link.
+        /// Further voltage per phase with the sign of the current, which no compensation knows; unset: 1.64 V at 311 V,
+        /// 40 % of the voltage of the dead time (assumed), in proportion to the dc link.
         residual_v: Option<f64> = None, [0 .. 20], "V" => plant.inverter.residual_v;
-        /// Further dead time of which the drive does not know; not below minus the dead time.
+        /// Further dead time that the drive does not know; not below minus the dead time.
         extra_dead_time_s: f64 = 0.0, [-6e-6 .. 6e-6], "s";
-        /// Capacitance of the output node of each leg; not with switched.
+        /// Capacitance of the output node of each leg; no effect with switched.
         node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F" => plant.inverter.node_capacitance;
-        /// Current up to which what goes with the sign of a phase current grows in proportion to it.
+        /// Current below which voltages with the sign of a phase current are proportional to that current instead.
         smoothing_a: f64 = 0.02, [1e-5 .. 100], "A" => plant.inverter.smoothing_a;
-        /// Resistance of a switch that conducts.
+        /// Resistance of a conducting switch.
         on_resistance: f64 = 0.0, [0 .. 100], "ohm" => plant.inverter.on_resistance;
-        /// Resistance of line and winding of phase b beyond that of phase a; not with switched.
+        /// Resistance of line and winding of phase b minus that of phase a; no effect with switched.
         more_ohm_b: f64 = 0.0, [-10 .. 10], "ohm" => plant.inverter.more_ohm[1];
-        /// Resistance of line and winding of phase c beyond that of phase a; not with switched.
+        /// Resistance of line and winding of phase c minus that of phase a; no effect with switched.
         more_ohm_c: f64 = 0.0, [-10 .. 10], "ohm" => plant.inverter.more_ohm[2];
-        /// Dead time of leg b beyond that of leg a; not with switched.
+        /// Dead time of leg b minus that of leg a; no effect with switched.
         more_dead_time_b_us: f64 = 0.0, [-1 .. 1], "us" => plant.inverter.more_dead_time_us[1];
-        /// Dead time of leg c beyond that of leg a; not with switched.
+        /// Dead time of leg c minus that of leg a; no effect with switched.
         more_dead_time_c_us: f64 = 0.0, [-1 .. 1], "us" => plant.inverter.more_dead_time_us[2];
         /// Phase that is interrupted between inverter and motor.
         open_phase: OpenPhase = OpenPhase::None, [OpenPhase], "";
-        /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
+        /// Whether every switching edge is simulated; otherwise the mean voltage of a period is used.
         switched: bool = false, [switch], "" => plant.inverter.switched;
     }
     /// The dc link, whose nominal voltage is inverter.dc_link_v.
@@ -245,7 +245,7 @@ keys! {
         ripple: f64 = 0.0, [0 .. 0.5], "" => plant.dc_link.ripple;
         /// Frequency of that ripple.
         ripple_hz: f64 = 100.0, [0.1 .. 3000], "Hz" => plant.dc_link.ripple_hz;
-        /// Capacitor behind a rectifier, with no way back to the mains; 0 for a stiff link.
+        /// Capacitor behind a rectifier that cannot feed back into the mains; 0 for a stiff link.
         capacitor_f: f64 = 0.0, [0 .. 0.1], "F" => plant.dc_link.capacitor;
         /// Pulses of the rectifier per mains period: 2 or 6; 0 for a supply without ripple.
         pulses: u32 = 6, [0 .. 6], "" => plant.dc_link.pulses;
@@ -253,7 +253,7 @@ keys! {
         mains_hz: f64 = 50.0, [1 .. 1000], "Hz" => plant.dc_link.mains_hz;
         /// Resistance of mains and rectifier.
         source: f64 = 1.0, [0.01 .. 1000], "ohm" => plant.dc_link.source;
-        /// Resistance more while the precharge relay is open; 0 without one.
+        /// Further resistance while the precharge relay is open; 0 for no relay.
         precharge: f64 = 0.0, [0 .. 1e5], "ohm" => plant.dc_link.precharge;
         /// Start of a mains outage.
         outage_at_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.outage_at;
@@ -263,24 +263,24 @@ keys! {
         sag_at_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.sag_at;
         /// Duration of the sag; 0 for none.
         sag_s: f64 = 0.0, [0 .. 1e6], "s" => plant.dc_link.sag;
-        /// Peak of the rectified mains meanwhile.
+        /// Peak of the rectified mains during the sag.
         sag_v: f64 = 230.0, [0 .. 1000], "V" => plant.dc_link.sag_v;
-        /// Time in which the sag comes, and goes.
+        /// Time in which the mains voltage falls to the sag, and returns.
         sag_ramp_s: f64 = 0.01, [0.0001 .. 1e6], "s" => plant.dc_link.sag_ramp;
-        /// Power that others take from the link.
+        /// Power that other devices take from the link.
         load_w: f64 = 0.0, [0 .. 1e6], "W" => plant.dc_link.load;
-        /// Voltage at which the brake chopper goes on by itself; unset: when the drive says so.
+        /// Voltage at which the brake chopper switches on by itself; unset: the drive commands it.
         chopper_v: Option<f64> = None, [10 .. 1000], "V" => plant.dc_link.chopper_v;
         /// Resistor of the chopper.
         chopper: f64 = 100.0, [0.1 .. 1e6], "ohm" => plant.dc_link.chopper;
     }
-    /// The sensors and their converters. The drive's scales are set to match, without the errors.
+    /// The sensors and their ADCs. The drive's scales are set to match, without the errors.
     "measurement." measurement: MeasurementConfig {
         /// End of the range of the current sensors.
         range_a: f64 = 4.4727134, [0.01 .. 5000], "A" => plant.measurement.range_a;
         /// Noise of each channel, rms; unset: 5 mA with the dissertation's sensors, in proportion to the range.
         noise_a: Option<f64> = None, [0 .. 10], "A" => plant.measurement.noise_a;
-        /// Step of the converter, 7 to 16 bits over the range; unset: 12 bits.
+        /// Resolution of the ADC, 7 to 16 bits over the range; unset: 12 bits.
         lsb_a: Option<f64> = None, [1e-7 .. 50], "A" => plant.measurement.lsb_a;
         /// Corner of the analog filter of Figure 16, first order; 0 for none.
         filter_hz: f64 = 5305.0, [0 .. 1e6], "Hz" => plant.measurement.filter_hz;
@@ -300,11 +300,11 @@ keys! {
         lag_b_us: f64 = 0.0, [0 .. 1000], "us" => plant.measurement.lag_b_us;
         /// Relative error at the end of the range; it grows with the square of the current.
         cubic_error: f64 = 0.0, [-0.3 .. 0.3], "" => plant.measurement.cubic_error;
-        /// Drift of the offset of channel a from the start on.
+        /// Drift of the offset of channel a, from the start.
         drift_a: f64 = 0.0, [-1 .. 1], "A/s" => plant.measurement.drift_a;
-        /// Drift of the offset of channel b from the start on.
+        /// Drift of the offset of channel b, from the start.
         drift_b: f64 = 0.0, [-1 .. 1], "A/s" => plant.measurement.drift_b;
-        /// Whether each sample is the mean of two conversions, in both zero vectors. The drive is set to the age of the mean.
+        /// Whether each sample is the mean of two conversions, one in each zero vector. The drive is set to the age of the mean.
         both_zero_vectors: bool = false, [switch], "" => plant.measurement.both_zero_vectors;
         /// Relative error of the gain of the dc-link voltage.
         dc_gain_error: f64 = 0.0, [-0.5 .. 0.5], "" => plant.measurement.dc_gain_error;
@@ -326,85 +326,85 @@ keys! {
         /// Torque of the load, with load.mode = free; unset: none, or the experiment's own.
         torque_nm: Option<f64> = None, [-10000 .. 10000], "Nm";
     }
-    /// What a shaft may have besides inertia, friction and load.
+    /// Properties that a shaft may have besides inertia, friction and load.
     "shaft." shaft: ShaftConfig {
-        /// Static friction: the torque to break away, and that against the motion.
+        /// Static friction: the breakaway torque, and the same torque against the motion.
         static_nm: f64 = 0.0, [0 .. 1000], "Nm" => plant.mechanics.static_torque;
-        /// Amplitude of a load torque that varies once a turn.
+        /// Amplitude of a load torque that varies once per revolution.
         once_nm: f64 = 0.0, [0 .. 1000], "Nm" => plant.mechanics.once_torque;
-        /// Stops on both sides, this far from where the shaft begins; 0: it turns freely.
+        /// Distance of the stops on both sides from the initial position; 0: no stops.
         stops_turns: f64 = 0.0, [0 .. 1000], "turns";
         /// Stiffness of a stop.
         stop_stiffness: f64 = 100.0, [0 .. 1e9], "Nm/rad" => plant.mechanics.stop_stiffness;
-        /// Inertia behind an elastic coupling, where the load acts; 0 for a rigid shaft. motor.inertia is then that before
-        /// it.
+        /// Inertia behind an elastic coupling, where the load acts; 0 for a rigid shaft. motor.inertia is then the
+        /// inertia before the coupling.
         load_inertia: f64 = 0.0, [0 .. 1000], "kg m2" => plant.mechanics.load_inertia;
-        /// Stiffness of the coupling; a resonance of at most 500 Hz.
+        /// Stiffness of the coupling; its resonance may be 500 Hz at most.
         stiffness: f64 = 100.0, [0.001 .. 1e9], "Nm/rad" => plant.mechanics.stiffness;
         /// Damping of the coupling.
         damping: f64 = 0.0, [0 .. 1000], "Nm s/rad" => plant.mechanics.damping;
     }
     /// References, for experiments that do not bring their own.
     "reference." reference: ReferenceConfig {
-        /// Quadrature-axis (torque) current, peak; unset: 1 A with the dissertation's motor, in proportion to the rated
-        /// current.
+        /// q-axis current, peak; unset: 1 A with the dissertation's motor, in proportion to the rated current.
         iq_a: Option<f64> = None, [-1000 .. 1000], "A";
     }
     /// Preparation of the drive before the experiment.
     "prepare." prepare: PrepareConfig {
-        /// Whether the drive measures its motor first, as a user has it do: it knows the nameplate. Its direct current is
-        /// that of the rule.
+        /// Whether the drive measures its motor first, as a user would command it: the drive then knows only the
+        /// nameplate. Its magnetising current follows the rule.
         commission: bool = false, [switch], "";
-        /// Whether a sensorless drive learns first, with the shaft locked, as a user would have it do.
+        /// Whether a sensorless drive first runs the saliency self-commissioning with the shaft locked, as a user would.
         learn: bool = false, [switch], "";
     }
-    /// The experiment battery.
+    /// The stress test (experiment battery).
     "battery." battery: BatteryConfig {
-        /// Which runs: kinds for the twelve kinds, load for load steps, hold for torque near its largest at rest, forced
-        /// for a flux that is turned at once, restless for torque commands that never rest, dragged for a shaft that is
-        /// dragged through zero stator frequency under torque.
+        /// Kind of runs: kinds for the twelve kinds, load for load steps, hold for torque near the maximum at
+        /// standstill, forced for a sudden rotation of the flux, restless for dithered torque, dragged for a shaft that
+        /// is driven through zero stator frequency under torque.
         runs: BatteryRuns = BatteryRuns::Kinds, [BatteryRuns], "";
-        /// Load step of battery.runs = load, in relation to the torque at the nominal limit of the torque current.
+        /// Load step of battery.runs = load, relative to the torque at the nominal limit of the q-axis current.
         load_share: f64 = 0.4, [0 .. 2], "";
-        /// Whether the drive learns anew for every twelve runs; otherwise once, unless disturbances are drawn.
+        /// Whether the drive repeats the saliency self-commissioning for every twelve runs; otherwise once, unless
+        /// disturbances are drawn at random.
         relearn: bool = false, [switch], "";
     }
     /// The experiment full-range.
     "full_range." full_range: FullRangeConfig {
-        /// The one kind of runs; unset: all.
+        /// The only kind of runs; unset: all kinds.
         kind: Option<RangeKind> = None, [RangeKind], "";
-        /// The one run, by its number, with a record of it; unset: all.
+        /// The only run, by its number, with its curves; unset: all runs.
         index: Option<u32> = None, [0 .. 1e9], "";
     }
-    /// Disturbances of the battery: all those of the page Statistics together, in relation to their full sizes.
+    /// Disturbances of the stress test: all of the page Statistics together, relative to their full sizes.
     "disturbed." disturbed: DisturbedConfig {
-        /// Size of each.
+        /// Size of each disturbance.
         together: f64 = 0.0, [0 .. 2], "";
-        /// Largest part that is drawn for each and added, of either sign where it has one.
+        /// Largest random part that is added to each disturbance, of either sign where it has one.
         drawn: f64 = 0.0, [0 .. 2], "";
     }
-    /// The experiment record.
+    /// The endurance test (experiment record).
     "record." record: RecordConfig {
-        /// How long the torque limit is held at zero stator frequency.
+        /// Time for which the torque limit is held at zero stator frequency.
         minutes: f64 = 10.0, [0.05 .. 1000], "min";
-        /// Largest torque of the rated one; with more than the drive gives, its torque limit.
+        /// Largest torque relative to the rated torque; if the drive cannot give it, its torque limit is used.
         torque_pct: f64 = 1000.0, [1 .. 1000], "%";
-        /// Where the rotor flux stands meanwhile, electrical, from phase a.
+        /// Angle of the fixed rotor flux during that time, electrical, from phase a.
         flux_deg: f64 = 0.0, [-180 .. 180], "deg";
-        /// How long the reversal of the speed takes.
+        /// Duration of the speed reversal.
         reversal_s: f64 = 60.0, [1 .. 3600], "s";
     }
     /// The experiment commission.
     "commission." commission: CommissionConfig {
-        /// Whether the machines drawn also have phases, legs and sensors that differ: resistances by 2 % and delays by 0.1 us
-        /// either way, a stator-fixed saliency of 1 % along any axis, and a lag of channel b of 10 us.
+        /// Whether phases, legs and sensors of the random machines differ as well: resistances by 2 % and delays by 0.1
+        /// us either way, a stator-fixed saliency of 1 % along any axis, and a lag of channel b of 10 us.
         disturbed: bool = false, [switch], "";
     }
-    /// Errors that monte-carlo draws for every run, beside the operating point.
+    /// Errors that monte-carlo draws at random for every run, besides the operating point.
     "spread." spread: SpreadConfig {
-        /// Largest relative error of each parameter that the drive believes of its motor.
+        /// Largest relative error of each motor parameter that the drive uses.
         motor: f64 = 0.0, [0 .. 0.5], "";
-        /// In machines: factor by which each parameter of the motor is larger or smaller at most; 1 for the motor itself.
+        /// In machines: largest factor by which each motor parameter is multiplied or divided; 1 for the motor itself.
         machine: f64 = 1.0, [1 .. 4], "";
         /// Largest relative change of the sensors' noise.
         noise: f64 = 0.0, [0 .. 1], "";

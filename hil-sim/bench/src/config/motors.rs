@@ -16,11 +16,11 @@ use crate::error::{Error, cut, parser_text};
 /// The folder `motors`, which `build.rs` finds.
 static FILES: Dir<'static> = include_dir!("$MOTORS");
 
-/// What a file of one's own must say, because no rule gives it and nothing of another motor may stand in for it.
+/// Keys that a user's motor file must set, because no rule gives them and no value of another motor may replace them.
 pub const NEEDED: &str = "nameplate.power_w nameplate.voltage_v nameplate.current_a nameplate.frequency_hz nameplate.speed_rpm \
     motor.r_s motor.r_r motor.l_ls motor.l_lr motor.l_m motor.pole_pairs inverter.dc_link_v";
 
-/// The text of a file of `motors/measured`: what others have measured on a motor.
+/// Returns the text of a file of `motors/measured`: values that others have measured on a motor.
 ///
 /// # Errors
 /// [`Error::Internal`] if there is no such file.
@@ -34,11 +34,11 @@ pub fn measured(name: &str) -> Result<&'static str, Error> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
-    /// The keys whose values come from here.
+    /// Keys whose values come from this source.
     pub keys: Vec<String>,
-    /// Publication, file and line, and how the values were converted.
+    /// Publication, file and line, and the conversion of the values.
     pub from: String,
-    /// The values are recalled: nobody has looked them up.
+    /// Whether the values are quoted from memory: nobody has looked them up.
     #[serde(default)]
     pub unverified: bool,
 }
@@ -46,16 +46,17 @@ pub struct Source {
 /// A motor with the inverter and the sensors that suit it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Motor {
-    /// Name on the command line: that of the file; with `.toml` for a file of one's own, with `.json` for a passport.
+    /// Name on the command line. For a motor that comes with the program it is the name of the file; for a user's file
+    /// it ends in `.toml`, for a passport in `.json`.
     #[serde(skip)]
     pub name: String,
-    /// Rated data in a line.
+    /// Rated data in one line.
     #[serde(default)]
     pub title: String,
-    /// The motor, and what is special about it.
+    /// Description of the motor and its peculiarities.
     #[serde(default)]
     pub about: String,
-    /// Where the numbers come from; a file of one's own need not say it.
+    /// Sources of the numbers; a user's file need not state them.
     #[serde(default)]
     pub source: Vec<Source>,
     /// The settings, in groups.
@@ -64,14 +65,14 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// All motors that come with the program, by name.
+    /// Returns all motors that come with the program, by name.
     pub fn all() -> Vec<Self> {
         let mut all: Vec<Self> = FILES.files().filter_map(|file| embedded(file.path())).collect();
         all.sort_by(|a, b| a.name.cmp(&b.name));
         all
     }
 
-    /// The motor with this name, or of this file when the name ends in `.toml`, or, a passport, in `.json`.
+    /// Returns the motor of this name. A name that ends in `.toml` is a motor file, one that ends in `.json` a passport.
     ///
     /// # Errors
     /// [`Error::Unknown`] with the most similar name; [`Error::Data`].
@@ -91,34 +92,34 @@ impl Motor {
         found.cloned().ok_or_else(|| Error::unknown("motor", name, names()))
     }
 
-    /// The motor of a text in the form of the files.
+    /// Parses a motor from the text of a motor file.
     ///
     /// # Errors
-    /// [`Error::Refused`] when it is not of that form.
+    /// [`Error::Refused`] if the text is not a motor file.
     pub fn from_text(name: &str, text: &str) -> Result<Self, Error> {
         parse(name, text).map_err(|e| Error::Refused(parser_text(e)))
     }
 
-    /// The keys that the file sets, with their values.
+    /// Returns the keys that the file sets, with their values.
     pub fn settings(&self) -> Vec<(String, Value)> {
         flattened(&self.settings)
     }
 
-    /// The source of a key.
+    /// Returns the source of a key.
     pub fn source_of(&self, key: &str) -> Option<&Source> {
         self.source.iter().find(|source| source.keys.iter().any(|known| known == key))
     }
 
-    /// Whether it is a file of one's own; the others come with the program.
+    /// Whether it is a user's file; the other motors come with the program.
     fn is_own(&self) -> bool {
         is_file(&self.name)
     }
 
-    /// Sets the keys of the file, and those that it leaves to [`implied`](Self::implied).
+    /// Sets the keys of the file, and the keys that follow by [`implied`](Self::implied).
     ///
     /// # Errors
-    /// As [`Config::set`]; [`Error::Refused`] when a number that comes with the program has no source, when one has two,
-    /// and with all that a file of one's own must say and does not.
+    /// As [`Config::set`]. [`Error::Refused`] if a number of a motor that comes with the program has no source or two
+    /// sources, or if a user's file does not set all [`NEEDED`] keys.
     pub fn apply(&self, config: &mut Config) -> Result<(), Error> {
         let (settings, name) = (self.settings(), &self.name);
         let missing: Vec<_> =
@@ -144,8 +145,8 @@ impl Motor {
         self.settings().iter().any(|(name, value)| alias::today(name, value).0 == key)
     }
 
-    /// The keys that the file does not set and that follow, with the reason; of one that comes with the program those alone that a
-    /// commissioned drive has.
+    /// Returns the keys that the file does not set and that follow from others, with the reason. For a motor that comes
+    /// with the program these are only the keys that a commissioned drive has.
     pub fn implied(&self, config: &Config) -> Vec<(&'static str, Value, &'static str)> {
         let (base, four_digits) = (Config::default(), |value: f64| {
             Value::Number(format!("{value:.3e}").parse().unwrap_or(value))
@@ -166,7 +167,7 @@ impl Motor {
         all.into_iter().filter(|(key, _, reason)| of_all(*reason) && !self.says(key)).collect()
     }
 
-    /// The lines that set the drive to this motor at the console.
+    /// Returns the lines that set the drive to this motor at the console.
     pub fn console_lines(&self) -> Vec<String> {
         let mut config = Config::default();
         if self.apply(&mut config).is_err() {
@@ -182,7 +183,7 @@ impl Motor {
     }
 }
 
-/// Whether a motor of this name is a file of one's own.
+/// Whether a motor of this name is a user's file.
 fn is_file(name: &str) -> bool {
     [".toml", ".json"].iter().any(|end| name.ends_with(end))
 }
@@ -194,7 +195,7 @@ fn of_passport(name: &str, Passport { image, twin, .. }: Passport) -> Motor {
 
 fn embedded(path: &Path) -> Option<Motor> {
     let name = path.file_stem()?.to_str()?;
-    // Every file is parsed by a test.
+    // A test parses every file.
     parse(name, FILES.get_file(path)?.contents_utf8()?).ok()
 }
 

@@ -10,14 +10,14 @@ use super::{Config, FluxLevel, LoadMode};
 use crate::config::value::CopyTo as _;
 use crate::plant::{FAMILIES, IronSettings, Load, MeasurementSettings, PlantSettings};
 
-/// Scales of the drive's current channels a and b that match these sensors, without their errors.
+/// Scales of the drive's current channels a and b that match these sensors, without the sensors' errors.
 pub fn current_lines(sensors: &MeasurementSettings) -> [Line; 2] {
     sensors
         .calibration()
         .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 })
 }
 
-/// The direct current, A peak, at whose flux the numbers of a family of iron hold.
+/// The magnetising current, A peak, at whose flux the numbers of a saturation model hold.
 pub fn flux_level_a(config: &Config) -> f64 {
     match config.model.flux_level {
         FluxLevel::Low => config.amperes(0.7),
@@ -31,9 +31,10 @@ pub fn flux_level_a(config: &Config) -> f64 {
     }
 }
 
-/// The plant that the configuration describes. Unset values follow the dissertation's bench: in proportion to rated current, dc
-/// link and range of the sensors. Those of the iron are of its family, which model A does not have: per ampere in proportion to
-/// the rated current, and the skin effect to the rotor leakage.
+/// Returns the plant that the configuration describes. Unset values follow the dissertation's bench, in proportion to
+/// rated current, dc link and range of the sensors. Unset values of the saturation come from the saturation model,
+/// which model A does not have: values per ampere scale with the rated current, and the skin effect with the rotor
+/// leakage inductance.
 pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
     let mut plant = PlantSettings::DEFAULT;
@@ -72,7 +73,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     plant
 }
 
-/// The phase that is interrupted, 0 to 2.
+/// Returns the interrupted phase, 0 to 2.
 pub fn open_phase(config: &Config) -> Option<usize> {
     (config.inverter.open_phase as usize).checked_sub(1)
 }

@@ -1,16 +1,16 @@
-//! Values of configuration keys: allowed values, and conversion from text and TOML.
+//! Values of configuration keys, their allowed ranges, and their conversion from text and TOML.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// A value as it was written, before a key has taken it.
+/// A value as the user wrote it, before a key has accepted it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
     /// A number.
     Number(f64),
-    /// `yes` or `no`; also `true` or `false`, as TOML has it.
+    /// `yes` or `no`; also `true` or `false`, as in TOML.
     Switch(bool),
     /// A word.
     Word(String),
@@ -19,7 +19,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// From the text behind the equals sign on the command line.
+    /// Converts the text after the equals sign on the command line.
     pub fn from_text(text: &str) -> Self {
         let text = text.trim();
         match (text.parse(), text) {
@@ -30,7 +30,7 @@ impl Value {
         }
     }
 
-    /// From a TOML value; a date or an array becomes a word, which no key takes.
+    /// Converts a TOML value; a date or an array becomes a word, which no key accepts.
     pub fn from_toml(value: &toml::Value) -> Self {
         match value {
             toml::Value::Float(number) => Self::Number(*number),
@@ -53,12 +53,12 @@ impl fmt::Display for Value {
     }
 }
 
-/// The shortest decimal fraction that stands for a number in single precision.
+/// Converts single to double precision so that both have the same shortest decimal fraction.
 pub fn double(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(number.into())
 }
 
-/// The values a key allows.
+/// The allowed values of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
     /// A number from `min` to `max`, both included.
@@ -75,7 +75,7 @@ pub enum Allowed {
 }
 
 impl Allowed {
-    /// In words, with the unit.
+    /// Describes the allowed values in words, with the unit.
     pub fn describe(&self, unit: &str) -> String {
         match self {
             Self::Range { min, max } => format!("{min} to {max} {unit}").trim_end().to_owned(),
@@ -87,9 +87,9 @@ impl Allowed {
 
 /// A type that a field of the configuration can have.
 pub trait Field: Sized {
-    /// The value as text or TOML would give it.
+    /// Returns the value as text or TOML would give it.
     fn to_value(&self) -> Value;
-    /// From a value.
+    /// Converts a value.
     ///
     /// # Errors
     /// The reason why the value is not allowed.
@@ -145,9 +145,9 @@ impl<T: Field> Field for Option<T> {
     }
 }
 
-/// A value of the configuration that the plant has, too.
+/// A value of the configuration that the settings of the plant have as well.
 pub trait CopyTo<T> {
-    /// Copies it; what is not set leaves the place as it is.
+    /// Copies the value; a value that is not set leaves `place` unchanged.
     fn copy_to(self, place: &mut T);
 }
 

@@ -1,11 +1,11 @@
-//! The words that keys of the bench may have as values.
+//! The words that are values of keys of the bench.
 
 use drive_settings::value::Words;
 use drive_settings::words;
 
 use super::value::{Allowed, Field, Value};
 
-/// Words that are values of keys.
+/// Defines types of words that are values of keys.
 macro_rules! words_of_keys {
     ($($(#[$about:meta])* pub enum $type:ident { $($words:tt)+ })+) => {$(
         words! { $(#[$about])* pub enum $type { $($words)+ } }
@@ -29,17 +29,17 @@ words_of_keys! {
     pub enum LoadMode {
         /// Shaft blocked.
         Locked = "locked",
-        /// Turns freely against `load.torque_nm`.
+        /// The shaft turns freely against `load.torque_nm`.
         Free = "free",
         /// A dynamometer holds `load.speed_rpm`.
         Speed = "speed",
     }
 
-    /// Model of the motor: model A with its assumed saliency, or a family of iron from which saliency emerges.
+    /// Model of the motor: model A with its assumed saliency, or a saturation model from which saliency emerges.
     pub enum PlantModel {
         /// Model A.
         A = "a",
-        /// Energy model, linear iron.
+        /// Energy model with linear iron.
         Linear = "linear",
         /// Teeth fixed to the rotor flux, -3.5 %.
         R = "r",
@@ -49,67 +49,67 @@ words_of_keys! {
         G = "g",
         /// Teeth fixed to the air-gap flux, -7 %.
         G7 = "g7",
-        /// As r; both leakages saturate as measured at a start.
+        /// As `r`; both leakage inductances saturate as measured at a start.
         Rl = "rl",
-        /// As g; both leakages saturate as measured at a start.
+        /// As `g`; both leakage inductances saturate as measured at a start.
         Gl = "gl",
-        /// Main flux, n = 4.
+        /// Saturation of the main flux, n = 4.
         M4 = "m4",
-        /// Main flux, n = 6.
+        /// Saturation of the main flux, n = 6.
         M6 = "m6",
-        /// Main flux, n = 4, and stator leakage.
+        /// Saturation of the main flux, n = 4, and of the stator leakage.
         M4b = "m4b",
-        /// Main flux, n = 6, and stator leakage.
+        /// Saturation of the main flux, n = 6, and of the stator leakage.
         M6b = "m6b",
-        /// Teeth, main flux, leakages and skin effect.
+        /// Teeth, main flux, leakage inductances and skin effect.
         F = "f",
     }
 
-    /// Flux at which the numbers of a family hold.
+    /// Flux at which the numbers of a saturation model hold.
     pub enum FluxLevel {
-        /// That of a direct current of 0.7 A with the dissertation's motor, in proportion to the rated current.
+        /// The flux of a magnetising current of 0.7 A with the dissertation's motor, in proportion to the rated current.
         Low = "low",
-        /// The smaller of the rated flux and that of 0.55 times the peak of the rated current.
+        /// The smaller of the rated flux and the flux of 0.55 times the peak of the rated current.
         High = "high",
     }
 
-    /// Which runs the battery consists of.
+    /// Kind of runs of the stress test.
     pub enum BatteryRuns {
         /// The twelve kinds.
         Kinds = "kinds",
-        /// Load steps of battery.load_share.
+        /// Load steps of `battery.load_share`.
         Load = "load",
-        /// Torque near its largest at rest.
+        /// Torque near its maximum at standstill.
         Hold = "hold",
-        /// The flux turned at once.
+        /// A sudden rotation of the flux.
         Forced = "forced",
-        /// Torque commands that never rest.
+        /// Dithered torque commands.
         Restless = "restless",
-        /// The shaft dragged through zero stator frequency under torque.
+        /// A shaft that is driven through zero stator frequency under torque.
         Dragged = "dragged",
     }
 
-    /// What the drive is asked for in runs over the whole speed range.
+    /// Task of the drive in runs over the whole speed range.
     pub enum RangeKind {
         /// Constant torque at constant speed.
         Constant = "constant",
-        /// Steps of the torque between its limits at constant speed.
+        /// Torque steps between the torque limits at constant speed.
         Reversals = "reversals",
-        /// Load steps at a regulated speed.
+        /// Load steps while the speed is regulated.
         LoadSteps = "load-steps",
-        /// Ramps of the speed through zero.
+        /// Speed ramps through zero.
         Ramps = "ramps",
-        /// The same, and the motor warms up on the way.
+        /// Speed ramps through zero while the motor warms up.
         HotRamps = "hot-ramps",
-        /// Constant torque with a drive that is wrong about its motor.
+        /// Constant torque with wrong motor parameters in the drive.
         WrongParameters = "wrong-parameters",
-        /// The flux turned at once under constant torque.
+        /// A sudden rotation of the flux under constant torque.
         TurnedFlux = "turned-flux",
-        /// Start on a turning shaft without flux.
+        /// Flying start without flux.
         TurningStart = "turning-start",
-        /// The same soon after a stop, with flux left.
+        /// Flying start soon after a stop, with residual flux.
         ResidualStart = "residual-start",
-        /// Stop of a large inertia on a dc link that takes no energy back.
+        /// Stop of a large inertia on a dc link that cannot feed energy back.
         Braking = "braking",
         /// Mains outage.
         Outage = "outage",
@@ -117,9 +117,9 @@ words_of_keys! {
         Sag = "sag",
     }
 
-    /// A phase that is interrupted between inverter and motor.
+    /// Phase that is interrupted between inverter and motor.
     pub enum OpenPhase {
-        /// None.
+        /// No phase.
         None = "none",
         /// Phase a.
         A = "a",

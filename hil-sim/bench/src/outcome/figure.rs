@@ -1,4 +1,4 @@
-//! Figures, without any word about how they are drawn.
+//! Figures, independent of how they are drawn.
 
 use super::name;
 
@@ -23,7 +23,7 @@ pub struct Curve<'a> {
     pub name: String,
     /// The panel that it belongs to.
     pub panel: &'a Panel,
-    /// Its points.
+    /// Points of the series.
     pub series: &'a Series,
 }
 
@@ -38,19 +38,19 @@ impl Figure {
         Self { name, title, source, ..Self::default() }
     }
 
-    /// With one more panel below.
+    /// Adds a panel below.
     pub fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
-    /// With more events.
+    /// Adds events.
     pub fn events(mut self, events: impl IntoIterator<Item = (f64, String)>) -> Self {
         self.events.extend(events);
         self
     }
 
-    /// All series of all panels, with their names.
+    /// Returns all series of all panels, with their names.
     pub fn curves(&self) -> Vec<Curve<'_>> {
         let (mut taken, mut curves) = (Vec::new(), Vec::new());
         for panel in &self.panels {
@@ -74,45 +74,45 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Logarithmic horizontal axis.
     pub log_x: bool,
-    /// Range of the vertical axis; unset: that of the data.
+    /// Range of the vertical axis; unset: the range of the data.
     pub y_range: Option<(f64, f64)>,
-    /// One unit is as long on either axis.
+    /// Whether one unit has the same length on both axes.
     pub equal_axes: bool,
-    /// The values are 0 for off and 1 for on.
+    /// Whether the values are 0 for off and 1 for on.
     pub switch: bool,
 }
 
 impl Panel {
-    /// Empty axes.
+    /// Makes empty axes.
     pub fn new(x_label: impl Into<String>, y_label: impl Into<String>) -> Self {
         Self { x_label: x_label.into(), y_label: y_label.into(), ..Self::default() }
     }
 
-    /// With one more series.
+    /// Adds a series.
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// With a logarithmic horizontal axis.
+    /// Makes the horizontal axis logarithmic.
     pub fn log_x(mut self) -> Self {
         self.log_x = true;
         self
     }
 
-    /// With this range of the vertical axis.
+    /// Sets the range of the vertical axis.
     pub fn y_range(mut self, low: f64, high: f64) -> Self {
         self.y_range = Some((low, high));
         self
     }
 
-    /// With 0 for off and 1 for on, and no other labels.
+    /// Labels the values 0 as off and 1 as on, and no others.
     pub fn switch(mut self) -> Self {
         self.switch = true;
         self.y_range(-0.1, 1.1)
     }
 
-    /// With a unit as long on either axis.
+    /// Gives a unit the same length on both axes.
     pub fn equal_axes(mut self) -> Self {
         self.equal_axes = true;
         self
@@ -138,11 +138,11 @@ pub enum Style {
 pub struct Series {
     /// Name in the legend; unnamed series are not listed.
     pub name: String,
-    /// Points; one that is not finite interrupts the line.
+    /// Points; a point that is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,
     /// How it is drawn.
     pub style: Style,
-    /// Whether it has the colour of the series before it.
+    /// Whether it has the colour of the previous series.
     pub like_previous: bool,
 }
 
@@ -152,28 +152,28 @@ impl Series {
         Self { name, points, style, like_previous: false }
     }
 
-    /// In the colour of the series before it.
+    /// Takes the colour of the previous series.
     pub fn like_previous(mut self) -> Self {
         self.like_previous = true;
         self
     }
 
-    /// A line.
+    /// Makes a line.
     pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, points, Style::Line)
     }
 
-    /// A reference.
+    /// Makes a reference line.
     pub fn reference(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, points, Style::Reference)
     }
 
-    /// A limit.
+    /// Makes a limit line.
     pub fn limit(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, points, Style::Limit)
     }
 
-    /// Markers.
+    /// Makes markers.
     pub fn points(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, points, Style::Points)
     }

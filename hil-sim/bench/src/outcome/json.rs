@@ -5,10 +5,10 @@ use serde::ser::Serializer;
 
 use super::{Compared, Figure, Metrics, Origin, Outcome, Step, Table};
 
-/// Version of the form: it grows when a name changes its meaning or goes away.
+/// Version of the JSON form: it increases when a name changes its meaning or is removed.
 pub const SCHEMA_VERSION: u32 = 3;
 
-/// The one JSON object of an experiment.
+/// The JSON object of an experiment.
 #[derive(Serialize)]
 struct Json<'a> {
     schema_version: u32,
@@ -32,7 +32,7 @@ struct Json<'a> {
     faults: &'a [String],
 }
 
-/// Pairs as the entries of an object, in their order.
+/// Writes pairs as the entries of an object, in their order.
 pub(super) fn as_map<S: Serializer, V: Serialize>(
     pairs: &[(String, V)],
     serializer: S,
@@ -50,7 +50,7 @@ struct Points<'a> {
 }
 
 impl Origin {
-    /// Names and values of the settings as they stand in JSON: what is a number or a switch is one there too.
+    /// Returns names and values of the settings as JSON types: numbers and switches are numbers and switches there too.
     pub fn typed_settings(&self) -> impl Iterator<Item = (String, serde_json::Value)> {
         let typed = |text: &String| match serde_json::from_str(text) {
             Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
@@ -60,7 +60,7 @@ impl Origin {
     }
 }
 
-/// The curves of a figure, by `FIGURE/CURVE`.
+/// Returns the curves of a figure by `FIGURE/CURVE`.
 fn series(figure: &Figure) -> impl Iterator<Item = (String, Points<'_>)> {
     figure.curves().into_iter().map(|curve| {
         let (x, y) = curve.series.points.iter().copied().unzip();
@@ -70,9 +70,9 @@ fn series(figure: &Figure) -> impl Iterator<Item = (String, Points<'_>)> {
 }
 
 impl Outcome {
-    /// The one JSON object: `schema_version`, `version` of the program, `experiment`, `seed`, `settings` (those
-    /// that were changed), `metrics`, `series` (`FIGURE/CURVE`), `remarks`, `faults`, and where there are any
-    /// `events`, `steps`, `table` and `compared`. A number that is not finite becomes `null`.
+    /// Returns the JSON object: `schema_version`, `version` of the program, `experiment`, `seed`, `settings` (the
+    /// changed ones), `metrics`, `series` (`FIGURE/CURVE`), `remarks`, `faults`, and, if there are any, `events`,
+    /// `steps`, `table` and `compared`. A number that is not finite becomes `null`.
     ///
     /// # Errors
     /// As [`serde_json::to_string`].
@@ -96,7 +96,7 @@ impl Outcome {
     }
 }
 
-/// The object of an experiment, or one with the objects of several in the list `experiments`.
+/// Returns the object of an experiment, or one object with those of several experiments in the list `experiments`.
 pub fn joined(objects: &[String]) -> String {
     if let [object] = objects {
         return object.clone();

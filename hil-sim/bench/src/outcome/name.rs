@@ -1,15 +1,15 @@
-//! Names for programs, made of labels for people.
+//! Names for programs, derived from labels for people.
 //!
-//! Own code: the crates that change the case of identifiers split `mA` and `dB`, and know no units.
+//! This is our own code: crates that change the case of identifiers split `mA` and `dB`, and know no units.
 
-/// A label in `snake_case`: `turn of the axis (°)` becomes `turn_of_the_axis_deg`. A unit in brackets at the
+/// Converts a label to `snake_case`: `turn of the axis (°)` becomes `turn_of_the_axis_deg`. A unit in brackets at the
 /// end stays at the end; signs and Greek letters are spelled out.
 pub fn snake(label: &str) -> String {
     let (quantity, unit) = split(label);
     joined(&[quantity, unit])
 }
 
-/// The name of a curve: that of its panel and its own, with the unit of the panel at the end.
+/// Returns the name of a curve: the name of its panel, then its own, and the unit of the panel at the end.
 pub fn of_curve(panel: &str, series: &str) -> String {
     let (quantity, unit) = split(panel);
     joined(&[quantity, series, unit])
@@ -22,12 +22,12 @@ const UNITS: [(&str, &str); 19] = [
     ("_db", "dB"), ("_w", "W"), ("_h", "H"), ("_c", "°C"),
 ];
 
-/// The name without the unit at its end, and the unit as it is shown; none where it ends in no unit.
+/// Splits the unit from the end of a name and returns it as it is shown; none if the name ends in no unit.
 pub fn split_unit(name: &str) -> Option<(&str, &'static str)> {
     UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)))
 }
 
-/// A name in words: `angle_error_rms_deg` becomes `angle error rms (°)`.
+/// Converts a name to words: `angle_error_rms_deg` becomes `angle error rms (°)`.
 pub fn words(name: &str) -> String {
     match split_unit(name).filter(|(quantity, _)| !quantity.ends_with("_per")) {
         Some((quantity, unit)) => format!("{} ({unit})", quantity.replace('_', " ")),
@@ -35,7 +35,7 @@ pub fn words(name: &str) -> String {
     }
 }
 
-/// A name that `taken` does not have yet: with a number behind it where needed.
+/// Returns a name that `taken` does not have yet, with a number at the end if needed.
 pub fn unique(name: String, taken: &mut Vec<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}_{number}"));
     let mut candidates = std::iter::once(name.clone()).chain(numbered);
@@ -44,7 +44,7 @@ pub fn unique(name: String, taken: &mut Vec<String>) -> String {
     free
 }
 
-/// Quantity and unit of a label.
+/// Splits a label into quantity and unit.
 fn split(label: &str) -> (&str, &str) {
     let inside = label.strip_suffix(')').and_then(|label| label.rsplit_once(" ("));
     inside.unwrap_or((label, ""))
@@ -57,7 +57,7 @@ fn joined(parts: &[&str]) -> String {
 }
 
 fn plain(text: &str) -> String {
-    // As in the names of metrics: the kind of an angle stands before its unit.
+    // As in the names of metrics, the kind of an angle stands before its unit.
     let text = match text.strip_prefix("° ") {
         Some(kind) => format!("{kind} °"),
         None => text.replace("10⁻³", "milli"),

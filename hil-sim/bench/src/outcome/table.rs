@@ -14,18 +14,18 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Rows, each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
-    /// Source, conditions, reading help; may be empty.
+    /// Source, conditions and help for reading; may be empty.
     pub note: String,
 }
 
 impl Table {
-    /// A table without rows.
+    /// Makes a table without rows.
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|&column| column.to_owned()).collect();
         Self { title: title.into(), columns, ..Self::default() }
     }
 
-    /// With a row for each of these lists of cells, as [`Self::record`] adds it.
+    /// Adds a row for each of these lists of cells, as [`Self::record`] does.
     pub fn records<H: Into<String>, R: IntoIterator<Item = (H, Cell)>>(
         mut self,
         rows: impl IntoIterator<Item = R>,
@@ -48,7 +48,7 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// A row for each record, with its number.
+    /// Makes a table with a row for each record; the columns get the record and its number.
     pub fn of<'a, R: 'a>(
         title: impl Into<String>,
         columns: &[Column<'_, R>],
@@ -62,18 +62,18 @@ impl Table {
         Self { title: title.into(), columns: heads, rows, note: String::new() }
     }
 
-    /// With this note below it.
+    /// Sets the note below the table.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
     }
 
-    /// Whether a column has numbers.
+    /// Whether a column contains numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         self.rows.iter().any(|row| row.get(column).is_some_and(Cell::is_number))
     }
 
-    /// The standard table of the levels of a torque experiment.
+    /// Makes the standard table of the current levels of a torque experiment.
     pub fn of_steps(steps: &[Step]) -> Self {
         let columns = columns![|_, step: &Step|
             "iq reference (A)" => Cell::fixed(step.iq_ref_a, 3);
@@ -87,16 +87,16 @@ impl Table {
 
 /// A column of records: one description for the printed table, the page, JSON and CSV.
 pub struct Column<'a, R> {
-    /// Head, with the unit; the name in CSV is made of it.
+    /// Head, with the unit; the name in CSV is derived from it.
     pub head: &'a str,
-    /// Its value of a record, which has a number.
+    /// Computes the cell of a record and its number.
     pub cell: OfRecord<'a, R>,
 }
 
-/// A cell of the number of a record and the record.
+/// A function from the number of a record and the record to a cell.
 pub type OfRecord<'a, R> = Box<dyn Fn(usize, &R) -> Cell + 'a>;
 
-/// Columns: heads, and cells of a number and a record.
+/// Makes columns from heads and expressions of number and record.
 #[macro_export]
 macro_rules! columns {
     (|$number:tt, $record:tt: $type:ty| $($head:expr => $cell:expr;)+) => {
@@ -108,7 +108,7 @@ macro_rules! columns {
     };
 }
 
-/// The mean over a level, which a lost run does not reach.
+/// Cell of the mean over a current level; `lost` if the run ended before that level.
 fn of_level(value: f64, decimals: usize) -> Cell {
     if value.is_nan() { Cell::from("lost") } else { Cell::fixed(value, decimals) }
 }
@@ -128,23 +128,22 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// The cell, or a dash where there is none.
+    /// Returns the cell, or a dash if there is none.
     pub fn or_dash(cell: Option<Self>) -> Self {
         cell.unwrap_or_else(|| "-".into())
     }
 
-    /// A number with this many decimals, or a dash where there is none.
+    /// Returns a number with this many decimals, or a dash if there is none.
     pub fn fixed_or_dash(value: Option<f64>, decimals: usize) -> Self {
         Self::or_dash(value.map(|value| Self::fixed(value, decimals)))
     }
 
-    /// A number with this many decimals.
+    /// Returns a number with this many decimals.
     pub fn fixed(value: f64, decimals: usize) -> Self {
         Self::number(value, format!("{value:.decimals$}"))
     }
 
-    /// A number with this many significant digits; powers of ten for the very small and the very
-    /// large.
+    /// Returns a number with this many significant digits, with powers of ten for very small and very large numbers.
     pub fn significant(value: f64, digits: usize) -> Self {
         let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
         let text = if (-4..6).contains(&exponent) {
@@ -156,7 +155,7 @@ impl Cell {
         Self::number(value, text)
     }
 
-    /// A number with its rounded text; words for what is not finite.
+    /// Returns a number with its rounded text, or words if it is not finite.
     fn number(value: f64, rounded: String) -> Self {
         let text = match value {
             nan if nan.is_nan() => "none".to_owned(),
@@ -167,20 +166,20 @@ impl Cell {
         Self::Number { value, text }
     }
 
-    /// How it is shown.
+    /// Returns the shown text.
     pub fn text(&self) -> &str {
         match self {
             Self::Text(text) | Self::Number { text, .. } => text,
         }
     }
 
-    /// Whether it is a number.
+    /// Whether the cell is a number.
     pub fn is_number(&self) -> bool {
         matches!(self, Self::Number { .. })
     }
 }
 
-/// Takes the sign from a rounded zero.
+/// Removes the sign of a rounded zero.
 fn plain_minus(text: String) -> String {
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),

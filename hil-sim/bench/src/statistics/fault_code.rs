@@ -4,18 +4,18 @@ use drive_core::Fault;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// For `#[serde(with)]`.
+/// Writes a fault; for `#[serde(with)]`.
 ///
 /// # Errors
-/// Those of the serializer.
+/// The errors of the serializer.
 pub fn serialize<S: Serializer>(fault: &Option<Fault>, serializer: S) -> Result<S::Ok, S::Error> {
     fault.map(Fault::code).serialize(serializer)
 }
 
-/// For `#[serde(with)]`.
+/// Reads a fault; for `#[serde(with)]`.
 ///
 /// # Errors
-/// Those of the deserializer; a number that no fault has.
+/// The errors of the deserializer, and a number that no fault has.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Fault>, D::Error> {
     let Some(code) = Option::<u8>::deserialize(deserializer)? else { return Ok(None) };
     let fault = Fault::ALL.iter().copied().find(|fault| fault.code() == code);

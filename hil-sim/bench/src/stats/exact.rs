@@ -1,13 +1,13 @@
-//! Numbers in JSON that are read back to the bit. JSON has no word for a number that is not finite: it becomes a text,
+//! Numbers in JSON that are read back exactly. JSON cannot write a number that is not finite, so it becomes a text:
 //! `NaN`, `inf` or `-inf`.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serializer};
 
-/// For `#[serde(with)]`.
+/// Writes a number; for `#[serde(with)]`.
 ///
 /// # Errors
-/// Those of the serializer.
+/// The errors of the serializer.
 pub fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     if value.is_finite() {
         serializer.serialize_f64(*value)
@@ -23,10 +23,10 @@ enum Written {
     Text(String),
 }
 
-/// For `#[serde(with)]`.
+/// Reads a number; for `#[serde(with)]`.
 ///
 /// # Errors
-/// Those of the deserializer; a text that is no number.
+/// The errors of the deserializer, and a text that is not a number.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     match Written::deserialize(deserializer)? {
         Written::Number(number) => Ok(number),

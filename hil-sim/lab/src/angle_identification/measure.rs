@@ -1,32 +1,32 @@
-//! Turning the injection axis, alone or with the current, while the encoder holds the orientation.
+//! Measurement of the response to a rotation of the injection axis, alone or with the current, while the encoder holds the orientation.
 
 use crate::identification::signals::Prbs;
 use crate::prelude::*;
 
-/// Samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the excitation lies where
-/// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no
-/// term, decides the fit: 50 % and less, and gains that are wrong by half.)
+/// Number of samples for which each value of the sequence (8 bits, as in section 3.10) is held: 10 ms, so that the
+/// excitation lies in the frequency range of the loop. If a value is held for one sample or for 3 ms, the delay of the
+/// filters, for which Eq. 3.43 has no term, dominates the fit: it is 50 % or less, and the gains are wrong by half.
 const HOLD: usize = 60;
-/// Periods of the sequence: one to settle, the rest averaged.
+/// Periods of the sequence: one to settle; the others are averaged.
 const PERIODS: usize = 7;
-/// Turn of the axis either way, rad: 3°.
+/// Rotation of the axis in either direction, rad: 3°.
 pub const TURN: f64 = 0.052_36;
 
-/// Half of the encoder's step, counts of 0.072° electrical: 2° either way.
+/// Half of the encoder's step, counts of 0.072° electrical: 2° in either direction.
 const STEP_COUNTS: i32 = 28;
-/// Samples at each side of a step.
+/// Samples on each side of a step.
 pub const STEP_SAMPLES: usize = 360;
-/// Steps either way.
+/// Number of steps in either direction.
 const STEPS: usize = 200;
-/// Samples where the slow gain is read: the current has followed, the flux (186 ms) hardly.
+/// Samples at which the slow gain is read: the current has followed, the flux (186 ms) has hardly changed.
 pub const SLOW: std::ops::Range<usize> = 240..360;
 
-/// The identification experiment: input and output over one period of the sequence, averaged.
+/// Record of the identification experiment: input and output over one period of the sequence, averaged.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Turn of the injection axis, rad.
+    /// Rotation of the injection axis, rad.
     pub u: Vec<f64>,
-    /// Signal without its mean, A or 1.
+    /// Signal without its mean, A or dimensionless.
     pub y: Vec<f64>,
 }
 
@@ -34,10 +34,10 @@ fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
     rig.command(&Command::TurnInjection(radians.to_degrees() as f32)).map(|_| ())
 }
 
-/// Measures with the pseudo-random sequence on theta; the encoder orients the current.
+/// Measures with the pseudo-random sequence on theta, while the encoder orients the current.
 ///
 /// # Errors
-/// When the drive refuses a command.
+/// If the drive refuses a command.
 pub fn sequence(mut rig: Rig) -> Result<Record, Error> {
     let mut prbs = Prbs::default();
     let bits = [(); Prbs::PERIOD].map(|()| TURN * prbs.step());
@@ -59,19 +59,19 @@ pub fn sequence(mut rig: Rig) -> Result<Record, Error> {
     Ok(Record { u: bits.iter().flat_map(|&bit| [bit; HOLD]).collect(), y })
 }
 
-/// Answers to a step of the injection axis, signal per rad: the axis alone, and with the current.
+/// Responses to a step of the injection axis, signal per rad: of the axis alone, and with the current.
 #[derive(Clone, Debug)]
 pub struct StepResponses {
-    /// The axis alone.
+    /// Step of the axis alone.
     pub alone: Vec<f64>,
-    /// The estimated flux angle, and with it axis and current.
+    /// Step of the estimated flux angle, which moves axis and current.
     pub with_current: Vec<f64>,
 }
 
 /// Measures both step responses.
 ///
 /// # Errors
-/// When the drive refuses a command.
+/// If the drive refuses a command.
 pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
     let size = f64::from(2 * STEP_COUNTS) * TURN_PER_COUNT;
     let alone = alternate(&mut rig, |rig, side, k| {
@@ -104,8 +104,8 @@ pub fn steps(mut rig: Rig) -> Result<StepResponses, Error> {
 /// Electrical angle of a count of the encoder of the default drive: two pole pairs, 10 000 counts.
 const TURN_PER_COUNT: f64 = 2.0 * std::f64::consts::TAU / 10_000.0;
 
-/// From one side to the other and back, many times; the mean change of the signal over the mean change
-/// of the angle.
+/// Steps between the two sides many times; returns the mean change of the signal divided by the mean change of the
+/// angle.
 fn alternate(
     rig: &mut Rig,
     mut one: impl FnMut(&mut Rig, f64, usize) -> Result<(f64, f64), Error>,
@@ -115,7 +115,7 @@ fn alternate(
         let side = if n % 2 == 0 { 1.0 } else { -1.0 };
         for (k, signal) in signal.iter_mut().enumerate() {
             let (y, x) = one(rig, side, k)?;
-            // The first step comes from the middle; of the others as many go up as down.
+            // The first step starts in the middle. Half of the others go up, half go down.
             if n > 0 {
                 *signal += side * y;
                 if SLOW.contains(&k) {
@@ -125,7 +125,7 @@ fn alternate(
         }
     }
     let angle = angle / SLOW.len() as f64;
-    // From -y to y for angles from -x to x; before the step the signal is that of the other side.
+    // The signal goes from -y to y for angles from -x to x; before a step it has the value of the opposite side.
     let end = SLOW.map(|k| signal[k]).sum::<f64>() / SLOW.len() as f64;
     Ok(signal.iter().map(|y| 0.5 * (y + end) / angle).collect())
 }

@@ -6,11 +6,11 @@ use drive_settings::tuning::motor_plant;
 use crate::prelude::*;
 use crate::recomputed::PERIOD_S;
 
-/// Speeds of the frame, Hz.
+/// Rotation speeds of the frame, Hz.
 const FRAME_HZ: [f64; 4] = [0.0, 5.0, 25.0, 48.0];
 const SAMPLES: usize = 6000;
 
-/// Adds the table, and what is compared.
+/// Adds the table and the comparisons.
 pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
     let mut table =
         Table::new("LPF before and after the rotation (section 3.4): steps of i_d and i_q", &[]);
@@ -27,8 +27,8 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
         ]);
     }
     outcome.tables.push(table.note(
-        "What still swings of i_d and i_q. The current loop in complex numbers: Table 5, the controller of Eq. 3.39, a period of delay, LPF on the current in \
-         the frame of the stator (filter before the rotation) or in that of the flux.",
+        "Remaining oscillation of i_d and i_q. The current loop in complex numbers: Table 5, the controller of Eq. 3.39, a period of delay, LPF on the current in \
+         the frame of the stator (filter before the rotation) or in the frame of the flux.",
     ));
     outcome.metrics.set("orders_that_settle", f64::from(u8::from(settles) + u8::from(all)));
     outcome.compared.extend([
@@ -39,7 +39,7 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
     Ok(())
 }
 
-/// Largest distance of the currents from their mean over the second half of a second after a step of both, A.
+/// Largest distance of the currents from their mean over the second half of a second after a step of both currents, A.
 fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
     let motor = motor_plant(&Settings::default().motor.into(), PERIOD_S).map_err(Error::refused)?;
     let (k_c, z_c) = (printed("section 3.8", "k_c"), printed("Eq. 3.38", "z_c"));
@@ -50,7 +50,7 @@ fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
     let mut late = Vec::new();
     for n in 0..SAMPLES {
         let angle = Complex64::cis(turn * n as f64);
-        // The current of the stator; the filter is linear and the same for both axes.
+        // The current in the stator frame; the filter is linear and equal for both axes.
         let input = if rotated_first { i } else { i * angle };
         let out = LPF.step(&mut filter, AlphaBeta::new(input.re as f32, input.im as f32));
         let out = Complex64::new(out.alpha.into(), out.beta.into());
@@ -58,7 +58,7 @@ fn swing(frame_hz: f64, rotated_first: bool) -> Result<f64, Error> {
         let error = reference - seen;
         u += (error - before * z_c) * k_c;
         before = error;
-        // In the frame, which turns on by a period until the voltage acts.
+        // The current in the flux frame, which rotates on by one period until the voltage takes effect.
         i = (i * motor.p + delayed * motor.k) * Complex64::cis(-turn);
         delayed = u;
         if n >= SAMPLES / 2 {

@@ -3,19 +3,19 @@
 use crate::prelude::*;
 use crate::recomputed::plant;
 
-/// Length of the runs, s.
+/// Duration of the runs, s.
 const SECONDS: f64 = 3.0;
-/// Limit of the torque current, A: that of the drive.
+/// Limit of the q-axis current, A: the limit of the drive.
 const LIMIT_A: f64 = 3.0;
 
-/// Position, torque current and speed over time.
+/// Position, q-axis current and speed over time.
 #[derive(Default)]
 struct Trace {
     degrees: Vec<(f64, f64)>,
     current: Vec<(f64, f64)>,
 }
 
-/// Adds the figure, and what is compared.
+/// Adds the figure and the comparisons.
 pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     let (literal, ours) = (literal(), ours(context)?);
     let zero_from = |trace: &Trace| {
@@ -55,7 +55,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     Ok(())
 }
 
-/// Eq. 4.1 to 4.3 at 100 Hz: position in radians, PI with the anti-windup of appendix B, and no torque beyond 1440 rpm.
+/// Simulates Eq. 4.1 to 4.3 at 100 Hz: position in radians, PI with the anti-windup of appendix B, and no torque beyond 1440 rpm.
 fn literal() -> Trace {
     let plant = plant("Eq. 4.1");
     let (gain, zero) = (printed("Eq. 4.2", "gain"), printed("Eq. 4.2", "zero"));
@@ -73,28 +73,28 @@ fn literal() -> Trace {
         let allowed = if moved * rate > fastest { u.min(0.0) } else { u };
         trace.degrees.push((t, y * 360.0 / TAU));
         trace.current.push((t, allowed));
-        // k / ((z - 1)(z - p)): the step of the position is a first-order lag of the current.
+        // k / ((z - 1)(z - p)): the change of the position is a first-order lag of the current.
         y += moved;
         moved = plant.p * moved + plant.k * allowed;
     }
     trace
 }
 
-/// The drive on a shaft with the time constant and the gain of Eq. 4.1.
+/// Simulates the drive on a shaft with the time constant and the gain of Eq. 4.1.
 fn ours(context: &Context<'_>) -> Result<Trace, Error> {
     let mut config = context.config.clone();
     let (plant, rate) = (plant("Eq. 4.1"), printed("Eq. 4.1", "f_s"));
     let time_constant = -1.0 / (rate * plant.p.ln());
-    // rad/s per ampere in the steady state, and newton metres per ampere.
+    // rad/s per ampere in steady state, and newton metres per ampere.
     let per_ampere = plant.k * rate / (1.0 - plant.p);
-    // Eq. 2.7 with L_m²/L_r, beside 0.7 A of direct current, Nm/A.
+    // Eq. 2.7 with L_m²/L_r, with 0.7 A of magnetising current, Nm/A.
     let torque = source::value_of("S1", "torque_per_ampere").unwrap_or(f64::NAN);
     config.motor.friction = torque / per_ampere;
     config.motor.inertia = time_constant * config.motor.friction;
     config.drive.motor.inertia = config.motor.inertia as f32;
     config.drive.angle_source = AngleSource::Encoder;
     config.drive.speed.limit_rpm = Some(printed("section 4.1", "limit of the speed") as f32);
-    // 70 % of the acceleration by the largest torque current.
+    // 70 % of the acceleration at the largest q-axis current.
     let fastest = 0.7 * LIMIT_A * torque / config.motor.inertia * 60.0 / TAU;
     config.drive.speed.ramp_rpm_per_s = Some(fastest as f32);
     config.load.mode = LoadMode::Free;

@@ -1,31 +1,31 @@
-//! Table 1 as runs: encoder, fundamental model and injection at rest, near it and far from it.
+//! Table 1 as runs: encoder, fundamental model and injection at standstill, near it and far from it.
 
 use sim_bench::steady::{bring_up, prepared};
 
 use crate::prelude::*;
 
-/// Row of the table and speed, rpm.
+/// Rows of the table, and their speeds, rpm.
 const SPEEDS: [(&str, f64); 3] = [
     ("works at omega = 0", 0.0),
     ("works at omega near 0", 5.0),
     ("works at omega far above 0", 1500.0),
 ];
-/// Column of the table.
+/// Columns of the table.
 const COLUMNS: [&str; 3] = ["mechanical sensor", "fundamental model", "signal injection"];
 const IQ_A: f64 = 1.5;
 
-/// Adds the table of runs, and what is compared.
+/// Adds the table of runs and the comparisons.
 pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     let mut table =
         Table::new("Table 1 as runs: angle error over a second at 1.5 A, and the carrier", &[]);
     for column in COLUMNS {
-        // By construction.
+        // This holds by construction.
         let without = f64::from(column != COLUMNS[0]);
         let place = beside("Table 1, works without encoder", column);
         outcome.compared.push(place.simulated(without));
         for (row, rpm) in SPEEDS {
             let found = tracked(context, column, rpm)?;
-            // The method works where the angle is right by it: by the injection while there is a carrier, else by the model.
+            // The method works if the angle it gives is right: by injection while it is on, otherwise by the model.
             let by_it = |(error, carrier): (f64, f64)| {
                 let by = if carrier > 1.0 { COLUMNS[2] } else { COLUMNS[1] };
                 error < LOST_DEG && (column == COLUMNS[0] || column == by)
@@ -46,13 +46,13 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
         }
     }
     outcome.tables.push(table.note(
-        "The fundamental model is the drive's own flux observer. Far from standstill the drive itself takes the carrier away; \
-         near it, it does not start without one.",
+        "The fundamental model is the drive's own flux observer. Far from standstill the drive itself switches the injection off; \
+         near standstill it does not start without the injection.",
     ));
     Ok(())
 }
 
-/// Largest angle error, degrees, and carrier current, mA; nothing where the drive does not start or stops itself.
+/// Largest angle error, degrees, and injection current, mA; nothing if the drive does not start or stops itself.
 fn tracked(context: &Context<'_>, column: &str, rpm: f64) -> Result<Option<(f64, f64)>, Error> {
     let mut config = context.config.clone();
     if column == COLUMNS[0] {

@@ -1,4 +1,4 @@
-//! The demodulations that are compared, and the drives that use them.
+//! The demodulations under comparison, and the drives that use them.
 
 use drive_core::table::ReferenceTable;
 use drive_settings::words;
@@ -24,21 +24,21 @@ pub const LITERAL: Demodulation = Demodulation(DemodulatorKind::Literal);
 pub const RECTIFIED: Demodulation = Demodulation(DemodulatorKind::Rectified);
 const RMS_IMPEDANCE: Demodulation = Demodulation(DemodulatorKind::RmsImpedance);
 const ENVELOPE: Demodulation = Demodulation(DemodulatorKind::Envelope);
-/// The drive's own.
+/// The drive's own demodulation.
 pub const SYNCHRONOUS: Demodulation = Demodulation(DemodulatorKind::Synchronous);
 
-/// All of them.
+/// All demodulations.
 pub const DEMODULATIONS: [Demodulation; 5] =
     [LITERAL, RECTIFIED, RMS_IMPEDANCE, ENVELOPE, SYNCHRONOUS];
 
 impl Demodulation {
-    /// How the configuration names it.
+    /// Returns the name in the configuration.
     pub fn name(&self) -> &'static str {
         self.0.word()
     }
 
-    /// How much larger its signal is than that of the rectified chain for the same saliency, by the
-    /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
+    /// Returns how much larger its signal is than that of the rectified chain for the same saliency, from the gains of
+    /// filters and detectors. The printed gain k_s divided by it makes the same loop.
     fn gain(&self) -> f64 {
         match self.0 {
             DemodulatorKind::RmsImpedance => PP / BPF / RECTIFIED_GAIN,
@@ -47,7 +47,7 @@ impl Demodulation {
         }
     }
 
-    /// Constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
+    /// Returns the constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
     fn constant_a(&self) -> f64 {
         match self.0 {
             DemodulatorKind::RmsImpedance | DemodulatorKind::Synchronous => 0.0,
@@ -56,26 +56,26 @@ impl Demodulation {
         }
     }
 
-    /// The name in metrics and file names.
+    /// Returns the name in metrics and file names.
     pub fn key(&self) -> String {
         self.name().replace('-', "_")
     }
 
-    /// The configuration with this demodulation.
+    /// Returns the configuration with this demodulation.
     pub fn config(&self, config: &Config) -> Config {
         let mut config = config.clone();
         config.drive.injection.demodulator = self.0;
-        // A motor without saliency must be measured, not refused.
+        // A motor without saliency must be measured here, so the drive must not refuse it.
         config.drive.injection.synchronous.check = false;
         config
     }
 
-    /// Unit of its signal times 1000.
+    /// Returns the unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
         if self.0 == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
     }
 
-    /// The configuration with the drive of this kind, if the demodulation has one.
+    /// Returns the configuration with the drive of this kind, if the demodulation has one.
     pub fn drive(
         &self,
         kind: ReferenceKind,
@@ -103,18 +103,17 @@ impl Demodulation {
 }
 
 words! {
-    /// Reference of the signal, and the controller behind it; with the names in tables and metrics.
+    /// Reference of the signal and controller of the loop, with the names in tables and metrics.
     pub enum ReferenceKind {
         /// A constant and the gains of the configuration (as printed).
         Constant = "constant",
-        /// A learned table and the same gains.
+        /// A learned table, with the gains of the configuration.
         Learned = "learned",
-        /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
-        /// own loop.
+        /// A learned table and a controller with a larger phase margin; the synchronous demodulation uses its own loop.
         Retuned = "retuned",
     }
 }
 
-/// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
-/// crossover, where the printed one has none.
+/// k_s, in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the crossover, where the
+/// printed controller has none.
 const RETUNED: (f32, f32) = (0.1, 0.995);

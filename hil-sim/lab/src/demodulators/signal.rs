@@ -1,32 +1,32 @@
-//! Signal of a demodulation while the encoder holds the angle: mean, slope, noise, delay.
+//! Signal of a demodulation while the encoder holds the angle: mean, sensitivity to the angle, noise, delay.
 
 use sim_bench::plant::MeasurementSettings;
 
 use crate::prelude::*;
 
-/// Half of the turn over which the slope is taken, degrees.
+/// Half of the rotation over which the sensitivity is measured, degrees.
 const TURN_DEG: f64 = 4.0;
 /// Time for the current to settle, s.
 pub const SETTLED_S: f64 = 0.5;
-/// Time to settle after a turn, and to average, s.
+/// Time to settle after a rotation, s; the averaging takes the same time.
 const SETTLE_S: f64 = 0.1;
 const AVERAGE_S: f64 = 0.4;
 
 /// Signal of a demodulation at the true flux angle.
 #[derive(Clone, Copy, Debug)]
 pub struct SignalQuality {
-    /// Signal, A or 1.
+    /// Signal, A or dimensionless.
     pub signal: f64,
-    /// Change of the signal with the angle error, per rad: the current held, the axis turned.
+    /// Change of the signal with the angle error, per rad, with the current held and the axis rotated.
     pub slope: f64,
-    /// Deviation of the signal, rms.
+    /// Standard deviation of the signal.
     pub noise: f64,
 }
 
-/// Measures at the true flux angle and 4° to either side.
+/// Measures at the true flux angle and at 4° to either side.
 ///
 /// # Errors
-/// When the drive refuses a command.
+/// If the drive refuses a command.
 pub fn signal_quality(mut rig: Rig) -> Result<SignalQuality, Error> {
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
         rig.settle(&Command::TurnInjection(turn as f32), SETTLE_S)?;
@@ -41,21 +41,21 @@ pub fn signal_quality(mut rig: Rig) -> Result<SignalQuality, Error> {
     })
 }
 
-/// Changes of the saliency, their size (1/A), and the samples after each: no multiple of the carrier
-/// period, so that they fall on every phase of the carrier. The first is not counted: as many go up
-/// then as down.
+/// Number of changes of the saliency, their size (1/A), and the samples after each. The samples are no multiple of the
+/// injection period, so that the changes fall on every phase of the injection. The first change does not count; half of
+/// the others go up, half go down.
 const CHANGES: usize = 41;
 const CHANGE: f64 = 0.004;
 const AFTER: usize = 603;
 
-/// Mean delay, samples, from a change of the motor's saliency to the signal: the area above the step
+/// Returns the mean delay, samples, from a change of the motor's saliency to the signal: the area above the step
 /// response, measured without noise.
 ///
 /// # Errors
 /// As [`Rig::oriented`].
 pub fn delay(mut config: Config, iq: f64, seed: u64) -> Result<f64, Error> {
     config.measurement.noise_a = Some(0.0);
-    // 16 bits.
+    // A resolution of 16 bits.
     let fine = MeasurementSettings::IDEAL;
     config.measurement.lsb_a = Some(fine.lsb_a / fine.range_a * config.measurement.range_a);
     config.calibrate();
@@ -69,7 +69,7 @@ pub fn delay(mut config: Config, iq: f64, seed: u64) -> Result<f64, Error> {
         rig.plant.set_saliency(&plant.machine, &saliency).map_err(Error::refused)?;
         let mut k = 0;
         rig.run(AFTER as f64 / sim_bench::rig::RATE_HZ, |p| {
-            // The first change comes from the middle.
+            // The first change starts in the middle.
             if n > 0 {
                 response[k] += sign * p.signal();
             }

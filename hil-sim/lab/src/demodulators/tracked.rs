@@ -4,24 +4,24 @@ use drive_core::carrier::CARRIER_SAMPLES;
 
 use crate::prelude::*;
 
-/// Levels of Figure 38, A, and the time at each, s.
+/// Current levels of Figure 38, A, and the time at each, s.
 const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 const LEVEL_S: f64 = 0.6;
-/// Not judged after the first level, s: the angle settles from the magnetising position.
+/// Time after the first level that is not judged, s: the angle settles from the magnetising position.
 const SETTLING_S: f64 = 0.5;
 
 /// A run through the torque steps.
 #[derive(Clone, Debug)]
 pub struct StepsRun {
-    /// Angle error, degrees, over time, s: means over a carrier period.
+    /// Angle error, degrees, over time, s: means over an injection period.
     pub error: Vec<(f64, f64)>,
     /// Angle error after settling, degrees.
     pub stats: Stats,
-    /// Whether it went beyond 45°, or the drive stopped itself.
+    /// Whether the error exceeded 45°, or the drive stopped itself.
     pub lost: bool,
 }
 
-/// Torque steps with the shaft locked.
+/// Runs the torque steps with the shaft locked.
 ///
 /// # Errors
 /// As [`Rig::new`] and [`Rig::start`].

@@ -1,4 +1,4 @@
-//! The filters, each in the forms that are compared.
+//! The filters, each in the forms under comparison.
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
 
@@ -9,30 +9,30 @@ use crate::prelude::*;
 pub struct ComparedFilter {
     /// Its name in the source.
     pub name: &'static str,
-    /// Numerator and denominator by Tables 7 and 8.
+    /// Numerator and denominator from Tables 7 and 8.
     pub printed: [Vec<f64>; 2],
     response: fn(f64) -> Complex64,
-    /// A filter of sections at rest, as the drive runs it.
+    /// Makes a filter of sections at rest, as the drive runs it.
     at_rest: fn() -> Box<dyn FnMut(f32) -> f32>,
 }
 
 impl ComparedFilter {
-    /// Frequency response of the sections the drive runs.
+    /// Frequency response of the sections in the drive.
     pub fn sections(&self, omega_t: f64) -> Complex64 {
         (self.response)(omega_t)
     }
 
-    /// Frequency response by Tables 7 and 8.
+    /// Frequency response from Tables 7 and 8.
     pub fn direct(&self, omega_t: f64) -> Complex64 {
         direct::response(&self.printed, omega_t)
     }
 
-    /// Likewise, with coefficients rounded to `f32`.
+    /// Frequency response from Tables 7 and 8, with coefficients rounded to `f32`.
     pub fn direct_rounded(&self, omega_t: f64) -> Complex64 {
         direct::response(&direct::rounded(&self.printed), omega_t)
     }
 
-    /// Largest pole of the direct form: as printed, rounded to `f32`.
+    /// Magnitude of the largest pole of the direct form, as printed and rounded to `f32`.
     pub fn largest_poles(&self) -> [f64; 2] {
         let [_, rounded] = direct::rounded(&self.printed);
         [&self.printed[1], &rounded].map(|a| largest_pole(&a[1..]))
@@ -44,7 +44,7 @@ impl ComparedFilter {
         -(self.sections(omega_t + h) / self.sections(omega_t - h)).arg() / (2.0 * h)
     }
 
-    /// Errors against `f64`, A: for each form its name, its name in the metrics and statistics.
+    /// Measures errors against `f64`, A: for each form its name, its name in the metrics and statistics.
     pub fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<FormErrors> {
         let mut forms: Vec<Form> =
             vec![("sections, f32 (the drive)", "sections", (self.at_rest)())];

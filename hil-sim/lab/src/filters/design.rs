@@ -1,8 +1,8 @@
-//! Filters from their specification: analog prototypes and the bilinear transformation, in f64. No crate designs elliptic
-//! filters.
+//! Filter design from a specification: analog prototypes and the bilinear transformation, in f64. No crate designs
+//! elliptic filters.
 //!
-//! Elliptic functions by Landen's transformation (Orfanidis, Lecture notes on elliptic filter design, 2006); arguments are in
-//! quarter periods.
+//! Elliptic functions are computed by Landen's transformation (Orfanidis, Lecture notes on elliptic filter design,
+//! 2006); arguments are in quarter periods.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -19,7 +19,7 @@ pub struct Prototype {
     dc: f64,
 }
 
-/// The band of a filter, edges in Hz.
+/// The band of a filter, with edges in Hz.
 #[derive(Clone, Copy)]
 pub enum Band {
     /// A low-pass.
@@ -44,7 +44,7 @@ fn landen(k: f64) -> Vec<f64> {
     std::iter::successors(step(&k), step).collect()
 }
 
-/// The function whose cosine or sine at modulus 0 is `w`, at modulus k.
+/// Value at modulus k of the function whose value at modulus 0, a cosine or sine, is `w`.
 fn ascend(w: Complex64, k: f64) -> Complex64 {
     landen(k).iter().rev().fold(w, |w, v| (1.0 + v) * w / (ONE + *v * w * w))
 }
@@ -67,20 +67,20 @@ fn asn(w: Complex64, k: f64) -> Complex64 {
     ONE - w.acos() / FRAC_PI_2
 }
 
-/// Middles of the `n` parts of two quarter periods, those of the upper half plane.
+/// Middles of the `n` parts of two quarter periods that lie in the upper half plane.
 fn middles(n: usize) -> impl Iterator<Item = f64> {
     (0..n / 2).map(move |i| (2 * i + 1) as f64 / n as f64)
 }
 
-/// Roots and their conjugates.
+/// Returns roots and their conjugates.
 fn pairs(half: impl Iterator<Item = Complex64>) -> Vec<Complex64> {
     half.flat_map(|root| [root, root.conj()]).collect()
 }
 
-/// Elliptic, with a ripple of `pass` dB and `stop` dB of attenuation.
+/// Designs an elliptic filter with a ripple of `pass` dB and an attenuation of `stop` dB.
 pub fn elliptic(n: usize, pass: f64, stop: f64) -> Prototype {
     let k1 = ripple(pass) / ripple(stop);
-    // The modulus from the degree equation, by the complementary one.
+    // The modulus from the degree equation, by the complementary modulus.
     let k1_complement = (1.0 - k1 * k1).sqrt();
     let product: f64 = middles(n).map(|u| sn(u.into(), k1_complement).re).product();
     let complement = k1_complement.powi(n as i32) * product.powi(4);
@@ -95,7 +95,7 @@ pub fn elliptic(n: usize, pass: f64, stop: f64) -> Prototype {
     Prototype { zeros, poles, dc }
 }
 
-/// Chebyshev's of the first kind, and with its ripple in the stop band, which begins at `edge` rad/s.
+/// Poles of a Chebyshev filter of the first kind.
 fn chebyshev_poles(n: usize, ripple: f64) -> Vec<Complex64> {
     let v0 = (1.0 / ripple).asinh() / n as f64;
     let pole = |u: f64| J * (Complex64::from(u * FRAC_PI_2) - J * v0).cos();
@@ -106,20 +106,20 @@ fn chebyshev_poles(n: usize, ripple: f64) -> Vec<Complex64> {
     poles
 }
 
-/// Chebyshev's of the first kind, with a ripple of `pass` dB.
+/// Designs a Chebyshev filter of the first kind, with a ripple of `pass` dB.
 pub fn chebyshev_1(n: usize, pass: f64) -> Prototype {
     let dc = if n.is_multiple_of(2) { 10f64.powf(-0.05 * pass) } else { 1.0 };
     Prototype { zeros: Vec::new(), poles: chebyshev_poles(n, ripple(pass)), dc }
 }
 
-/// Chebyshev's of the second kind, with `stop` dB from `edge` rad/s on.
+/// Designs a Chebyshev filter of the second kind, with an attenuation of `stop` dB above `edge` rad/s.
 pub fn chebyshev_2(n: usize, stop: f64, edge: f64) -> Prototype {
     let poles = chebyshev_poles(n, 1.0 / ripple(stop)).into_iter().map(|p| edge / p).collect();
     let zeros = pairs(middles(n).map(|u| J * edge / (u * FRAC_PI_2).cos()));
     Prototype { zeros, poles, dc: 1.0 }
 }
 
-/// Butterworth's, `pass` dB down at 1 rad/s.
+/// Designs a Butterworth filter with an attenuation of `pass` dB at 1 rad/s.
 pub fn butterworth(n: usize, pass: f64) -> Prototype {
     let radius = ripple(pass).powf(-1.0 / n as f64);
     let pole =
@@ -128,10 +128,10 @@ pub fn butterworth(n: usize, pass: f64) -> Prototype {
 }
 
 impl Prototype {
-    /// Numerator and denominator at the control rate; the edges are exact.
+    /// Returns numerator and denominator at the control rate; the edges are exact.
     pub fn digital(&self, band: Band) -> [Vec<f64>; 2] {
         let warped = |hz: f64| (PI * hz / RATE).tan();
-        // Roots in the plane of the band, and where a zero at infinity goes.
+        // Roots in the plane of the band, and the position of zeros at infinity.
         let moved = |root: Complex64| -> Vec<Complex64> {
             let both = |low: f64, high: f64, moved: &dyn Fn(f64) -> Complex64| {
                 let (low, high) = (warped(low), warped(high));
@@ -149,7 +149,7 @@ impl Prototype {
             roots.iter().flat_map(|&r| moved(r)).map(|s| (ONE + s) / (ONE - s)).collect()
         };
         let (mut zeros, poles) = (plane(&self.zeros), plane(&self.poles));
-        // Of a low-pass, zeros at infinity come to half the sampling rate.
+        // In a low-pass, zeros at infinity move to half the sampling rate.
         zeros.resize(poles.len(), -ONE);
         let [b, a] = [&zeros, &poles].map(|roots| expanded(roots));
         let centre = match band {
@@ -162,7 +162,7 @@ impl Prototype {
     }
 }
 
-/// The polynomial with these roots, real, from the highest power on.
+/// Returns the real polynomial with these roots, highest power first.
 fn expanded(roots: &[Complex64]) -> Vec<f64> {
     let mut polynomial = vec![ONE];
     for root in roots {

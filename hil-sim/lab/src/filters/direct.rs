@@ -1,18 +1,18 @@
-//! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
+//! The filters in direct form (Eq. C.1) with the printed coefficients, for comparison.
 
 use crate::prelude::*;
 
-/// A filter of Table 7 or 8: numerator, denominator.
+/// Returns numerator and denominator of a filter of Table 7 or 8.
 pub fn printed(table: &str, filter: &str) -> [Vec<f64>; 2] {
     ["b", "a"].map(|part| source::column("S1", table, &format!("{part} ({filter})")))
 }
 
-/// Each coefficient rounded to `f32`.
+/// Rounds each coefficient to `f32`.
 pub fn rounded(filter: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     filter.each_ref().map(|part| part.iter().map(|&c| f64::from(c as f32)).collect())
 }
 
-/// A polynomial in z⁻¹ at rad/sample.
+/// Evaluates a polynomial in z⁻¹ at an angle in rad/sample.
 pub fn value(part: &[f64], omega_t: f64) -> Complex64 {
     let delay = Complex64::cis(-omega_t);
     part.iter().rev().fold(Complex64::ZERO, |sum, &c| sum * delay + c)
@@ -23,7 +23,7 @@ pub fn response(filter: &[Vec<f64>; 2], omega_t: f64) -> Complex64 {
     value(&filter[0], omega_t) / value(&filter[1], omega_t)
 }
 
-/// The reference: the filter in `f64`, direct form I.
+/// Returns the reference: the filter in `f64`, direct form I.
 pub fn reference([b, a]: &[Vec<f64>; 2]) -> impl FnMut(f64) -> f64 {
     let (mut x, mut y) = (vec![0.0; b.len()], vec![0.0; b.len()]);
     move |input| {
@@ -38,10 +38,10 @@ pub fn reference([b, a]: &[Vec<f64>; 2]) -> impl FnMut(f64) -> f64 {
     }
 }
 
-/// A way to compute a filter in `f32`: its name, that in the metrics, and its output for an input.
+/// A way to compute a filter in `f32`: its name, its name in the metrics, and its output for an input.
 pub type Form = (&'static str, &'static str, Box<dyn FnMut(f32) -> f32>);
 
-/// The three direct forms in `f32`.
+/// Returns the three direct forms in `f32`.
 pub fn f32_forms(filter: &[Vec<f64>; 2]) -> [Form; 3] {
     let [b, a] = filter.each_ref().map(|part| part.iter().map(|&c| c as f32).collect::<Vec<_>>());
     [

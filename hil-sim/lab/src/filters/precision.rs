@@ -1,4 +1,4 @@
-//! The error that single precision causes.
+//! The error caused by single precision.
 
 use rand_distr::{Distribution, Uniform};
 
@@ -48,5 +48,5 @@ pub fn errors(
             table.row(cells.chain([Cell::significant(1e3 * largest, 2)]));
         }
     }
-    Ok(table.note(format!("{samples} samples at 6 kHz. One step of the converter is 2.2 mA.")))
+    Ok(table.note(format!("{samples} samples at 6 kHz. One count of the ADC is 2.2 mA.")))
 }

@@ -4,8 +4,8 @@
 //! y[k] = -a1 y[k-1] - ... - an y[k-n] + b1 u[k-d-1] + ... + bm u[k-d-m]
 //! ```
 //!
-//! The appendix prints the last row of Eq. A.4 and A.5 one sample too far; here all rows are those for
-//! which every term exists. The sentence below Eq. A.8 omits the inverse that the equation prints.
+//! The appendix prints the last row of Eq. A.4 and A.5 one sample too late; this code uses all rows for which every
+//! term exists. The sentence below Eq. A.8 omits the inverse that the equation prints.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -26,13 +26,13 @@ pub struct Orders {
 /// The fitted model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arx {
-    /// a1 to an.
+    /// Coefficients a1 to an.
     pub a: Vec<f64>,
-    /// b1 to bm.
+    /// Coefficients b1 to bm.
     pub b: Vec<f64>,
-    /// Ratio of the singular values of the regression, its columns scaled to the same length.
+    /// Ratio of the singular values of the regression, with its columns scaled to equal length.
     pub condition: f64,
-    /// Root of the mean squared error left, in the unit of y.
+    /// Root of the remaining mean squared error, in the unit of y.
     pub rms: f64,
 }
 

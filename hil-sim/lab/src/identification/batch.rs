@@ -1,12 +1,12 @@
-//! Least squares over all samples at once: Model A with four complex unknowns (Eq. 22 to 24) and
-//! the regression of Model B with seven real ones (Eq. 31).
+//! Least squares over all samples at once: Model A with four complex unknowns (Eq. 22 to 24), and the regression of
+//! Model B with seven real unknowns (Eq. 31).
 
 use nalgebra::{ComplexField, DMatrix, DVector, Matrix4, Vector4};
 
 use super::{Complex, Delta, FirstOrderTheta, NotIdentifiable};
 
-/// Largest ratio of the singular values of a regression, its columns scaled to the same length,
-/// that still gives a result. Clean six-step data have up to 1e5, a constant signal above 6e9.
+/// Largest ratio of the singular values of a regression, with its columns scaled to equal length, that still gives a
+/// result. Clean six-step data have up to 1e5, a constant signal above 6e9.
 pub const CONDITION_LIMIT: f64 = 1e8;
 
 /// Sampled voltage (V) and current (A), filtered alike: `v[k]` is applied from sample k to k+1.
@@ -23,10 +23,9 @@ pub struct Data {
 pub struct Solution<T: ComplexField> {
     /// The estimate with the least squared error.
     pub theta: DVector<T>,
-    /// Upper triangular factor of the regression: its squared error rises from the minimum by
-    /// |R (theta - minimum)|².
+    /// Upper triangular factor of the regression: the squared error exceeds its minimum by |R (theta - minimum)|².
     pub r: DMatrix<T>,
-    /// Ratio of the singular values, columns scaled to the same length.
+    /// Ratio of the singular values, with the columns scaled to equal length.
     pub condition: f64,
     /// Squared error at the minimum.
     pub residual: f64,
@@ -35,7 +34,7 @@ pub struct Solution<T: ComplexField> {
 /// Minimises |A theta - y|² by QR factorisation.
 ///
 /// # Errors
-/// When a number is not finite, there are fewer rows than columns, or the condition number exceeds
+/// If a number is not finite, if there are fewer rows than columns, or if the condition number exceeds
 /// [`CONDITION_LIMIT`].
 pub fn least_squares<T: ComplexField<RealField = f64>>(
     mut a: DMatrix<T>,
@@ -75,21 +74,21 @@ pub fn least_squares<T: ComplexField<RealField = f64>>(
     Ok(Solution { theta, r, condition, residual })
 }
 
-/// Real and imaginary parts behind each other.
+/// Returns the real parts, followed by the imaginary parts.
 pub fn parts<'a>(values: impl Iterator<Item = &'a Complex>) -> DVector<f64> {
     DVector::from_vec(values.flat_map(|z| [z.re, z.im]).collect())
 }
 
-/// Model A: the coefficients of the equation in differences, and how sharply the data fix them.
+/// Model A: the coefficients of the equation in differences, and how accurately the data determine them.
 #[derive(Clone, Copy, Debug)]
 pub struct Regression {
     /// The least-squares estimate.
     pub delta: Delta,
     /// Upper triangular factor of the regression, for unknowns in the order of [`Delta::array`].
     pub r: Matrix4<Complex>,
-    /// Ratio of the singular values, columns scaled to the same length.
+    /// Ratio of the singular values, with the columns scaled to equal length.
     pub condition: f64,
-    /// Squared error left, A².
+    /// Remaining squared error, A².
     pub residual: f64,
 }
 
@@ -101,8 +100,8 @@ impl Data {
             .map(move |k| (i[k + 1] - i[k], [i[k] - i[k - 1], i[k - 1], v[k] - v[k - 1], v[k - 1]]))
     }
 
-    /// Model A (Eq. 22 to 24) with four complex unknowns. Same solution as the eight real unknowns
-    /// of Eq. 24, to 1e-12.
+    /// Fits Model A (Eq. 22 to 24) with four complex unknowns. The solution equals that of the eight real unknowns of
+    /// Eq. 24 to within 1e-12.
     ///
     /// # Errors
     /// As [`least_squares`].
@@ -119,7 +118,7 @@ impl Data {
         })
     }
 
-    /// The regression of Model B (Eq. 31), in differences.
+    /// Fits the regression of Model B (Eq. 31), in differences.
     ///
     /// # Errors
     /// As [`least_squares`].

@@ -1,5 +1,5 @@
-//! The direct-current, locked-rotor and no-load tests of section 3.6 of Barroso (2017): from readings
-//! of meters to the equivalent circuit (Figure 21), and the readings that a simulated motor gives.
+//! The direct-current, locked-rotor and no-load tests of section 3.6 of Barroso (2017): the equivalent circuit (Figure
+//! 21) from readings of meters, and the readings that a simulated motor gives.
 
 use std::f64::consts::SQRT_2;
 
@@ -8,11 +8,10 @@ use sim_bench::plant::{Machine, PlantError, SaliencySettings};
 use super::Complex;
 use crate::prelude::*;
 
-/// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
-/// values, rms.
+/// Readings of the meters. Voltages and currents of the two tests with alternating current are phase values, rms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readings {
-    /// Direct voltage between two phases, V, and the current through them, A.
+    /// Dc voltage between two phases, V, and the current through them, A.
     pub dc: (f64, f64),
     /// Frequency (Hz), voltage (V), current (A) and the angle between them (rad), rotor locked.
     pub locked: (f64, f64, f64, f64),
@@ -21,7 +20,7 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// Sections 3.6.1 to 3.6.3.
+    /// The readings of sections 3.6.1 to 3.6.3.
     pub const PRINTED: Self =
         Self { dc: (27.9, 2.60), locked: (15.0, 22.67, 2.71, 0.671), no_load: (60.0, 37.9, 0.491) };
 
@@ -36,8 +35,8 @@ impl Readings {
         self.no_load.1 / self.no_load.2
     }
 
-    /// The circuit as section 3.6 reads it off: no current in the magnetising branch while the rotor is
-    /// locked, no voltage at the stator resistance without load, two equal leakages.
+    /// The circuit as section 3.6 derives it: no current in the magnetising branch while the rotor is locked, no
+    /// voltage across the stator resistance without load, two equal leakage inductances.
     pub fn as_printed(&self) -> MachineSettings {
         let r_s = 0.5 * self.dc.0 / self.dc.1;
         let z = self.locked_impedance();
@@ -46,8 +45,8 @@ impl Readings {
         circuit([r_s, z.re - r_s, leakage, l_s - leakage])
     }
 
-    /// The circuit that has these readings with a magnetising branch, and the stator resistance in the
-    /// no-load test: Z - r_s - j w L_s = (w L_m)² / (r_r + j w L_r), L_r = L_s.
+    /// The circuit that has these readings, with a magnetising branch in the locked-rotor test and the stator
+    /// resistance in the no-load test: Z - r_s - j w L_s = (w L_m)² / (r_r + j w L_r), L_r = L_s.
     pub fn exact(&self) -> MachineSettings {
         let r_s = 0.5 * self.dc.0 / self.dc.1;
         let z = self.no_load_impedance();
@@ -60,28 +59,28 @@ impl Readings {
     }
 }
 
-/// The circuit of resistances of stator and rotor, of the leakage of each, and of the magnetising inductance.
+/// Makes the circuit from the resistances of stator and rotor, the leakage inductance of each, and the magnetising inductance.
 fn circuit([rs, rr, leakage, lm]: [f64; 4]) -> MachineSettings {
     MachineSettings { rs, rr, lls: leakage, llr: leakage, lm, ..MachineSettings::default() }
 }
 
 /// Steps of the simulation in a period of the supply.
 const STEPS: u32 = 400;
-/// The direct current is read after this time, s.
+/// The current of the direct-current test is read after this time, s.
 const DC_S: f64 = 2.0;
-/// The alternating current settles for so long before it is read, s.
+/// Time for which the alternating current settles before it is read, s.
 const SETTLE_S: f64 = 3.0;
-/// Periods over which a meter reads.
+/// Periods over which a meter averages.
 const PERIODS: u32 = 10;
-/// How often the supply is set anew until it gives the wanted current: the saliency bends the line.
+/// Number of adjustments of the supply until it gives the wanted current: the saliency makes the relation nonlinear.
 const ADJUSTMENTS: u32 = 4;
 
 /// Drive of the rotor in the no-load test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shaft {
-    /// Another machine, at synchronous speed: no slip, as section 3.6.3 takes it.
+    /// Another machine drives it at synchronous speed: no slip, as section 3.6.3 assumes.
     Driven,
-    /// The motor itself, against its friction. It was turning already.
+    /// The motor itself drives it against friction, from synchronous speed.
     Free,
 }
 
@@ -89,7 +88,7 @@ pub enum Shaft {
 /// [`Readings::PRINTED`].
 ///
 /// # Errors
-/// [`PlantError`] when the plant refuses the settings.
+/// [`PlantError`] if the plant refuses the settings.
 pub fn measure(
     machine: &MachineSettings,
     saliency: &SaliencySettings,
@@ -124,7 +123,7 @@ pub fn measure(
     })
 }
 
-/// Sets the voltage until the current is that of the reading; both as they are then.
+/// Adjusts the voltage until the current equals the reading; returns the final values of both.
 fn adjusted((volts, amps): (f64, f64), current: impl Fn(f64) -> f64) -> (f64, f64) {
     let mut volts = volts;
     for _ in 0..ADJUSTMENTS {
@@ -133,7 +132,7 @@ fn adjusted((volts, amps): (f64, f64), current: impl Fn(f64) -> f64) -> (f64, f6
     (volts, current(volts))
 }
 
-/// Direct current through phases b and c in series, A, phase a open: that is a voltage along beta.
+/// Direct current through phases b and c in series, A, with phase a open: the voltage lies along beta.
 fn dc_current(mut motor: MotorModel, volts: f64) -> f64 {
     const H: f64 = 1e-4;
     for _ in 0..(DC_S / H) as u32 {
@@ -153,7 +152,7 @@ fn steady(mut motor: MotorModel, hz: f64, volts: f64) -> Complex {
             if period >= settle {
                 sum += motor.state.electrical.i * Complex::from_polar(1.0, -turn);
             }
-            // Constant within a step: the mean of the sinusoid over it, ahead by half a step.
+            // The voltage is constant within a step: the mean of the sinusoid over the step, half a step ahead.
             let middle = turn + 0.5 * TAU / f64::from(STEPS);
             motor.step(Complex::from_polar(SQRT_2 * volts, middle), h);
         }

@@ -13,19 +13,19 @@ fn rows(model: &'static str, speed: f64) -> Vec<Row> {
     names.iter().map(|name| (model, speed, *name)).collect()
 }
 
-/// Printed errors of a row over the periods, %.
+/// Printed errors of a row for the periods, %.
 fn over_h((model, speed, name): Row, signal: Signal) -> [f64; 3] {
     [0, 1, 2].map(|period| error(model, Case { speed, signal, period }, name).unwrap_or(f64::NAN))
 }
 
-/// Errors at 50 µs but those of the rows left out: the least and the largest.
+/// Smallest and largest error at 50 µs, without the rows in `not`.
 fn at_50(rows: &[Row], signals: &[Signal], not: &[&str]) -> (f64, f64) {
     let used = rows.iter().filter(|row| !not.contains(&row.2));
     let all = used.flat_map(|&row| signals.iter().map(move |&signal| over_h(row, signal)[0]));
     all.fold((f64::MAX, 0.0), |(least, most), error| (least.min(error), most.max(error)))
 }
 
-/// Adds the claims, and the numbers behind the errata.
+/// Adds the claims, and the numbers on which the errata are based.
 pub fn add(compared: &mut Vec<Compared>, metrics: &mut Metrics) {
     let [fast, slow] = SPEEDS;
     let tables = [("A", fast), ("A", slow), ("B", fast), ("C", fast), ("C", slow)];

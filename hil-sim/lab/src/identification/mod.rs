@@ -3,15 +3,15 @@
 //! máquina assíncrona usando um modelo dinâmico discreto corrente-tensão", 1996. Equation, table
 //! and figure numbers in this module are those of that paper.
 //!
-//! From the terminals a machine shows five numbers, [`Parameters`]; from sampled data with a
-//! voltage held over each period it shows four complex ones, [`CurrentVoltage`]. The way there:
+//! At its terminals a machine shows five numbers, [`Parameters`]. Sampled data with a voltage held over each period
+//! show four complex numbers, [`CurrentVoltage`]. The steps between them:
 //!
 //! ```text
 //! signals -> trial (machine, noise, filters) -> batch (least squares) -> models (A, B, C, D, S)
 //! ```
 //!
-//! All of it is complex arithmetic: the machine is symmetric, so a vector with components d and q
-//! obeys one complex equation. The real form of Eq. 19 to 24 has the same solution, to 1e-12.
+//! All of it is complex arithmetic: the machine is symmetric, so a vector with components d and q obeys one complex
+//! equation. The real form of Eq. 19 to 24 has the same solution, to within 1e-12.
 
 pub mod arx;
 pub mod batch;

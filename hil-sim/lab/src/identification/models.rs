@@ -1,7 +1,7 @@
-//! From the sampled equation back to the machine: Models B and C of the paper, and Model D, the
-//! exact algebraic inverse.
+//! Computation of the machine from the sampled equation: Models B and C of the paper, and Model D, the exact algebraic
+//! inverse.
 //!
-//! Bias without any noise, in % of (r_s, tau_r, sigma_l_s, l_s, omega_m), machine
+//! Bias without noise, in % of (r_s, tau_r, sigma_l_s, l_s, omega_m), for the machine
 //! [`Parameters::PX`](super::Parameters::PX) at 375 rad/s:
 //!
 //! | h (µs) | B | C | D |
@@ -10,7 +10,7 @@
 //! | 100 | 2.26, -31.76, 1.46, -30.24, -2.38 | 0.80, -1.36, 0.01, -0.59, -2.38 | 0 |
 //! | 200 | 4.55, -48.07, 2.92, -45.78, -4.73 | 1.62, -3.23, 0.04, -1.80, -4.73 | 0 |
 //!
-//! D is exact to 1e-9 on exact coefficients. It takes the bias away, not the noise.
+//! D is exact to 1e-9 on exact coefficients. It removes the bias, not the noise.
 
 use super::{Complex, Delta, FirstOrderTheta, Parameters};
 
@@ -38,7 +38,7 @@ pub enum NotIdentifiable {
     /// Two poles coincide, or one lies at z = 1: the residues do not exist.
     #[error("two discrete poles coincide or one is at 1")]
     DegeneratePoles,
-    /// The nonlinear fit did not converge, or to parameters that are not those of a machine.
+    /// The nonlinear fit did not converge, or it converged to parameters that no machine has.
     #[error("the nonlinear fit did not converge to a machine")]
     NotConverged,
 }
@@ -46,20 +46,20 @@ pub enum NotIdentifiable {
 /// A finite number, or the reason why it cannot be estimated.
 pub type Value = Result<f64, NotIdentifiable>;
 
-/// An estimate of [`Parameters`], each on its own: noise can make one unidentifiable and leave the
-/// others. A number can come out negative; that is the noise, not a machine.
+/// An estimate of [`Parameters`], each with its own result: noise can make one parameter unidentifiable and not affect
+/// the others. Noise can also make a number negative.
 pub type Estimate = Parameters<Value>;
 
 impl Estimate {
-    /// No estimate, for this reason.
+    /// Makes an estimate without values, for this reason.
     pub const fn none(reason: NotIdentifiable) -> Self {
         Self::of([Err(reason); 5])
     }
 
-    /// All five, if all are identifiable.
+    /// Returns all five parameters, if all are identifiable.
     ///
     /// # Errors
-    /// The reason of the first that is not.
+    /// The reason of the first parameter that is not identifiable.
     pub fn parameters(&self) -> Result<Parameters, NotIdentifiable> {
         let [r_s, tau_r, sigma_l_s, l_s, omega_m] = self.array();
         Ok(Parameters::of([r_s?, tau_r?, sigma_l_s?, l_s?, omega_m?]))
@@ -72,18 +72,18 @@ impl From<Parameters> for Estimate {
     }
 }
 
-/// A finite number, or that it is none.
+/// Returns a finite number, or the error that it is not finite.
 fn finite(x: f64) -> Value {
     if x.is_finite() { Ok(x) } else { Err(NotIdentifiable::NotFinite) }
 }
 
-/// A quotient; `reason` if the divisor is zero.
+/// Returns a quotient, or `reason` if the divisor is zero.
 fn ratio(x: f64, y: f64, reason: NotIdentifiable) -> Value {
     if y == 0.0 { Err(reason) } else { finite(x / y) }
 }
 
-/// Model B (Eq. 33 to 37): first order in `h` s. Exact on Eq. 32; on a real machine tau_r and l_s
-/// are 18 to 48 % low at 375 rad/s.
+/// Model B (Eq. 33 to 37): first order in `h` s. It is exact on Eq. 32. On a real machine tau_r and l_s are 18 to 48 %
+/// too low at 375 rad/s.
 pub fn model_b(theta: &FirstOrderTheta, h: f64) -> Estimate {
     let FirstOrderTheta { t1_minus_1, t2, t2_t4, t5, t5_t6 } = *theta;
     let sigma_l_s = ratio(h, t5, NotIdentifiable::NoGain);
@@ -94,12 +94,12 @@ pub fn model_b(theta: &FirstOrderTheta, h: f64) -> Estimate {
     Estimate { r_s, tau_r, sigma_l_s, l_s, omega_m: finite(-t2 / h) }
 }
 
-/// Model C (Eq. 38 to 42): sigma_l_s and tau_r to second order in `h` s, the others to first, from
-/// the coefficients in differences, so that no small sum is left over from a cancellation.
+/// Model C (Eq. 38 to 42): sigma_l_s and tau_r to second order in `h` s, the others to first order. It uses the
+/// coefficients in differences, so that no small sum results from a cancellation.
 ///
-/// It takes the root of Eq. 39 with the minus sign; the other is about h/2. Eq. 42
-/// is low in the speed by about h (r_s/sigma_l_s + (l_s/sigma_l_s - 1)/tau_r) / 2 relative,
-/// 1.19 % at 50 µs for [`Parameters::PX`], which no amount of data takes away.
+/// It takes the root of Eq. 39 with the minus sign; the other root is about h/2. The speed of Eq. 42 is too low by
+/// about h (r_s/sigma_l_s + (l_s/sigma_l_s - 1)/tau_r) / 2 relative, 1.19 % at 50 µs for [`Parameters::PX`]; more data
+/// do not reduce this error.
 pub fn model_c(delta: &Delta, h: f64) -> Estimate {
     let Delta { g1, g0, h1, u0 } = *delta;
     if h1.norm_sqr() == 0.0 {
@@ -110,7 +110,7 @@ pub fn model_c(delta: &Delta, h: f64) -> Estimate {
     let f11 = g1 + u;
     let fd = g0 + u * (Complex::ONE - f11);
     let sigma_l_s = ratio(h * (1.0 + f11.re), 2.0 * h1.re, NotIdentifiable::NoGain);
-    // A discriminant that noise makes negative counts as zero.
+    // A discriminant that noise has made negative counts as zero.
     let tau_r = time_constant_roots(u, fd, h).map(|[_, root]| root);
     let speed = ratio(g0.im, h * g1.im, NotIdentifiable::NoSpeed);
     let r_s = speed.and_then(|x| finite(x * sigma_l_s?));
@@ -118,8 +118,8 @@ pub fn model_c(delta: &Delta, h: f64) -> Estimate {
     Estimate { r_s, tau_r, sigma_l_s, l_s, omega_m: finite(g1.im / h) }
 }
 
-/// Both roots of Eq. 39 from u = 1 - f22 and fd: that with the plus sign, about h/2, and that with the minus sign, the
-/// time constant.
+/// Returns both roots of Eq. 39 from u = 1 - f22 and fd: the root with the plus sign, about h/2, and the root with the
+/// minus sign, the time constant.
 ///
 /// # Errors
 /// [`NotIdentifiable::NoSpeed`]; [`NotIdentifiable::NoPositiveRoot`].
@@ -133,11 +133,10 @@ pub fn time_constant_roots(u: Complex, fd: Complex, h: f64) -> Result<[f64; 2], 
     Ok([finite((root - b) / (2.0 * a))?, finite((-b - root) / (2.0 * a))?])
 }
 
-/// Model D: the exact inverse. Poles and residues of the sampled equation give those of
-/// i/v = (b1 s + b0) / (s² + a1 s + a0) with
-/// b1 = 1/sigma_l_s, b0 = (1/tau_r - j omega_m) b1, a0 = r_s b0 and
-/// a1 = r_s/sigma_l_s + l_s/(sigma_l_s tau_r) - j omega_m.
-/// Relative error 4e-12 on exact coefficients, 1.2e-7 on those of the series to h^5.
+/// Model D: the exact inverse. Poles and residues of the sampled equation give the poles and residues of i/v = (b1 s +
+/// b0) / (s² + a1 s + a0) with b1 = 1/sigma_l_s, b0 = (1/tau_r - j omega_m) b1, a0 = r_s b0 and a1 = r_s/sigma_l_s +
+/// l_s/(sigma_l_s tau_r) - j omega_m. The relative error is 4e-12 on exact coefficients and 1.2e-7 on those of the
+/// series to h^5.
 pub fn model_d(delta: &Delta, h: f64) -> Estimate {
     let [e1, e2] = delta.poles_minus_one();
     let apart = e1 - e2;
@@ -162,7 +161,7 @@ pub fn model_d(delta: &Delta, h: f64) -> Estimate {
     Estimate { r_s, tau_r, sigma_l_s, l_s, omega_m: finite(-a1.im) }
 }
 
-/// ln(1 + e) without losing a small `e`.
+/// Computes ln(1 + e) without losing a small `e`.
 fn ln_1p(e: Complex) -> Complex {
     let re = 0.5 * (2.0 * e.re + e.norm_sqr()).ln_1p();
     Complex::new(re, e.im.atan2(1.0 + e.re))

@@ -1,40 +1,40 @@
 //! Output-error fit: the machine whose simulated current is nearest to a recorded one, at the recorded voltage and speed.
 //!
-//! The unknowns are the four parameters, the state at the first sample and, unless it is given, the voltage drop of the
-//! inverter that goes with the sign of each phase current. Minimised is the sum of the squared differences of the currents, by
-//! Levenberg and Marquardt's method. Noise of the current does not bias the fit, as it does a regression with measured
-//! currents as regressors.
+//! The unknowns are the four parameters, the state at the first sample and, unless it is given, the inverter voltage
+//! error, which has the sign of each phase current. The fit minimises the sum of the squared differences of the
+//! currents by Levenberg and Marquardt's method. Noise of the current does not bias this fit; it does bias a regression
+//! with measured currents as regressors.
 //!
-//! A residual is seldom white: it holds harmonics, saturation, a speed that errs. So deviations are those of fits that leave
-//! out a part of the record each (delete-a-group jackknife: J. Shao, D. Tu, "The Jackknife and Bootstrap", 1995, section 2.3),
-//! every part in turn, each by one step of Gauss and Newton.
+//! A residual is seldom white: it contains harmonics, saturation and errors of the speed. The deviations are therefore
+//! obtained from fits that each leave out a part of the record (delete-a-group jackknife: J. Shao, D. Tu, "The
+//! Jackknife and Bootstrap", 1995, section 2.3), every part in turn, each by one Gauss-Newton step.
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::batch::parts;
 use super::{Complex, NotIdentifiable, Parameters};
 
-/// Most steps from one start.
+/// Largest number of steps from one start.
 const STEPS: u32 = 60;
 /// A fit has converged when a step lowers the squared error by less than this share.
 const CONVERGED: f64 = 1e-8;
-/// The sampled equation is computed anew when the speed has changed by this much, rad/s.
+/// Change of the speed, rad/s, after which the sampled equation is computed again.
 const SPEED_STEP: f64 = 0.002;
 /// Order of the series of the sampled equation; see [`Continuous::series`](super::Continuous::series).
 const ORDER: u32 = 5;
-/// Parameters, rotor state, current, drop.
+/// Number of unknowns: parameters, rotor state, current, inverter voltage error.
 const UNKNOWNS: usize = 9;
-/// Steps of the numeric derivative: relative, A, V.
+/// Steps of the numerical derivative: relative, A, V.
 const DERIVATIVE: [f64; UNKNOWNS] = [1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3];
-/// Parts of the record, each left out once.
+/// Number of parts of the record, each of which is left out once.
 const PARTS: usize = 10;
 
-/// A record of a machine, one value a sampling period.
+/// A record of a machine, with one value per sampling period.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     /// Sampling period, s.
     pub h: f64,
-    /// Stator voltage, V: what acts from sample k to k+1, or the samples themselves, between which it is straight.
+    /// Stator voltage, V: either the voltage that acts from sample k to k+1, or samples, between which it is a straight line.
     pub v: Vec<Complex>,
     /// Whether `v` are samples.
     pub sampled: bool,
@@ -49,17 +49,17 @@ pub struct Record {
 pub struct OutputErrorFit {
     /// The machine; its speed is the mean of the record.
     pub parameters: Parameters,
-    /// Drop of a phase with the sign of its current, V; not negative.
+    /// Inverter voltage error of a phase, with the sign of its current, V; not negative.
     pub drop_v: f64,
-    /// Standard deviations: of the first four parameters in their units, and of the drop, V; that of a given drop is 0.
+    /// Standard deviations of the first four parameters, in their units, and of the inverter voltage error, V; 0 if that error was given.
     pub deviations: [f64; 5],
-    /// Change of the current that each parameter alone can make, all else fitted anew: rms per relative change, A.
+    /// Change of the current that each parameter alone can cause, everything else fitted again: rms per relative change, A.
     pub told_a: [f64; 4],
-    /// Whether further steps would change next to nothing.
+    /// Whether further steps would change almost nothing.
     pub converged: bool,
     /// Simulated current, A.
     pub current: Vec<Complex>,
-    /// Difference of the currents, rms of the length, A.
+    /// Difference of the currents, rms of its magnitude, A.
     pub residual_a: f64,
 }
 
@@ -112,11 +112,11 @@ impl Record {
         Some(jacobian)
     }
 
-    /// The machine that fits best, from this start, with the given drop, V, or one that is found: 0 where it would be negative.
+    /// Fits the machine from this start. The inverter voltage error, V, is given or fitted; if it would be negative, it is 0.
     ///
     /// # Errors
-    /// [`NotIdentifiable::TooFewSamples`]; [`NotIdentifiable::NotFinite`]; [`NotIdentifiable::PoorExcitation`] when the
-    /// record leaves a parameter open.
+    /// [`NotIdentifiable::TooFewSamples`]; [`NotIdentifiable::NotFinite`]; [`NotIdentifiable::PoorExcitation`] if the
+    /// record does not determine a parameter.
     pub fn fit(
         &self,
         start: &Parameters,
@@ -145,7 +145,7 @@ impl Record {
                 }
                 let factor = damped.cholesky().ok_or(NotIdentifiable::PoorExcitation)?;
                 let mut step = -factor.solve(&gradient);
-                // No leap of more than a factor e in any parameter.
+                // No parameter may change by more than a factor e in one step.
                 let leap = step.rows(0, 4).amax();
                 step *= (1.0 / leap).min(1.0);
                 let mut next = x.clone();
@@ -160,7 +160,7 @@ impl Record {
                     break gain;
                 }
                 if damping > 1e6 {
-                    // No direction leads down: the minimum to rounding.
+                    // No direction reduces the error: this is the minimum to within rounding.
                     break 0.0;
                 }
                 damping *= 8.0;
@@ -199,7 +199,7 @@ impl Record {
             let (without, left) = (jacobian.rows(from, count), residual.rows(from, count));
             let mut rest = &normal - without.tr_mul(&without);
             for n in 0..free {
-                // The state at the first sample is in the first part alone.
+                // Only the first part contains the state at the first sample.
                 rest[(n, n)] += 1e-9 * normal[(n, n)];
             }
             let moved = rest.cholesky().ok_or(NotIdentifiable::PoorExcitation)?;

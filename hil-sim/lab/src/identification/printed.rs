@@ -20,7 +20,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// All twelve, in the order of the tables.
+    /// Returns all twelve columns, in the order of the tables.
     pub fn all() -> Vec<Self> {
         let mut cases = Vec::new();
         for speed in SPEEDS {
@@ -37,8 +37,8 @@ impl Case {
     }
 }
 
-/// Place and quantity of an error in the list: of the five parameters by a model at one of [`SPEEDS`], one of [`PERIODS`].
-/// The tables have Model A at both speeds, B at the first, C at both.
+/// Place and quantity of an error in the list: an error of one of the five parameters, by a model, at one of [`SPEEDS`]
+/// and one of [`PERIODS`]. The tables have Model A at both speeds, B at the first, C at both.
 pub fn place(model: &str, case: Case, parameter: &str) -> [String; 2] {
     let Case { speed, signal, period } = case;
     let table = match (model, speed == SPEEDS[0], signal) {

@@ -1,5 +1,5 @@
-//! Which machine the tables were made with: numbers that follow from the print and do not depend on
-//! the noise, beside the same numbers of two machines.
+//! Identification of the machine with which the tables were made: numbers that follow from the print and do not depend
+//! on the noise, beside the same numbers of two machines.
 
 use super::printed::{self, Case, PERIODS, SPEEDS};
 use super::{CurrentVoltage, FirstOrderTheta, Parameters, Signal, model_b};
@@ -11,7 +11,7 @@ pub struct Ratio {
     pub quantity: &'static str,
     /// Sampling period, s.
     pub h: f64,
-    /// By the tables.
+    /// Value from the tables.
     pub printed: f64,
     /// Value for [`Parameters::PX`] at 375 rad/s.
     pub px: f64,
@@ -23,9 +23,9 @@ fn coefficients(machine: Parameters, h: f64) -> CurrentVoltage {
     machine.at(375.0).continuous().series(h, 5).current_voltage()
 }
 
-/// h_1b and h_0b are small and estimated with the same absolute error: their relative errors have the
-/// ratio |h_0b / h_1b|. Geometric mean of the four columns of Tables 1 and 4 that share a period; the
-/// ratio does not depend on the speed.
+/// h_1b and h_0b are small and are estimated with the same absolute error, so their relative errors have the ratio
+/// |h_0b / h_1b|. Returns the geometric mean of the four columns of Tables 1 and 4 with the same period; the ratio does
+/// not depend on the speed.
 fn gains(period: usize) -> f64 {
     let at = |case, parameter| printed::error("A", case, parameter).unwrap_or(f64::NAN);
     let of = |speed| {
@@ -35,26 +35,26 @@ fn gains(period: usize) -> f64 {
     SPEEDS.map(of).iter().flatten().product::<f64>().powf(0.25)
 }
 
-/// Printed errors by a model at 375 rad/s, with both signals.
+/// Printed errors of a model at 375 rad/s, with both signals.
 fn fast(model: &str, period: usize, parameter: &str) -> [f64; 2] {
     let case = |signal| Case { speed: SPEEDS[0], signal, period };
     Signal::ALL.map(|signal| printed::error(model, case(signal), parameter).unwrap_or(f64::NAN))
 }
 
-/// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and use the same h_1a: their errors differ by
-/// (1 - f_11) / 2. Mean of both signals, where B is biased upwards.
+/// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and use the same h_1a, so their errors differ by (1 - f_11) / 2.
+/// Returns the mean of both signals, where B is biased upwards.
 fn inductances(period: usize) -> f64 {
     let [b, c] = ["B", "C"].map(|model| fast(model, period, "sigma_l_s"));
-    // The larger: absolute values in the tables can only shrink the difference.
+    // The larger value, because absolute values in the tables can only reduce the difference.
     0.01 * (b[0] - c[0]).max(b[1] - c[1])
 }
 
-/// The error of tau_r by Model B is almost all bias. Mean of both signals.
+/// The error of tau_r by Model B is almost entirely bias. Returns the mean of both signals.
 fn time_constants(period: usize) -> f64 {
     0.005 * fast("B", period, "tau_r").iter().sum::<f64>()
 }
 
-/// All nine.
+/// Returns all nine ratios.
 pub fn all() -> Vec<Ratio> {
     let mut ratios = Vec::new();
     for (period, h) in PERIODS.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Recursive least squares in `f64`, the reference of `rotor_id::rls`.
+//! Recursive least squares in `f64`, as reference for `rotor_id::rls`.
 
 use super::{Complex, Delta};
 
@@ -15,7 +15,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// All coefficients of Eq. 14 zero, P0 = `p0` I.
+    /// Starts with all coefficients of Eq. 14 zero and P0 = `p0` I.
     pub fn new(lambda: f64, p0: f64) -> Self {
         let theta =
             [Complex::new(-1.0, 0.0), Complex::new(-1.0, 0.0), Complex::ZERO, Complex::ZERO];
@@ -23,7 +23,7 @@ impl Reference {
         Self { lambda, theta, u, d: [p0; 4], samples, count: 0 }
     }
 
-    /// One filtered sample.
+    /// Processes one filtered sample.
     pub fn step(&mut self, v: Complex, i: Complex) {
         for (samples, x) in self.samples.iter_mut().zip([v, i]) {
             *samples = [x, samples[0], samples[1]];
@@ -58,7 +58,7 @@ impl Reference {
         }
     }
 
-    /// The estimate.
+    /// Returns the estimate.
     pub fn delta(&self) -> Delta {
         Delta::from_array(self.theta)
     }

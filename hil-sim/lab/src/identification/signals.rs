@@ -1,5 +1,4 @@
-//! Voltages that excite a machine, measurement noise, and the filters in front of the estimation
-//! (sections 4 and 5).
+//! Voltages that excite a machine, measurement noise, and the filters before the estimation (sections 4 and 5).
 
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
@@ -9,20 +8,19 @@ use super::Complex;
 
 /// Tones of the Schroeder signal.
 const TONES: u32 = 5;
-/// Amplitude of a tone over that of the six-step voltage: sqrt(p_k / 2) = 0.2 max(S_g).
+/// Amplitude of a tone divided by that of the six-step voltage: sqrt(p_k / 2) = 0.2 max(S_g).
 const TONE_AMPLITUDE: f64 = 0.2;
 
-/// Six-step voltage S_g: a vector of `amplitude` V that jumps by 60° six times per period of the
-/// fundamental of `hz`. At `t` s.
+/// Six-step voltage S_g at `t` s: a vector of `amplitude` V that jumps by 60° six times per period of the fundamental
+/// of `hz`.
 pub fn six_step(amplitude: f64, hz: f64, t: f64) -> Complex {
-    // A jump that falls on a sample falls before it, whatever the rounding of `t`.
+    // A jump that coincides with a sample counts as before it, independent of the rounding of `t`.
     let sector = (6.0 * hz * t + 1e-9).floor().rem_euclid(6.0);
     Complex::from_polar(amplitude, FRAC_PI_3 * sector)
 }
 
-/// r(t) of Eq. 43 with five tones of amplitude 1 at multiples of 1/`period` Hz and Schroeder's
-/// phases psi_k = -pi k (k-1) / 5: all equally strong and the peak low. Peak 2.83, against 5 with
-/// phases zero.
+/// r(t) of Eq. 43 with five tones of amplitude 1 at multiples of 1/`period` Hz and Schroeder's phases psi_k = -pi k
+/// (k-1) / 5. All tones are equally strong and the peak is low: 2.83, against 5 with phases of zero.
 pub fn schroeder(period: f64, t: f64) -> f64 {
     let tone = |k: u32| {
         let k = f64::from(k);
@@ -31,18 +29,17 @@ pub fn schroeder(period: f64, t: f64) -> f64 {
     (1..=TONES).map(tone).sum()
 }
 
-/// Six-step plus Schroeder voltage S_s: the same r(t) on either axis, its period two periods of the
-/// fundamental.
+/// Six-step plus Schroeder voltage S_s: the same r(t) on either axis, with a period of two periods of the fundamental.
 ///
-/// The paper prints neither the phases nor the period nor how r(t) is laid on the axes; this choice
-/// comes nearest to its tables of those that were tried.
+/// The paper prints neither the phases nor the period nor the distribution of r(t) to the axes. This choice is
+/// the closest to its tables among those that were tried.
 pub fn six_step_and_schroeder(amplitude: f64, hz: f64, t: f64) -> Complex {
     let r = TONE_AMPLITUDE * amplitude * schroeder(2.0 / hz, t);
     six_step(amplitude, hz, t) + Complex::new(r, r)
 }
 
-/// A pseudo-random binary sequence of a shift register of 8 bits with linear feedback: +1 or -1 with the longest period,
-/// [`Self::PERIOD`].
+/// A pseudo-random binary sequence from a shift register of 8 bits with linear feedback: +1 or -1 with the longest
+/// period, [`Self::PERIOD`].
 #[derive(Clone, Copy, Debug)]
 pub struct Prbs(pub u8);
 
@@ -53,10 +50,10 @@ impl Default for Prbs {
 }
 
 impl Prbs {
-    /// Values after which it repeats.
+    /// Number of values after which the sequence repeats.
     pub const PERIOD: usize = 255;
 
-    /// The next value.
+    /// Returns the next value.
     pub fn step(&mut self) -> f64 {
         let out = self.0 & 1;
         self.0 = (self.0 >> 1) ^ (0xB8 * out);
@@ -64,10 +61,10 @@ impl Prbs {
     }
 }
 
-/// omega_n³ / (s + omega_n)³ (Eq. 44) for one vector: three first-order sections by Tustin's rule.
+/// The filter omega_n³ / (s + omega_n)³ (Eq. 44) for one vector: three first-order sections by Tustin's rule.
 ///
-/// Any one linear filter on voltage and current leaves the equation between them as it is, so the
-/// rule does not bias the estimate.
+/// Applying the same linear filter to voltage and current does not change the equation between them, so the rule does
+/// not bias the estimate.
 #[derive(Clone, Copy, Debug)]
 pub struct Filter {
     gain: f64,
@@ -76,12 +73,12 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Corner `omega_n` rad/s at a sampling period of `h` s; at rest.
+    /// Makes a filter with the corner `omega_n` rad/s at a sampling period of `h` s, at rest.
     pub fn new(omega_n: f64, h: f64) -> Self {
         Self { gain: omega_n * h / (2.0 + omega_n * h), state: [Complex::ZERO; 4] }
     }
 
-    /// One sample.
+    /// Filters one sample.
     #[inline]
     pub fn step(&mut self, x: Complex) -> Complex {
         let mut before = std::mem::replace(&mut self.state[0], x);
@@ -95,7 +92,7 @@ impl Filter {
     }
 }
 
-/// Noise of section 5: uniform, independent on either axis, up to `largest` each way.
+/// Noise of section 5: uniform, independent on either axis, up to `largest` in either direction.
 pub fn noise(rng: &mut impl Rng, largest: f64) -> Complex {
     let mut component = || largest * (2.0 * rng.random::<f64>() - 1.0);
     Complex::new(component(), component())

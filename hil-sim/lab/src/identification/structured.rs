@@ -1,43 +1,41 @@
 //! Model S: the five parameters that fit the data best through the exact sampled equation.
 //!
-//! The least-squares problem of Model A has four complex unknowns, a machine five real ones. Model
-//! S stays on the machine: it minimises |R (theta - theta(p))|², with R the triangular factor of
-//! the regression and theta(p) the exact map, by Levenberg and Marquardt's method. It cuts the error
-//! of the speed 30 to 100 times against Model C; r_s and tau_r stay limited by the noise in the
-//! regressors.
+//! The least-squares problem of Model A has four complex unknowns, but a machine has five real ones. Model S only
+//! admits machines: it minimises |R (theta - theta(p))|², with R the triangular factor of the regression and theta(p)
+//! the exact map, by Levenberg and Marquardt's method. It reduces the error of the speed by a factor of 30 to 100
+//! against Model C; r_s and tau_r stay limited by the noise in the regressors.
 
 use nalgebra::{SMatrix, SVector, Vector4};
 
 use super::{Delta, NotIdentifiable, Parameters, Regression, model_c, model_d};
 
-/// Most steps from one start.
+/// Largest number of steps from one start.
 const STEPS: u32 = 200;
-/// Below this relative change of the unknowns a fit has converged.
+/// Relative change of the unknowns below which a fit has converged.
 const TOLERANCE: f64 = 1e-9;
-/// A fit has also converged below this cosine between the residual and its derivative.
+/// Cosine between the residual and its derivative below which a fit has converged as well.
 const FLAT: f64 = 1e-7;
-/// A speed well below this many rad/s counts in proportion, one well above in decades.
+/// Speed, rad/s, well below which the unknown is linear in the speed and well above which it is logarithmic.
 const SLOW: f64 = 10.0;
-/// Unknowns beyond e^±30 end a fit.
+/// Magnitude of the unknowns (as e^±30) beyond which a fit ends.
 const LARGEST: f64 = 30.0;
-/// Plausible ranges: tau_r / h, sigma_l_s / (r_s h) and l_s / sigma_l_s - 1. A fit that
-/// goes astray runs one of them to zero or infinity.
+/// Plausible ranges: tau_r / h, sigma_l_s / (r_s h) and l_s / sigma_l_s - 1. A fit that diverges drives one of them to
+/// zero or infinity.
 const MACHINE: [std::ops::Range<f64>; 3] = [1.0..1e7, 1.0..1e7, 0.01..1e3];
 
 type Unknowns = SVector<f64, 5>;
 type Residual = SVector<f64, 8>;
 
-/// Where a fit from one start ended.
+/// Result of a fit from one start.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     /// The machine.
     pub parameters: Parameters,
-    /// |R (theta - theta(p))|², the squared error of Model S above that of Model A, A².
+    /// |R (theta - theta(p))|², the squared error of Model S in excess of Model A's, A².
     pub cost: f64,
 }
 
-/// Logarithms of r_s, tau_r, sigma_l_s and l_s/sigma_l_s - 1, and asinh of the speed: every vector
-/// is a machine.
+/// Logarithms of r_s, tau_r, sigma_l_s and l_s/sigma_l_s - 1, and asinh of the speed: every vector is a machine.
 fn unknowns(p: &Parameters) -> Unknowns {
     let k = p.l_s / p.sigma_l_s - 1.0;
     let speed = (p.omega_m / SLOW).asinh();
@@ -87,9 +85,9 @@ impl Problem<'_> {
     }
 }
 
-/// Model S from one start. Of 500 starts with every parameter five times too large or too small
-/// (noisy data, 4000 samples), 477 came to the best fit and 23 failed and said so. [`model_s`] came to
-/// it in 498 of these; in 2 there is none: the noise puts r_s below zero.
+/// Fits Model S from one start. From 500 starts with every parameter five times too large or too small (noisy data,
+/// 4000 samples), 477 reached the best fit and 23 failed and reported it. [`model_s`] reached it in 498 of these cases;
+/// in 2 there is none, because the noise makes r_s negative.
 ///
 /// # Errors
 /// [`NotIdentifiable::NotConverged`].
@@ -128,7 +126,7 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
             damped[(k, k)] += damping * scale[k].max(1e-12 * scale.max());
         }
         let step = damped.cholesky().map(|factor| -factor.solve(&gradient));
-        // No leap of more than a factor e^2 in any unknown.
+        // No unknown may change by more than a factor e^2 in one step.
         let step = step.map(|step| step * (2.0 / step.amax()).min(1.0));
         let taken = step.and_then(|step| {
             let next = x + step;
@@ -143,7 +141,7 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
             jacobian = problem.jacobian(&x).ok_or(FAILED)?;
             damping = (damping * 0.2).max(1e-15);
         } else if damping > 1e9 {
-            // No direction leads down: the minimum to rounding, if the gradient says so too.
+            // No direction reduces the error: this is the minimum to within rounding, if the gradient confirms it.
             return if flat(1e3 * FLAT) { Ok(here) } else { Err(FAILED) };
         } else {
             damping *= 8.0;
@@ -152,8 +150,8 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
     Err(FAILED)
 }
 
-/// Starts that need nothing known: Models D and C where they give a machine, and machines with
-/// sigma_l_s and the speed of the data, r_s and tau_r over four decades.
+/// Starts that need no prior knowledge: Models D and C if they give a machine, and machines with the sigma_l_s and the
+/// speed of the data and with r_s and tau_r over four decades.
 pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
     let estimates = [model_d(delta, h), model_c(delta, h)];
     let mut starts: Vec<_> = estimates.iter().filter_map(|e| e.parameters().ok()).collect();
@@ -169,11 +167,11 @@ pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
     starts
 }
 
-/// Model S: the best of the fits from [`starts`]. Speed error below 0.5 % on 4000 samples of S_s with the noise of section 5
-/// halved, at all three periods.
+/// Model S: the best of the fits from [`starts`]. The speed error is below 0.5 % on 4000 samples of S_s with half the
+/// noise of section 5, at all three periods.
 ///
 /// # Errors
-/// [`NotIdentifiable::NotConverged`] when no start leads to a machine.
+/// [`NotIdentifiable::NotConverged`] if no start leads to a machine.
 pub fn model_s(regression: &Regression, h: f64) -> Result<Fit, NotIdentifiable> {
     let starts = starts(&regression.delta, h);
     let fits = starts.iter().filter_map(|start| fit_from(regression, h, start).ok());

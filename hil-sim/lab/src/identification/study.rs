@@ -1,4 +1,4 @@
-//! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
+//! Mean errors of many simulated measurements (Eq. 45), beside the printed errors.
 
 use super::printed::{self, Case};
 use super::structured::model_s;
@@ -16,11 +16,11 @@ pub struct Errors {
     pub case: Case,
     /// Mean absolute errors of Model A, %, in the order of [`CurrentVoltage::NAMES`].
     pub discrete: [f64; 8],
-    /// Those of [`MODELS`], %, each in the order of [`Parameters::NAMES`].
+    /// Mean absolute errors of [`MODELS`], %, each in the order of [`Parameters::NAMES`].
     pub continuous: [[f64; 5]; 4],
 }
 
-/// Mean of the errors, %, over the measurements that give one.
+/// Mean of the errors, %, over the measurements that give an error.
 fn mean(errors: impl Iterator<Item = Option<f64>>) -> f64 {
     let (mut sum, mut count) = (0.0, 0u32);
     for error in errors.flatten() {
@@ -29,14 +29,14 @@ fn mean(errors: impl Iterator<Item = Option<f64>>) -> f64 {
     if count > 0 { 100.0 * sum / f64::from(count) } else { 100.0 }
 }
 
-/// The errors of one column over `trials` measurements of `machine`. Where no measurement gives a
-/// number, its error counts as 100 %.
+/// Errors of one column over `trials` measurements of `machine`. If no measurement gives a number, its error counts as
+/// 100 %.
 pub fn errors(machine: Parameters, case: Case, noise: Noise, seed: u64, trials: u64) -> Errors {
     let trial = Trial::printed(machine.at(case.speed), case.signal, case.h(), noise);
     errors_of(&trial, case, seed, trials)
 }
 
-/// The same of a measurement that may have another supply.
+/// As [`errors`], with a measurement that may have another supply.
 pub fn errors_of(trial: &Trial, case: Case, seed: u64, trials: u64) -> Errors {
     let (machine, h) = (trial.machine, case.h());
     // The true coefficients of Tables 1 and 4: series to h^5.
@@ -74,7 +74,7 @@ pub fn errors_of(trial: &Trial, case: Case, seed: u64, trials: u64) -> Errors {
     }
 }
 
-/// The error of one estimated parameter, as printed (if it is) and as found here.
+/// The error of one estimated parameter: the printed one, if there is one, and ours.
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// `A`, or one of [`MODELS`].
@@ -90,12 +90,12 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Ours over printed.
+    /// Our error divided by the printed one.
     pub fn ratio(&self) -> Option<f64> {
         self.printed_pct.map(|printed| self.ours_pct / printed)
     }
 
-    /// Whether ours and printed differ by no more than this factor.
+    /// Whether our error and the printed one differ by no more than this factor.
     pub fn within(&self, factor: f64) -> bool {
         self.ratio().is_some_and(|ratio| ratio <= factor && ratio * factor >= 1.0)
     }
@@ -108,7 +108,7 @@ pub fn share(entries: &[Entry]) -> f64 {
 }
 
 impl Errors {
-    /// The errors of some models (`A`, and those of [`MODELS`]), beside Tables 1 to 5.
+    /// Lists the errors of some models (`A` and [`MODELS`]), beside Tables 1 to 5.
     pub fn entries(&self, models: &[&'static str]) -> Vec<Entry> {
         let case = self.case;
         let of_model = |model: &&'static str| -> Vec<Entry> {
@@ -129,11 +129,12 @@ impl Errors {
 
 /// Measurements of a column, M.
 pub const TRIALS: u64 = 7;
-/// Seeds that give the spread.
+/// Number of seeds for the spread.
 const SEEDS: usize = 5;
 
-/// The errors of some models in all columns with half the printed noise, beside the printed ones and with their spread over
-/// seeds; the shares within a factor of two, with that noise and with the printed one, as metrics.
+/// Computes the errors of some models in all columns with half the printed noise, beside the printed errors and with
+/// their spread over seeds. The shares within a factor of two, with that noise and with the printed noise, become
+/// metrics.
 pub fn tables(
     context: &Context<'_>,
     models: &[&'static str],

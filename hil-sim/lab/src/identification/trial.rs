@@ -8,13 +8,13 @@ use crate::prelude::*;
 
 /// Simulation step of the paper, s.
 const FINE: f64 = 5e-6;
-/// Order of the series of the paper.
+/// Order of the series in the paper.
 const ORDER: u32 = 5;
 /// Amplitude of the six-step voltage, V. The errors in % do not depend on it.
 pub const VOLTAGE: f64 = 180.0;
-/// The machine runs this long before anything is recorded, s.
+/// Time that the machine runs before recording starts, s.
 const WARM_UP: f64 = 1.0;
-/// Samples through the filters before the first one is used.
+/// Samples that pass the filters before the first one is used.
 const DISCARDED: usize = 2000;
 
 /// The two excitations of the paper.
@@ -27,10 +27,10 @@ pub enum Signal {
 }
 
 impl Signal {
-    /// Both, in the order of the tables.
+    /// Both excitations, in the order of the tables.
     pub const ALL: [Self; 2] = [Self::SixStep, Self::Schroeder];
 
-    /// `Sg` or `Ss`.
+    /// Returns `Sg` or `Ss`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SixStep => "Sg",
@@ -47,7 +47,7 @@ impl Signal {
     }
 }
 
-/// Largest noise over the largest value of either axis.
+/// Largest noise relative to the largest value of either axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Relative noise of the voltage.
@@ -57,12 +57,12 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// None.
+    /// No noise.
     pub const NONE: Self = Self { voltage: 0.0, current: 0.0 };
-    /// r_v and r_i as section 5 prints them: up to 5 % and 20 % each way.
+    /// r_v and r_i as section 5 prints them: up to 5 % and 20 % in either direction.
     pub const PRINTED: Self = Self { voltage: 0.05, current: 0.2 };
-    /// r_v and r_i read as peak to peak. Nearer to Tables 1 to 3, but against the words of the paper;
-    /// chosen by comparing with those same tables.
+    /// r_v and r_i read as peak to peak. The results are closer to Tables 1 to 3, but this contradicts the words of the
+    /// paper; it was chosen by comparison with those same tables.
     pub const HALF: Self = Self { voltage: 0.025, current: 0.1 };
 }
 
@@ -85,23 +85,22 @@ pub struct Trial {
     pub h: f64,
     /// Measurement noise.
     pub noise: Noise,
-    /// Samples that are used, N.
+    /// Number of samples that are used, N.
     pub samples: usize,
 }
 
 impl Trial {
-    /// The simulated measurements of the paper at this speed (60 Hz above 200 rad/s, else 10 Hz):
-    /// 4000 samples.
+    /// The simulated measurement of the paper at this speed (60 Hz above 200 rad/s, otherwise 10 Hz): 4000 samples.
     pub fn printed(machine: Parameters, signal: Signal, h: f64, noise: Noise) -> Self {
         let hz = if machine.omega_m > 200.0 { 60.0 } else { 10.0 };
         Self { machine, signal, hz, h, noise, samples: 4000 }
     }
 
-    /// Voltage and current at every sample, from standstill of the currents on, without end.
+    /// Voltage and current at every sample, without end, starting with zero current.
     pub fn raw(&self) -> impl Iterator<Item = (Complex, Complex)> + use<> {
         let Self { machine, signal, hz, h, .. } = *self;
         let fine = (h / FINE).round().max(1.0);
-        // Held voltage: the fine steps of a period are one map.
+        // The voltage is held, so the fine steps of a period form one linear map.
         let step = machine.continuous().series(h / fine, ORDER).repeated(fine as u32);
         let mut x = Vector2::zeros();
         (0u64..).map(move |k| {
@@ -112,7 +111,7 @@ impl Trial {
         })
     }
 
-    /// Voltage and current behind noise and filters, the machine and the filters warmed up.
+    /// Voltage and current with noise, after the filters; machine and filters have settled.
     pub fn run(&self, seed: u64, m: u64) -> Data {
         let warm_up = (WARM_UP / self.h).round() as usize;
         let length = self.samples + DISCARDED;

@@ -1,23 +1,23 @@
-//! Figure 11: the spectrum of the current difference before and behind the band pass.
+//! Figure 11: the spectrum of the current difference before and after the band-pass.
 
 use drive_core::filter::{BPF, SosState};
 use rand_distr::{Distribution, Uniform};
 
 use crate::prelude::*;
 
-/// Samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
+/// Number of samples of a spectrum: 1 s, so that its lines are 1 Hz apart.
 const SAMPLES: usize = RATE as usize;
 const CARRIER_HZ: f64 = 600.0;
 /// The band of the arbitrary signal, Hz.
 const BAND: std::ops::RangeInclusive<u32> = 20..=180;
 
-/// Adds the figure and its numbers.
+/// Adds the figure and its metrics.
 pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     let signal = signal(context.seed);
     let carrier = |k: usize| (omega_t(CARRIER_HZ) * k as f64).cos();
     let product: Vec<f64> = signal.iter().enumerate().map(|(k, a)| a * carrier(k)).collect();
     let mut state = SosState::default();
-    // The signal repeats every second; from the second one on the output is settled.
+    // The signal repeats every second; the output has settled after the first second.
     let filtered: Vec<f64> = (product.iter().chain(&product))
         .map(|&x| f64::from(BPF.step(&mut state, x as f32)))
         .skip(SAMPLES)
@@ -41,8 +41,8 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     }
     let metric = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
     let remark = format!(
-        "The pass band of BPF ends 100 Hz from the carrier: {} Hz away a change of the angle is \
-         attenuated by {:.1} dB below the carrier and {:.1} dB above, {} Hz away hardly \
+        "The pass band of BPF ends 100 Hz from the injection frequency: {} Hz away a change of the angle is \
+         attenuated by {:.1} dB below that frequency and {:.1} dB above, {} Hz away hardly \
          ({:.1} and {:.1} dB).",
         BAND.end(),
         -metric("bpf_lower_outer_edge_db"),
@@ -55,8 +55,8 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
 
     let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
     let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);
-    let title = "Eq. 2.15: a band-limited signal A and the carrier, their product, and the product \
-             behind BPF";
+    let title = "Eq. 2.15: a band-limited signal A and the injection, their product, and the product \
+             after BPF";
     let (behind, gain) = (Series::line("behind BPF", f), Series::reference("gain of BPF", gain));
     let figure = Figure::new("spectrum", title, "Figure 11")
         .panel(panel().with(Series::line("A", a)).with(Series::line("carrier", c)))
@@ -65,7 +65,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     outcome.figures.push(figure);
 }
 
-/// Lines of 1 Hz spacing over the band, highest at its low end, with arbitrary phases.
+/// Makes lines of 1 Hz spacing over the band, highest at its low end, with arbitrary phases.
 fn signal(seed: u64) -> Vec<f64> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let phases = Uniform::new(0.0, TAU);
@@ -82,7 +82,7 @@ fn signal(seed: u64) -> Vec<f64> {
     (0..SAMPLES).map(at).collect()
 }
 
-/// Amplitude over Hz, up to 1 kHz: the sums themselves, since one transform needs no fast one.
+/// Amplitude over Hz, up to 1 kHz, by direct summation: a single transform needs no fast algorithm.
 fn spectrum(signal: &[f64]) -> Vec<(f64, f64)> {
     let turn = |k: usize| Complex64::from_polar(2.0 / SAMPLES as f64, omega_t(k as f64));
     let turns: Vec<Complex64> = (0..SAMPLES).map(turn).collect();

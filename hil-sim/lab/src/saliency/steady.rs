@@ -5,17 +5,17 @@ use sim_bench::plant::{EnergyRate, EnergyState, Machine, MachineState, Rate};
 
 use crate::prelude::*;
 
-/// Step of the numeric derivatives, relative to the size of a state.
+/// Step of the numerical derivatives, relative to the size of a state.
 const STEP: f64 = 1e-6;
 const ITERATIONS: usize = 60;
 
-/// A machine whose integrated state is a list of space vectors that all turn with the flux.
+/// A machine whose integrated state is a list of space vectors that all rotate with the flux.
 pub(crate) trait Listed: MachineModel {
-    /// The integrated vectors, in an order that stays.
+    /// Returns the integrated vectors, in a fixed order.
     fn list(&self, x: &Self::State) -> Vec<Complex64>;
-    /// Their rates, in the same order.
+    /// Returns their rates, in the same order.
     fn rates(&self, k: &Rate<Self>) -> Vec<Complex64>;
-    /// The state with these vectors.
+    /// Makes the state from these vectors.
     fn state(&self, list: &[Complex64]) -> Self::State;
 }
 
@@ -54,13 +54,13 @@ impl Listed for EnergyMachine {
     }
 }
 
-/// Those of stator, rotor, bottom of the bars and iron that the machine integrates.
+/// Selects the vectors that the machine integrates: stator, rotor, bottom of the bars and iron.
 fn integrated(machine: &EnergyMachine, all: [Complex64; 4]) -> Vec<Complex64> {
     let there = [true, true, machine.has_skin_effect(), machine.has_iron_loss()];
     all.into_iter().zip(there).filter(|(_, there)| *there).map(|(z, _)| z).collect()
 }
 
-/// Real and imaginary parts behind each other.
+/// Returns real and imaginary parts, one after the other.
 fn flat(list: &[Complex64]) -> Vec<f64> {
     list.iter().flat_map(|z| [z.re, z.im]).collect()
 }
@@ -69,10 +69,10 @@ fn listed(flat: &[f64]) -> Vec<Complex64> {
     flat.chunks(2).map(|z| Complex64::new(z[0], z[1])).collect()
 }
 
-/// The root of `f` near `start`, by Newton's rule with a line search; `sizes` are typical sizes of the unknowns.
+/// Finds the root of `f` near `start`, by Newton's method with a line search; `sizes` are typical sizes of the unknowns.
 ///
 /// # Errors
-/// [`Error::Refused`] when it does not converge.
+/// [`Error::Refused`] if it does not converge.
 pub(crate) fn root(
     f: impl Fn(&[f64]) -> Vec<f64>,
     start: Vec<f64>,
@@ -116,7 +116,7 @@ fn jacobian(f: impl Fn(&[f64]) -> Vec<f64>, y: &[f64], sizes: &[f64]) -> DMatrix
 /// A first guess of a steady state: state, terminal voltage, V, and slip, rad/s.
 pub(crate) type Guess<M> = (<M as MachineModel>::State, Complex64, f64);
 
-/// The steady state at the stator current `i`, A, in the frame of the rotor flux, with the shaft locked.
+/// Finds the steady state at the stator current `i`, A, in the frame of the rotor flux, with the shaft locked.
 ///
 /// # Errors
 /// As [`root`].
@@ -147,7 +147,7 @@ pub(crate) fn at_current<M: Listed>(
     Ok((machine.state(&listed(&found[..n])), v, found[n + 2]))
 }
 
-/// The steady state at the voltage `v`, V, the electrical frequency `w_s` and the electrical speed `w`, rad/s.
+/// Finds the steady state at the voltage `v`, V, the electrical frequency `w_s` and the electrical speed `w`, rad/s.
 ///
 /// # Errors
 /// As [`root`].
@@ -168,8 +168,8 @@ pub(crate) fn at_voltage<M: Listed>(
     Ok(machine.state(&listed(&root(residual, y, &sizes)?)))
 }
 
-/// Admittance at the frequency `w`, rad/s, for small signals about a state, shaft locked: columns are the currents, A, that 1 V along
-/// and across the real axis gives.
+/// Returns the admittance at the frequency `w`, rad/s, for small signals about a state, with the shaft locked. Its
+/// columns are the currents, A, caused by 1 V along and across the real axis.
 pub(crate) fn admittance<M: Listed>(
     machine: &M,
     x: &M::State,

@@ -1,4 +1,4 @@
-//! The errata: claims and numbers of the sources that do not hold, each with the numbers that show it and the run that
+//! The errata: claims and numbers of the sources that are wrong, each with the numbers that show it and the run that
 //! computes them.
 
 use std::sync::LazyLock;
@@ -15,26 +15,25 @@ pub struct Erratum {
     pub group: String,
     /// `S0` or `S1`.
     pub source: String,
-    /// Where it stands, for the reader.
+    /// The printed place, for the reader.
     pub place: String,
-    /// What is printed.
+    /// The printed statement.
     pub printed: String,
-    /// What holds, with `{}` for each of `numbers`.
+    /// The correct statement, with `{}` for each of `numbers`.
     pub(super) holds: String,
-    /// The printed values that differ by it: place, and quantity.
+    /// The printed values that differ because of this erratum: place, and quantity.
     #[serde(default)]
     pub(super) of: Vec<[String; 2]>,
-    /// What the finding rests on: ours of `PLACE | QUANTITY`, `EXPERIMENT/METRIC`, or a
-    /// formula of this source; and the number with the
-    /// digits that are shown.
+    /// Basis of the finding: our value of `PLACE | QUANTITY`, `EXPERIMENT/METRIC`, or a formula of this source; and the
+    /// number with the digits that are shown.
     #[serde(default)]
     pub(super) numbers: Vec<[String; 2]>,
-    /// Tests that show it, where no number does: files of the repository.
+    /// Tests that show it, if no number does: files of the repository.
     #[serde(default)]
     pub tests: Vec<String>,
 }
 
-/// What gives the numbers of an erratum that needs no run.
+/// Origin of the numbers of an erratum that needs no run.
 pub const OWN: &str = "its own numbers";
 
 #[derive(Deserialize)]
@@ -50,8 +49,8 @@ pub static ERRATA: LazyLock<Vec<Erratum>> = LazyLock::new(|| {
 });
 
 impl Erratum {
-    /// Whether this printed value differs by it. A quantity `*` stands for all of a place, a place that ends in `*` for all that
-    /// begin so.
+    /// Whether this printed value differs because of this erratum. A quantity `*` stands for all quantities of a place;
+    /// a place that ends in `*` stands for all places that begin so.
     pub fn explains(&self, place: usize) -> bool {
         self.of.iter().any(|of| self.names(of, &PRINTED[place]))
     }
@@ -65,21 +64,21 @@ impl Erratum {
         here && self.source == printed.source && (quantity == "*" || *quantity == printed.quantity)
     }
 
-    /// What holds, with its numbers.
+    /// Returns the correct statement, with its numbers.
     pub fn holds(&self) -> String {
         let mut parts = self.holds.split("{}");
         let first = parts.next().unwrap_or_default().to_owned();
         parts.zip(&self.numbers).fold(first, |text, (part, [_, number])| text + number + part)
     }
 
-    /// The place of a number that is ours of a printed value.
+    /// Returns the place of a number that is our value of a printed one.
     pub(super) fn place_of(&self, name: &str) -> Option<usize> {
         let (place, quantity) = name.split_once(" | ")?;
         place_of(&self.source, place, quantity)
     }
 }
 
-/// A number with as many decimals as another is shown with; yes and no for what is shown so.
+/// Formats a number with as many decimals as another one, or as yes or no if the other is shown so.
 pub(super) fn rounded(value: f64, like: &str) -> String {
     if like == "yes" || like == "no" {
         return if value == 0.0 { "no" } else { "yes" }.to_owned();

@@ -1,4 +1,4 @@
-//! The printed values beside ours: what the experiments report, counted, and as chapters of a page.
+//! The printed values beside ours: the results of the experiments, counted, and as chapters of a page.
 
 use std::collections::HashMap;
 
@@ -7,19 +7,19 @@ use sim_bench::outcome::{Cell, Compared, Figure, Outcome, Table};
 use super::errata::{ERRATA, Erratum, OWN, rounded};
 use super::{Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
 
-/// What the experiments report.
+/// Results of the experiments.
 pub struct Evidence {
-    /// By place in [`PRINTED`]: the experiment, and its values.
+    /// Compared values by index in [`PRINTED`], with the experiments that report them.
     compared: HashMap<usize, (Vec<String>, Compared)>,
-    /// By `EXPERIMENT/METRIC`.
+    /// Metrics by `EXPERIMENT/METRIC`.
     metrics: HashMap<String, f64>,
-    /// What was compared with a value that is not in the list.
+    /// Comparisons with a value that is not in the list.
     pub astray: Vec<String>,
     /// Figures of the sources, each with its experiment.
     figures: Vec<(String, Figure)>,
 }
 
-/// What follows from the print itself; experiments add theirs.
+/// Values that follow from the print itself; experiments add theirs.
 impl Default for Evidence {
     fn default() -> Self {
         let of = |(place, printed): (usize, &'static Printed)| {
@@ -33,7 +33,7 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Takes what an experiment reports. Where two report a place, the columns are filled in turn.
+    /// Adds the results of an experiment. If two experiments report a place, the columns are filled in turn.
     pub fn add(&mut self, experiment: &str, outcome: &Outcome) {
         for (name, value) in outcome.metrics.iter() {
             self.metrics.insert(format!("{experiment}/{name}"), value);
@@ -55,28 +55,28 @@ impl Evidence {
         self.figures.extend(figures.map(|figure| (experiment.to_owned(), figure)));
     }
 
-    /// The experiments that report a place; none of what follows from the print itself.
+    /// Returns the experiments that report a place; none for values that follow from the print itself.
     pub fn by(&self, place: usize) -> impl Iterator<Item = &str> {
         self.compared.get(&place).into_iter().flat_map(|(names, _)| names).map(String::as_str)
     }
 
-    /// Our value of a place.
+    /// Returns our value of a place.
     pub fn value(&self, place: usize) -> Option<f64> {
         self.compared.get(&place)?.1.value()
     }
 
-    /// A metric, by `EXPERIMENT/METRIC`.
+    /// Returns a metric by `EXPERIMENT/METRIC`.
     pub fn metric(&self, name: &str) -> Option<f64> {
         self.metrics.get(name).copied()
     }
 
-    /// The verdict on a place.
+    /// Returns the verdict on a place.
     pub fn verdict(&self, place: usize) -> Verdict {
         let none = Compared::default();
         verdict(place, self.compared.get(&place).map_or(&none, |(_, ours)| ours))
     }
 
-    /// How many printed values of a source (and kind) have each verdict, in the order of [`Verdict::NAMES`].
+    /// Counts the printed values of a source (and kind) by verdict, in the order of [`Verdict::NAMES`].
     pub fn count(&self, source: &str, kind: Option<Kind>) -> [usize; 6] {
         let mut counts = [0; 6];
         for (place, printed) in PRINTED.iter().enumerate() {
@@ -87,7 +87,7 @@ impl Evidence {
         counts
     }
 
-    /// The printed values of an experiment.
+    /// Makes the table of the printed values of an experiment.
     pub fn table(&self, compared: &[Compared]) -> Table {
         let places = compared.iter().filter_map(|c| place_of(c.source, &c.place, &c.quantity));
         let mut places: Vec<_> = places.collect();
@@ -97,7 +97,8 @@ impl Evidence {
         Table::new("Printed values and ours", &[]).records(rows)
     }
 
-    /// The experiments that give the numbers of an erratum and the tests, each once; [`OWN`] for what follows from the print itself.
+    /// Returns the experiments and tests that give the numbers of an erratum, each once; [`OWN`] for values that follow
+    /// from the print itself.
     pub fn runs_of<'a>(&'a self, erratum: &'a Erratum) -> Vec<&'a str> {
         let of = |[name, _]: &'a [String; 2]| match (erratum.place_of(name), name.split_once('/')) {
             (Some(place), _) => self.by(place).collect(),
@@ -111,7 +112,7 @@ impl Evidence {
         if runs.is_empty() { vec![OWN] } else { runs }
     }
 
-    /// The faults of an erratum: a form that is wrong, a number that no run gives, and one that is no longer what is shown.
+    /// Returns the faults of an erratum: a wrong form, a number that no run gives, and a number that no longer equals the shown one.
     fn faults_of(&self, erratum: &Erratum) -> Vec<String> {
         let mut faults = Vec::new();
         if erratum.holds.matches("{}").count() > erratum.numbers.len()
@@ -140,7 +141,7 @@ impl Evidence {
         faults
     }
 
-    /// Places without a verdict, values astray, and faults of the errata.
+    /// Returns places without a verdict, comparisons with unknown values, and faults of the errata.
     pub fn faults(&self) -> Vec<String> {
         let none = |(number, printed): (usize, &Printed)| {
             let Printed { source, place, quantity, value, .. } = printed;
@@ -154,7 +155,7 @@ impl Evidence {
         faults
     }
 
-    /// Counts of the verdicts.
+    /// Makes the counts of the verdicts.
     pub fn counts(&self) -> Table {
         let mut table = Table::new("Printed values by verdict", &[]);
         for source in ["S1", "S0"] {
@@ -179,7 +180,7 @@ impl Evidence {
         table
     }
 
-    /// The first page, and the chapters of both sources with what is printed, recomputed and simulated.
+    /// Makes the first page, and the chapters of both sources with printed, recomputed and simulated values.
     pub fn chapters(&self) -> Vec<Chapter> {
         let mut chapters = vec![self.first()];
         let mut homes: HashMap<&str, usize> = HashMap::new();
@@ -204,7 +205,7 @@ impl Evidence {
         }
         for (experiment, figure) in &self.figures {
             let Some(&home) = homes.get(&**experiment) else { continue };
-            // In the chapter where the source has it, if the list has values of it.
+            // The figure belongs to the chapter in which the source has it, if the list has values of that figure.
             let number = figure.source.split([' ', ',']).nth(1).unwrap_or_default();
             let place = format!("Figure {number}");
             let is_there = |p: &&Printed| p.source == chapters[home].source && p.place == place;
@@ -222,7 +223,7 @@ impl Evidence {
         chapters
     }
 
-    /// Counts, errata, and what the numbers are about.
+    /// Makes the first page: counts, errata, and an explanation of the numbers.
     fn first(&self) -> Chapter {
         let mut outcome = Outcome::default();
         let equal = |source| self.count(source, None)[..2].iter().sum::<usize>() as f64;
@@ -248,7 +249,7 @@ impl Evidence {
         outcome.remark(
             "S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996. Recomputed: from the source's own numbers. Simulated: by \
              the drive, or the method of the source, on the simulated motor of Table 5 with an assumed saliency fixed to the \
-             flux; the motors of the sources are not known. What follows from a saliency is a statement about that motor.",
+             flux; the motors of the sources are not known. Conclusions from a saliency hold for that motor.",
         );
         let drift = |name: &str| {
             self.metric(&format!("sensorless-position/{name}")).unwrap_or(f64::NAN).abs()
@@ -256,7 +257,7 @@ impl Evidence {
         outcome.remark(format!(
             "Sensorless position (section 5.1 of S1): the flux is seen, not the rotor, so more is not to be had without a \
              saliency that is fixed to the rotor. A position at rest drifts by the error of the slip: {:.0}° a minute without \
-             load, {:.0}° a minute and ampere of torque current, {:.0}° more for each percent of error of the rotor resistance; \
+             load, {:.0}° a minute and ampere of q-axis current, {:.0}° more for each percent of error of the rotor resistance; \
              {:.0}° a minute and ampere once that is learned. Homing finds the position again.",
             drift("drift_no_load_deg_per_min"),
             drift("drift_deg_per_min_a"),
@@ -306,13 +307,13 @@ impl Evidence {
 
 /// A chapter of a source.
 pub struct Chapter {
-    /// Its name on the page: source and number.
+    /// Name on the page: source and number.
     pub name: String,
     /// `S0` or `S1`.
     pub source: &'static str,
     /// Number and title.
     pub about: String,
-    /// The experiments that give its values.
+    /// Experiments that give its values.
     pub runs: Vec<String>,
     /// Table and figures.
     pub outcome: Outcome,

@@ -4,10 +4,10 @@
 //! The crates that evaluate formulas bring parsers of regular expressions with them. To compile those for these few
 //! formulas took 30 s of a processor.
 
-/// The operators; each binds tighter than those before it, so `a*b/c` is `a*(b/c)`.
+/// The operators. Each one has precedence over those before it, so `a*b/c` is `a*(b/c)`.
 const OPERATORS: &str = "+-*/^";
 
-/// Returns the value of a formula with these values of its names.
+/// Returns the value of a formula; `value` gives the values of its names.
 pub fn evaluate(formula: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<f64> {
     let mut formula = Formula { rest: formula.trim_start(), value };
     let result = formula.operation(0)?;
@@ -15,20 +15,20 @@ pub fn evaluate(formula: &str, value: &dyn Fn(&str) -> Option<f64>) -> Option<f6
 }
 
 struct Formula<'a> {
-    /// Text that is not read yet; it begins with no space.
+    /// The text that has not been read yet; it does not begin with a space.
     rest: &'a str,
     value: &'a dyn Fn(&str) -> Option<f64>,
 }
 
 impl<'a> Formula<'a> {
-    /// Takes this many bytes and the spaces behind them.
+    /// Takes this many bytes, and the spaces after them.
     fn take(&mut self, bytes: usize) -> &'a str {
         let (taken, rest) = self.rest.split_at(bytes);
         self.rest = rest.trim_start();
         taken
     }
 
-    /// Operands with operators of this rank or above between them.
+    /// Reads operands that are joined by operators of this rank or above.
     fn operation(&mut self, least: usize) -> Option<f64> {
         let mut left = self.operand()?;
         let rank = |rest: &str| OPERATORS.find(rest.chars().next()?);

@@ -1,22 +1,22 @@
-//! Named families of iron, fixed: what a motor's saliency may come from.
+//! Named saturation models, which fix where the saliency of a motor comes from.
 //!
-//! Values that measurements leave open are chosen here, once, and frozen: no drive is tuned by changing them.
+//! Values that measurements leave open were chosen here once and stay fixed. They are never changed to tune a drive.
 
 use super::IronSettings;
 
-/// A family: its name and its iron, with everything per ampere as for a nominal direct current of
-/// 0.7 A on a motor whose rated current is that of Table 5.
+/// A saturation model: its name and its magnetic settings. Settings per ampere are for a nominal magnetising current of
+/// 0.7 A on a motor with the rated current of Table 5.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Family {
     /// Name.
     pub name: &'static str,
     /// Source of the saliency.
     pub about: &'static str,
-    /// The iron.
+    /// Magnetic settings.
     pub iron: IronSettings,
 }
 
-/// Loss of stator leakage inductance, 1/A: a current-fixed saliency of about 3.6 % per ampere.
+/// Relative decrease of the stator leakage inductance, 1/A: a current-fixed saliency of about 3.6 % per ampere.
 const LEAKAGE: f64 = 0.15;
 
 const LINEAR: IronSettings = IronSettings::LINEAR;
@@ -27,8 +27,9 @@ const M6: IronSettings = IronSettings { saturation: 1.3, exponent: 6, ..LINEAR }
 const M4: IronSettings = IronSettings { exponent: 4, ..M6 };
 /// Peak of the rated current of Table 5, A.
 const RATED: f64 = 2.56 * std::f64::consts::SQRT_2;
-/// Loss of both leakage inductances per rated current. As measured at a start, each falls to half from one to five times
-/// the rated current: 2 (1 + sqrt(1 + 4 k)) = 1 + sqrt(1 + 20 k) at k = 6. At the rated current it is a third of the unsaturated.
+/// Relative decrease of both leakage inductances per rated current. As measured at a start, each falls to half between
+/// one and five times the rated current: 2 (1 + sqrt(1 + 4 k)) = 1 + sqrt(1 + 20 k) at k = 6. At the rated current it
+/// is a third of the unsaturated inductance.
 const PER_RATED: f64 = 6.0;
 const RL: IronSettings = IronSettings {
     nominal_a: RATED,
@@ -46,7 +47,7 @@ const F: IronSettings = IronSettings {
     ..G
 };
 
-/// All families.
+/// All saturation models.
 #[rustfmt::skip] // one a line
 pub const FAMILIES: [Family; 12] = [
     Family { name: "linear", about: "no saturation: the textbook machine, no saliency", iron: LINEAR },

@@ -1,7 +1,7 @@
 //! Currents as gradients of one magnetic energy.
 //!
-//! With stator flux `s`, gap-side rotor flux `r`, flux `e` of the iron's eddy currents and main flux `m`,
-//! all in the stator frame, `x = s - m`, `y = r - m`, `z = e - m`:
+//! The stator flux is `s`, the gap-side rotor flux `r`, the flux of the iron's eddy currents `e` and the main flux `m`,
+//! all in the stator frame, with `x = s - m`, `y = r - m`, `z = e - m`:
 //!
 //! ```text
 //! W = Wl(x) + Wl(y) + |z|^2/(2 Le) + Wm(m) + c Re(x^2 m*^2)/(mn^2 + |m|^2) + 1/2 Re(A x*^2)/Ll
@@ -10,24 +10,26 @@
 //! A = a_f e^(2 j angle) + a_s e^(j bars theta)     stator-fixed and rotor-slot saliency of the stator leakage
 //! ```
 //!
-//! The currents are its gradients by `s`, `r` and `e`; `m` is where its gradient by `m` vanishes (currents add up to
-//! that of the main flux), found by Newton's rule. So cross-saturation is in it, and no term can
-//! make energy. The exception is a tooth term that does not follow `m`: it is added to the stator
-//! current alone, and the balance of power does not hold to its size (see `IronSettings::conservative`).
+//! The currents are the gradients of `W` by `s`, `r` and `e`. The main flux `m` makes the gradient by `m` zero, which
+//! means that the currents add up to the current of the main flux; Newton's rule finds it. Cross-saturation is
+//! therefore included, and no term can create energy. The exception is a tooth term that does not follow `m`. It is
+//! added to the stator current alone, and the balance of power is then off by its size (see
+//! `IronSettings::conservative`).
 //!
-//! A derivative of a complex function is a real matrix, kept by its columns.
+//! The derivative of a complex function is a real matrix, stored by its columns.
 
 use crate::complex::{Complex, square};
 
-/// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
-/// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
+/// Residual, A per ampere of current, below which one more linear correction ends the iteration. The error after the
+/// correction is of second order: about 1e-7 of the current, a hundredth of the error of two integration steps a
+/// period.
 const CLOSE: f64 = 1e-3;
-/// Most iterations; one is usual, some ten after a jump of the flux.
+/// Largest number of iterations; one is usual, about ten after a jump of the flux.
 const LIMIT: u32 = 60;
-/// Below this, Wb, a flux has no direction.
+/// Flux, Wb, below which its direction is undefined.
 const NO_FLUX: f64 = 1e-12;
 
-/// A symmetric slope, `df = direct du + conjugate du*`: that of a gradient by its own flux.
+/// A symmetric derivative, `df = direct du + conjugate du*`, as a gradient has by its own flux.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Curvature {
     direct: f64,
@@ -73,13 +75,13 @@ impl Slope {
         self.re * d.re + self.im * d.im
     }
 
-    /// The slope of the function of `by u`.
+    /// Derivative of the function with the argument `by u`.
     #[inline]
     fn after(&self, by: Complex) -> Self {
         Self { re: self.times(by), im: self.times(by * Complex::I) }
     }
 
-    /// The slope of the inverse function.
+    /// Derivative of the inverse function.
     #[inline]
     fn inverse(&self) -> Self {
         let scale = 1.0 / (self.re.re * self.im.im - self.re.im * self.im.re);
@@ -95,19 +97,19 @@ impl Slope {
     }
 }
 
-/// Slopes of the currents at a solution.
+/// Derivatives of the currents at a solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slopes {
-    /// Stator current by `x` and, at fixed `x`, by `m`.
+    /// Derivative of the stator current by `x` and, at fixed `x`, by `m`.
     stator_x: Slope,
     stator_m: Slope,
-    /// Stator current by `r`, where the teeth follow it.
+    /// Derivative of the stator current by `r`, if the teeth follow `r`.
     stator_r: Slope,
-    /// Rotor current by `y`.
+    /// Derivative of the rotor current by `y`.
     pub rotor: Slope,
-    /// Negative residual by `s` at fixed `m`.
+    /// Derivative of the negative residual by `s` at fixed `m`.
     residual_s: Slope,
-    /// `m` by residual.
+    /// Derivative of `m` by the residual.
     by_residual: Slope,
 }
 
@@ -121,9 +123,9 @@ pub(crate) struct Leakage {
 }
 
 impl Leakage {
-    /// With the chord inductance, H, at a current, A, and the relative loss of the unsaturated one, 1/A.
+    /// Makes a leakage from the chord inductance, H, at a current, A, and the relative decrease of the unsaturated inductance, 1/A.
     pub(crate) fn new(inductance: f64, at: f64, per_ampere: f64) -> Self {
-        // Of i = u (1 + b u) with u = x/L, the root 2/(1 + sqrt(1 + 4 b i)) = u/i is chord over unsaturated inductance.
+        // In i = u (1 + b u) with u = x/L, u/i = 2/(1 + sqrt(1 + 4 b i)) is chord over unsaturated inductance.
         let unsaturated = 0.5 * (1.0 + (1.0 + 4.0 * per_ampere * at).sqrt()) * inductance;
         Self { inverse: 1.0 / unsaturated, saturation: per_ampere / unsaturated }
     }
@@ -137,7 +139,7 @@ impl Leakage {
         let squared = square(x);
         let length = squared.sqrt();
         let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
-        // Root and quotient side by side.
+        // The root and the quotient are independent, so the processor computes them at the same time.
         let conjugate = x * x * (half * length * (1.0 / squared.max(NO_FLUX * NO_FLUX)));
         let direct = self.inverse * (1.0 + 1.5 * bent);
         (x * (self.inverse * (1.0 + bent)), Curvature { direct, conjugate })
@@ -182,18 +184,18 @@ pub(crate) struct Teeth {
     pub twice: f64,
     /// mn^2.
     pub knee_squared: f64,
-    /// Way from rotor flux to main flux, 0 to 1.
+    /// Position between rotor flux (0) and main flux (1).
     pub gap: f64,
-    /// Turn of the axis: constant, rad, per ampere, and the load that it goes with, A.
+    /// Rotation of the axis: the constant part, rad, the part per ampere, and the load current of that part, A.
     pub turn: f64,
     pub turn_per_a: f64,
     pub load: f64,
-    /// Whether it is a gradient: it follows the main flux.
+    /// Whether the term is a gradient of the energy: it is if the teeth follow the main flux.
     pub conservative: bool,
 }
 
 impl Teeth {
-    /// Unit vector by which the axis is turned.
+    /// Unit vector by which the axis is rotated.
     #[inline]
     fn turned(&self) -> Complex {
         if self.turn == 0.0 && self.turn_per_a == 0.0 {
@@ -203,7 +205,7 @@ impl Teeth {
     }
 }
 
-/// A unit vector. (Out of line: sine and cosine would be taken where they are not needed, too.)
+/// Computes a unit vector. (It is out of line because sine and cosine would otherwise be computed where they are not needed.)
 #[cold]
 fn cis(angle: f64) -> Complex {
     Complex::cis(angle)
@@ -225,7 +227,7 @@ pub(crate) struct Magnetics {
     pub eddy: f64,
 }
 
-/// Fluxes in, currents out.
+/// A solution: currents for given fluxes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Solution {
     /// Main flux, Wb.
@@ -255,7 +257,7 @@ impl Magnetics {
             let residual = self.evaluate(fluxes, found);
             let step = -found.slopes.by_residual.times(residual);
             found.m += step;
-            // Not a number ends the iteration too.
+            // The iteration also ends at a value that is not a number.
             let size = CLOSE * CLOSE * (CLOSE * CLOSE + square(found.i));
             if square(residual) <= size || residual.re.is_nan() {
                 let slopes = &found.slopes;
@@ -266,7 +268,7 @@ impl Magnetics {
         }
     }
 
-    /// Currents and slopes at `found.m`; returns the gradient of the energy by `m`.
+    /// Computes currents and derivatives at `found.m`; returns the gradient of the energy by `m`.
     #[inline(always)]
     pub(crate) fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
         let m = found.m;
@@ -279,7 +281,7 @@ impl Magnetics {
         let (i_m, main) = self.main.current(m);
         let mut residual = i_m - i_r;
         let mut own = main + rotor;
-        // Of the stator current by m and r, and of the gradient by m by x.
+        // Derivatives of the stator current by m and by r, and of the gradient by m by x.
         let [mut stator_m, mut stator_r, mut m_stator] = [Slope::default(); 3];
         if let Some(t) = &self.teeth {
             let turn = if t.conservative { Complex::ONE } else { t.turned() };
@@ -287,7 +289,7 @@ impl Magnetics {
             let length = square(f);
             let d = 1.0 / (t.knee_squared + length);
             let (once, twice) = (t.twice * d, t.twice * d * d);
-            // The gradient by x, 2c x* f^2/D, and its slopes.
+            // The gradient by x, 2c x* f^2/D, and its derivatives.
             let (ff, xf) = (f * f, x.conj() * f);
             let xff = xf * f;
             i += xff * once;
@@ -299,7 +301,7 @@ impl Magnetics {
             };
             if t.conservative {
                 (stator_m, m_stator) = (by_f, by_f.transposed());
-                // The gradient by m, 2c (m* x^2/D - q m/D^2) with q = Re(x^2 m*^2), and its slopes.
+                // The gradient by m, 2c (m* x^2/D - q m/D^2) with q = Re(x^2 m*^2), and its derivatives.
                 let q = xf.re * xf.re - xf.im * xf.im;
                 residual += xf.conj() * x * once - m * (q * twice);
                 own.direct += q * twice * (2.0 * length * d - 3.0);
@@ -324,8 +326,8 @@ impl Magnetics {
         residual
     }
 
-    /// Rates of main flux and stator current at these rates of the fluxes; `turned` is that of the stator current
-    /// alone, by the turning of the slots.
+    /// Rates of main flux and stator current at these rates of the fluxes; `turned` is the rate of the stator current
+    /// that comes from the rotation of the slots alone.
     #[inline(always)]
     pub(crate) fn rates(
         &self,
@@ -339,7 +341,7 @@ impl Magnetics {
         (m, k.stator_x.times(s - m) + k.stator_m.times(m) + own)
     }
 
-    /// The energy in Wb A; times 3/2 it is in J. Without the tooth term unless that is a gradient.
+    /// The energy in Wb A; times 3/2 it is in J. It excludes a tooth term that is not a gradient.
     pub(crate) fn energy(&self, [s, r, e]: [Complex; 3], theta: f64, m: Complex) -> f64 {
         let leakage = |l: &Leakage, x: Complex| {
             let length = x.norm();

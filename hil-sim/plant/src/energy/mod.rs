@@ -1,8 +1,8 @@
 //! The induction machine from one magnetic energy ("energy model").
 //!
-//! Saliency is not assumed but emerges: from the saturation of the main flux, of the leakages and of the teeth.
-//! All vectors are complex, in the stator frame. With the currents `i` and `i_r` of
-//! [`magnetics`], electrical rotor speed `w` and mechanical rotor angle `theta_m`:
+//! Saliency is not assumed: it emerges from the saturation of the main flux, of the leakage inductances and of the
+//! teeth. All vectors are complex, in the stator frame. With the currents `i` and `i_r` of [`magnetics`], electrical
+//! rotor speed `w` and mechanical rotor angle `theta_m`:
 //!
 //! ```text
 //! ds/dt = v - rs i                  dr/dt = -r1 (i_r - i_2) + j w r
@@ -11,14 +11,15 @@
 //! Te    = -3/2 P Im(r* (i_r - i_2) + d* i_2) - 3/2 dW/dtheta_m    explicit: rotor slots
 //! ```
 //!
-//! The ladder of the bar has `r1 = K rr` on the gap side and `r2 = rr K/(K - 1)`, `Lb = Lx/(1 - 1/K)^2`
-//! below it: `rr` and the whole rotor leakage at slip frequency, K times `rr` and the leakage less `Lx` at high frequency.
-//! Without skin effect there is `dr/dt = -rr i_r + j w r` alone. The eddy currents have a leakage
-//! `Le = Re 100 us`: iron loss follows the square of the frequency up to 1.6 kHz. Hysteresis, space
-//! harmonics and the ripple of the PWM edges in the iron are absent.
+//! The ladder network of the bar has `r1 = K rr` on the gap side, and `r2 = rr K/(K - 1)` and `Lb = Lx/(1 - 1/K)^2`
+//! below it. The rotor shows `rr` and the whole rotor leakage at slip frequency, and K times `rr` and the leakage minus
+//! `Lx` at high frequency. Without skin effect only `dr/dt = -rr i_r + j w r` remains. The eddy currents have a leakage
+//! `Le = Re 100 us`, so the iron loss follows the square of the frequency up to 1.6 kHz. Hysteresis, space harmonics
+//! and the iron loss by the ripple of the PWM edges are not modelled.
 //!
-//! Within an integration step main flux, current and the axis of the slots are integrated by their exact rates. At its
-//! end main flux and current are solved for; at the start of a period the slots are set to the angle of the rotor.
+//! Within an integration step, main flux, current and the axis of the slots are integrated by their exact rates. At the
+//! end of the step main flux and current are solved for. At the start of a period the slots are set to the angle of the
+//! rotor.
 
 mod family;
 mod magnetics;
@@ -38,9 +39,9 @@ use crate::model::MachineModel;
 
 /// Time constant of the eddy currents, s.
 const EDDY_LAG: f64 = 100e-6;
-/// Corner of the lag behind which a load turns the axis of the teeth, rad/s: far below a carrier.
+/// Corner of the lag behind which a load rotates the axis of the teeth, rad/s: far below an injection frequency.
 const LOAD_CORNER: f64 = std::f64::consts::TAU * 20.0;
-/// Corrections that set a current; each squares the error.
+/// Number of corrections that set a current; each one squares the error.
 const CURRENT_STEPS: u32 = 8;
 
 /// Coefficients of the energy model.
@@ -49,7 +50,7 @@ pub struct EnergyMachine {
     magnetics: Magnetics,
     rs: f64,
     rr: f64,
-    /// Resistances of the gap side and the bottom of the bars over `rr`; the latter 0 without skin effect.
+    /// Resistances of the gap side and of the bottom of the bars divided by `rr`; the latter is 0 without skin effect.
     top: f64,
     bottom: f64,
     /// 1/Lb.
@@ -62,7 +63,7 @@ pub struct EnergyMachine {
 }
 
 impl EnergyMachine {
-    /// The machine with these settings.
+    /// Makes the machine with these settings.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -116,12 +117,12 @@ impl EnergyMachine {
         })
     }
 
-    /// Changes the resistances and keeps all else.
+    /// Changes the resistances and keeps everything else.
     pub(crate) fn set_resistances(&mut self, rs: f64, rr: f64) {
         (self.rs, self.rr) = (rs, rr);
     }
 
-    /// The machine with this current across the rotor flux, A, as the load that turns the axis of its teeth.
+    /// Returns the machine with this current across the rotor flux, A, as the load that rotates the axis of its teeth.
     #[must_use]
     pub fn with_load(mut self, across: f64) -> Self {
         if let Some(teeth) = &mut self.magnetics.teeth {
@@ -130,7 +131,7 @@ impl EnergyMachine {
         self
     }
 
-    /// Whether the bars have a bottom of their own.
+    /// Whether the bars have a bottom with its own flux.
     pub fn has_skin_effect(&self) -> bool {
         self.inverse_bar != 0.0
     }
@@ -171,7 +172,7 @@ impl EnergyMachine {
         (x.solution.i_r - bottom, bottom)
     }
 
-    /// As `derivative`, without the rates of the dependent quantities.
+    /// Computes the derivative as `derivative` does, without the rates of the dependent quantities.
     #[inline(always)]
     fn flux_rates(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyRate {
         let (top, bottom) = self.bar_currents(x);
@@ -201,13 +202,13 @@ impl EnergyMachine {
         k
     }
 
-    /// Change of the current by a change of the stator flux, everything else constant.
+    /// Change of the current for a change of the stator flux, everything else constant.
     #[inline]
     fn current_by_flux(&self, x: &EnergyState, d: Complex) -> Complex {
         self.magnetics.rates(&x.solution.slopes, [d, Complex::ZERO, Complex::ZERO], Complex::ZERO).1
     }
 
-    /// The change of the stator flux that changes the current by `d`.
+    /// Change of the stator flux that changes the current by `d`.
     fn flux_for_current(&self, x: &EnergyState, d: Complex) -> Complex {
         let (a, b) = (
             self.current_by_flux(x, Complex::new(1.0, 0.0)),
@@ -284,7 +285,7 @@ impl MachineModel for EnergyMachine {
             x.psi_s += self.flux_for_current(&x, missing);
             self.settle(&mut x);
         }
-        // To the last digit: no current is none.
+        // Exactly, so that a current of zero is exactly zero.
         x.solution.i = i;
         x
     }
@@ -305,7 +306,7 @@ impl MachineModel for EnergyMachine {
         self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
     }
 
-    /// Main flux and current are as integrated.
+    /// Keeps main flux and current as integrated.
     #[inline]
     fn correct(&self, x: &mut EnergyState) {
         let i = x.solution.i;

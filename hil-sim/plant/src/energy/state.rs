@@ -21,7 +21,8 @@ pub struct EnergyState {
 }
 
 impl EnergyState {
-    /// With these fluxes, Wb, in the order of the fields. [`EnergyMachine`](super::EnergyMachine) settles its currents.
+    /// Makes a state with these fluxes, Wb, in the order of the fields. [`EnergyMachine`](super::EnergyMachine) then
+    /// computes its currents.
     pub fn of_fluxes([psi_s, psi_r, psi_deep, psi_iron]: [Complex; 4]) -> Self {
         Self { psi_s, psi_r, psi_deep, psi_iron, ..Self::default() }
     }
@@ -40,19 +41,19 @@ impl EnergyState {
 /// Time derivative of an [`EnergyState`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyRate {
-    /// Of the stator flux, V.
+    /// Rate of the stator flux, V.
     pub psi_s: Complex,
-    /// Of the rotor flux, V.
+    /// Rate of the rotor flux, V.
     pub psi_r: Complex,
-    /// Of the flux of the bottom of the bars, V.
+    /// Rate of the flux of the bottom of the bars, V.
     pub psi_deep: Complex,
-    /// Of the flux of the eddy currents, V.
+    /// Rate of the flux of the eddy currents, V.
     pub psi_iron: Complex,
     /// Electrical speed, rad/s.
     pub theta: f64,
-    /// Of the saliency of the rotor's slots.
+    /// Rate of the saliency of the rotor's slots.
     pub(super) slots: Complex,
-    /// Of main flux and stator current.
+    /// Rates of main flux and stator current.
     pub(super) m: Complex,
     pub(super) i: Complex,
 }
@@ -85,7 +86,7 @@ impl ElectricalState for EnergyState {
         self.psi_iron = x.psi_iron + k.psi_iron * h;
         self.theta = x.theta + k.theta * h;
         self.solution.slots = x.solution.slots + k.slots * h;
-        // Rotor current and slopes are left to `correct`.
+        // `correct` sets the rotor current and the derivatives.
         self.solution.m = x.solution.m + k.m * h;
         self.solution.i = x.solution.i + k.i * h;
     }

@@ -1,7 +1,7 @@
-//! The current sensors and the converter.
+//! The current sensors and the ADC.
 //!
-//! Section 3.2: two phases are measured, each through an analog first-order filter (Eq. 3.3), and
-//! converted to a code along the line of Eq. 3.5.
+//! Section 3.2: two phases are measured, each through an analog first-order filter (Eq. 3.3), and converted to ADC
+//! counts along the line of Eq. 3.5.
 
 use std::f64::consts::TAU;
 
@@ -34,17 +34,17 @@ pub enum CurrentFault {
     /// No fault.
     #[default]
     None,
-    /// The code does not change.
+    /// The ADC counts do not change.
     Stuck(u16),
-    /// The sensor reads no current (noise and offset stay).
+    /// The sensor reads no current (noise and offset remain).
     Open,
-    /// The largest code.
+    /// The ADC reads its largest value.
     SaturatedHigh,
-    /// Code zero.
+    /// The ADC reads zero.
     SaturatedLow,
 }
 
-/// One channel, current to code.
+/// One channel, from current to ADC counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CurrentChannel {
     gain: f64,
@@ -83,8 +83,8 @@ impl CurrentChannel {
     }
 }
 
-/// Pole, and weights of old and new input, of a first-order lag over a step of `x` time constants in which
-/// the input is straight.
+/// Returns the pole of a first-order lag, and the weights of its old and new input, over a step of `x` time constants
+/// in which the input is a straight line.
 #[inline]
 fn coefficients(x: f64) -> [f64; 3] {
     let pole = (-x).exp();
@@ -93,17 +93,17 @@ fn coefficients(x: f64) -> [f64; 3] {
     [pole, mean - pole, 1.0 - mean]
 }
 
-/// The two current sensors with their filters and converters.
+/// The two current sensors with their filters and ADCs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     noise: f64,
     channels: [CurrentChannel; 2],
     corner: f64,
     filtered: Complex,
-    /// None where all are zero.
+    /// Rare errors; none if all of them are zero.
     rare: Option<CurrentErrors>,
     rare_dc: Option<VoltageErrors>,
-    /// Coefficients of the filter and the time step, s, they are for.
+    /// Coefficients of the filter, and the time step, s, for which they hold.
     step: f64,
     pole: f64,
     from_old: f64,
@@ -113,7 +113,7 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// The sensors with these settings, at zero current.
+    /// Makes the sensors with these settings, at zero current.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`].
@@ -139,7 +139,7 @@ impl Sensors {
         })
     }
 
-    /// Begins a period of `period` seconds with so many pulses.
+    /// Begins a period of `period` seconds with this number of pulses.
     #[inline]
     pub(crate) fn begin_period(&mut self, period: f64, pulses: u16) {
         if let Some(rare) = &mut self.rare {
@@ -147,8 +147,8 @@ impl Sensors {
         }
     }
 
-    /// Follows the current over `h` seconds, in which it goes linearly from `old` to `new`. Both
-    /// channels have the same filter, so it filters the space vector.
+    /// Follows the current over `h` seconds, in which it changes linearly from `old` to `new`. Both channels have the
+    /// same filter, so the space vector is filtered.
     #[inline]
     pub fn follow(&mut self, old: Complex, new: Complex, h: f64) {
         if h != self.step {
@@ -177,7 +177,7 @@ impl Sensors {
         self.channels[channel as usize].fault = fault;
     }
 
-    /// The codes of channels A and B now.
+    /// Returns the present ADC counts of channels A and B.
     #[inline]
     pub fn currents(&self, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let Some(rare) = &self.rare else {
@@ -187,7 +187,7 @@ impl Sensors {
         self.rare_codes(rare, rng)
     }
 
-    /// Codes with the rare errors; of two conversions their sum.
+    /// Returns ADC counts with the rare errors; with two conversions, their sum.
     #[cold]
     fn rare_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let (now, middle) = rare.currents();
@@ -197,7 +197,7 @@ impl Sensors {
         [0, 1].map(|k| now[k] + middle[k])
     }
 
-    /// The codes at these currents and further offsets, A.
+    /// Converts these currents with further offsets, A, to ADC counts.
     #[inline]
     fn converted(&self, i: [f64; 2], offsets: [f64; 2], rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let code = |k: usize, noise: f64| self.channels[k].code(i[k], noise + offsets[k]);
@@ -212,7 +212,7 @@ impl Sensors {
         [code(0, a), code(1, b)]
     }
 
-    /// Follows the dc-link voltage, V, over `h` seconds at whose end it is `vdc`.
+    /// Follows the dc-link voltage, V, over `h` seconds; `vdc` is the voltage at their end.
     #[inline]
     pub(crate) fn follow_dc_link(&mut self, vdc: f64, h: f64) {
         if let Some(rare) = &mut self.rare_dc {
@@ -220,19 +220,19 @@ impl Sensors {
         }
     }
 
-    /// The code of the dc-link voltage, which is `vdc`, V.
+    /// Converts the dc-link voltage `vdc`, V, to ADC counts.
     #[inline]
     pub fn dc_link(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> u16 {
         let seen = self.rare_dc.as_ref().map_or(vdc, |rare| rare.reading(vdc, rng));
         ((seen * self.codes_per_v).clamp(0.0, FULL_SCALE) + 0.5) as u16
     }
 
-    /// The code of the heat-sink temperature.
+    /// Returns the ADC counts of the heat-sink temperature.
     pub fn heat_sink(&self) -> u16 {
         self.heat_sink
     }
 
-    /// Changes the code of the heat-sink temperature.
+    /// Changes the ADC counts of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
         self.heat_sink = code;
     }

@@ -1,5 +1,5 @@
-//! Errors of the measurement that most boards do not have, in a layer that costs those boards nothing
-//! (cold: 4 ns of 285 a period).
+//! Errors of the measurement that most boards do not have. They are in a layer of their own, so that boards without
+//! them lose no time (as cold code: 4 ns of 285 a period).
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -9,30 +9,30 @@ use super::{MeasurementSettings, coefficients};
 /// The errors of channels A and B, with their state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CurrentErrors {
-    /// Shares of the other phase.
+    /// Shares of the current of the other phase.
     cross_talk: [f64; 2],
-    /// 1/A^2.
+    /// Coefficient of the error that grows with the square of the current, 1/A^2.
     cubic: [f64; 2],
-    /// A/s.
+    /// Drift of the offsets, A/s.
     drift: [f64; 2],
-    /// Seconds from the start.
+    /// Time since the start, s.
     time: f64,
-    /// Time constant of the lag of channel B, s; 0 is none.
+    /// Time constant of the lag of channel B, s; 0 for no lag.
     lag_b: f64,
     lagging_b: [f64; 3],
-    /// Phase b before and behind that lag.
+    /// Current of phase b before and after that lag.
     before_b: f64,
     behind_b: f64,
     /// Time from now to the middle of the last pulse, s.
     until_middle: f64,
-    /// What the channels see now.
+    /// Present input of the channels.
     now: [f64; 2],
-    /// The same in the middle of the last pulse, if that is converted too.
+    /// Input of the channels in the middle of the last pulse, if that is converted as well.
     middle: Option<[f64; 2]>,
 }
 
 impl CurrentErrors {
-    /// These errors; none where all are zero.
+    /// Makes these errors; none if all of them are zero.
     pub(super) fn new(s: &MeasurementSettings) -> Option<Self> {
         let errors = Self {
             cross_talk: [s.cross_talk_a, s.cross_talk_b],
@@ -52,7 +52,7 @@ impl CurrentErrors {
         acts.then_some(errors)
     }
 
-    /// Begins a period with so many pulses; the middle is that of the last one.
+    /// Begins a period with this number of pulses; the middle is the middle of the last pulse.
     pub(super) fn begin(&mut self, period: f64, pulses: u16) {
         self.until_middle = period - 0.5 * period / f64::from(pulses);
     }
@@ -64,7 +64,7 @@ impl CurrentErrors {
         }
     }
 
-    /// Follows phases a and b, A, over `h` seconds at whose end they are these.
+    /// Follows the currents of phases a and b, A, over `h` seconds; the arguments are the currents at their end.
     #[cold]
     pub(super) fn follow(&mut self, [a, b]: [f64; 2], h: f64) {
         self.time += h;
@@ -77,13 +77,13 @@ impl CurrentErrors {
         }
         self.now = [a + self.cross_talk[0] * seen_b, seen_b + self.cross_talk[1] * a];
         self.until_middle -= h;
-        // The end of a step that is next to the middle.
+        // The end of a step that is nearest to the middle.
         if self.until_middle.abs() <= 0.5 * h {
             self.middle = self.middle.map(|_| self.now);
         }
     }
 
-    /// Readings of the channels now, A, and in the middle of the last pulse where that is converted too.
+    /// Returns the present readings of the channels, A, and those in the middle of the last pulse if that is converted as well.
     pub(super) fn currents(&self) -> ([f64; 2], Option<[f64; 2]>) {
         let bent = |seen: [f64; 2]| [0, 1].map(|k| seen[k] + self.cubic[k] * seen[k].powi(3));
         (bent(self.now), self.middle.map(bent))
@@ -99,19 +99,19 @@ impl CurrentErrors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VoltageErrors {
     gain: f64,
-    /// Time constant of the lag, s; 0 is none.
+    /// Time constant of the lag, s; 0 for no lag.
     lag: f64,
-    /// Pole of the lag and the time step, s, it is for.
+    /// Pole of the lag, and the time step, s, for which it holds.
     pole: f64,
     step: f64,
-    /// What is behind the lag, V; not a number before the first period.
+    /// Voltage after the lag, V; not a number before the first period.
     seen: f64,
-    /// V rms.
+    /// Noise, V rms.
     noise: f64,
 }
 
 impl VoltageErrors {
-    /// These errors; none where all are zero.
+    /// Makes these errors; none if all of them are zero.
     pub(super) fn new(s: &MeasurementSettings) -> Option<Self> {
         let acts = s.dc_gain_error != 0.0 || s.dc_lag_us > 0.0 || s.dc_noise_v > 0.0;
         acts.then_some(Self {
@@ -124,7 +124,7 @@ impl VoltageErrors {
         })
     }
 
-    /// Follows the voltage, V, over `h` seconds at whose end it is `vdc`.
+    /// Follows the voltage over `h` seconds; `vdc`, V, is the voltage at their end.
     pub(super) fn follow(&mut self, vdc: f64, h: f64) {
         if self.lag > 0.0 {
             if h != self.step {
@@ -135,7 +135,7 @@ impl VoltageErrors {
         }
     }
 
-    /// Reading of the voltage, which is `vdc`, V.
+    /// Returns the reading of the voltage `vdc`, V.
     #[cold]
     pub(super) fn reading(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
         let seen = self.gain * if self.seen.is_nan() { vdc } else { self.seen };

@@ -1,4 +1,4 @@
-//! What the tests of the effects share.
+//! Functions for the tests of the effects.
 
 use drive_core::Compare;
 use motor_plant::{
@@ -9,7 +9,7 @@ use motor_plant::{
 /// A PWM period, s.
 pub const T: f64 = 1.0 / 6000.0;
 
-/// Linear iron, ideal inverter and sensors, a locked shaft.
+/// Settings with linear iron, ideal inverter and sensors, and a locked shaft.
 pub fn settings() -> PlantSettings {
     let mut settings = PlantSettings {
         iron: Some(IronSettings::LINEAR),
@@ -41,7 +41,7 @@ pub fn held(settings: &PlantSettings, v: Complex, seconds: f64) -> Plant {
     plant
 }
 
-/// Within a tolerance.
+/// Checks that a value is within a tolerance.
 pub fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found}, expected {expected} ± {tolerance}");
 }

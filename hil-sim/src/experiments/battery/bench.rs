@@ -1,20 +1,20 @@
-//! A drive and a plant in a run of the battery, and what is seen of them.
+//! A drive and a plant in a run of the stress test, with the quantities that are observed.
 
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
-/// An error beyond this, degrees, is wrong, unless the run says otherwise.
+/// Error beyond which the angle is wrong, degrees, unless the run sets another limit.
 const WRONG_DEG: f64 = 30.0;
-/// Flux in relation to its nominal value that is off: below the first, above the second.
+/// Limits of the flux relative to its nominal value: it is off below the first and above the second.
 const FLUX_OFF: (f64, f64) = (0.5, 2.0);
-/// A state lasts on over interruptions up to this, s: an angle that runs through has a sound one now and then.
+/// Longest interruption over which a state is regarded as continuing, s: an angle that runs through is right now and then.
 const GAP_S: f64 = 0.1;
 
-/// Periods between two moments of a record: 5 ms.
+/// Number of periods between two recorded moments: 5 ms.
 const TRACE_EVERY: u64 = 30;
 
-/// How long a state lasts at the longest.
+/// Longest duration of a state.
 #[derive(Default)]
 pub struct Lasting {
     since: Option<f64>,
@@ -33,7 +33,7 @@ impl Lasting {
     }
 }
 
-/// A moment of a run that is recorded.
+/// A recorded moment of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     /// Time, s.
@@ -44,7 +44,7 @@ pub struct Moment {
     pub rpm: f64,
     /// Torque of the motor, Nm.
     pub torque: f64,
-    /// Length of the stator current, A peak.
+    /// Magnitude of the stator current, A peak.
     pub current: f64,
     /// Rotor flux of the motor from phase a, Wb peak.
     pub flux: Complex,
@@ -52,13 +52,13 @@ pub struct Moment {
     pub dc_link: f64,
 }
 
-/// A drive and a plant, and what is seen of them.
+/// A drive and a plant, with the quantities that are observed.
 pub struct Bench {
     /// Drive and plant.
     pub rig: Rig,
     /// Flux of the magnetising current, Wb.
     nominal_flux: f64,
-    /// Time from which on the error is counted, s; unset before the first reference, and after the flux was turned.
+    /// Time from which the error is counted, s; unset before the first reference, and after the flux was rotated.
     pub counted_from: Option<f64>,
     /// Torque of the motor over the same time, Nm.
     pub torque: Stats,
@@ -66,25 +66,25 @@ pub struct Bench {
     pub trial: Trial,
     /// Angle error at the last sample, degrees.
     pub error_deg: f64,
-    /// An error beyond this, degrees, is wrong.
+    /// Error beyond which the angle is wrong, degrees.
     pub wrong_deg: f64,
-    /// The record of the run, where one is wanted.
+    /// The curves of the run, if requested.
     pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
-    /// How long the angle is wrong and lost, and the flux off.
+    /// Durations for which the angle is wrong and lost, and the flux off.
     lasting: [Lasting; 3],
-    /// Whether angle or flux was off at any time since the first reference, and whether one is now.
+    /// Whether angle or flux was off at any time since the first reference, and whether one of them is off now.
     was_off: bool,
     is_off: bool,
-    /// Whether the flux was turned.
+    /// Whether the flux was rotated.
     turned: bool,
 }
 
 impl Bench {
-    /// A copy of a drive that is off, and the plant with another load.
+    /// Copies a drive that is off, and the plant with another load.
     ///
     /// # Errors
-    /// When the plant is refused.
+    /// If the plant is refused.
     pub fn new(config: &Config, drive: &Drive, load: Load, seed: u64) -> Result<Self, Error> {
         let mut settings = plant_settings(config);
         settings.mechanics.load = load;
@@ -113,7 +113,7 @@ impl Bench {
         self.rig.time()
     }
 
-    /// One period.
+    /// Runs one period.
     fn step(&mut self) {
         let (t, is_recorded) = (self.time(), self.rig.periods().is_multiple_of(TRACE_EVERY));
         self.rig.step();
@@ -136,12 +136,12 @@ impl Bench {
         }
     }
 
-    /// For some seconds, whatever the drive does.
+    /// Runs for some seconds, whatever the drive does.
     pub fn coast(&mut self, seconds: f64) {
         (0..(seconds * RATE_HZ).round() as u64).for_each(|_| self.step());
     }
 
-    /// Until the drive is off, stopped by a fault or regulating, or for this many seconds.
+    /// Runs until the drive is off, stopped by a fault or regulating, or for this many seconds.
     pub fn wait(&mut self, seconds: f64) -> State {
         for _ in 0..(seconds * RATE_HZ) as u64 {
             self.step();
@@ -153,10 +153,10 @@ impl Bench {
         self.rig.drive.state()
     }
 
-    /// Gives a torque current, A peak; returns that which the drive takes. It may limit it.
+    /// Commands a q-axis current, A peak; returns the current that the drive accepts, which may be limited.
     ///
     /// # Errors
-    /// When it is refused.
+    /// If the drive refuses it.
     pub fn torque(&mut self, i_q: f32) -> Result<f32, Error> {
         match self.rig.command(&Command::Torque(i_q))? {
             Accepted::Limited(taken) => Ok(taken),
@@ -164,15 +164,15 @@ impl Bench {
         }
     }
 
-    /// Turns the rotor flux of the motor at once. The error is counted no more, and how long angle and flux are off is
-    /// counted from here.
+    /// Rotates the rotor flux of the motor at once. From then on the error is no longer counted, and the durations for
+    /// which angle and flux are off start again.
     pub fn turn_flux(&mut self, degrees: f64) {
         self.rig.plant.turn_rotor_flux(degrees.to_radians());
         (self.turned, self.counted_from) = (true, None);
         self.lasting = Default::default();
     }
 
-    /// Runs for some seconds, or until the drive no longer regulates; says whether it still does.
+    /// Runs for some seconds, or until the drive no longer regulates; returns whether it still does.
     pub fn watch(&mut self, seconds: f64) -> bool {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
             let (t, plant) = (self.time(), &self.rig.plant);
@@ -204,7 +204,7 @@ impl Bench {
         true
     }
 
-    /// The result of the run, and its record; `still` says whether the drive regulated to its end.
+    /// Returns the result of the run and its curves; `still` tells whether the drive regulated to its end.
     pub fn finish(self, still: bool) -> (Trial, Vec<Moment>) {
         let mut trial = self.trial;
         if !still && let State::Fault(fault) = self.rig.drive.state() {
@@ -236,7 +236,7 @@ mod tests {
         // Interrupted for 0.09 s: one stretch from 0 on.
         assert!((at(0.29, 0.4, true) - 0.399).abs() < 1e-9);
         at(0.4, 0.6, false);
-        // Interrupted for 0.2 s: a new one, which is shorter.
+        // Interrupted for 0.2 s: a new stretch, which is shorter.
         assert!((at(0.6, 0.9, true) - 0.399).abs() < 1e-9);
         assert!((at(0.9, 1.2, true) - 0.599).abs() < 1e-9);
     }

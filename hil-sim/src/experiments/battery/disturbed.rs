@@ -1,9 +1,9 @@
-//! Disturbances of the bench: what a real inverter, real sensors and a real motor add, all together.
+//! Disturbances of the bench: combined errors of a real inverter, real sensors and a real motor.
 
 use crate::prelude::*;
 
-/// A disturbance: in words, with its full size on the dissertation's bench, to which others are in proportion; whether it has a
-/// sign; and what adds it to the bench, in relation to its full size.
+/// A disturbance: its description, with its full size on the dissertation's bench, to which other benches are in
+/// proportion; whether it has a sign; and the function that adds it to the bench, relative to its full size.
 pub type Disturbance = (&'static str, Sign, fn(&mut Config, f64));
 
 /// Whether a disturbance has a sign.
@@ -13,7 +13,7 @@ pub enum Sign {
     Positive,
 }
 
-/// Those that are there while the drive learns, and after.
+/// Disturbances that are present during the saliency self-commissioning and after it.
 pub static ALWAYS: [Disturbance; 7] = [
     ("slots 0.3 %", Sign::Either, |c, x| c.iron.slots += 0.003 * x),
     ("stator-fixed 0.3 %", Sign::Either, |c, x| c.iron.stator_fixed += 0.003 * x),
@@ -26,7 +26,7 @@ pub static ALWAYS: [Disturbance; 7] = [
     ("0.3 ohm", Sign::Positive, |c, x| c.inverter.on_resistance += 0.3 / c.amperes(1.0) * x),
 ];
 
-/// Those that come after the learning.
+/// Disturbances that appear after the saliency self-commissioning.
 pub static AFTER: [Disturbance; 8] = [
     ("ripple 2 %", Sign::Positive, |c, x| c.dc_link.ripple += 0.02 * x),
     ("dc lag 300 µs", Sign::Positive, |c, x| c.measurement.dc_lag_us += 300.0 * x),
@@ -41,20 +41,20 @@ pub static AFTER: [Disturbance; 8] = [
 /// A difference between phases or sensors that a drive has not learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Asymmetry {
-    /// None.
+    /// No difference.
     None,
-    /// Gain of current sensor a that is higher by this, in thousandths.
+    /// Gain of current sensor a, higher by this many thousandths.
     GainA(i16),
-    /// The same of sensor b.
+    /// Gain of current sensor b, higher by this many thousandths.
     GainB(i16),
-    /// Cross-talk from channel b to channel a, likewise.
+    /// Cross-talk from channel b to channel a, in thousandths.
     CrossTalk(i16),
-    /// Saliency fixed to the stator of a motor of iron, likewise.
+    /// Saliency fixed to the stator of a motor with saturation, in thousandths.
     StatorFixed(i16),
 }
 
 impl Asymmetry {
-    /// In words.
+    /// Describes the difference in words.
     pub fn name(self) -> String {
         let percent = |thousandths: i16| f64::from(thousandths) / 10.0;
         match self {
@@ -66,7 +66,7 @@ impl Asymmetry {
         }
     }
 
-    /// Adds it to the bench.
+    /// Adds the difference to the bench.
     pub fn add(self, config: &mut Config) {
         let share = |thousandths: i16| f64::from(thousandths) / 1e3;
         let sensors = &mut config.measurement;
@@ -80,7 +80,7 @@ impl Asymmetry {
     }
 }
 
-/// Sizes of disturbances, each in relation to its full size: those of the configuration, and what is drawn.
+/// Sizes of disturbances, each relative to its full size: the sizes of the configuration plus random parts.
 pub fn sizes(config: &Config, all: &[Disturbance], seed: u64) -> Vec<f64> {
     let mut random = seeded(seed);
     let (together, most) = (config.disturbed.together, config.disturbed.drawn);
@@ -91,7 +91,7 @@ pub fn sizes(config: &Config, all: &[Disturbance], seed: u64) -> Vec<f64> {
     all.iter().map(size).collect()
 }
 
-/// Adds disturbances of these sizes to the bench. Slots and stator-fixed saliency act on a motor of iron only.
+/// Adds disturbances of these sizes to the bench. Slots and stator-fixed saliency act only on a motor with saturation.
 pub fn add(config: &mut Config, all: &[Disturbance], sizes: &[f64]) {
     all.iter().zip(sizes).for_each(|((_, _, add), &size)| add(config, size));
 }
@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(c.changes(), expected.changes());
     }
 
-    /// Over 2000 seeds: as often positive as negative where there is a sign, never negative otherwise, up to the size.
+    /// Over 2000 seeds: as often positive as negative if the disturbance has a sign, otherwise never negative, up to the size.
     #[test]
     fn drawn_sizes_fill_their_range() {
         let c = config(&[("disturbed.drawn", 0.5)]);

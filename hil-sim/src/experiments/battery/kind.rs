@@ -1,44 +1,44 @@
-//! The kinds of runs, each with what the drive is asked for over time.
+//! The kinds of runs, each with the commands to the drive over time.
 
 use super::disturbed::Asymmetry;
 use crate::config::BatteryRuns;
 use crate::prelude::*;
 
-/// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion, torque currents to
-/// the [nominal limit](nominal_limit_a).
+/// A kind of run. Currents, speeds and torques are for the dissertation's motor; on others they are in proportion,
+/// q-axis currents to the [nominal limit](nominal_limit_a).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
-    /// Constant torque current while a dynamometer holds this speed, rpm.
+    /// Constant q-axis current while a dynamometer holds this speed, rpm.
     Constant(i16),
-    /// A torque current drawn anew every half second, shaft locked.
+    /// A random q-axis current every half second, shaft locked.
     Steps,
-    /// Torque current of 3 A, reversed every second, shaft locked.
+    /// q-axis current of 3 A, reversed every second, shaft locked.
     Reversals,
-    /// Torque current from -3 A to 3 A, or back, in three seconds, shaft locked.
+    /// q-axis current from -3 A to 3 A, or back, in three seconds, shaft locked.
     Ramp,
-    /// Speed regulated, this reference, rpm, and then its opposite; free shaft.
+    /// Speed regulated at this reference, rpm, and then at its opposite; free shaft.
     Speed(i16),
     /// Speed regulated, a step of 0.4 Nm on a free shaft.
     Load,
-    /// Speed regulated, a step of this share of the torque at the [nominal limit](nominal_limit_a), in thousandths; free
-    /// shaft.
+    /// Speed regulated, a step of this share of the torque at the [nominal limit](nominal_limit_a), in thousandths;
+    /// free shaft.
     LoadStep(u16),
-    /// Torque current near its largest for six seconds, shaft locked.
+    /// q-axis current near its maximum for six seconds, shaft locked.
     Hold,
-    /// Constant torque current while a dynamometer holds this speed, rpm; the rotor flux is turned at once.
+    /// Constant q-axis current while a dynamometer holds this speed, rpm; the rotor flux is suddenly rotated.
     Forced(i16),
-    /// A torque current that steps about a constant one so many times a second, shaft locked. With `forced`, the rotor
-    /// flux is turned at once.
+    /// Dithered torque: a q-axis current that steps about a constant value this many times per second, shaft locked.
+    /// With `forced`, the rotor flux is suddenly rotated.
     Restless {
-        /// Steps in a second.
+        /// Steps per second.
         hz: u16,
-        /// Whether the flux is turned.
+        /// Whether the flux is rotated.
         forced: bool,
     },
-    /// Constant torque current while a dynamometer drags the shaft through zero stator frequency, into or out of
-    /// generating; an asymmetry appears after the learning.
+    /// Constant q-axis current while a dynamometer drives the shaft through zero stator frequency, into or out of
+    /// generating. An asymmetry appears after the saliency self-commissioning.
     Dragged(Asymmetry),
-    /// Constant torque currents of either sign, each while a dynamometer drags the shaft through zero stator frequency, there and back.
+    /// Constant q-axis currents of either sign, each while a dynamometer drives the shaft through zero stator frequency, there and back.
     Quadrants,
 }
 
@@ -49,7 +49,7 @@ pub const KINDS: [Kind; 12] = [
     Kind::Steps, Kind::Reversals, Kind::Ramp, Kind::Speed(150), Kind::Speed(-150), Kind::Load,
 ];
 
-/// The kinds that a configuration asks for, and how many runs there are unless it says.
+/// Returns the kinds that a configuration asks for, and the default number of runs.
 pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     match config.battery.runs {
         BatteryRuns::Kinds => (KINDS.to_vec(), 8 * KINDS.len()),
@@ -76,15 +76,15 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
     }
 }
 
-/// The torque current, A peak, that the drive's current limit leaves beside the magnetising current.
+/// The q-axis current, A peak, that the drive's current limit leaves beside the magnetising current.
 pub fn torque_limit_a(config: &Config) -> f64 {
     let (all, i_d) = (f64::from(config.drive.current_limit_a()), f64::from(config.drive.i_d()));
     (all * all - i_d * i_d).max(0.0).sqrt()
 }
 
-/// The nominal limit of the torque current, A peak: the current that the drive's limit leaves beside the magnetising current; with the
-/// dissertation's flux not more than its speed loop takes, 3 A. A drive that has learned a lower one is measured by the nominal
-/// one.
+/// The nominal limit of the q-axis current, A peak: the current that the drive's limit leaves beside the magnetising
+/// current. With the dissertation's flux it is at most the 3 A of the speed loop. A drive that has learned a lower
+/// limit is still judged by the nominal one.
 pub fn nominal_limit_a(config: &Config) -> f64 {
     match config.drive.sequence.flux {
         Flux::Low => torque_limit_a(config).min(config.amperes(MOST_A)),
@@ -92,32 +92,32 @@ pub fn nominal_limit_a(config: &Config) -> f64 {
     }
 }
 
-/// A torque current of a run, A on the dissertation's motor, in proportion to the [nominal limit](nominal_limit_a), A peak.
+/// Scales a q-axis current of a run, A on the dissertation's motor, in proportion to the [nominal limit](nominal_limit_a), A peak.
 pub fn share_of_limit(config: &Config, on_reference: f64) -> f64 {
     on_reference * (nominal_limit_a(config) / MOST_A)
 }
 
-/// Torque, Nm, of a torque current, A peak, at the right angle and the flux of the magnetising current: 3/2 P L_m^2/L_r
+/// Torque, Nm, of a q-axis current, A peak, at the right angle and the flux of the magnetising current: 3/2 P L_m^2/L_r
 /// i_d i_q.
 pub fn torque_nm(config: &Config, i_q: f64) -> f64 {
     i_q * f64::from(config.drive.motor.torque_per_ampere(config.drive.i_d()))
 }
 
-/// Largest torque current, A, and the least of a constant one.
+/// Largest q-axis current, A, and the smallest constant one.
 const MOST_A: f64 = 3.0;
 const LEAST_A: f64 = 0.5;
-/// Load, Nm, and the speeds at which it comes, rpm.
+/// Load, Nm, and the speeds at which it is applied, rpm.
 const LOAD_NM: f64 = 0.4;
 const LOAD_RPM: [f64; 4] = [0.0, 30.0, 150.0, -150.0];
-/// Time between two changes of a torque current, s.
+/// Time between two changes of a q-axis current, s.
 const LEVEL_S: f64 = 0.5;
-/// Least and largest turn of the flux, degrees, and the time before and after it, s.
+/// Smallest and largest rotation of the flux, degrees, and the time before and after it, s.
 const TURN_DEG: (f64, f64) = (60.0, 180.0);
 const TURN_S: (f64, f64) = (1.0, 4.0);
-/// How far a current that never rests is from the constant one at the most, A.
+/// Largest deviation of a dithered current from its constant value, A.
 const RESTLESS_A: f64 = 0.2;
-/// A dragged shaft: least torque current, in relation to the largest; acceleration, rpm/s; speeds to which and from which it is
-/// dragged, rpm; acceleration without torque, rpm/s; time under torque before and after, s.
+/// A driven shaft: smallest q-axis current, relative to the largest; acceleration, rpm/s; speeds at the end and the
+/// start of the drive, rpm; acceleration without torque, rpm/s; time under torque before and after, s.
 const DRAGGED_SHARE: f64 = 0.75;
 const DRAGGED_RPM_PER_S: (f64, f64) = (5.0, 300.0);
 const DRAGGED_RPM: (f64, f64) = (150.0, 300.0);
@@ -127,14 +127,14 @@ const DRAGGED_S: (f64, f64) = (1.5, 20.0);
 /// A load torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadTorque {
-    /// Nm on the dissertation's motor; see [`Config::newton_metres`].
+    /// Torque in Nm on the dissertation's motor; see [`Config::newton_metres`].
     Nm(f64),
     /// Share of the torque at the [nominal limit](nominal_limit_a).
     Share(f64),
 }
 
 impl LoadTorque {
-    /// In Nm on the motor of the configuration.
+    /// Returns the torque in Nm on the motor of the configuration.
     pub fn newton_metres(self, config: &Config) -> f64 {
         match self {
             Self::Nm(torque) => config.newton_metres(torque),
@@ -146,26 +146,26 @@ impl LoadTorque {
 /// A part of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
-    /// Torque current, A, or speed, rpm, at the beginning and at the end; straight between them.
+    /// q-axis current, A, or speed, rpm, at the beginning and at the end; a straight line between them.
     pub reference: (f64, f64),
-    /// Torque of the load where the shaft is free.
+    /// Torque of the load, if the shaft is free.
     pub load: LoadTorque,
-    /// Speed of the dynamometer at the beginning and at the end, rpm; straight between them. None: as it is.
+    /// Speed of the dynamometer at the beginning and at the end, rpm; a straight line between them. None: unchanged.
     pub shaft_rpm: Option<(f64, f64)>,
-    /// Turn of the rotor flux at the beginning, electrical degrees.
+    /// Rotation of the rotor flux at the beginning, electrical degrees.
     pub turn_deg: f64,
-    /// Length, s.
+    /// Duration, s.
     pub seconds: f64,
 }
 
 impl Part {
-    /// A constant reference.
+    /// Makes a part with a constant reference.
     pub fn constant(reference: f64, seconds: f64) -> Self {
         let reference = (reference, reference);
         Self { reference, load: LoadTorque::Nm(0.0), shaft_rpm: None, turn_deg: 0.0, seconds }
     }
 
-    /// A constant torque current while the dynamometer changes its speed by so many rpm/s.
+    /// Makes a part with a constant q-axis current while the dynamometer changes its speed by this many rpm/s.
     fn dragged(i_q: f64, rpm: (f64, f64), rate: f64) -> Self {
         Self { shaft_rpm: Some(rpm), ..Self::constant(i_q, (rpm.1 - rpm.0).abs() / rate) }
     }
@@ -174,16 +174,16 @@ impl Part {
 /// The shaft in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shaft {
-    /// Locked.
+    /// The shaft is locked.
     Locked,
     /// A dynamometer holds a speed, rpm.
     Held(f64),
-    /// Free; the drive regulates its speed.
+    /// The shaft is free; the drive regulates its speed.
     Free,
 }
 
 impl Kind {
-    /// In words.
+    /// Describes the kind in words.
     pub fn name(self) -> String {
         match self {
             Self::Constant(rpm) => format!("constant torque, {rpm} rpm"),
@@ -205,7 +205,7 @@ impl Kind {
         }
     }
 
-    /// Whether the flux is turned: then a stop is no failure.
+    /// Whether the flux is rotated: then a stop is no failure.
     pub fn turns_flux(self) -> bool {
         matches!(self, Self::Forced(_) | Self::Restless { forced: true, .. })
     }
@@ -224,7 +224,7 @@ impl Kind {
         }
     }
 
-    /// The parts of a run, drawn at random.
+    /// Returns the parts of a run, with random values.
     pub fn parts(self, random: &mut impl Rng) -> Vec<Part> {
         let sign = sign(random);
         match self {
@@ -255,7 +255,7 @@ impl Kind {
                     Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
                     _ => LoadTorque::Nm(sign * LOAD_NM),
                 };
-                // It comes and goes while the speed is held.
+                // The load comes and goes while the speed is held.
                 let loaded = Part { load, ..Part::constant(rpm, 2.0) };
                 vec![Part::constant(rpm, 1.5), loaded, Part::constant(rpm, 1.0)]
             }
@@ -305,15 +305,15 @@ impl Kind {
     }
 }
 
-/// A turn of the flux, degrees, of either sign.
+/// Returns a random rotation of the flux, degrees, of either sign.
 fn turn(random: &mut impl Rng) -> f64 {
     sign(random) * random.random_range(TURN_DEG.0..=TURN_DEG.1)
 }
 
-/// The torque current that a drive which is off would take when it is asked for this one, A peak.
+/// Returns the q-axis current that a drive which is off would accept if commanded this one, A peak.
 ///
 /// # Errors
-/// When it is refused.
+/// If the drive refuses it.
 pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
     let mut drive = drive.clone();
     drive.command(&Command::Start(Mode::Torque)).map_err(Error::refused)?;
@@ -328,8 +328,9 @@ mod tests {
     use super::*;
     use crate::config::Value;
 
-    /// With Table 5 beside 2.0 A the vector limit of 3.5 A leaves sqrt(3.5^2 - 2^2) = 2.872 A, and 62 % of its torque is
-    /// 0.62 * 3/2 * 2 * 0.1771^2/0.2047 * 2.0 * 2.872 = 1.637 Nm. Beside 0.7 A the 3 A of the speed loop are less.
+    /// With Table 5 and 2.0 A of magnetising current the vector limit of 3.5 A leaves sqrt(3.5^2 - 2^2) = 2.872 A, and
+    /// 62 % of its torque is 0.62 * 3/2 * 2 * 0.1771^2/0.2047 * 2.0 * 2.872 = 1.637 Nm. With 0.7 A the 3 A of the speed
+    /// loop are less.
     #[test]
     fn load_steps_are_shares_of_the_torque_at_the_nominal_limit() {
         let mut config = Config::default();
@@ -347,7 +348,7 @@ mod tests {
         assert!((loads[1] - 1.637).abs() < 2e-3, "{loads:?}");
     }
 
-    /// A stator-fixed saliency changes nothing on model A, so that it is none of its kinds.
+    /// A stator-fixed saliency changes nothing on model A, so it is none of its kinds.
     #[test]
     fn a_kind_that_changes_nothing_is_left_out() {
         let mut config = Config::default();
@@ -362,9 +363,8 @@ mod tests {
         assert_eq!(fixed(&config), (2, 9, 216));
     }
 
-    /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is
-    /// turned once.
-    /// Either torque is there while the speed passes zero in either direction.
+    /// A dithered current changes as often as stated, by more than noise, for the whole run, and the flux is rotated
+    /// once. Torque of either sign is present while the speed passes zero in either direction.
     #[test]
     fn quadrants_are_all_four() {
         let parts = Kind::Quadrants.parts(&mut seeded(1));
@@ -393,7 +393,7 @@ mod tests {
             let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
             assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");
             let steps = parts.windows(2).map(|two| (two[1].reference.0 - two[0].reference.0).abs());
-            // Two uniform values within ±0.2 A are 0.133 A apart in the mean.
+            // Two uniform values within ±0.2 A differ by 0.133 A in the mean.
             let mean = steps.sum::<f64>() / (parts.len() - 1) as f64;
             assert!((mean - 0.133).abs() < 0.015, "{hz}: {mean}");
             let turns: Vec<f64> =

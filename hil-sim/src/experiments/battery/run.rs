@@ -1,24 +1,25 @@
-//! One run of the battery.
+//! One run of the stress test.
 
 use super::bench::Bench;
 use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit, torque_nm};
 use super::trial::{Refused, Trial};
 use crate::prelude::*;
 
-/// Time after the first reference that the statistics of the error leave out, s: the angle settles.
+/// Time after the first reference that the statistics of the error exclude, s: the angle settles.
 const SETTLING_S: f64 = 0.5;
-/// Pace of a reference that changes gradually, s.
+/// Step time of a reference that changes gradually, s.
 const PACE_S: f64 = 0.01;
-/// How fast the dynamometer gets up to speed, rpm/s.
+/// Acceleration of the dynamometer, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
-/// Longest start and longest learning, s.
+/// Longest start and longest saliency self-commissioning, s.
 pub const LONGEST_START_S: f64 = 30.0;
 const LONGEST_LEARNING_S: f64 = 1000.0;
 
-/// Lets a drive learn with the shaft locked; returns it off, or the number of the fault with which it refused.
+/// Runs the saliency self-commissioning of a drive with the shaft locked; returns the drive, off, or the number of the
+/// fault with which it refused.
 ///
 /// # Errors
-/// When the plant is refused, or the drive neither learns nor says why.
+/// If the plant is refused, or the drive neither learns nor gives a reason.
 pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive, u8>, Error> {
     let mut bench = Bench::new(config, &drive, Load::Locked, seed)?;
     bench.rig.command(&Command::Start(Mode::Learning))?;
@@ -34,7 +35,7 @@ pub fn learned(config: &Config, drive: Drive, seed: u64) -> Result<Result<Drive,
 /// Does one run with a copy of a drive that is off. The configuration scales currents, speeds and torques.
 ///
 /// # Errors
-/// When the plant is refused, or the drive refuses a command.
+/// If the plant is refused, or the drive refuses a command.
 pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Trial, Error> {
     let mut random = seeded(seed);
     let parts = kind.parts(&mut random);
@@ -73,10 +74,10 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
     Ok(bench.finish(still).0)
 }
 
-/// A bench whose drive regulates torque while a dynamometer holds this speed, rpm; none when it did not get there.
+/// Makes a bench whose drive regulates torque while a dynamometer holds this speed, rpm; none if the drive did not reach that state.
 ///
 /// # Errors
-/// When the plant is refused, or the drive refuses to start.
+/// If the plant is refused, or the drive refuses to start.
 pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Option<Bench>, Error> {
     let mut bench = Bench::new(config, drive, Load::Speed { speed: 0.0 }, seed)?;
     bench.rig.command(&Command::Start(Mode::Torque))?;
@@ -85,10 +86,10 @@ pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Optio
     Ok(regulates.then_some(bench))
 }
 
-/// Brings a held shaft up to speed without torque; says whether the drive regulated to the end.
+/// Brings a held shaft up to speed without torque; returns whether the drive regulated to the end.
 ///
 /// # Errors
-/// When the plant is refused.
+/// If the plant is refused.
 pub fn bring_up(bench: &mut Bench, shaft: Shaft, config: &Config) -> Result<bool, Error> {
     let Shaft::Held(rpm) = shaft else { return Ok(true) };
     let speed = config.rpm(rpm) * TAU / 60.0;
@@ -102,11 +103,11 @@ pub fn bring_up(bench: &mut Bench, shaft: Shaft, config: &Config) -> Result<bool
     Ok(bench.watch(0.3))
 }
 
-/// Follows the references. Returns the last one as the drive has taken it, A or rpm; none when it did not regulate to the
-/// end.
+/// Follows the references. Returns the last reference as the drive accepted it, A or rpm; none if it did not regulate
+/// to the end.
 ///
 /// # Errors
-/// When the plant is refused, or the drive refuses a reference.
+/// If the plant is refused, or the drive refuses a reference.
 pub fn follow(
     bench: &mut Bench,
     mode: Mode,
@@ -152,14 +153,14 @@ mod tests {
     use super::super::disturbed::Asymmetry;
     use super::*;
 
-    /// A lower limit is seen in every run, and the torque is judged by the command that was taken: with 0.5 A for any
-    /// command the error stays that of a sound drive, a few per cent of the torque at the limit.
+    /// A lower limit is visible in every run, and the torque is judged by the accepted command. With 0.5 A for any
+    /// command the error stays that of a healthy drive, a few per cent of the torque at the limit.
     #[test]
     fn a_lower_limit_is_seen_and_torque_is_judged_by_what_was_taken() {
         let config = Config::default();
         let of = |limit: Option<f32>| {
             let mut settings = config.drive;
-            // Beside the 0.7 A of the flux this leaves 0.5 A.
+            // With the 0.7 A of the flux this leaves 0.5 A.
             (settings.limits.current_a, settings.limits.inverter_a) = (limit, Some(3.5));
             settings.braking.flux_a = Some(0.0);
             if limit.is_some() {
@@ -178,9 +179,10 @@ mod tests {
         }
     }
 
-    /// A dragged shaft takes the rotor flux of the motor through zero frequency while the torque brakes or drives: its angle,
-    /// from the plant, turns one way before and the other way after, and between them the torque is that of 2.25 A or more
-    /// beside the 0.7 A of the flux, 3/2 P L_m^2/L_r i_d i_q. Into and out of generating, at 5 to 300 rpm/s.
+    /// A driven shaft takes the rotor flux of the motor through zero frequency while the torque brakes or drives. The
+    /// flux angle of the plant rotates one way before and the other way after. In between, the torque is that of 2.25 A
+    /// or more with the 0.7 A of the flux, 3/2 P L_m^2/L_r i_d i_q. Covers into and out of generating, at 5 to 300
+    /// rpm/s.
     #[test]
     fn a_dragged_shaft_takes_the_flux_through_zero_frequency_under_torque() {
         let config = Config::default();

@@ -1,28 +1,28 @@
-//! The verdict over many runs of the battery.
+//! The verdict on many runs of the stress test.
 
 use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
 use crate::prelude::*;
 
 /// The meaning of the columns.
-pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference on. Lost: beyond 45° at \
-    any time from the start on. Wrong: beyond 30° for more than 0.5 s, interruptions up to 0.1 s included. Flux off: below half or above \
-    twice that of the magnetising current for more than 0.5 s. Silent: wrong or flux off. Stuck: silent to the end of the \
-    run. Trips: stopped by a fault while it regulates. Sound: trips with the angle within 30° and the flux within a factor \
-    of two at all times before. Limited: the drive allows less torque current than the nominal limit. After the flux was \
-    turned at once, wrong and flux off count from there, and the error no more.";
+pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference. Lost: beyond 45° at \
+    any time after the start. Wrong: beyond 30° for more than 0.5 s, interruptions up to 0.1 s included. Flux off: below half or above \
+    twice that of the magnetising current for more than 0.5 s. Silent: undetected, wrong or flux off. Stuck: silent to the end of the \
+    run. Trips: stopped by a fault while it regulates. Sound: healthy, trips with the angle within 30° and the flux within a factor \
+    of two at all times before. Limited: the drive allows less q-axis current than the nominal limit. After a sudden rotation of \
+    the flux, wrong and flux off count from there, and the error no longer counts.";
 
-/// A time of a run, s, and the number of a fault.
+/// A duration in a run, s, and the number of a fault.
 type Seconds = fn(&Trial) -> f64;
 type Number = fn(&Trial) -> Option<u8>;
 
-/// States that should not last: in the metrics, in the table, and how long they did, s.
+/// States that should not last: name in the metrics, head in the table, and duration, s.
 const LASTING: [(&str, &str, Seconds); 3] = [
     ("wrong", "wrong (longest)", |trial| trial.wrong_s),
     ("beyond_45_deg", "beyond 45° (longest)", |trial| trial.lost_s),
     ("flux_off", "flux off (longest)", |trial| trial.flux_off_s),
 ];
-/// Ends by a fault: all of them and each in the metrics, in the table, and the number of the fault.
+/// Ends by a fault: metrics of all and of each fault, head in the table, and the number of the fault.
 const ENDS: [(&str, &str, &str, Number); 2] = [
     ("trips", "trips_by_fault", "trips, fault: runs", |trial| trial.trip),
     ("refused_starts", "refused_by_fault", "refused, fault: runs", Trial::refused_by),
@@ -32,12 +32,12 @@ const ENDS: [(&str, &str, &str, Number); 2] = [
 pub struct Summary<'a>(Vec<&'a Trial>);
 
 impl<'a> Summary<'a> {
-    /// That of these runs.
+    /// Makes the summary of these runs.
     pub fn of(trials: impl IntoIterator<Item = &'a Trial>) -> Self {
         Self(trials.into_iter().collect())
     }
 
-    /// How many runs are so.
+    /// Counts the runs with a property.
     pub fn count(&self, is: impl Fn(&Trial) -> bool) -> usize {
         self.0.iter().filter(|trial| is(trial)).count()
     }
@@ -49,7 +49,7 @@ impl<'a> Summary<'a> {
         error
     }
 
-    /// The magnitude that 99 % of all samples stay below, to 0.1°; not a number without samples.
+    /// The magnitude that 99 % of all samples stay below, to 0.1°; not a number if there are no samples.
     pub fn p99_deg(&self) -> f64 {
         let mut histogram: BTreeMap<u32, u64> = BTreeMap::new();
         for &(class, count) in self.0.iter().flat_map(|trial| &trial.histogram) {
@@ -64,12 +64,12 @@ impl<'a> Summary<'a> {
         class.map_or(f64::NAN, |(class, _)| f64::from(class + 1) / CLASSES_PER_DEG)
     }
 
-    /// The least limit of the torque current that a drive has learned, in relation to the nominal one.
+    /// The lowest limit of the q-axis current that a drive has learned, relative to the nominal limit.
     pub fn limit_share(&self) -> Option<f64> {
         self.0.iter().filter_map(|trial| trial.limit_share).reduce(f64::min)
     }
 
-    /// Number of runs by number of the fault.
+    /// Returns the number of runs by number of the fault.
     fn by_fault(&self, of: Number) -> BTreeMap<u8, usize> {
         let mut faults = BTreeMap::new();
         for fault in self.0.iter().filter_map(|trial| of(trial)) {
@@ -78,13 +78,13 @@ impl<'a> Summary<'a> {
         faults
     }
 
-    /// How many runs were so for long, and the longest time, s.
+    /// Returns the number of runs in which a state lasted too long, and its longest duration, s.
     fn lasting(&self, of: Seconds) -> (usize, f64) {
         let longest = self.0.iter().map(|trial| of(trial)).fold(0.0, f64::max);
         (self.count(|trial| of(trial) > UNNOTICED_S), longest)
     }
 
-    /// As metrics.
+    /// Writes the summary as metrics.
     pub fn metrics(&self, metrics: &mut Metrics) {
         let mut set = |name: &str, value: f64| metrics.set(name, value);
         let error = self.error();
@@ -120,7 +120,7 @@ impl<'a> Summary<'a> {
         set("runs", self.0.len() as f64);
     }
 
-    /// As cells of a row, with the heads of their columns.
+    /// Returns the summary as cells of a row, with the heads of their columns.
     pub fn cells(&self) -> Vec<(&'static str, Cell)> {
         let error = self.error();
         let degrees = |value| Cell::fixed_or_dash((error.count() > 0).then_some(value), 2);
@@ -149,7 +149,7 @@ impl<'a> Summary<'a> {
     }
 }
 
-/// The runs of each kind, and all.
+/// Makes the table of the runs of each kind, and of all.
 pub fn by_kind(trials: &[Trial]) -> Table {
     let mut kinds: Vec<Option<Kind>> = Vec::new();
     for trial in trials {
@@ -168,7 +168,7 @@ pub fn by_kind(trials: &[Trial]) -> Table {
     Table::new("By kind", &[]).records(kinds.into_iter().map(of_kind).chain([all]))
 }
 
-/// The silent runs, each with its disturbances in words.
+/// Makes the table of the silent (undetected) runs, each with its disturbances in words.
 pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table {
     let (disturbances, end) = (&disturbances, |trial: &Trial| match trial.trip {
         Some(fault) => format!("fault {fault}"),
@@ -185,11 +185,11 @@ pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table
         "disturbances" => Cell::from(disturbances(number));
     ];
     let silent = trials.iter().enumerate().filter(|(_, trial)| trial.is_silent());
-    Table::of("Silently wrong", &columns, silent)
-        .note("Disturbances: of the page Statistics, in relation to their full sizes.")
+    Table::of("Undetected errors", &columns, silent)
+        .note("Disturbances: those of the page Statistics, relative to their full sizes.")
 }
 
-/// Rms and largest error of every run, by its number.
+/// Draws rms and largest error of every run, by its number.
 pub fn figure(trials: &[Trial]) -> Figure {
     let points = |of: fn(&Trial) -> f64| {
         let regulated = (0..).zip(trials).filter(|(_, trial)| trial.error.count() > 0);
@@ -218,7 +218,7 @@ mod tests {
         trial
     }
 
-    /// 1000 samples from 0.05° to 99.95° in steps of 0.1°, in two runs: 990 are below 99.0°.
+    /// Two runs with 1000 samples from 0.05° to 99.95° in steps of 0.1°: 990 are below 99.0°.
     #[test]
     fn the_percentile_is_over_all_samples_of_all_runs() {
         let errors: Vec<f64> = (0..1000).map(|n| (f64::from(n) + 0.5) * 0.1).collect();

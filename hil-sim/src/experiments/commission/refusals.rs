@@ -1,4 +1,4 @@
-//! Defects of motor, wiring, sensors and board: are they refused, by name?
+//! Tests whether defects of motor, wiring, sensors and board are refused by name.
 
 use drive_commission::{Commissioning, Meaning, Refusal, Step};
 use drive_core::Sample;
@@ -16,21 +16,21 @@ pub const EXPERIMENT: Experiment = Experiment::new("commission-refusals", whole:
     .uses(&[BENCH, DRIVE, &["load.", "spread.machine", "runs"]]);
 
 const RUNS: u32 = 50;
-/// The steps that are done.
+/// The first and the last step of a session.
 const STEPS: (Step, Step) = (Step::Nameplate, Step::CurrentLoop);
 
 /// A defect.
 struct Defect {
     name: &'static str,
-    /// Makes it, in the configuration of bench and drive.
+    /// Makes the defect in the configuration of bench and drive.
     make: fn(&mut Config),
-    /// Makes it, on the bench.
+    /// Makes the defect on the bench.
     on_bench: fn(&mut Rig),
-    /// Makes it, in what the sensors say.
+    /// Makes the defect in the sensor readings.
     sensors: fn(&mut Sample),
-    /// Whether this refusal names it.
+    /// Whether this refusal names the defect.
     named: fn(&Refusal) -> bool,
-    /// Step that is aborted.
+    /// The step that is aborted.
     abort: Option<Step>,
 }
 
@@ -38,14 +38,14 @@ struct Defect {
 const NONE: Defect =
     Defect { name: "", make: |_| {}, on_bench: |_| {}, sensors: |_| {}, named: |_| false, abort: None };
 
-/// Codes of the channels without current.
+/// ADC counts of the channels without current.
 const ZERO: [u16; 2] = [2022, 2015];
 
 fn meant(refusal: &Refusal, meaning: Meaning) -> bool {
     matches!(refusal, Refusal::Value { meaning: m, .. } if *m == meaning)
 }
 
-/// A motor whose resistances and inductances are all this multiple.
+/// Scales the resistances and inductances of a motor by a common factor.
 fn scaled(config: &mut Config, factor: f64) {
     let m = &mut config.motor;
     for value in [&mut m.r_s, &mut m.r_r, &mut m.l_ls, &mut m.l_lr, &mut m.l_m] {
@@ -54,7 +54,7 @@ fn scaled(config: &mut Config, factor: f64) {
     config.saliency.psi_n = None;
 }
 
-/// Iron whose main flux saturates.
+/// Makes a motor with saturation of the main flux.
 fn saturating(config: &mut Config) {
     config.saliency = Config::default().saliency;
     (config.model.plant, config.model.flux_level) = (PlantModel::M4, FluxLevel::High);
@@ -104,7 +104,7 @@ fn abort_within(step: Step) -> u32 {
     }
 }
 
-/// The sessions: `runs` of each defect.
+/// The sessions: `runs` with each defect.
 pub struct Refusals {
     config: Config,
     seed: u64,
@@ -116,7 +116,7 @@ pub struct Refusals {
 pub struct Record {
     /// The answer.
     answer: String,
-    /// Whether it names the defect; and whether the outputs are off and the settings as they were.
+    /// Whether the answer names the defect; and whether the outputs are off and the settings unchanged.
     named: bool,
     unchanged: bool,
     seconds: f64,

@@ -6,30 +6,30 @@ use drive_core::{AlphaBeta, Motor, Sample, TestSignal};
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
 use crate::prelude::*;
 
-/// Control periods from one poll of the main loop to the next.
+/// Number of control periods between two polls of the main loop.
 const POLL: u32 = 6;
 /// Longest session, s.
 const LONGEST_S: f64 = 100.0;
 
-/// A session: what was reported, and what happened to the motor.
+/// A session: its reports, and the effects on the motor.
 pub struct Session {
     /// The bench.
     pub rig: Rig,
     /// The commissioning at its end.
     pub commissioning: Commissioning,
-    /// The reports, with the time at which each came, s.
+    /// The reports, each with its time, s.
     pub reports: Vec<(f64, Report)>,
     /// Time until the drive was off, s.
     pub seconds: f64,
-    /// Largest turn of the shaft, mechanical degrees.
+    /// Largest rotation of the shaft, mechanical degrees.
     pub shaft_deg: f64,
     /// Largest phase current, A.
     pub largest_a: f64,
-    /// Transient inductance of a motor of iron at the operating points of the carrier, mean along and across it, H.
+    /// Transient inductance of a motor with saturation at the operating points of the injection, mean along and across it, H.
     pub leakage: Option<f64>,
 }
 
-/// The transient inductance of a motor of iron at its present currents, along and across phase a, H.
+/// Transient inductance of a motor with saturation at its present currents, along and across phase a, H.
 fn transient(rig: &Rig) -> Option<[f64; 2]> {
     let motor = rig.plant.energy_model()?;
     let rate = |volts| {
@@ -42,20 +42,20 @@ fn transient(rig: &Rig) -> Option<[f64; 2]> {
     Some([1.0 / along.re, 1.0 / across.im])
 }
 
-/// Where a session is stopped from outside.
+/// Point at which a session is stopped from outside.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Abort {
     /// The step.
     pub step: Option<Step>,
-    /// Control periods within it.
+    /// Control periods after its beginning.
     pub after: u32,
 }
 
 impl Session {
-    /// Runs the steps from `first` to `last`; `sensors` changes what they say.
+    /// Runs the steps from `first` to `last`; `sensors` changes the sensor readings.
     ///
     /// # Errors
-    /// When the drive refuses a command, or the session does not end.
+    /// If the drive refuses a command, or the session does not end.
     pub fn run(
         mut rig: Rig,
         mut commissioning: Commissioning,
@@ -133,20 +133,20 @@ impl Session {
         Err(Error::Refused(format!("the commissioning does not end in {LONGEST_S} s")))
     }
 
-    /// Time until the last report of a step up to this one, s.
+    /// Returns the time until the last report of a step up to this one, s.
     pub fn until(&self, step: Step) -> f64 {
         let earlier = self.reports.iter().filter(|(_, report)| report.step <= step);
         earlier.map(|(at, _)| *at).fold(0.0, f64::max)
     }
 
-    /// Why it was refused.
+    /// Returns the reason why the session was refused.
     pub fn refusal(&self) -> Option<(Step, Refusal)> {
         let refused = |(_, report): &(f64, Report)| Some((report.step, report.refusal?));
         self.reports.iter().find_map(refused)
     }
 }
 
-/// The settings of a drive that knows its nameplate, but not its motor.
+/// Returns the settings of a drive that knows its nameplate, but not its motor.
 pub fn unaware(config: &Config) -> Settings {
     Settings { motor: Motor::default(), ..config.drive }
 }

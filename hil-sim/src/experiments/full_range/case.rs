@@ -1,12 +1,12 @@
-//! What is run: each kind in the regions of the speed that it is for.
+//! The cases: each kind in the regions of the speed for which it is intended.
 
 use crate::experiments::battery::Shaft;
 use crate::prelude::*;
 
-/// Ends of the regions, rpm on four poles. The injection alone gives the angle up to 450 rpm and the motor's own voltage from
-/// 600 rpm on, the carrier is off above 750 rpm, and the field is weakened in the last.
+/// Limits of the regions, rpm on four poles. The angle comes from the injection alone up to 450 rpm and from the
+/// back-EMF above 600 rpm. The injection is off above 750 rpm, and field weakening is active in the last region.
 const REGIONS_RPM: [f64; 9] = [0.0, 150.0, 350.0, 550.0, 750.0, 1200.0, 1800.0, 2700.0, 3600.0];
-/// Speed of the kinds that have but one, rpm.
+/// Speed of the kinds that use only one, rpm.
 pub const ONE_RPM: f64 = 1800.0;
 
 /// A kind in a region.
@@ -14,12 +14,12 @@ pub const ONE_RPM: f64 = 1800.0;
 pub struct Case {
     /// The kind.
     pub kind: RangeKind,
-    /// From and to, rpm on four poles.
+    /// Lower and upper limit, rpm on four poles.
     pub region: (f64, f64),
 }
 
 impl Case {
-    /// All of one kind, or of all kinds.
+    /// Returns all cases of one kind, or of all kinds.
     pub fn all(only: Option<RangeKind>) -> Vec<Self> {
         let kinds = RangeKind::VALUES.iter().copied();
         let kinds = kinds.filter(|kind| only.is_none_or(|only| only == *kind));
@@ -36,31 +36,31 @@ impl Case {
         }
     }
 
-    /// For metrics: `constant_550_750`.
+    /// Returns the name for metrics: `constant_550_750`.
     pub fn name(&self) -> String {
         let kind = self.kind.word().replace('-', "_");
         format!("{kind}_{}_{}", self.region.0, self.region.1)
     }
 
-    /// In words.
+    /// Returns the name in words.
     pub fn words(&self) -> String {
         format!("{}, {} to {} rpm", self.kind.word(), self.region.0, self.region.1)
     }
 
-    /// The shaft at a speed, rpm on four poles.
+    /// Returns the shaft at a speed, rpm on four poles.
     pub fn shaft(&self, rpm: f64) -> Shaft {
         let free = self.kind == RangeKind::LoadSteps || has_one_speed(self.kind);
         if free { Shaft::Free } else { Shaft::Held(rpm) }
     }
 
-    /// A speed in the region, of either sign, rpm on four poles; that of the kinds that have but one.
+    /// Returns a random speed in the region, of either sign, rpm on four poles; or the speed of the kinds that use only one.
     pub fn speed(&self, random: &mut impl Rng) -> f64 {
         let speed = random.random_range(self.region.0..=self.region.1);
         sign(random) * if has_one_speed(self.kind) { ONE_RPM } else { speed }
     }
 }
 
-/// Whether the runs of a kind have but one speed, which the drive regulates.
+/// Whether the runs of a kind use only one speed, which the drive regulates.
 fn has_one_speed(kind: RangeKind) -> bool {
     matches!(kind, RangeKind::Ramps | RangeKind::HotRamps | RangeKind::Braking | RangeKind::Outage)
 }

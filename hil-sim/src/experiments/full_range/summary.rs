@@ -1,4 +1,4 @@
-//! The verdict over the runs, per kind and region.
+//! The verdict on the runs, for each kind and region.
 
 use super::case::Case;
 use crate::experiments::battery::{Moment, Refused, Trial};
@@ -6,13 +6,13 @@ use crate::prelude::*;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: true minus estimated, over all samples that count: at constant torque and in reversals from 0.5 s \
-    after the first torque on, after a start on a turning shaft from 0.1 s to 0.7 s after the torque, until the flux is turned, and \
-    otherwise from the end of the run-up on. Lost: stopped by a fault, or beyond 45° at any time; a turned flux may end in a stop. \
-    Refused: not started; no failure where the shaft turns too fast to be caught (fault 47). \
-    Silent: beyond 45° for more than 0.5 s while the drive regulates. Current: the largest of a phase, carrier included. Took: until \
-    a turning shaft was caught, or a braked one stood.";
+    after the first torque, after a flying start from 0.1 s to 0.7 s after the torque, until the flux is rotated, and \
+    otherwise from the end of the run-up. Lost: stopped by a fault, or beyond 45° at any time; a rotated flux may end in a stop. \
+    Refused: not started; no failure if the shaft turns too fast for a flying start (fault 47). \
+    Silent: undetected, beyond 45° for more than 0.5 s while the drive regulates. Current: the largest of a phase, injection included. Took: \
+    until a flying start found the flux, or a braked shaft stopped.";
 
-/// Lost: stopped by a fault, or beyond 45°; after a turn of the flux neither counts.
+/// Whether a run was lost: stopped by a fault, or beyond 45°. After a rotation of the flux neither counts.
 fn is_lost(case: &Case, run: &Trial) -> bool {
     run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
 }
@@ -20,17 +20,17 @@ fn is_lost(case: &Case, run: &Trial) -> bool {
 /// A run with its case and number.
 pub type Done = (Case, usize, Trial);
 
-/// Of how many runs it is so.
+/// Counts the runs with a property.
 fn count(done: &[&Done], is: impl Fn(&Case, &Trial) -> bool) -> f64 {
     done.iter().filter(|(case, _, run)| is(case, run)).count() as f64
 }
 
-/// The verdict on some runs: names in the metrics, heads of the columns, numbers, and decimals where they are no counts.
+/// The verdict on some runs: names in the metrics, heads of the columns, numbers, and decimals if they are not counts.
 fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize>)> {
     let started = || done.iter().map(|(_, _, run)| run).filter(|run| run.refused.is_none());
     let mut error = Stats::default();
     started().for_each(|run| error.add(&run.error));
-    // Not a number where none has started.
+    // Not a number if no run has started.
     let largest = |of: fn(&Trial) -> f64| started().map(of).fold(f64::NAN, f64::max);
     let least_v = started().map(|run| run.dc_link_v.0).fold(f64::NAN, f64::min);
     let largest_deg = if error.count() > 0 { error.largest() } else { f64::NAN };
@@ -50,7 +50,7 @@ fn verdict(done: &[&Done]) -> Vec<(&'static str, &'static str, f64, Option<usize
     ]
 }
 
-/// Metrics, table and failures of all runs.
+/// Adds metrics, table and failures of all runs.
 pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
     let mut table = Table::new("By kind and region", &[]);
     for case in cases {
@@ -69,7 +69,7 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
             let name = format!("{}_torque_error_mean_pct", case.name());
             outcome.metrics.set(name, 100.0 * torque.mean());
         }
-        // In the table the least voltage stands before the most.
+        // In the table the lowest voltage stands before the highest.
         verdict.swap(8, 9);
         let cell = |value: f64, decimals: Option<usize>| match decimals {
             None => Cell::from(value.to_string()),
@@ -93,10 +93,10 @@ pub fn of(cases: &[Case], done: &[Done], outcome: &mut Outcome) {
     }));
 }
 
-/// Speed of the shaft beyond which a start refuses to follow it, rpm on four poles.
+/// Speed of the shaft above which a flying start is refused, rpm on four poles.
 const CAUGHT_RPM: f64 = 2700.0;
 
-/// The refusal of a shaft that turns too fast to be caught: a number of the table, and no failure.
+/// Whether a flying start was refused because the shaft turns too fast: it counts in the table, but is no failure.
 fn too_fast(case: &Case, run: &Trial) -> bool {
     let turning = matches!(case.kind, RangeKind::TurningStart | RangeKind::ResidualStart);
     turning
@@ -104,7 +104,7 @@ fn too_fast(case: &Case, run: &Trial) -> bool {
         && run.refused == Some(Refused::Start(Fault::NotCaught.code()))
 }
 
-/// Why a run is none that a drive should have.
+/// Returns the reason why a run is a failure.
 fn failure(case: &Case, run: &Trial) -> Option<String> {
     if let Some(why) = &run.refused {
         return (!too_fast(case, run)).then(|| format!("not started: {why}"));
@@ -120,7 +120,7 @@ fn failure(case: &Case, run: &Trial) -> Option<String> {
     (!reason.is_empty()).then_some(reason)
 }
 
-/// The record of one run.
+/// Draws the curves of one run.
 pub fn figure(moments: &[Moment]) -> Figure {
     let panel = |label: &str, of: fn(&Moment) -> f64| {
         let points = moments.iter().map(|m| (m.t, of(m))).filter(|(_, y)| y.is_finite());

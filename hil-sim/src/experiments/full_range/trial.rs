@@ -1,4 +1,4 @@
-//! One run, and what is recorded of it.
+//! One run, and its record.
 
 use super::case::Case;
 use crate::experiments::battery::{
@@ -7,40 +7,40 @@ use crate::experiments::battery::{
 };
 use crate::prelude::*;
 
-/// Least and largest constant torque current, in relation to the current limit.
+/// Smallest and largest constant q-axis current, relative to the current limit.
 const TORQUE: (f64, f64) = (1.0 / 7.0, 6.0 / 7.0);
-/// Torque current of the steps and of the time after a start on a turning shaft, A on the dissertation's motor.
+/// q-axis current of the steps and of the time after a flying start, A on the dissertation's motor.
 const STEP_A: f64 = 3.0;
 const CAUGHT_A: f64 = 2.0;
 /// Load step, Nm on the dissertation's motor.
 const LOAD_NM: f64 = 0.97;
-/// Turn of the flux, degrees.
+/// Rotation of the flux, degrees.
 const TURN_DEG: (f64, f64) = (90.0, 180.0);
-/// Rise of the resistances of stator and rotor on a hot ramp, and the time that it takes, s.
+/// Relative rise of the resistances of stator and rotor on a hot ramp, and its duration, s.
 const RISE: (f64, f64) = (0.2, 0.3);
 const WARMING_S: f64 = 3.0;
-/// Error within which a turning shaft is caught, degrees, and the longest time for it, s.
+/// Error within which a flying start has found the flux, degrees, and the longest time for it, s.
 const CAUGHT_DEG: f64 = 15.0;
 const LONGEST_CATCH_S: f64 = 3.0;
-/// Time without current before a start with flux left, s.
+/// Time without current before a start with residual flux, s.
 const OFF_S: (f64, f64) = (0.02, 0.3);
-/// Inertia of the braked shaft in relation to the motor's, its ramp, rpm/s on four poles, and the longest stop, s.
+/// Inertia of the braked shaft relative to the motor's, its ramp, rpm/s on four poles, and the longest stop, s.
 const HEAVY: f64 = 5.0;
 const HEAVY_RAMP_RPM_PER_S: f64 = 300.0;
 const LONGEST_STOP_S: f64 = 60.0;
-/// Speed at which it has stopped, rpm on four poles.
+/// Speed below which the shaft counts as stopped, rpm on four poles.
 const STOPPED_RPM: f64 = 30.0;
 /// The dc link of braking and outage: capacitor, resistance of the mains, other load.
 const CAPACITOR_F: f64 = 470e-6;
 const SOURCE_OHM: f64 = 2.0;
 const OTHERS_W: f64 = 5.0;
 const OUTAGE_S: f64 = 1.0;
-/// The sag: share of the dc link that is left, how long it takes to come and to go, how long it lasts.
+/// The sag: share of the dc-link voltage that remains, times in which it falls and returns, and duration.
 const SAG: f64 = 230.0 / 311.0;
 const SAG_RAMP_S: f64 = 0.01;
 const SAG_S: f64 = 1.0;
 
-/// Gives a configuration what the shaft and the dc link of a case need.
+/// Adds the shaft and the dc link of a case to a configuration.
 pub fn set_up(case: Case, config: &mut Config) {
     if case.kind == RangeKind::Braking {
         config.motor.inertia *= HEAVY;
@@ -54,7 +54,7 @@ pub fn set_up(case: Case, config: &mut Config) {
     }
 }
 
-/// A run: the bench, and what was drawn for it.
+/// A run: the bench, and its random values.
 pub struct Run<'a> {
     case: Case,
     config: &'a Config,
@@ -66,11 +66,11 @@ pub struct Run<'a> {
     bench: Bench,
 }
 
-/// Why a run has ended before its time.
+/// Reasons for an early end of a run.
 enum End {
     /// The drive does not start.
     Refused(Refused),
-    /// It no longer regulates.
+    /// The drive no longer regulates.
     Stopped,
     Failed(Error),
 }
@@ -81,16 +81,16 @@ impl From<Error> for End {
     }
 }
 
-/// Goes on while the drive regulates.
+/// Continues while the drive regulates.
 fn still(regulates: bool) -> Result<(), End> {
     if regulates { Ok(()) } else { Err(End::Stopped) }
 }
 
 impl<'a> Run<'a> {
-    /// With a copy of a drive that is off; the configuration is one of [`set_up`].
+    /// Makes a run with a copy of a drive that is off; the configuration comes from [`set_up`].
     ///
     /// # Errors
-    /// When the plant is refused.
+    /// If the plant is refused.
     pub fn new(
         case: Case,
         config: &'a Config,
@@ -117,10 +117,10 @@ impl<'a> Run<'a> {
         Ok(Self { case, config, rpm, i_q, sign, turn_deg, off_s, bench })
     }
 
-    /// Does the run; returns its record too, where there is one.
+    /// Does the run; also returns its curves, if they were requested.
     ///
     /// # Errors
-    /// When the plant is refused, or the drive refuses a reference.
+    /// If the plant is refused, or the drive refuses a reference.
     pub fn run(mut self) -> Result<(Trial, Vec<Moment>), Error> {
         let still = match self.course() {
             Ok(()) => true,
@@ -168,7 +168,7 @@ impl<'a> Run<'a> {
             }
             RangeKind::TurningStart => self.turning_start(),
             RangeKind::ResidualStart => {
-                // Refused by a drive that has stopped itself.
+                // A drive that has stopped itself refuses this command.
                 let _ = self.bench.rig.command(&Command::Stop(Stop::Coast));
                 self.bench.wait(LONGEST_START_S);
                 self.bench.coast(self.off_s);
@@ -203,7 +203,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Starts at rest and brings the shaft up to speed, without torque or by the drive.
+    /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
     fn up_to_speed(&mut self) -> Result<(), End> {
         self.start()?;
         let shaft = self.case.shaft(self.rpm);
@@ -221,13 +221,13 @@ impl<'a> Run<'a> {
         still(follow(&mut self.bench, mode, self.config, parts)?.is_some())
     }
 
-    /// Follows, and counts the error after so many seconds.
+    /// Follows the parts, and counts the error after this many seconds.
     fn counted(&mut self, after: f64, parts: &[Part]) -> Result<(), End> {
         self.bench.counted_from = Some(self.bench.time() + after);
         self.follow(parts)
     }
 
-    /// Through zero and back; on the way the motor warms up, or not.
+    /// Ramps through zero and back, with or without warming of the motor on the way.
     fn ramps(&mut self) -> Result<(), End> {
         let rate = f64::from(self.config.drive.ramp_rpm_per_s());
         let once = self.config.rpm(self.rpm.abs()) / rate;
@@ -247,14 +247,14 @@ impl<'a> Run<'a> {
         self.follow(&[Part::constant(-rpm, 2.0 * once + 0.7), Part::constant(0.0, once + 1.0)])
     }
 
-    /// A start while a dynamometer turns the shaft, then torque.
+    /// Starts while a dynamometer turns the shaft, then commands torque.
     fn turning_start(&mut self) -> Result<(), End> {
         let speed = self.config.rpm(self.rpm) * TAU / 60.0;
         self.bench.rig.set_load(Load::Speed { speed })?;
         let (from, i_q) = (self.bench.time(), self.sign * CAUGHT_A);
         self.bench.trial.peak_a = 0.0;
         self.start()?;
-        // The error of the first samples belongs to the catching.
+        // The error of the first samples belongs to the search for the flux.
         let before = self.bench.trial.largest_deg;
         loop {
             still(self.bench.watch(1.0 / 600.0))?;
@@ -270,7 +270,7 @@ impl<'a> Run<'a> {
         self.counted(0.1, &[Part::constant(i_q, 0.7)])
     }
 
-    /// From full speed to standstill.
+    /// Brakes from full speed to standstill.
     fn braking(&mut self) -> Result<(), End> {
         let from = self.bench.time();
         self.bench.counted_from = Some(from);
@@ -285,7 +285,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// A stiff dc link goes down and comes back under torque.
+    /// The voltage of a stiff dc link falls and returns under torque.
     fn sag(&mut self) -> Result<(), End> {
         self.counted(0.5, &[Part::constant(self.i_q, 1.0)])?;
         let nominal = self.config.inverter.dc_link_v;

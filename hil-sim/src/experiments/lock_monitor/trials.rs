@@ -1,4 +1,4 @@
-//! The trials of the experiment, each from a seed alone.
+//! The trials of the experiment, each determined by its seed alone.
 
 use drive_settings::words;
 
@@ -6,52 +6,52 @@ use crate::experiments::statistics::fault_code;
 use crate::experiments::steady::{OperatingPoint, at_speed};
 use crate::prelude::*;
 
-/// An error below this, degrees, counts as locked.
+/// Angle error below which the drive counts as locked, degrees.
 pub const LOCKED_DEG: f64 = 15.0;
-/// Least and largest torque current, A.
+/// Smallest and largest q-axis current, A.
 const IQ_A: (f64, f64) = (0.5, 3.0);
-/// How long a trial is watched after the angle was forced off, s.
+/// Time for which a trial is watched after the angle was forced off, s.
 const WATCH_S: f64 = 2.0;
 
-/// Why the drive stopped itself, if it did.
+/// Returns the fault with which the drive stopped itself, if it did.
 pub fn fault(rig: &Rig) -> Option<Fault> {
     rig.drive.state().fault()
 }
 
-/// A random operating point: speeds within ±`bound` rpm.
+/// Returns a random operating point with a speed within ±`bound` rpm.
 pub fn case(seed: u64, bound: f64) -> OperatingPoint {
     let mut random = seeded(seed);
     let sign = sign(&mut random);
-    // Every fifth at the least current, where the torque that a wrong angle makes is least.
+    // Every fifth trial has the smallest current, at which a wrong angle causes the smallest torque.
     let least = random.random_range(0..5) == 0;
     let length = if least { IQ_A.0 } else { random.random_range(IQ_A.0..=IQ_A.1) };
     OperatingPoint { rpm: random.random_range(-bound..=bound), iq: sign * length, seed }
 }
 
-/// The result of a trial of any part; what the part does not give is at its default.
+/// The result of a trial of any part; values that the part does not give have their defaults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Trial {
-    /// Where.
+    /// Operating point and seed.
     pub case: OperatingPoint,
     /// The fault with which the drive stopped.
     #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
-    /// With the angle forced off: the last moment, s after that, at which the drive was on with an error of 15° or more.
+    /// With the angle forced off: the last time, s after that, at which the drive was on with an error of 15° or more.
     pub wrong_s: f64,
-    /// Loss of saliency over time; only of the first trial of each offset, for the figure.
+    /// Saliency deficit over time; only for the first trial of each offset, for the figure.
     pub loss: Vec<(f64, f64)>,
-    /// Disturbance of a run that the drive must not stop, and the largest loss that the monitor saw.
+    /// Disturbance in a run in which the drive must not stop, and the largest deficit that the monitor measured.
     pub kind: Option<HealthyKind>,
     /// See `kind`.
     pub largest_loss: f64,
     /// Largest angle error of such a run, or in the half second after an accepted start, degrees.
     pub largest_deg: f64,
-    /// Of a shaft that is driven past the limit: acceleration, rpm/s, and time from the limit to off, s; not more than zero
-    /// when the drive stopped before.
+    /// For a shaft that is driven past the limit: acceleration, rpm/s, and time from the limit to the switch-off, s;
+    /// zero or less if the drive stopped before the limit.
     pub rpm_per_s: f64,
     /// See `rpm_per_s`.
     pub late_s: f64,
-    /// Whether the drive went on after a start or a relock on a turning shaft.
+    /// Whether the drive continued after a flying start or a relock on a turning shaft.
     pub accepted: bool,
 }
 
@@ -61,16 +61,16 @@ impl Trial {
         self.wrong_s <= if self.case.iq.abs() > IQ_A.0 { 0.5 } else { 1.5 }
     }
 
-    /// Whether a start was refused, or right.
+    /// Whether a start was refused, or led to a right angle.
     pub fn is_honest(&self) -> bool {
         !self.accepted || self.largest_deg < LOCKED_DEG
     }
 }
 
-/// Turns the rotor flux by `degrees` at a random moment.
+/// Rotates the rotor flux by `degrees` at a random moment.
 ///
 /// # Errors
-/// As [`at_speed`], or when the drive stops before that moment.
+/// As [`at_speed`], or if the drive stops before that moment.
 pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Trial, Error> {
     let mut random = seeded(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
@@ -83,7 +83,7 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
     rig.plant.turn_rotor_flux(degrees.to_radians());
     let (start, mut wrong_s, mut loss) = (rig.time(), 0.0, Vec::new());
     while rig.time() < start + WATCH_S && fault(&rig).is_none() {
-        // One carrier period: the drive itself acts no more often.
+        // One period of the injection: the drive itself acts no more often.
         rig.run(1.0 / 600.0, |p| {
             if p.angle_error_deg.abs() >= LOCKED_DEG {
                 wrong_s = p.t - start;
@@ -97,21 +97,21 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<Tri
 }
 
 words! {
-    /// Disturbance in a run that the drive must not stop, with its name in legends and tables.
+    /// Disturbance in a run in which the drive must not stop, with its name in legends and tables.
     #[derive(Serialize, Deserialize)]
     pub enum HealthyKind {
-        /// Nothing, at a low speed.
+        /// No disturbance, at a low speed.
         Slow = "within 150 rpm",
-        /// Nothing.
+        /// No disturbance.
         Fast = "within 300 rpm",
-        /// The torque reversed, at a low speed.
+        /// A reversal of the torque, at a low speed.
         Reversal = "torque reversed, within 150 rpm",
-        /// The speed regulated, and loaded.
+        /// A load step while the speed is regulated.
         LoadStep = "free shaft, load step of 0.6 Nm",
     }
 }
 
-/// Two seconds, after 0.3 s to settle, with the disturbance after one.
+/// Runs two seconds, after 0.3 s to settle; the disturbance comes after one second.
 ///
 /// # Errors
 /// As [`at_speed`].
@@ -137,12 +137,12 @@ pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<Trial, E
     Ok(result)
 }
 
-/// Speed loop of the load steps: its crossover, rad/s, well below the tracking loop's.
+/// Crossover of the speed loop in the load steps, rad/s, well below that of the tracking loop.
 const SPEED_LOOP: f64 = 4.4;
 /// Load, Nm.
 const LOAD_NM: f64 = 0.6;
 
-/// Speed regulated on the estimate of the drive, the load coming on after one second of two.
+/// Regulates the speed by the estimate of the drive; the load comes after one of two seconds.
 fn load_step(
     config: &Config,
     case: OperatingPoint,
@@ -177,7 +177,7 @@ fn load_step(
 /// Time for which a drive beyond the limit is watched, s.
 pub const OVER_SPEED_S: f64 = 0.5;
 
-/// From 70 % of `limit` rpm at a random acceleration past it.
+/// Accelerates at random from 70 % of `limit` rpm past the limit.
 ///
 /// # Errors
 /// As [`at_speed`].
@@ -198,7 +198,7 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<Trial, Error
     Ok(Trial { case, rpm_per_s, late_s, fault: fault(&rig), ..Trial::default() })
 }
 
-/// A start, or a relock of a drive that runs, at `rpm`.
+/// Starts a drive, or relocks a running one, at `rpm`.
 ///
 /// # Errors
 /// As [`Rig::from_config`] and [`at_speed`].
@@ -208,7 +208,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
     let mut rig = if relock {
         let mut rig = at_speed(config, case)?;
         rig.wait(0.5);
-        // Refused while the shaft turns.
+        // The drive refuses a relock while the shaft turns.
         if rig.command(&Command::Relock).is_err() {
             return Ok(result);
         }
@@ -229,7 +229,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Trial
     };
     if fault(&rig).is_none() {
         rig.run(0.5, |p| result.largest_deg = result.largest_deg.max(p.angle_error_deg.abs()));
-        // A drive that stops by itself in this time has not accepted the start.
+        // A drive that stops itself within this time has not accepted the start.
         result.accepted = fault(&rig).is_none();
     }
     Ok(result)

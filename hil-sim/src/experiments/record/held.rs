@@ -2,21 +2,23 @@
 
 use crate::prelude::*;
 
-/// Pace of the dynamometer, s, and of the lines of the figures.
+/// Time step of the dynamometer, s, and of the lines of the figures.
 const PACE_S: f64 = 0.001;
 const SHOWN_S: f64 = 0.5;
-/// Time constant of its filter of the slip, s; its gain from the angle of the flux to the electrical speed, 1/s, and the
-/// largest part that this has, rad/s; its largest electrical acceleration, rad/s^2, 200 rpm/s on four poles. It is slow
-/// against the drive: a faster one answers the noise of the angle with acceleration.
+/// Time constant of the dynamometer's slip filter, s; its gain from the flux angle to the electrical speed, 1/s, and
+/// the limit of that part, rad/s; its largest electrical acceleration, rad/s^2, which is 200 rpm/s on four poles. The
+/// dynamometer is slow compared with the drive, because a faster one would respond to the noise of the angle with
+/// acceleration.
 const SLIP_S: f64 = 2.0;
 const ANGLE_GAIN: f64 = 3.0;
 const ANGLE_MOST: f64 = 4.0;
 const ACCELERATION: f64 = 42.0;
 
-/// What is seen while torque is held.
+/// Observations while torque is held.
 #[derive(Default)]
 pub struct Held {
-    /// Angle error, electrical degrees; in the mean of the first and of the last minute, or tenth of a shorter time than ten.
+    /// Angle error, electrical degrees: over the whole time, and over the first and the last minute (or tenth, if the
+    /// time is shorter than ten minutes).
     pub error: Stats,
     /// See `error`.
     pub first: Stats,
@@ -24,13 +26,13 @@ pub struct Held {
     pub last: Stats,
     /// Torque of the motor, Nm.
     pub torque: Stats,
-    /// Largest angle of the rotor flux from where the dynamometer is to hold it, electrical degrees.
+    /// Largest distance of the rotor flux angle from its target, electrical degrees.
     pub travel_deg: f64,
-    /// Mean stator frequency: that of the rotor flux, electrical Hz.
+    /// Mean stator frequency, which is the frequency of the rotor flux, electrical Hz.
     pub stator_hz: f64,
     /// Speed of the rotor, rpm.
     pub speed: Stats,
-    /// Means of angle error, degrees, torque, Nm, and speed, rpm, at their times, s.
+    /// Means of angle error, degrees, torque, Nm, and speed, rpm, with their times, s.
     pub lines: [Vec<(f64, f64)>; 3],
     /// The fault with which the drive stopped.
     pub fault: Option<String>,
@@ -42,16 +44,16 @@ impl Held {
         self.fault.is_some() || self.error.largest() > LOST_DEG
     }
 
-    /// How far the mean of the last minute, or tenth, is from that of the first, degrees.
+    /// Difference between the means of the last and the first minute, or tenth, degrees.
     pub fn drift_deg(&self) -> f64 {
         self.last.mean() - self.first.mean()
     }
 
-    /// Watches for some seconds; `speed` gives the dynamometer's electrical speed, rad/s, of time and plant, and `at` is
-    /// where it holds the rotor flux, rad.
+    /// Watches for some seconds. `speed` computes the dynamometer's electrical speed, rad/s, from time and plant; `at`
+    /// is the target angle of the rotor flux, rad.
     ///
     /// # Errors
-    /// When the load is refused.
+    /// If the load is refused.
     pub fn watch(
         rig: &mut Rig,
         seconds: f64,
@@ -97,23 +99,24 @@ impl Held {
     }
 }
 
-/// A dynamometer that turns the rotor against the slip, so that the rotor flux stands: zero stator frequency. In steady state the slip is `T r_r/(3/2 P psi^2)`.
+/// A dynamometer that turns the rotor against the slip, so that the rotor flux is fixed: zero stator frequency. In
+/// steady state the slip is `T r_r/(3/2 P psi^2)`.
 pub struct Standstill {
     r_r: f64,
     slip: f64,
     speed: f64,
-    /// Where the flux is to stand, rad from phase a.
+    /// Target angle of the flux, rad from phase a.
     pub at: f64,
 }
 
 impl Standstill {
-    /// For the motor of the configuration, at rest.
+    /// Makes the dynamometer for the motor of the configuration, at rest.
     pub fn new(config: &Config) -> Self {
         let at = config.record.flux_deg.to_radians();
         Self { r_r: config.motor.r_r, slip: 0.0, speed: 0.0, at }
     }
 
-    /// The electrical speed of the rotor, rad/s, for the next millisecond.
+    /// Returns the electrical speed of the rotor, rad/s, for the next millisecond.
     pub fn speed(&mut self, plant: &Plant) -> f64 {
         let square = plant.rotor_flux().norm().powi(2);
         let slip = plant.torque() * self.r_r / (1.5 * plant.pole_pairs() * square);

@@ -1,4 +1,4 @@
-//! Scenarios as they are written: a TOML file, or the rows of a CSV file.
+//! Scenarios in files: a TOML file, or the rows of a CSV file.
 
 use toml::Spanned;
 
@@ -9,12 +9,12 @@ use crate::config::{Value, flattened};
 use crate::error::{cut, parser_text, unknown};
 use crate::prelude::*;
 
-/// A value from the beginning to the end of a part, straight between them.
+/// A value at the beginning and at the end of a part, with a straight line between them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ramp(pub f64, pub f64);
 
 impl Ramp {
-    /// From a number, or from two in a list.
+    /// Reads a number, or two in a list.
     fn of(value: &toml::Value) -> Option<Self> {
         let number = |value: &toml::Value| match Value::from_toml(value) {
             Value::Number(number) if number.is_finite() => Some(number),
@@ -29,7 +29,7 @@ impl Ramp {
     }
 }
 
-/// The columns of a part: references of the drive, and the shaft; the first five are those of a CSV file.
+/// The columns of a part: references of the drive, and the shaft. A CSV file has the first five.
 #[rustfmt::skip] // one a line
 static COLUMNS: [(&str, Result<&Reference, Shaft>); 7] = [
     ("torque_current_a", Ok(&REFERENCES[0])),
@@ -42,7 +42,7 @@ static COLUMNS: [(&str, Result<&Reference, Shaft>); 7] = [
 ];
 const IN_ROWS: usize = 5;
 
-/// The number that a metric takes from the values of a quantity.
+/// The number that a metric computes from the values of a quantity.
 #[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Statistic {
@@ -57,9 +57,9 @@ pub enum Statistic {
     Highest,
     /// Last value.
     Last,
-    /// How far the highest is beyond the last reference, %.
+    /// Excess of the highest value over the last reference, %.
     Overshoot,
-    /// When the magnitude was beyond `within` for the last time, s.
+    /// Last time at which the magnitude was beyond `within`, s.
     Settling,
 }
 
@@ -70,13 +70,13 @@ pub enum Over {
     /// All of them.
     #[default]
     All,
-    /// From half a second after the first reference on, or a tenth of a shorter run than five.
+    /// From half a second after the first reference, or a tenth of the run if it is shorter than five seconds.
     AfterStart,
     /// The last half second of each part.
     Settled,
 }
 
-/// A number made of the values of a quantity.
+/// A number that is computed from the values of a quantity.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Metric {
@@ -91,7 +91,7 @@ pub struct Metric {
     /// The samples that count.
     #[serde(default)]
     pub over: Over,
-    /// For [`Statistic::Settling`]; of a bound, the largest magnitude.
+    /// The band for [`Statistic::Settling`]; for a bound, the largest magnitude.
     #[serde(default)]
     pub within: f64,
 }
@@ -114,9 +114,9 @@ pub struct Line {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PanelText {
-    /// Label; unless given, that of the first line.
+    /// Label; if it is not given, the label of the first line.
     pub label: Option<String>,
-    /// Shown only with the synchronous demodulation, or only with others.
+    /// Whether the panel is shown only with the synchronous demodulation, or only with others.
     pub synchronous: Option<bool>,
     /// The lines.
     pub lines: Vec<Line>,
@@ -128,29 +128,29 @@ pub struct PanelText {
 pub struct Text {
     part: Vec<BTreeMap<Spanned<String>, Spanned<toml::Value>>>,
     settings: BTreeMap<String, Spanned<toml::Value>>,
-    /// Whether the values are those of the dissertation's motor, in proportion on others.
+    /// Whether the values are for the dissertation's motor and scale in proportion on others.
     pub in_proportion: bool,
-    /// Load whose multiples the parts give, unless `load.torque_nm` is set; Nm.
+    /// Load whose multiples the parts state, unless `load.torque_nm` is set; Nm.
     pub load_nm: f64,
     /// Whether means over the second half of each constant part are listed.
     pub levels: bool,
     /// Numbers for programs.
     pub metrics: Option<Vec<Metric>>,
-    /// Bounds; a run beyond one is lost.
+    /// Bounds; a run that exceeds one is lost.
     pub judge: Option<Vec<Metric>>,
-    /// Name of the figure for programs, its title, and what it reproduces.
+    /// Name of the figure for programs, its title, and the part of the source that it reproduces.
     pub figure: String,
     /// See `figure`.
     pub title: String,
     /// See `figure`.
     pub source: String,
-    /// Its panels, and quantities that have a panel of their own.
+    /// Its panels, and quantities that have their own panel.
     pub panel: Vec<PanelText>,
     /// See `panel`.
     pub columns: Vec<Named>,
-    /// Samples whose mean is a point; 0 for those of a carrier period.
+    /// Number of samples whose mean is a point; 0 for the samples of an injection period.
     pub samples: usize,
-    /// For the reader; `{KEY}` is the value of a key, `{load_nm}` the load.
+    /// Remarks for the reader; `{KEY}` is the value of a key, `{load_nm}` the load.
     pub remarks: Vec<String>,
 }
 
@@ -175,7 +175,7 @@ impl Text {
 }
 
 impl Scenario {
-    /// Reads a TOML file; the configuration gives its values their scale.
+    /// Reads a TOML file; the configuration determines the scale of its values.
     ///
     /// # Errors
     /// [`Error::Data`] with the line.
@@ -184,7 +184,7 @@ impl Scenario {
         Self::of_toml(path, &bounded::text(path).map_err(failed)?, config)
     }
 
-    /// The same from the text of the file.
+    /// Reads the text of a TOML file.
     ///
     /// # Errors
     /// [`Error::Data`] with the line.
@@ -230,7 +230,7 @@ impl Scenario {
         Ok(Self { text: scenario.text.completed(reference.column)?, ..scenario })
     }
 
-    /// Reads the rows of a CSV file: straight lines between them; two rows of the same time are a step.
+    /// Reads the rows of a CSV file. The values follow straight lines between the rows; two rows of the same time are a step.
     ///
     /// # Errors
     /// [`Error::Data`] with the line.
@@ -277,7 +277,7 @@ impl Scenario {
         Ok(Self { text, ..scenario })
     }
 
-    /// A part behind the others, with their last values.
+    /// Makes a part after the others, with their last values.
     fn next(&self) -> Part {
         let Some(last) = self.parts.last() else { return Part::default() };
         let stays = |Ramp(_, value)| Ramp(value, value);
@@ -285,7 +285,7 @@ impl Scenario {
         Part { begin: last.begin + last.seconds, reference, load, ..Part::default() }
     }
 
-    /// Takes a key of a part.
+    /// Reads a key of a part.
     fn set(
         &mut self,
         part: &mut Part,
@@ -320,7 +320,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// Puts the value of a column into a part. All parts regulate the same, and have the same kind of shaft.
+    /// Puts the value of a column into a part. All parts regulate the same quantity, and have the same kind of shaft.
     fn put(
         &mut self,
         part: &mut Part,
@@ -349,12 +349,12 @@ impl Scenario {
     }
 }
 
-/// The names of the references.
+/// Lists the names of the references.
 fn references() -> String {
     REFERENCES.each_ref().map(|reference| reference.column).join(", ")
 }
 
-/// Checks the time of a whole run, of which every sample is kept, against the range of the key `seconds`.
+/// Checks the total time of a run, of which every sample is stored, against the range of the key `seconds`.
 fn check_time(seconds: f64) -> Result<(), String> {
     match Config::default().set("seconds", &Value::Number(seconds)) {
         Err(Error::Value { value, problem, allowed, .. }) => Err(format!(

@@ -7,9 +7,9 @@ use crate::rig::Point;
 
 /// A sample of a run.
 pub struct Seen<'a> {
-    /// Truth and estimates.
+    /// True values and estimates.
     pub point: &'a Point,
-    /// The reference that was in force, and the actual value of the quantity that it is a reference of.
+    /// The reference in force, and the actual value of the referenced quantity.
     pub reference: f64,
     /// See `reference`.
     pub actual: f64,
@@ -26,7 +26,7 @@ pub struct Quantity {
     pub of: fn(&Seen<'_>) -> f64,
 }
 
-/// By name.
+/// All quantities, by name.
 #[rustfmt::skip] // one a line
 pub const QUANTITIES: &[Quantity] = &[
     Quantity { name: "reference", label: "reference", of: |s| s.reference },
@@ -55,9 +55,8 @@ pub const QUANTITIES: &[Quantity] = &[
     Quantity { name: "saliency_loss", label: "saliency loss", of: |s| s.point.loss },
 ];
 
-/// Torque by Eq. 4.4 from the currents of the drive and the angle error: 3/2 P psi |i| sin(Delta
-/// alpha), times L_m/L_r since psi is the rotor flux; Delta alpha = gamma - e, gamma from the
-/// measured currents.
+/// Torque by Eq. 4.4 from the currents of the drive and the angle error: 3/2 P psi |i| sin(Delta alpha), times L_m/L_r
+/// since psi is the rotor flux; Delta alpha = gamma - e, gamma from the measured currents.
 fn eq_4_4(p: &Point) -> f64 {
     let gamma = p.iq.atan2(p.id);
     let length = p.iq.hypot(p.id);

@@ -1,4 +1,4 @@
-//! The record of a run, and what is made of it.
+//! The record of a run, and its evaluation.
 
 use drive_core::carrier::CARRIER_SAMPLES;
 
@@ -8,39 +8,39 @@ use super::{Part, Reference, Scenario, Shaft};
 use crate::outcome::Step;
 use crate::prelude::*;
 
-/// Time between two references, s: they change at the pace of a host, not of the control.
+/// Time between two references, s: they change at the rate of a host, not of the control.
 const PACE_S: f64 = CARRIER_SAMPLES as f64 / RATE_HZ;
-/// A part begins with the reference whose time is not this much before it, s: sums of times are rounded.
+/// A part begins with the first reference that is not earlier than the part by more than this, s, because sums of times are rounded.
 const DUST_S: f64 = 1e-9;
-/// Time after the first reference that the angle takes from the position of the magnetising, and the end of a part in which
-/// it is settled; s.
+/// Time after the first reference in which the angle settles from the position of the magnetising, and the last time of
+/// a part in which the drive has settled; s.
 const SETTLING_S: f64 = 0.5;
 
-/// The samples of a run; times count from the first reference, positions from where the shaft was then.
+/// The samples of a run. Times count from the first reference, positions from the position of the shaft at that time.
 pub struct Record {
-    /// The samples, and the reference that was in force at each.
+    /// The samples, and the reference in force at each of them.
     pub points: Vec<Point>,
     references: Vec<f64>,
-    /// The configuration of the run, and the parts of it.
+    /// The configuration of the run, and its parts.
     pub config: Config,
     parts: Vec<Part>,
     reference: &'static Reference,
-    /// When the parts began, s.
+    /// Beginnings of the parts, s.
     begun: Vec<f64>,
-    /// The reference over time: its corners, or of a profile in rows its values.
+    /// The reference over time: its corners, or the values of a profile in rows.
     wanted: Vec<(f64, f64)>,
     events: Vec<(f64, String)>,
-    /// The first reference that the drive has limited: when, s, which, and to what.
+    /// The first reference that the drive has limited: its time, s, its value, and the limited value.
     pub limited: Option<(f64, f64, f32)>,
     /// The fault with which the drive has stopped itself.
     pub fault: Option<String>,
 }
 
 impl Scenario {
-    /// Runs it, until the drive stops itself.
+    /// Runs the scenario until its end, or until the drive stops itself.
     ///
     /// # Errors
-    /// When the configuration is refused, or the drive refuses a command or does not start.
+    /// If the configuration is refused, or the drive refuses a command or does not start.
     pub fn record(&self, context: &Context<'_>) -> Result<Record, Error> {
         let reference = self.reference();
         let (parts, seconds) = self.course(context.seconds);
@@ -132,7 +132,7 @@ impl Record {
         (quantity.of)(&Seen { point, reference, actual: (self.reference.actual)(point) })
     }
 
-    /// The values that a quantity has in the samples that count, with their times.
+    /// Returns the values of a quantity in the samples that count, with their times.
     fn values(&self, of: Named, over: Over) -> impl Iterator<Item = (f64, f64)> {
         let after = SETTLING_S.min(0.1 * self.end());
         let settled = |t: f64| {
@@ -150,7 +150,7 @@ impl Record {
         values.filter(|(_, value)| value.is_finite())
     }
 
-    /// A number made of the values of a quantity.
+    /// Computes a number from the values of a quantity.
     pub fn statistic(&self, metric: &Metric) -> f64 {
         let values = || self.values(metric.of, metric.over).map(|(_, value)| value);
         let stats = || Stats::of(values());
@@ -171,7 +171,7 @@ impl Record {
         }
     }
 
-    /// The metrics of a scenario; `lost` where it is judged.
+    /// Adds the metrics of a scenario, and `lost` if it is judged.
     pub fn metrics(&self, scenario: &Scenario, into: &mut Metrics) {
         for metric in scenario.text.metrics.iter().flatten() {
             into.set(metric.name.as_str(), self.statistic(metric));
@@ -186,7 +186,7 @@ impl Record {
         }
     }
 
-    /// Means over the second half of each part with a constant reference.
+    /// Computes means over the second half of each part with a constant reference.
     pub fn levels(&self) -> Vec<Step> {
         let of = |part: &Part| {
             let (from, to) = (part.begin + 0.5 * part.seconds, part.begin + part.seconds);
@@ -204,7 +204,7 @@ impl Record {
         self.parts.iter().filter(|part| part.reference.0 == part.reference.1).map(of).collect()
     }
 
-    /// A quantity over time: means over so many samples, at the time of the first of them.
+    /// Returns a quantity over time as means over this many samples, at the time of the first of them.
     fn line(&self, of: &Quantity, samples: usize) -> Vec<(f64, f64)> {
         let mean = |from: usize| {
             let part = from..self.points.len().min(from + samples);
@@ -214,12 +214,12 @@ impl Record {
         (0..self.points.len()).step_by(samples).map(mean).collect()
     }
 
-    /// Means over carrier periods of the quantity with this name.
+    /// Returns means over injection periods of the quantity with this name.
     pub fn means(&self, name: &str) -> Vec<(f64, f64)> {
         self.line(named(name).0, CARRIER_SAMPLES)
     }
 
-    /// The figure of a scenario: its panels, and one for each of its columns.
+    /// Draws the figure of a scenario: its panels, and one for each of its columns.
     pub fn figure(&self, scenario: &Scenario, config: &Config) -> Figure {
         let text = &scenario.text;
         let title = scenario.filled(&text.title, config);
@@ -247,7 +247,7 @@ impl Record {
         figure.events(self.events(scenario))
     }
 
-    /// The reference; beside single samples it ends with the last of them.
+    /// Returns the reference over time; beside single samples it ends with the last of them.
     fn wanted(&self, of: &Quantity, samples: usize) -> Vec<(f64, f64)> {
         let end = if samples == 1 { self.end() } else { f64::INFINITY };
         let value =
@@ -255,7 +255,7 @@ impl Record {
         self.wanted.iter().map(|&(t, reference)| (t.min(end), value(reference))).collect()
     }
 
-    /// Changes of the load, steps of the torque current, and at last a fault.
+    /// Returns changes of the load, steps of the q-axis current, and finally a fault.
     fn events(&self, scenario: &Scenario) -> Vec<(f64, String)> {
         let mut events = self.events.clone();
         if self.reference.mode == Mode::Torque && !scenario.from_rows {
@@ -270,13 +270,13 @@ impl Record {
     }
 }
 
-/// A quantity by its name in the program.
+/// Returns a quantity by its name in the program.
 fn named(name: &str) -> Named {
     Named(QUANTITIES.iter().find(|known| known.name == name).unwrap_or(&QUANTITIES[0]))
 }
 
 impl Metric {
-    /// A metric of all samples.
+    /// Makes a metric of all samples.
     pub fn of(name: impl Into<String>, of: &str, statistic: Statistic) -> Self {
         Self { name: name.into(), of: named(of), statistic, over: Over::All, within: 0.0 }
     }

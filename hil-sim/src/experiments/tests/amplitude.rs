@@ -1,4 +1,4 @@
-//! Angle error at standstill over the amplitude of the carrier.
+//! Angle error at standstill over the amplitude of the injection.
 
 use super::steady::{OperatingPoint, steady_run};
 use crate::prelude::*;
@@ -6,7 +6,7 @@ use crate::prelude::*;
 /// Not a figure of the source.
 pub const EXPERIMENT: Experiment = Experiment::new("amplitude", run)
     .stands_for("section 3.4")
-    .about("Angle error at standstill for three amplitudes of the carrier.")
+    .about("Angle error at standstill for three amplitudes of the injection.")
     .uses(&[BENCH, DRIVE, &["prepare.learn", "seconds"]])
     .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.amplitude_v"]]);
 

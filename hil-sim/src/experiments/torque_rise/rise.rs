@@ -1,4 +1,4 @@
-//! A step of the torque, and the figures of it.
+//! A step of the torque, and its characteristic numbers.
 
 use crate::prelude::*;
 use drive_core::carrier::CARRIER_SAMPLES;
@@ -11,13 +11,13 @@ const FINAL_S: f64 = 0.02;
 pub struct Response(pub Vec<f64>);
 
 impl Response {
-    /// The final value: the mean of the last 20 ms.
+    /// Returns the final value: the mean of the last 20 ms.
     pub fn end(&self) -> f64 {
         let last = &self.0[self.0.len() - (FINAL_S * RATE_HZ) as usize..];
         last.iter().sum::<f64>() / last.len() as f64
     }
 
-    /// Time from the command until this share of the final value is reached, ms; straight between two samples.
+    /// Returns the time from the command until this share of the final value is reached, ms, by a straight line between two samples.
     pub fn time_ms(&self, share: f64) -> f64 {
         let wanted = share * self.end();
         let reached = self.0.iter().position(|value| value / wanted >= 1.0);
@@ -29,7 +29,7 @@ impl Response {
         1e3 * (k as f64 + part) / RATE_HZ
     }
 
-    /// How far it goes beyond its final value, in relation to that.
+    /// Returns the excess over the final value, relative to the final value.
     pub fn overshoot(&self) -> f64 {
         self.0.iter().map(|value| value / self.end() - 1.0).fold(0.0, f64::max)
     }
@@ -37,8 +37,8 @@ impl Response {
 
 /// Response of the motor to a step of the torque reference from zero.
 pub struct Rise {
-    /// Torque current of the motor, A: its torque divided by the torque of an ampere. Mean over steps at all ten samples of a carrier period, in which
-    /// the carrier cancels.
+    /// q-axis current of the motor, A: its torque divided by the torque of an ampere. It is the mean over steps at all
+    /// ten samples of an injection period, which cancels the injection.
     pub current: Response,
     /// Largest current of a phase, A.
     pub peak_a: f64,
@@ -48,7 +48,7 @@ pub struct Rise {
 
 impl Rise {
     /// # Errors
-    /// [`Error::Refused`] when the drive refuses the command or stops.
+    /// [`Error::Refused`] if the drive refuses the command or stops.
     pub fn measured(rig: &Rig, i_q: f64) -> Result<Self, Error> {
         let mut currents = vec![0.0; (RECORDED_S * RATE_HZ) as usize];
         let (mut peak_a, mut angle_deg) = (0.0_f64, 0.0_f64);

@@ -16,7 +16,7 @@ const LEGEND_ROW: i32 = 20 * SCALE;
 /// Height of a row of events.
 const EVENT_ROW: i32 = 15 * SCALE;
 
-/// The series with their places in the palette.
+/// Returns the series with their places in the palette.
 pub fn places(panel: &Panel) -> impl Iterator<Item = (usize, &Series)> {
     let mut next = 0;
     panel.series.iter().map(move |series| {
@@ -28,13 +28,13 @@ pub fn places(panel: &Panel) -> impl Iterator<Item = (usize, &Series)> {
 /// An entry of a legend: name, style and place in the palette.
 pub type Entry<'a> = (&'a str, Style, usize);
 
-/// The named series.
+/// Returns the named series.
 pub fn legend(panel: &Panel) -> Vec<Entry<'_>> {
     let named = places(panel).filter(|(_, series)| !series.name.is_empty());
     named.map(|(place, series)| (series.name.as_str(), series.style, place)).collect()
 }
 
-/// Columns of a legend; generous, because the reader's fonts are not known.
+/// Number of columns of a legend; it is cautious, because the reader's fonts are not known.
 fn legend_columns(entries: &[Entry<'_>], width: i32) -> usize {
     let longest = entries.iter().map(|entry| entry.0.chars().count()).max().unwrap_or(0) as i32;
     ((width - LEFT - RIGHT) / ((50 + 7 * longest) * SCALE)).max(1) as usize
@@ -44,7 +44,7 @@ pub fn legend_height(entries: &[Entry<'_>], width: i32) -> i32 {
     LEGEND_ROW * entries.len().div_ceil(legend_columns(entries, width)) as i32
 }
 
-/// The legend in rows.
+/// Draws the legend in rows.
 pub fn draw_legend(area: &Area<'_>, entries: &[Entry<'_>], width: i32) -> Result<(), Failure> {
     let columns = legend_columns(entries, width);
     let cells =
@@ -69,11 +69,11 @@ pub struct Label<'a> {
     text: &'a str,
     x: i32,
     row: i32,
-    /// Whether the text ends at its x, because right of it there is no room.
+    /// Whether the text ends at its x, because there is no space to its right.
     ends: bool,
 }
 
-/// The events within a range of the horizontal axis, in the first row where they hide no other name.
+/// Places the events within a range of the horizontal axis, each in the first row where it hides no other name.
 pub fn labels<'a>(events: &'a [(f64, String)], range: &Range<f64>, page: i32) -> Vec<Label<'a>> {
     let mut events: Vec<_> =
         events.iter().filter(|(x, _)| (range.start..=range.end).contains(x)).collect();
@@ -101,7 +101,7 @@ pub fn labels_height(labels: &[Label<'_>]) -> i32 {
     EVENT_ROW * labels.iter().map(|label| label.row + 1).max().unwrap_or(0)
 }
 
-/// The names of the events, each with a line down to the plot.
+/// Draws the names of the events, each with a line down to the plot.
 pub fn draw_labels(area: &Area<'_>, labels: &[Label<'_>]) -> Result<(), Failure> {
     let bottom = labels_height(labels);
     for Label { text, x, row, ends } in labels {

@@ -5,7 +5,7 @@ use plotters::style::{Color as _, RGBColor, ShapeStyle};
 use super::SCALE;
 use crate::outcome::Style;
 
-/// Colours that can be told apart with any colour vision (Okabe and Ito).
+/// Colours that can be distinguished with any colour vision (Okabe and Ito).
 #[rustfmt::skip] // colours, side by side
 pub const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167), RGBColor(230, 159, 0),
@@ -15,13 +15,13 @@ pub const INK: RGBColor = RGBColor(51, 51, 51);
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 pub const GRID: RGBColor = RGBColor(230, 230, 230);
 
-/// The colours that take the place of the palette, ink, grey and grid in the dark.
+/// The colours that replace palette, ink, grey and grid in dark mode.
 const DARK: [&str; 10] = [
     "#3d9be0", "#ff7f32", "#2fc79a", "#e39bc4", "#ffbf3f", "#a6dcff", "#ffffff", "#e6e6e6",
     "#9a9fa6", "#33373d",
 ];
 
-/// Style sheet of a figure: in the dark its colours, which are attributes, are replaced.
+/// Returns the style sheet of a figure: in dark mode it replaces the colours, which are attributes.
 pub fn style() -> String {
     let light = PALETTE.into_iter().chain([INK, GREY, GRID]);
     let rules = light.zip(DARK).map(|(RGBColor(r, g, b), dark)| {
@@ -47,7 +47,7 @@ pub fn pen_of(style: Style, place: usize) -> ShapeStyle {
     }
 }
 
-/// Length of the dashes of a dashed line; a series without them has a colour of its own.
+/// Returns the length of the dashes of a dashed line; a series without dashes has its own colour.
 pub fn dash(style: Style) -> Option<i32> {
     match style {
         Style::Line | Style::Points => None,

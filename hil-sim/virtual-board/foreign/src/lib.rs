@@ -1,4 +1,4 @@
-//! The clock of all programs: 170 MHz from the crystal of the board, as the drive's.
+//! The clock of all programs: 170 MHz from the crystal of the board, as in the drive.
 #![no_std]
 
 use embassy_stm32::{Config, time::Hertz};

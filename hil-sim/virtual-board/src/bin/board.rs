@@ -39,7 +39,7 @@ fn main() -> ExitCode {
 }
 
 fn run(mut options: Options) -> Result<()> {
-    // Everything that can be refused, before the session begins.
+    // Everything that can be refused is checked before the session begins.
     let stage = PowerStage::named(&options.board)?;
     stage.suit(&mut options.input);
     let options = &options;
@@ -66,7 +66,7 @@ fn run(mut options: Options) -> Result<()> {
     ));
     if !kept && config.drive.injection.synchronous.allow_unlearned {
         say(
-            "Its flash begins with `injection.allow_unlearned yes`: the drive starts before it has learned. `defaults` takes that back.",
+            "Its flash begins with `injection.allow_unlearned yes`: the drive starts before it has learned. `defaults` reverts that.",
         );
     }
     let set_lines = virtual_board::Options::set_lines(stage, &config);
@@ -75,7 +75,7 @@ fn run(mut options: Options) -> Result<()> {
             "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",
         );
         set_lines.iter().for_each(|line| say(&format!("    {line}")));
-        // Scales are of the hardware.
+        // Scales belong to the hardware.
         ["apply", "confirm board"].into_iter().for_each(|line| say(&format!("    {line}")));
     }
     let inputs = Inputs {
@@ -103,7 +103,7 @@ fn image(stage: &PowerStage, elf: Option<&Path>) -> Result<Image> {
     image.map_err(|why| Error::Refused(format!("the firmware's ELF: {why:#}")).into())
 }
 
-/// Lines typed at the terminal, read by a thread of their own. Their end sets `stop`, if there is one.
+/// Reads lines typed at the terminal in a separate thread. The end of the input sets `stop`, if there is one.
 fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
     let (send, receive) = channel();
     std::thread::spawn(move || {
@@ -118,7 +118,7 @@ fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
     receive
 }
 
-/// Writes the page, its plots and the JSON object; where the page is.
+/// Writes the page, its plots and the JSON object; returns the path of the page.
 fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBuf> {
     let mut outcome = page::outcome(config, session);
     if session.behind_s > 0.0 {
@@ -144,7 +144,7 @@ fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBu
     Ok(path)
 }
 
-/// A line on standard output. A reader that has gone away is no reason to stop.
+/// Prints a line on standard output. A reader that has gone away does not stop the program.
 fn say(line: &str) {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());

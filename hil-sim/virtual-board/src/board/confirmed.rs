@@ -1,4 +1,4 @@
-//! The flash of a board whose bench steps were done: its settings, with the confirmation, saved.
+//! The flash of a board whose bench steps were done: its saved settings, with the confirmation.
 
 use anyhow::{Context, Result};
 use induction_drive::{board::settings_address, boards, settings::FirmwareSettings, store::codec};
@@ -6,7 +6,7 @@ use induction_drive::{board::settings_address, boards, settings::FirmwareSetting
 use super::Options;
 use crate::{memory::STORED, periph::flash::Flash};
 
-/// The settings of a board, confirmed.
+/// Returns the settings of a board, with the confirmation.
 ///
 /// # Errors
 /// The firmware has no such board.
@@ -18,7 +18,7 @@ pub fn settings(options: &Options) -> Result<FirmwareSettings> {
     Ok(settings)
 }
 
-/// Saves them.
+/// Saves these settings in the flash.
 ///
 /// # Errors
 /// As [`settings`].

@@ -1,4 +1,4 @@
-//! The control interrupt, as seen from outside: its inputs, its outputs and its cycles.
+//! The control interrupt as observed from outside: its inputs, its outputs and its cycles.
 
 use drive_core::{Compare, Hardware, Sample};
 
@@ -6,24 +6,24 @@ use super::Board;
 use crate::cost::{self, Block};
 use crate::{addresses::Addresses, power_stage::Sensors};
 
-/// One control interrupt, as seen from outside.
+/// One control interrupt as observed from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Period {
-    /// When it began, ticks.
+    /// Time of its beginning, ticks.
     pub began: u64,
-    /// Its input from the converters and the encoder.
+    /// Its input from the ADCs and the encoder.
     pub sample: Sample,
-    /// Compare values it wrote, and whether the outputs were on after it.
+    /// Compare values that it wrote, and whether the outputs were on after it.
     pub compare: Compare,
-    /// Whether it took an order from the console.
+    /// Whether it took a request from the console.
     pub took_order: bool,
-    /// Estimated cycles, with entry, exit and bus, when they are counted.
+    /// Estimated cycles, with entry, exit and bus, if they are counted.
     pub cycles: u32,
-    /// How many of them go by before the last compare value is written.
+    /// Number of these cycles before the last compare value is written.
     pub to_compares: u32,
 }
 
-/// The control interrupt that runs.
+/// The running control interrupt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RunningInterrupt {
     began: u64,
@@ -45,7 +45,7 @@ pub struct LongestPath {
 }
 
 impl Board {
-    /// Whether an order waits for the control interrupt.
+    /// Whether a request waits for the control interrupt.
     fn has_order(&self) -> bool {
         let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
         let mailbox = self.cpu.word(orders);
@@ -69,12 +69,12 @@ impl Board {
         if ended && !complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
-        // With the drive off the firmware switches it on again instead.
+        // With the drive off, the firmware switches it on again.
         if !chip.tim8.main_output() && chip.tim1.main_output() {
             hardware |= Hardware::CHOPPER_OFF;
         }
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
-        // With three shunts both convert the third current second.
+        // With three shunts both ADCs convert the third current as their second channel.
         let in_line = chip.gates.stage.sensors == Sensors::InLine;
         let (current_c, slow) = if in_line { (0, 1) } else { (one[1], 2) };
         let sample = Sample {

@@ -1,4 +1,4 @@
-//! What a debugger at the debug port does to the board.
+//! Effects of a debugger at the debug port on the board.
 
 use anyhow::Result;
 
@@ -7,22 +7,23 @@ use crate::chip::TICKS_PER_S;
 use crate::chip::debugger::{LOW_POWER, TIM5_STOP, WATCHDOG_STOPS};
 use crate::periph::plain::{DBG_APB1_FZ, DBG_CR};
 
-/// A program at the debug port, by its effect on DBGMCU as it attaches. All keep the port alive in low-power modes.
+/// A program at the debug port, characterised by its effect on DBGMCU when it attaches. All of them keep the port alive
+/// in low-power modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Debugger {
     /// probe-rs.
     ProbeRs,
     /// OpenOCD with `target/stm32g4x.cfg`, event `examine-end`: it stops both watchdogs while the core is halted.
     OpenOcd,
-    /// ST's server with its option that suspends the watchdogs; taken here for the worst, it stops TIM5 as well.
+    /// ST's server with its option that suspends the watchdogs; as the worst case it is assumed to stop TIM5 as well.
     StServer,
 }
 
 impl Debugger {
-    /// All of them.
+    /// All debuggers.
     pub const ALL: [Self; 3] = [Self::ProbeRs, Self::OpenOcd, Self::StServer];
 
-    /// The peripherals of APB1 that it stops while the core is halted.
+    /// Returns the peripherals of APB1 that it stops while the core is halted.
     const fn stops(self) -> u32 {
         match self {
             Self::ProbeRs => 0,
@@ -33,7 +34,7 @@ impl Debugger {
 }
 
 impl Board {
-    /// A debugger attaches.
+    /// Attaches a debugger.
     pub fn attach(&mut self, debugger: Debugger) {
         let debug = &mut self.chip().debug;
         for (register, bits) in [(DBG_CR, LOW_POWER), (DBG_APB1_FZ, debugger.stops())] {
@@ -42,7 +43,7 @@ impl Board {
         }
     }
 
-    /// It detaches, and clears the bits of low-power modes.
+    /// Detaches the debugger, and clears the bits of low-power modes.
     pub fn detach(&mut self) {
         self.resume();
         let debug = &mut self.chip().debug;
@@ -50,16 +51,16 @@ impl Board {
         debug.write(DBG_CR, cr & !LOW_POWER);
     }
 
-    /// It halts the core for some time, ms; [`Board::resume`] lets it go on.
+    /// Halts the core for some time, ms; [`Board::resume`] continues it.
     ///
     /// # Errors
-    /// As of [`Board::run_ticks`].
+    /// As [`Board::run_ticks`].
     pub fn halt(&mut self, ms: f64) -> Result<()> {
         self.chip().halt();
         self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)
     }
 
-    /// It lets the core go on.
+    /// Lets the core continue.
     pub fn resume(&mut self) {
         self.chip().resume();
     }

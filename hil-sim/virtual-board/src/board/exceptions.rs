@@ -1,4 +1,4 @@
-//! Lets the core run or sleep, and takes it into exceptions and back.
+//! Runs the core or lets it sleep, and takes it into exceptions and back.
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -32,7 +32,7 @@ impl Board {
             self.cpu.spoil_float();
         }
         if !stacked && exception != scs::HARD_FAULT {
-            // The stack is at its end: the frame is lost, and the fault is taken instead.
+            // The stack is at its end: the frame is lost, and a fault is taken instead.
             self.hard_fault(1 << 12, None)?;
         }
         Ok(())
@@ -44,7 +44,7 @@ impl Board {
         if chip.scs.running() < 0 {
             let place = || self.image.location(pc);
             ensure!(chip.forgiving, "lock-up: a fault in a fault handler at {}", place());
-            // Locked up, until a reset.
+            // The core is locked up until a reset.
             chip.lock_up();
             self.progress.hung = true;
             return Ok(());
@@ -58,7 +58,7 @@ impl Board {
         self.enter(scs::HARD_FAULT)
     }
 
-    /// Lets the core run, or time pass if it sleeps.
+    /// Runs the core, or lets time pass if it sleeps.
     pub(super) fn go(&mut self, end: u64) -> Result<()> {
         let chip = self.cpu.chip_mut();
         chip.deadline = chip.next_event().min(end);
@@ -81,7 +81,7 @@ impl Board {
         if chip.attention || chip.reset.is_some() {
             return Ok(());
         }
-        // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
+        // A pending exception is taken at the instruction that lifts its mask, so the core stops at every instruction.
         if chip.scs.wakes() {
             chip.deadline = chip.now + 1;
         }

@@ -1,4 +1,4 @@
-//! The motor beside the chip: it moves with the time, gets the voltages of the bridge, and is sampled.
+//! The motor at the chip: it is advanced with time, gets the voltages of the bridge, and is sampled.
 
 use anyhow::{Result, bail};
 use drive_core::{Compare, Sample};
@@ -18,39 +18,39 @@ pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 /// The connection between the chip and the motor.
 #[derive(Clone, Debug)]
 pub(super) struct Connection {
-    /// Time up to which the motor has moved, ticks.
+    /// Time up to which the motor has been advanced, ticks.
     at: u64,
-    /// Compare values that the motor sees.
+    /// Compare values in force at the motor.
     applied: Compare,
-    /// Dead time that it sees, ticks, and whether it moves by half periods; none before the outputs were on.
+    /// Dead time in force at the motor, ticks, and whether the motor is advanced by half periods; none before the outputs were on.
     dead_time: Option<(u32, bool)>,
     /// Further dead time, us.
     extra_us: f64,
-    /// Duty of the chopper and relay that it sees.
+    /// Chopper duty and relay state in force at the motor.
     dc_link: (f64, bool),
-    /// What the switches stand, V.
+    /// Voltage rating of the switches, V.
     rated_v: f64,
     /// The last sample.
     pub sample: Sample,
     shunts: Option<ShuntReader>,
 }
 
-/// The shunts with their amplifiers, and what is needed to read them at any time of a period.
+/// The shunts with their amplifiers, and the data for reading them at any time of a period.
 #[derive(Clone, Debug)]
 struct ShuntReader {
     shunts: Shunts,
-    /// Ticks that the drivers delay the gates by.
+    /// Delay of the gates by the drivers, ticks.
     delay: i64,
     rng: Xoshiro256PlusPlus,
     amplifiers: Amplifiers,
-    /// The gates now.
+    /// The present gates.
     bridge: Bridge,
-    /// The last top of the counter, ticks, and the one before.
+    /// Time of the last top of the counter, ticks, and of the one before.
     top: Top,
     before: Top,
 }
 
-/// The state at a top of the counter, from which a reading after it follows.
+/// The state at a top of the counter, from which a later reading follows.
 #[derive(Clone, Debug, Default)]
 struct Top {
     time: u64,
@@ -91,7 +91,7 @@ impl Connection {
 }
 
 impl ShuntReader {
-    /// Follows the shunts for some ticks, in which the currents went straight from `begin` to `end`.
+    /// Follows the shunts for some ticks, in which the currents change linearly from `begin` to `end`.
     fn follow(&mut self, at: u64, ticks: u64, begin: [f64; 3], end: [f64; 3]) {
         let seconds = ticks as f64 / TICKS_PER_S as f64;
         let slope = [0, 1, 2].map(|n| (end[n] - begin[n]) / seconds);
@@ -100,17 +100,17 @@ impl ShuntReader {
         self.amplifiers.follow(&self.shunts, &self.bridge, &currents, phase, ticks as u32);
     }
 
-    /// A top of the counter: the gates may be others from here on.
+    /// Processes a top of the counter, at which the gates may change.
     fn top(&mut self, time: u64, bridge: &Bridge, plant: &Plant) {
         self.bridge = bridge.clone();
-        // All low sides on, or none: the terminals have the same potential.
+        // With all low sides on, or none, the terminals have the same potential.
         let slope = if bridge.compare().enabled { plant.shorted_slopes() } else { [0.0; 3] };
         let currents = Currents { at: plant.phase_currents(), slope };
         let top = Top { time, amplifiers: self.amplifiers, bridge: bridge.clone(), currents };
         self.before = std::mem::replace(&mut self.top, top);
     }
 
-    /// The code of a leg's current that a converter samples at a time, ticks.
+    /// Returns the counts of a leg's current that an ADC samples at a time, ticks.
     fn code(&mut self, leg: usize, time: u64) -> u16 {
         let from = if time >= self.top.time { &self.top } else { &self.before };
         let mut amplifiers = from.amplifiers;
@@ -118,15 +118,15 @@ impl ShuntReader {
         let mut currents = from.currents;
         let first = |leg: &Leg| leg.pieces.first().map_or(0, |piece| piece.ticks);
         if from.bridge.legs.iter().any(|leg| first(leg) < after) {
-            // Behind the zero vector the other vectors bring the currents back: the mean of the period goes on.
+            // After the zero vector the other vectors bring the currents back, so the mean of the period applies.
             currents.slope = [0.0; 3];
         }
         amplifiers.follow(&self.shunts, &from.bridge, &currents, -self.delay, after);
         amplifiers.code(&self.shunts, leg, &mut self.rng)
     }
 
-    /// The codes of the three currents for each converter, at the instants at which it samples them, for a chip whose
-    /// counter is at its top.
+    /// Returns the counts of the three currents for each ADC, at the instants at which it samples them, for a chip
+    /// whose counter is at its top.
     fn codes(&mut self, chip: &Chip) -> [[u16; 3]; 2] {
         let now = self.top.time;
         let samplings = chip.adc.samplings(chip.tim1.trigger_after_top().map(|after| now + after));
@@ -135,20 +135,20 @@ impl ShuntReader {
             samplings[converter].iter().find(|one| one.0 == channel).map(|one| one.1)
         };
         let instants = [0, 1].map(|converter| [0, 1, 2].map(|leg| asked(converter, leg)));
-        // What no converter asks for is read at the top.
+        // Currents that no ADC samples are read at the top.
         instants.map(|legs| [0, 1, 2].map(|leg| self.code(leg, legs[leg].unwrap_or(now))))
     }
 }
 
 impl Board {
-    /// The gates as they are now.
+    /// Returns the present gates.
     pub fn gates(&mut self) -> &Bridge {
         let chip = self.cpu.chip_mut();
         chip.look_at_gates();
         &chip.gates.bridge
     }
 
-    /// Lets the motor see the outputs as they are from now on.
+    /// Makes the outputs take effect at the motor from now on.
     pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip_mut();
         // A break switches them off without a write.
@@ -179,7 +179,7 @@ impl Board {
         let connection = &mut self.connection;
         let compare = if connection.applied.enabled { connection.applied } else { Compare::OFF };
         while connection.at < to {
-            // The plant divides the time that it is given into steps: a period at most.
+            // The plant divides the given time into steps, so it may be a period at most.
             let ticks = (to - connection.at).min(TICKS_PER_PERIOD);
             let begin = self.plant.phase_currents();
             self.plant.advance(&compare, ticks as f64 / self.cpu.chip().ticks_per_s());
@@ -190,8 +190,8 @@ impl Board {
         }
     }
 
-    /// The counter is at its top: a period of the motor ends, the converters hold their samples, and the
-    /// compare values taken over are in force.
+    /// Processes a top of the counter: a period of the motor ends, the ADCs hold their samples, and the compare values
+    /// that the timer has taken over take effect.
     pub(super) fn crest(&mut self, at: u64) -> Result<()> {
         self.advance_plant(at);
         let chip = self.cpu.chip_mut();
@@ -205,20 +205,20 @@ impl Board {
         }
         if outputs_on && self.connection.dead_time != Some((dead_time, halves)) {
             self.connection.dead_time = Some((dead_time, halves));
-            // As the firmware computes it from the register, so that both are the same to the bit.
+            // Computed as in the firmware from the register, so that both values are exactly equal.
             let us = f64::from(dead_time as f32 / TICKS_PER_S as f32) * 1e6;
-            // The plant spreads all of it over the time that it is given; half of the edges are in half a period.
+            // The plant spreads the whole dead time over the given time; half of the edges are in half a period.
             let half = 0.5 * (us - self.connection.extra_us);
             self.plant.set_dead_time(if halves { half } else { us })?;
         }
         self.connection.sample = self.plant.sample();
         self.show_sample();
-        // The currents of the period that ends, at whose vectors they were switched off.
+        // The currents of the period that ends, during whose vectors they were switched off.
         let currents = if outputs_on { self.plant.phase_currents() } else { [0.0; 3] };
         let stress_v = stage.switches.stress_v(self.plant.dc_link(), currents);
         let rated_v = self.connection.rated_v;
         if stress_v > rated_v && !self.cpu.chip().forgiving {
-            bail!("the switches see {stress_v:.1} V and stand {rated_v} V");
+            bail!("the switches see {stress_v:.1} V and are rated for {rated_v} V");
         }
         match pulses {
             Err(_) if outputs_on && self.cpu.chip().forgiving => self.short_pulses += 1,
@@ -228,20 +228,20 @@ impl Board {
         Ok(())
     }
 
-    /// The counter is at 0, where the converters sample the currents, too.
+    /// Processes a counter value of 0, at which the ADCs sample the currents as well.
     pub(super) fn valley(&mut self, at: u64) {
         self.advance_plant(at);
         self.connection.sample = self.plant.sample();
         self.show_sample();
     }
 
-    /// Shows the sample to converters, comparators and encoder.
+    /// Passes the sample to ADCs, comparators and encoder.
     pub(super) fn show_sample(&mut self) {
         let Connection { sample, shunts, .. } = &mut self.connection;
         let chip = self.cpu.chip_mut();
         let seen = shunts.as_mut().map(|reader| reader.codes(chip));
         if let Some([one, two]) = seen {
-            // Current a is the first converter's, b the second's.
+            // The first ADC measures current a, the second current b.
             (sample.current_a, sample.current_b, sample.current_c) = (one[0], two[1], one[2]);
         }
         let undisturbed = *sample;
@@ -249,7 +249,7 @@ impl Board {
             disturb(sample);
         }
         if chip.reference_error != 0.0 {
-            // Half of it is the zero of the currents, and the divider of the thermistor hangs on it.
+            // Half of the reference is the zero of the currents, and the reference supplies the divider of the thermistor.
             let Sample { current_a, current_b, current_c, dc_link, .. } = &mut *sample;
             let zero = CODES / 2.0;
             for (code, zero) in
@@ -263,7 +263,7 @@ impl Board {
         let (now, before) = (of(sample), of(&undisturbed));
         for (converter, inputs) in chip.adc.inputs.iter_mut().enumerate() {
             for (leg, channel) in channel::CURRENTS.into_iter().enumerate() {
-                // A disturbed sensor is so for both converters.
+                // A disturbed sensor is disturbed for both ADCs.
                 let own = seen.filter(|_| now[leg] == before[leg]);
                 inputs[channel] = own.map_or(now[leg], |codes| codes[converter][leg]);
             }

@@ -19,26 +19,26 @@ pub struct Options {
     pub seed: u64,
     /// Counting of cycles and instructions.
     pub counting: Counting,
-    /// Whether its bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
+    /// Whether the bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
     pub confirmed: bool,
-    /// The drive's settings that are saved with the confirmation: by default those that the image starts with, and whether
-    /// a drive that has not learned starts as the configuration says.
+    /// The drive's settings that are saved with the confirmation. By default they are those with which the image
+    /// starts, and the configuration decides whether a drive that has not learned starts.
     pub saved: Settings,
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
-    /// The pin of the dc link: by default as the power stage has it.
+    /// The circuit at the pin of the dc link, by default that of the power stage.
     pub dc_link_pin: DcLinkPin,
-    /// Resistor of the fault input, ohm: by default that of the power stage.
+    /// Resistor of the fault input, ohm, by default that of the power stage.
     pub fault_pull_ohm: f64,
 }
 
 impl Options {
-    /// The plant that a configuration describes, with the power stage, its sensors and the dead time of its board.
+    /// Returns the plant of a configuration, with the power stage, its sensors and the dead time of its board.
     pub fn plant(stage: &PowerStage, config: &Config) -> PlantSettings {
         let mut plant = hil_sim::config::plant_settings(config);
         let settings = stage.firmware_settings();
         if stage.sensors == Sensors::InLine {
-            // The converters have another reference than the source's; their codes cover the range of the sensors.
+            // The ADCs have another reference than the source's; their counts cover the range of the sensors.
             let gain = f64::from(settings.scales.current_a.gain / Line::CHANNEL_A.gain);
             let source = MeasurementSettings::default();
             let range = plant.measurement.range_a / source.range_a;
@@ -52,35 +52,35 @@ impl Options {
             plant.inverter.propagation_us = delay_s * 1e6;
             plant.inverter.residual_v = drop_v;
         }
-        // The converters of the board do so by themselves.
+        // The ADCs of the board do this themselves.
         plant.measurement.both_zero_vectors = false;
         plant.inverter.dead_time_us =
             f64::from(firmware_board::dead_time(settings.inverter.dead_time_s).1) * 1e6;
         plant.inverter.timer_top = firmware_board::PWM_TOP;
-        // It moves from one top of the counter to the next.
+        // The plant is advanced from one top of the counter to the next.
         plant.inverter.pulses = 1;
         plant
     }
 
-    /// The lines for the console that adapt the image of a board to a configuration: its motor, and on the reference board
-    /// scales for its sensors at the converters of this board.
+    /// Returns the lines for the console that adapt the image of a board to a configuration: its motor, and on the
+    /// reference board scales for its sensors at the ADCs of this board.
     pub fn set_lines(stage: &PowerStage, config: &Config) -> Vec<String> {
         let needed = Self::needed(stage, config);
         needed.into_iter().map(|(entry, value)| format!("set {} {value}", entry.name)).collect()
     }
 
-    /// These settings with their values.
+    /// Returns these settings with their values.
     fn needed(stage: &PowerStage, config: &Config) -> Vec<(&'static Entry<Settings>, Value)> {
         let [image, default] = [stage.firmware_settings(), Config::default().drive];
         let mut wanted = config.drive;
-        // Timer and converters are the board's.
+        // Timer and ADCs belong to the board.
         wanted.inverter.top = image.inverter.top;
         wanted.inverter.dead_time_s = image.inverter.dead_time_s;
         wanted.scales.full_scale = image.scales.full_scale;
-        // Saved already.
+        // This setting is saved already.
         wanted.injection.synchronous.allow_unlearned = image.injection.synchronous.allow_unlearned;
         let in_line = stage.sensors == Sensors::InLine;
-        // The sensors of the reference board are those of the configuration.
+        // The sensors of the reference board come from the configuration.
         let may_differ =
             SETTINGS.iter().filter(|entry| !in_line || entry.get(&wanted) != entry.get(&default));
         let differing: Vec<_> = may_differ.collect();
@@ -94,7 +94,7 @@ impl Options {
         needed.map(|entry| (*entry, entry.get(&wanted))).collect()
     }
 
-    /// With the settings for a configuration saved, as if [`Options::set_lines`] were typed and saved before.
+    /// Saves the settings for a configuration, as if [`Options::set_lines`] had been typed and saved before.
     ///
     /// # Errors
     /// A line that the image would refuse.
@@ -106,12 +106,12 @@ impl Options {
         Ok(self)
     }
 
-    /// The reference board with the motor of a configuration.
+    /// Options of the reference board with the motor of a configuration.
     pub fn new(config: &Config, seed: u64) -> Self {
         Self::on(&power_stage::REFERENCE, config, seed)
     }
 
-    /// A board with this power stage and the motor of a configuration; [`PowerStage::config`] gives one that suits it.
+    /// Options of a board with this power stage and the motor of a configuration; [`PowerStage::config`] gives a suitable one.
     pub fn on(power_stage: &'static PowerStage, config: &Config, seed: u64) -> Self {
         let plant = Self::plant(power_stage, config);
         let mut saved = power_stage.firmware_settings();

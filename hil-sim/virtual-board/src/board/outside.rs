@@ -1,4 +1,4 @@
-//! Inputs of a board from outside, faults among them, and its console and log.
+//! Inputs of a board from outside, including faults, and its console and log.
 
 use anyhow::Result;
 
@@ -7,13 +7,13 @@ use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
 use crate::{image::Image, periph::Reset};
 
 impl Board {
-    /// Puts a line, without its end, on the wire to the console.
+    /// Sends a line, without its end, to the console.
     pub fn type_line(&mut self, line: &str) {
         self.send(line.as_bytes());
         self.send(b"\n");
     }
 
-    /// Puts bytes on the wire to the console.
+    /// Sends bytes to the console.
     pub fn send(&mut self, bytes: &[u8]) {
         if let Some(loader) = &mut self.loader {
             return loader.line.extend(bytes);
@@ -23,25 +23,25 @@ impl Board {
         chip.lpuart.wake(chip.now);
     }
 
-    /// Puts bytes on the line of the field bus, one behind the other.
+    /// Sends bytes on the line of the field bus, one after the other.
     pub fn send_bus(&mut self, bytes: &[u8]) {
         let chip = self.chip();
         chip.usart3.line.to_chip.extend(bytes.iter().map(|byte| u16::from(*byte)));
         chip.usart3.wake(chip.now);
     }
 
-    /// The bytes that the board sent on the field bus since the last call.
+    /// Returns the bytes that the board has sent on the field bus since the last call.
     pub fn take_bus(&mut self) -> Vec<u8> {
         self.chip().usart3.line.take()
     }
 
-    /// The output of the console since the last call.
+    /// Returns the output of the console since the last call.
     pub fn take_console(&mut self) -> String {
         let bytes = self.chip().lpuart.line.take();
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// The log since the last call.
+    /// Returns the log since the last call.
     ///
     /// # Errors
     /// The log cannot be decoded.
@@ -57,10 +57,10 @@ impl Board {
         Ok(())
     }
 
-    /// The power stage loses its supplies, of the gate drivers and of the dc link, V, or has them again.
+    /// Switches the supplies of the power stage, of the gate drivers and of the dc link, V, off or on.
     ///
     /// # Errors
-    /// A dc link that the plant refuses.
+    /// A dc-link voltage that the plant refuses.
     pub fn supply_stage(&mut self, on: bool, dc_link_v: f64) -> Result<()> {
         self.chip().gates.without_supply = !on;
         self.chip().look_at_gates();
@@ -68,19 +68,19 @@ impl Board {
         Ok(())
     }
 
-    /// The supply of the controller goes and comes back at once: RAM is lost, and an operation of the flash that is in
-    /// progress leaves its words unreadable.
+    /// Interrupts the supply of the controller for a moment: RAM is lost, and a running operation of the flash leaves
+    /// its words unreadable.
     pub fn unplug(&mut self) {
         let now = self.chip().now;
         self.chip().flash.cut(now);
         self.reset(Reset::Power);
     }
 
-    /// A programmer writes another image for some time, ms: it resets the chip and holds the core, so that nothing sets up
-    /// the pins; a reset ends it.
+    /// Lets a programmer write another image for some time, ms: it resets the chip and holds the core, so that nothing
+    /// sets up the pins. A reset ends it.
     ///
     /// # Errors
-    /// As of [`Board::run_ticks`].
+    /// As [`Board::run_ticks`].
     pub fn flash(&mut self, image: &Image, ms: f64) -> Result<()> {
         self.reset(Reset::Pin);
         self.hang();
@@ -92,45 +92,45 @@ impl Board {
         Ok(())
     }
 
-    /// The power stage lets go of the fault input, or pulls it low, which trips.
+    /// Lets the power stage release the fault input, or pull it low, which trips.
     pub fn set_fault_pin(&mut self, high: bool) {
         let chip = self.chip();
         chip.fault_low = !high;
         chip.follow_fault_pin();
     }
 
-    /// The crystal stops, or lives again.
+    /// Stops the crystal, or starts it again.
     pub fn set_crystal(&mut self, lives: bool) {
         self.chip().rcc.crystal_lives = lives;
     }
 
-    /// The core executes nothing any more, until a reset.
+    /// Stops the execution of the core until a reset.
     pub fn hang(&mut self) {
         self.progress.hung = true;
     }
 
-    /// The core executes nothing for some ticks, as if the bus were taken.
+    /// Stops the execution of the core for some ticks, as if the bus were occupied.
     pub fn stall(&mut self, ticks: u64) {
         let chip = self.chip();
         chip.stalled_until = chip.now + ticks;
     }
 
-    /// From now on accesses that the model does not know behave as on the chip: reserved registers read as 0,
-    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in which the
+    /// Makes accesses that the model does not know behave as on the chip from now on: reserved registers read as 0,
+    /// other accesses are faults, and a fault in a fault handler locks the core up. This is for runs in which the
     /// firmware is damaged on purpose.
     pub fn forgive(&mut self) {
         self.cpu.chip_mut().forgiving = true;
         self.collect_violations();
     }
 
-    /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
+    /// Makes [`Board::run_ticks`] return before the n-th instruction in the flash from here.
     pub fn stop_after(&mut self, instructions: u64) {
         self.progress.preempt_at = Some(self.cpu.chip().instructions + instructions);
     }
 
-    /// Makes an exception pending: it preempts by its priority and the masks.
+    /// Makes an exception pending: it preempts according to its priority and the masks.
     pub fn pend(&mut self, exception: u16) {
-        // A control interrupt that runs already delays only itself.
+        // A running control interrupt delays only itself.
         if exception == CONTROL_INTERRUPT && self.progress.entered.is_none() {
             self.progress.pended = Some(self.cpu.chip().now);
         }

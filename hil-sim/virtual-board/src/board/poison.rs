@@ -1,5 +1,5 @@
-//! A check that control interrupts leave the preempted code intact: registers, stack, and the floating-point
-//! registers, which are poisoned as the interrupt begins, so that a register that is not restored shows.
+//! A check that control interrupts leave the preempted code intact: registers, stack, and the floating-point registers.
+//! The latter are poisoned as the interrupt begins, so that a register that is not restored becomes visible.
 
 use anyhow::{Result, bail};
 
@@ -14,43 +14,43 @@ struct Preempted {
     stack: Vec<u8>,
 }
 
-/// The watch over control interrupts.
+/// The check of the control interrupts.
 #[derive(Default)]
 pub struct Poison {
     top: u32,
     before: Option<Preempted>,
-    /// Control interrupts that left everything as it was.
+    /// Number of control interrupts that left everything unchanged.
     pub intact: u64,
-    /// Of these, in code that uses floating point.
+    /// Number of these that preempted code with floating point.
     pub in_floating_point: u64,
 }
 
 impl Poison {
-    /// For a stack that begins at this address.
+    /// Makes the check for a stack that begins at this address.
     pub fn new(top: u32) -> Self {
         Self { top, ..Self::default() }
     }
 }
 
 impl Board {
-    /// The state of the core, with the stack between two addresses.
+    /// Returns the state of the core, with the stack between two addresses.
     fn preempted(&self, sp: u32, top: u32) -> Preempted {
         let mut stack = vec![0; top.saturating_sub(sp.max(memory::RAM)) as usize];
         self.cpu.read(sp, &mut stack);
         Preempted { registers: self.cpu.registers(), sp, stack }
     }
 
-    /// Remembers the state before a control interrupt.
+    /// Stores the state before a control interrupt.
     pub(super) fn remember(&mut self) {
         let Some(mut poison) = self.poison.take() else { return };
         poison.before = Some(self.preempted(self.cpu.get(Register::SP), poison.top));
         self.poison = Some(poison);
     }
 
-    /// Compares the state after a control interrupt with that before it.
+    /// Compares the state after a control interrupt with the state before it.
     ///
     /// # Errors
-    /// The state differs.
+    /// The states differ.
     pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
         let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };

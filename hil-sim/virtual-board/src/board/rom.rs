@@ -1,5 +1,5 @@
-//! ST's boot loader in the system memory, which starts instead of the image or from it: the pins as it drives them, and what it
-//! does at the serial port of the console.
+//! ST's boot loader in the system memory, which starts instead of the image or from it: the pins as it drives them, and
+//! its protocol at the serial port of the console.
 
 use std::collections::VecDeque;
 
@@ -13,9 +13,9 @@ use crate::periph::Reset;
 use crate::periph::flash::{ERASE, PAGE, PROGRAM};
 use crate::periph::rcc::{AHB2ENR, On};
 
-/// Bits of the option bytes (RM0440, FLASH_OPTR).
+/// Bit nSWBOOT0 of the option bytes (RM0440, FLASH_OPTR).
 pub const N_SWBOOT0: u32 = 1 << 26;
-/// The same.
+/// Bit nBOOT0 of the option bytes (RM0440, FLASH_OPTR).
 pub const N_BOOT0: u32 = 1 << 27;
 
 /// Registers of a port.
@@ -23,14 +23,14 @@ const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0c;
 const BSRR: u32 = 0x18;
 
-/// The loader's hold of a pin, as its fields of MODER and PUPDR: driven, idle at a high level; an input that the chip pulls up;
-/// one that it pulls down.
+/// State of a pin in the loader, as its fields of MODER and PUPDR: driven, idle at a high level; an input with the
+/// chip's pull-up; an input with its pull-down.
 type Held = (u32, u32);
 const HIGH: Held = (1, 1);
 const UP: Held = (0, 1);
 const DOWN: Held = (0, 2);
 
-/// Port, 0 is A, and number of the pins of its serial ports, SPI and I2C that a power stage has (AN2606, table of the
+/// Port (0 is A) and number of the pins of its serial ports, SPI and I2C that a power stage has (AN2606, table of the
 /// configuration of STM32G47x in system memory boot).
 const PINS: [(usize, u32, Held); 8] = [
     (0, 6, HIGH),
@@ -48,7 +48,7 @@ fn starts(option_bytes: u32, boot_pin: bool) -> bool {
     if option_bytes & N_SWBOOT0 != 0 { boot_pin } else { option_bytes & N_BOOT0 == 0 }
 }
 
-/// The system memory: stack pointer, entry, and an instruction that waits, where the model takes over.
+/// The system memory: stack pointer, entry, and an instruction that waits, at which the model takes over.
 pub const CODE: [u8; 12] = [0, 0x40, 0, 0x20, 9, 0, 0xff, 0x1f, 0x30, 0xbf, 0xfd, 0xe7];
 
 /// Whether the core executes the system memory.
@@ -58,9 +58,9 @@ pub fn is_inside(address: u32) -> bool {
 
 const ACK: u8 = 0x79;
 const NACK: u8 = 0x1f;
-/// Ticks of a byte: eleven bits, with its parity, at the usual rate.
+/// Duration of a byte, ticks: eleven bits, with its parity, at the usual rate.
 const BYTE: u64 = 11 * TICKS_PER_S / 115_200;
-/// Answer to Get: version, commands; to Get Version; to Get ID: the product.
+/// Answers to Get (version, commands), to Get Version, and to Get ID (the product).
 const GET: [u8; 14] = [11, 0x31, 0, 1, 2, 0x11, 0x21, 0x31, 0x44, 0x63, 0x73, 0x82, 0x92, ACK];
 const GET_VERSION: [u8; 4] = [0x31, 0, 0, ACK];
 const GET_ID: [u8; 4] = [1, 0x04, 0x69, ACK];
@@ -68,17 +68,17 @@ const GET_ID: [u8; 4] = [1, 0x04, 0x69, ACK];
 /// The loader at the pins of the console (AN3155): Get, Get Version, Get ID, Read, Go, Write, Extended Erase.
 #[derive(Default)]
 pub struct Loader {
-    /// Bytes on the line to it.
+    /// Bytes on the line to the loader.
     pub line: VecDeque<u8>,
-    /// When it takes the next.
+    /// Time at which it takes the next byte.
     ready_at: u64,
-    /// It has heard 0x7f.
+    /// Whether it has received 0x7f.
     synchronised: bool,
-    /// What it has heard of a command.
+    /// The received part of a command.
     heard: Vec<u8>,
 }
 
-/// The exclusive or of all bytes, with the sum behind them, is none.
+/// Whether the exclusive or of all bytes, including the check sum at the end, is zero.
 fn sums_up(bytes: &[u8]) -> bool {
     bytes.iter().fold(0, |sum, byte| sum ^ byte) == 0
 }
@@ -88,7 +88,7 @@ fn address(bytes: &[u8]) -> u32 {
 }
 
 impl Board {
-    /// Resets the chip with this level at PB8; whether ST's loader runs since then, instead of the image, until the next reset.
+    /// Resets the chip with this level at PB8; returns whether ST's loader runs from then on instead of the image, until the next reset.
     pub fn reset_with_boot_pin(&mut self, high: bool) -> bool {
         self.reset(Reset::Pin);
         let runs = starts(self.chip().flash.options, high);
@@ -98,7 +98,7 @@ impl Board {
         runs
     }
 
-    /// The image has jumped into it.
+    /// Starts the loader after the image has jumped into it.
     pub(super) fn enter_loader(&mut self) -> Result<()> {
         let chip = self.cpu.chip();
         ensure!(chip.syscfg.get(0) & 7 == 1, "the system memory is not at address 0");
@@ -131,7 +131,7 @@ impl Board {
     pub(super) fn serve_loader(&mut self) {
         let now = self.cpu.chip().now;
         if self.loader.is_some() {
-            // No interrupt does it meanwhile.
+            // No interrupt does this meanwhile.
             self.advance_plant(now);
         }
         while let Some(loader) = &mut self.loader {
@@ -164,7 +164,7 @@ impl Board {
         self.cpu.chip_mut().lpuart.line.from_chip.extend(sent);
     }
 
-    /// What the loader does at this much of a command: whether more of it is to come, and what it answers.
+    /// Processes the received part of a command: returns whether more of it is to come, and the answer.
     fn command(&mut self, heard: &[u8]) -> (bool, Vec<u8>) {
         let last = |done: bool| (false, vec![if done { ACK } else { NACK }]);
         let more = |right: bool| (right, vec![if right { ACK } else { NACK }]);
@@ -212,7 +212,7 @@ impl Board {
         }
     }
 
-    /// Some bytes of the flash.
+    /// Returns some bytes of the flash.
     fn contents(&mut self, from: u32, count: usize) -> Vec<u8> {
         let mut bytes = vec![0; count];
         if from < STORED {
@@ -224,7 +224,7 @@ impl Board {
         bytes
     }
 
-    /// Writes to the flash.
+    /// Writes bytes to the flash.
     fn program(&mut self, from: u32, bytes: &[u8]) -> bool {
         for (n, word) in bytes.chunks(8).enumerate() {
             let (at, mut new) = (from + 8 * n as u32, [0xff; 8]);
@@ -247,7 +247,7 @@ impl Board {
         inside
     }
 
-    /// An operation of the flash that takes some ticks.
+    /// Does an operation of the flash that takes some ticks.
     fn change(&mut self, at: u32, bytes: &[u8], ticks: u64) {
         if at < STORED {
             self.cpu.write(at, bytes);
@@ -256,7 +256,7 @@ impl Board {
         self.loader.iter_mut().for_each(|loader| loader.ready_at += ticks);
     }
 
-    /// The core goes on from a vector table.
+    /// Continues the core from a vector table.
     fn jump(&mut self, vectors: u32) {
         self.loader = None;
         self.progress.hung = false;

@@ -1,4 +1,4 @@
-//! Snapshots of a board: a start takes seconds, going back to a snapshot less than a millisecond.
+//! Snapshots of a board: a start takes seconds, going back to a snapshot takes less than a millisecond.
 
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
@@ -17,10 +17,10 @@ pub struct Snapshot {
 }
 
 impl Board {
-    /// Keeps the board as it is now, outside an interrupt.
+    /// Stores the present state of the board, outside an interrupt.
     ///
     /// # Errors
-    /// The core cannot be kept; the log cannot be decoded.
+    /// The core cannot be stored, or the log cannot be decoded.
     pub fn keep(&mut self) -> Result<Snapshot> {
         // The log so far belongs to the time before.
         self.take_log()?;

@@ -8,11 +8,11 @@ use crate::chip::pins::{self, Pin};
 use crate::periph::gpio::Pad;
 use crate::power_stage::{CODES, REFERENCE_V};
 
-/// Voltage at the pins of the reference at 20 mA: 150 Ohm.
+/// Voltage at the pins of the reference at 20 mA, across 150 ohm.
 const FULL_V: f64 = 3.0;
 
 impl Board {
-    /// The pins of contacts (0), outputs (1) or analog inputs (2).
+    /// Returns the pins of contacts (0), outputs (1) or analog inputs (2).
     fn terminals(&self, kind: usize) -> impl Iterator<Item = Option<Pin>> + use<> {
         self.cpu.chip().gates.stage.terminals[kind].split(' ').map(pins::pin)
     }
@@ -20,7 +20,7 @@ impl Board {
     /// Closes the contacts of these names and opens the others; a number is the current of the reference, mA.
     ///
     /// # Errors
-    /// A word is neither.
+    /// A word that is neither a name nor a number.
     pub fn set_wires(&mut self, wires: &str) -> Result<()> {
         self.chip().grounded = [0; 7];
         wires.split_whitespace().try_for_each(|word| match word.parse() {
@@ -46,14 +46,15 @@ impl Board {
         Ok(())
     }
 
-    /// Gives the reference, and the second one where there is one, a current, mA; a tenth of a volt in its place is 0.2 mA.
+    /// Applies a current, mA, to the reference, and to the second reference if there is one; instead of a current, a
+    /// tenth of a volt corresponds to 0.2 mA.
     pub fn set_reference(&mut self, ma: [f64; 2]) {
         ma.into_iter()
             .enumerate()
             .for_each(|(n, ma)| self.set_analog(n, ma / 20.0 * FULL_V / REFERENCE_V));
     }
 
-    /// Gives an analog input a voltage, as a share of the converter's reference: first and second reference, sensor of the motor.
+    /// Applies a voltage to an analog input, as a share of the ADC's reference: first and second reference, sensor of the motor.
     pub fn set_analog(&mut self, input: usize, share: f64) {
         let code = (share * CODES).clamp(0.0, CODES - 1.0) as u16;
         let Some(pin) = self.terminals(2).nth(input).flatten() else { return };
@@ -64,7 +65,7 @@ impl Board {
         }
     }
 
-    /// Whether RUN, FAULT and BRAKE are active.
+    /// Returns whether RUN, FAULT and BRAKE are active.
     pub fn terminal_outputs(&self) -> [bool; 3] {
         let gpio = &self.cpu.chip().gpio;
         let active = |(port, pin): Pin| gpio[port].pad(pin) == Pad::Output(true);

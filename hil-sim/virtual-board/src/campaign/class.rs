@@ -22,24 +22,24 @@ pub enum Run {
     /// A fault is injected while the drive regulates.
     #[default]
     Regulating,
-    /// The power goes in one of the operations of `save`.
+    /// The power is interrupted in one of the operations of `save`.
     Saving,
     /// A double word of the saved settings is damaged before a start.
     DamagedPage,
-    /// The reset pin is pulled: while it regulates, or while it starts.
+    /// The reset pin is pulled, while the drive regulates or while it starts.
     Reset,
-    /// Wires of the terminal strip, with the drive off and while it turns.
+    /// Faults of wires at the terminal strip, with the drive off and while it turns.
     Strip(Fault),
 }
 
-/// The file.
+/// The contents of the file.
 #[derive(Deserialize)]
 struct Table {
     class: Vec<Class>,
     bound: BTreeMap<String, Bound>,
 }
 
-/// A bound: its time, ms and more periods of control, and the reason.
+/// A bound: its time, ms, additional control periods, and the reason.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Bound {
@@ -57,22 +57,22 @@ struct Bound {
 pub struct Class {
     /// Its name.
     pub name: String,
-    /// Longest that outputs may be on with wrong control, ms, and the reason. Infinite: for the angle nothing is promised, and
-    /// only the currents are judged.
+    /// Longest time for which outputs may be on with wrong control, ms, and the reason. If it is infinite, nothing is
+    /// guaranteed for the angle, and only the currents are judged.
     #[serde(skip)]
     pub bound: (f64, String),
     #[serde(rename = "bound")]
     name_of_bound: String,
-    /// The angle sources that it is tried with.
+    /// The angle sources with which it is tried.
     #[serde(default = "both")]
     pub sources: Vec<Source>,
-    /// Whether it is no part of a campaign at speed.
+    /// Whether it is excluded from a campaign at speed.
     #[serde(default)]
     at_rest_only: bool,
     /// The procedure of its runs.
     #[serde(default)]
     pub run: Run,
-    /// Whether the outputs must be off after the bound, correct control or not.
+    /// Whether the outputs must be off after the bound even if the control is correct.
     #[serde(default)]
     pub ends: bool,
 }
@@ -87,7 +87,7 @@ const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;
 
 impl Class {
-    /// The classes of a campaign with their bounds, at speed or not.
+    /// Returns the classes of a campaign with their bounds, at speed or not.
     pub fn all(at_speed: bool) -> Vec<Self> {
         let table = toml::from_str(include_str!("classes.toml"));
         let Table { mut class, bound } = table.expect("the table of classes");
@@ -100,7 +100,7 @@ impl Class {
         class
     }
 
-    /// Injects a fault, and describes it.
+    /// Injects a fault, and returns its description.
     ///
     /// # Errors
     /// The class has no injection.
@@ -144,7 +144,7 @@ impl Class {
             }
             "not-a-number in the drive's state" => {
                 let Region { address: base, size } = addresses.state;
-                // A word that holds a plausible number; angles and counts are another class.
+                // The word must hold a plausible number; angles and counts belong to another class.
                 for _ in 0..1000 {
                     let address = base + 4 * rng.random_range(0..size / 4);
                     let value = f32::from_bits(board.cpu.word(address).unwrap_or(0)).abs();
@@ -157,7 +157,7 @@ impl Class {
                 "no such word".into()
             }
             "dc-link step" => {
-                // On a dc link of 311 V.
+                // Values for a dc link of 311 V.
                 let volts = target.relative_voltage * rng.random_range(100.0..600.0);
                 board.plant.set_dc_link(volts).ok();
                 format!("to {volts:.0} V")
@@ -205,7 +205,7 @@ impl Class {
             }
             "conversion trigger lost" => {
                 let which = rng.random_range(0..3_usize);
-                // For good, or for a while: up to longer than the watchdog waits.
+                // Permanently, or for a while that may be longer than the watchdog waits.
                 let for_good = rng.random_range(0..4) == 0;
                 let count = if for_good { u32::MAX } else { rng.random_range(1..40) };
                 board.chip().adc.lose_triggers = [[count, 0], [0, count], [count, count]][which];

@@ -13,10 +13,10 @@ use crate::memory::{FLASH, Region, STORED};
 use drive_core::{Line, Sample};
 use drive_settings::CurrentSensors;
 
-/// A code of a sample.
+/// Selects the ADC counts of a quantity in a sample.
 type Code = fn(&mut Sample) -> &mut u16;
 
-/// The code of the current sensor of phase 0, 1 or 2.
+/// Returns the ADC counts of the current sensor of phase 0, 1 or 2.
 pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {
     match which {
         0 => &mut sample.current_a,
@@ -25,13 +25,13 @@ pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {
     }
 }
 
-/// The name of a current sensor.
+/// Returns the name of a current sensor.
 pub fn name(which: usize) -> &'static str {
     ["sensor a", "sensor b", "sensor c"][which]
 }
 
 impl Target {
-    /// One of the current sensors.
+    /// Returns one of the current sensors at random.
     pub fn any_current(&self, rng: &mut dyn Rng) -> usize {
         match self.settings.scales.sensors {
             CurrentSensors::InLine => usize::from(!rng.random::<bool>()),
@@ -39,26 +39,26 @@ impl Target {
         }
     }
 
-    /// The scale of a current sensor.
+    /// Returns the scale of a current sensor.
     pub fn line(&self, which: usize) -> Line {
         let scales = &self.settings.scales;
         [scales.current_a, scales.current_b, scales.current_c][which]
     }
 }
 
-/// The encoder loses a share of its counts.
+/// Makes the encoder lose a share of its counts.
 pub fn losing(board: &mut Board, share: f64) -> String {
     board.plant.set_encoder_fault(EncoderFault::Losing(share));
     format!("{:.1} %", 100.0 * share)
 }
 
-/// The core clock is off by a share, or the LSI oscillator has another frequency, Hz.
+/// Sets the error of the core clock, as a share, and the frequency of the LSI oscillator, Hz.
 pub fn set_clocks(board: &mut Board, error: f64, lsi_hz: f64) -> String {
     board.chip().set_clocks(error, lsi_hz);
     format!("core clock {:.1} %, {lsi_hz:.0} Hz", 100.0 * error)
 }
 
-/// Gaussian noise of an rms value in codes, added to a code.
+/// Returns Gaussian noise with an rms value in ADC counts, which is added to counts.
 pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(rng.random());
     move |code| {
@@ -68,7 +68,7 @@ pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
     }
 }
 
-/// The sensor of the dc link or of the heat sink sticks, opens, saturates or has noise.
+/// Makes the sensor of the dc link or of the heat sink stick, open, saturate or noisy.
 pub fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: Code) -> String {
     let held = *of(&mut board.sample());
     let rms = 2_f64.powf(rng.random_range(0.0..10.0));
@@ -83,12 +83,12 @@ pub fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: Code) -> String {
             _ => noise(code),
         }
     }));
-    let noisy = format!("{rms:.0} codes of noise");
+    let noisy = format!("{rms:.0} counts of noise");
     [format!("stuck at {held}"), "open".into(), "saturated".into(), noisy][kind].clone()
 }
 
-/// Bits that are at the gates at once, before any software. TIM1: clock of the dead time (CR1), polarity (CCER). Ports: the
-/// functions of PA7 to PA10, PB0 and PB1; which level another function gives is not modelled.
+/// Bits that affect the gates at once, before any software. TIM1: clock of the dead time (CR1), polarity (CCER). Ports:
+/// the functions of PA7 to PA10, PB0 and PB1; the levels of other functions are not modelled.
 const AT_THE_GATES: [(u32, u32); 5] = [
     (0x4001_2c00, 3 << 8),
     (0x4001_2c20, 0xaaa),
@@ -97,7 +97,7 @@ const AT_THE_GATES: [(u32, u32); 5] = [
     (0x4800_0420, 0xff),
 ];
 
-/// Flips a bit that can be written of a register that the firmware checks.
+/// Flips a writable bit of a register that the firmware checks.
 pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
     loop {
         let Register { address, mask } = control().nth(rng.random_range(0..COUNT)).unwrap();
@@ -110,14 +110,14 @@ pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
         let chip = board.chip();
         let before = chip.read(address, 4);
         chip.write(address, 4, before ^ 1 << bit);
-        // Neither reserved nor locked.
+        // The bit is neither reserved nor locked.
         if (chip.read(address, 4) ^ before) & mask != 0 {
             return format!("bit {bit} of {address:#010x}");
         }
     }
 }
 
-/// The check code of the next instructions of the main loop in the flash, or of some behind them, is wrong.
+/// Makes the check code wrong of the next instructions of the main loop in the flash, or of some instructions after them.
 pub fn bad_code(board: &mut Board, rng: &mut dyn Rng) -> String {
     let (mut left, mut steps) = (rng.random_range(1..300), 0..100_000);
     while left > 0 && steps.next().is_some() && board.run_ticks(1).is_ok() {

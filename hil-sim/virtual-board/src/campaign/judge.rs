@@ -1,4 +1,4 @@
-//! The criterion of a run: at every instant after the bound, outputs are off or control is correct.
+//! The criterion of a run: at every instant after the bound, the outputs are off or the control is correct.
 
 use std::f64::consts::TAU;
 
@@ -9,13 +9,13 @@ use crate::{board::Board, periph::Reset};
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
-/// Resets from which on they count as a loop: the fault itself may cause the first.
+/// Number of resets that counts as a loop: the fault itself may cause the first reset.
 const MOST_RESETS: usize = 2;
-/// Periods from a reset until it has been reported in the log.
+/// Number of periods from a reset until the log has reported it.
 const REPORTED: u64 = 400;
-/// Periods from the outputs off until that has been reported.
+/// Number of periods from the switch-off of the outputs until the log has reported it.
 const FAULT_REPORTED: u64 = 60;
-/// Periods from a reset to the greeting, at most.
+/// Largest number of periods from a reset to the greeting.
 const START: u64 = 30_000;
 
 /// The outcome of a run.
@@ -23,9 +23,9 @@ const START: u64 = 30_000;
 pub struct Outcome {
     /// Description of the fault.
     pub what: String,
-    /// From the fault to the outputs off, ms.
+    /// Time from the fault to the switch-off of the outputs, ms.
     pub off_ms: Option<f64>,
-    /// From the fault to the last instant with outputs on and wrong control, ms.
+    /// Time from the fault to the last instant with outputs on and wrong control, ms.
     pub wrong_ms: f64,
     /// Largest phase current, A.
     pub peak_a: f64,
@@ -33,11 +33,11 @@ pub struct Outcome {
     pub angle_deg: f64,
 }
 
-/// Watches for `ms` after the fault, or until the outputs are off. The angle counts and the currents, up to `trip_a`, or the
-/// currents alone.
+/// Watches for `ms` after the fault, or until the outputs are off. It judges the currents, up to `trip_a`, and, if
+/// `angle_counts`, the angle as well.
 ///
 /// # Errors
-/// Bad gate signals; another failure of the model.
+/// Wrong gate signals, or another failure of the model.
 pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
     let mut outcome = Outcome::default();
@@ -45,7 +45,7 @@ pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Res
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
     let mut next = began;
     while since(next) < ms {
-        // The motor's truth and the drive's angle belong to the same sample.
+        // The true angle of the motor and the drive's angle belong to the same sample.
         next += TICKS_PER_PERIOD;
         let now = board.chip().now;
         board.run_ticks(next.saturating_sub(now))?;
@@ -59,7 +59,7 @@ pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Res
         }
         let error = angle_error(board);
         outcome.angle_deg = outcome.angle_deg.max(error);
-        // A not-a-number counts as wrong.
+        // A value that is not a number counts as wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
         if !(straight && current < trip_a) {
             outcome.wrong_ms = since(next);
@@ -68,7 +68,7 @@ pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Res
     Ok(outcome)
 }
 
-/// Goes on for some periods that nobody looks at.
+/// Runs for some periods that are not judged.
 ///
 /// # Errors
 /// An error of the emulator.
@@ -78,14 +78,14 @@ pub fn wait(board: &mut Board, periods: u64) -> Result<()> {
     Ok(())
 }
 
-/// Between the flux and where the drive believes it, degrees.
+/// Angle between the true flux and the drive's estimate, degrees.
 fn angle_error(board: &Board) -> f64 {
     let believed = f64::from(board.telemetry().phi.to_turns());
     let error = (board.plant.rotor_flux_angle() / TAU - believed).rem_euclid(1.0);
     error.min(1.0 - error) * 360.0
 }
 
-/// After the outputs have gone off: the reason is in the log, and there is no loop of resets.
+/// Checks, after the outputs have gone off, that the reason is in the log, and that there is no loop of resets.
 ///
 /// # Errors
 /// No reason in the log, or a loop of resets.
@@ -97,7 +97,7 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
         if told || !board.resets.is_empty() {
             return Ok(());
         }
-        // It may be that only the watchdog ends it.
+        // Only the watchdog may end it.
     }
     board.run_periods(REPORTED)?;
     let Some((_, reset)) = board.resets.first().copied() else {
@@ -116,10 +116,10 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     Ok(())
 }
 
-/// Runs until the firmware has greeted, and 200 periods more.
+/// Runs until the firmware has greeted, and for 200 more periods.
 ///
 /// # Errors
-/// No greeting comes, or another reset.
+/// No greeting comes, or another reset occurs.
 pub fn greeting(board: &mut Board) -> Result<String> {
     let resets = board.resets.len();
     let mut heard = String::new();

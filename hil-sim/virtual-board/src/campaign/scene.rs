@@ -1,4 +1,4 @@
-//! The beginning of every injection: snapshots of a board that has started.
+//! The initial state of every injection: snapshots of a board that has started.
 
 use std::f64::consts::TAU;
 
@@ -18,28 +18,28 @@ use crate::{
     power_stage::PowerStage,
 };
 
-/// Current on the quadrature axis before the injection of a fault, A on the dissertation's motor. At speed it also generates.
+/// q-axis current before the injection of a fault, A on the dissertation's motor. At speed its sign also makes the motor generate.
 const TORQUE_A: f64 = 1.5;
-/// Held speeds of the shaft with the encoder, rpm on four poles, in a campaign without a speed.
+/// Held speeds of the shaft with the encoder, rpm on four poles, in a campaign without a given speed.
 const SPEEDS_RPM: [f64; 2] = [300.0, 900.0];
-/// Periods until the torque stands; and at speed, where the flux may be weakened.
+/// Number of periods until the torque has settled; the second value is for speed, where the field may be weakened.
 const SETTLING: u64 = 1200;
 const SETTLING_AT_SPEED: u64 = 3600;
-/// Periods in which the held shaft becomes faster by [`STEP_RPM`]: 1000 rpm/s on four poles.
+/// Number of periods in which the held shaft is accelerated by [`STEP_RPM`]: 1000 rpm/s on four poles.
 const STEP: u64 = 60;
 const STEP_RPM: f64 = 10.0;
-/// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
+/// Number of periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
-/// Longest that learning takes, periods: ten minutes.
+/// Longest duration of the saliency self-commissioning, periods: ten minutes.
 const LEARNING: u64 = 3_600_000;
-/// A setting that is changed and not saved yet.
+/// A setting that is changed but not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
 /// The source of the flux angle, and the speed of the shaft unless the campaign has one.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// No encoder: the injection, with the shaft locked; at speed the observer.
+    /// No encoder: the injection, with the shaft locked, or the observer at speed.
     Sensorless,
     /// The encoder, at 300 rpm.
     Encoder,
@@ -60,9 +60,9 @@ pub struct Target {
     pub stack: Region,
     /// The drive's settings.
     pub settings: Settings,
-    /// Currents in proportion to the dissertation's motor.
+    /// Scale of currents relative to the dissertation's motor.
     pub relative_current: f64,
-    /// Voltages in proportion to its dc link.
+    /// Scale of voltages relative to its dc link.
     pub relative_voltage: f64,
     /// Speed of [`Source::Encoder`], rpm on four poles.
     pub encoder_rpm: f64,
@@ -95,22 +95,22 @@ pub struct Scene {
     pub target: Target,
     /// Two sets of settings.
     pub settings: [FirmwareSettings; 2],
-    /// With the first set saved twice and the second one not yet; with the second one saved over the older
-    /// of these, and the first one to be saved again.
+    /// Snapshots with the drive off: one with the first set saved twice and the second one not saved yet; one with the
+    /// second set saved over the older copy, and the first set to be saved again.
     off: [Snapshot; 2],
-    /// Off, and turning for the terminal strip, once a fault of its wires has asked for them.
+    /// Snapshots with the drive off, and turning for the terminal strip, after the first fault of its wires has made them.
     pub strip: Option<[Snapshot; 2]>,
-    /// One with each torque: without the encoder, and with it at each speed.
+    /// Snapshots with each torque: without the encoder, and with it at each speed.
     sensorless: Vec<Snapshot>,
     encoder: Vec<Vec<Snapshot>>,
 }
 
 impl Scene {
-    /// Starts a board with this power stage and a motor that suits it, once with each angle source; at this speed, rpm on
-    /// four poles, with settings for the whole range, or without one. `set` are assignments to the configuration.
+    /// Starts a board with this power stage and a motor that suits it, once with each angle source. A given speed, rpm
+    /// on four poles, selects settings for the full speed range. `set` holds assignments to the configuration.
     ///
     /// # Errors
-    /// The board does not start; an assignment is refused.
+    /// The board does not start, or an assignment is refused.
     pub fn new(
         image: Image,
         stage: &'static PowerStage,
@@ -134,7 +134,7 @@ impl Scene {
             pair.until_state(State::Learning)?;
             pair.until("the end of learning", LEARNING, |_, state| state == State::Off)?;
         }
-        // Twice: both pages hold a set.
+        // Saved twice, so that both pages hold a set.
         for _ in 0..2 {
             pair.order("save")?;
         }
@@ -169,7 +169,7 @@ impl Scene {
         Ok(Self { board, target, settings: [old, new], off, strip: None, sensorless, encoder })
     }
 
-    /// Regulating torque, at speed every other pair of turns a generating one.
+    /// Goes to a snapshot in which the drive regulates torque; at speed, every second pair of turns has a generating torque.
     ///
     /// # Errors
     /// An error of the emulator.
@@ -182,8 +182,8 @@ impl Scene {
         self.board.go_back(&snapshots[(turn / 2) as usize % snapshots.len()])
     }
 
-    /// Off, with settings that are not saved: the second set, to go to one slot, or the first, to go to the
-    /// other.
+    /// Goes to a snapshot with the drive off and settings that are not saved: the second set, to go to one slot, or the
+    /// first, to go to the other.
     ///
     /// # Errors
     /// An error of the emulator.
@@ -197,7 +197,7 @@ fn started(pair: &mut Pair) -> Result<()> {
     pair.until_state(State::Torque)
 }
 
-/// A snapshot with each torque; then it stops.
+/// Takes a snapshot with each torque, then stops the drive.
 fn with_torques(pair: &mut Pair, torques: &[f64], settling: u64) -> Result<Vec<Snapshot>> {
     let mut snapshots = Vec::new();
     for torque in torques {
@@ -209,12 +209,12 @@ fn with_torques(pair: &mut Pair, torques: &[f64], settling: u64) -> Result<Vec<S
     }
     pair.order("stop")?;
     pair.until_state(State::Off)?;
-    // A start takes a flux that has not decayed for a current that follows no voltage.
+    // A start mistakes a flux that has not decayed for a current without a voltage.
     pair.run(DECAYED, |_, _| {})?;
     Ok(snapshots)
 }
 
-/// The stored part of the flash, as the firmware reads it.
+/// The settings area of the flash, as the firmware reads it.
 #[derive(Debug)]
 struct Bank<'a>(&'a mut Chip);
 
@@ -235,10 +235,10 @@ impl Flash for Bank<'_> {
     }
 }
 
-/// The settings that the flash holds.
+/// Returns the settings in the flash.
 ///
 /// # Errors
-/// The flash holds none.
+/// The flash holds no settings.
 pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     ensure!(
         induction_drive::board::settings_address(0, 0) >= STORED,

@@ -1,4 +1,4 @@
-//! Faults of the wires at the terminal strip: with the drive off, and while it turns for the strip, by a switch at START.
+//! Faults of the wires at the terminal strip: with the drive off, and while it turns because of the strip, with a switch at START.
 
 use anyhow::{Result, ensure};
 use hil_sim::plant::Load;
@@ -14,44 +14,45 @@ use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fault {
-    /// A wire breaks, and is mended.
+    /// A wire breaks, and is repaired.
     Open,
     /// A contact is bridged.
     Shorted,
     /// A contact bounces.
     Chatters,
-    /// The reference is another at once.
+    /// The reference changes suddenly.
     Reference,
     /// The temperature sensor of the motor is open or shorted.
     Sensor,
 }
 
-/// A strip that commands, with all its inputs.
+/// Settings of a terminal strip that commands, with all its inputs.
 const SET_UP: [&str; 4] = [
     "angle encoder",
     "set strip.enable yes strip.start switch strip.reverse yes strip.reset yes strip.presets yes strip.outputs yes motor.sensor pt1000",
     "set strip.reference 4-20ma strip.reference_rpm 600 speed.ramp_rpm_per_s 1000 bus.commands strip",
     "apply",
 ];
-/// Signal at the beginning, mA: 300 rpm.
+/// Reference signal at the beginning, mA: 300 rpm.
 const HALF_MA: f64 = 12.0;
-/// Analog input of the motor's sensor, and the sensor at 25 degC: 1097 ohm at the divider's 4700 ohm.
+/// Index of the analog input of the motor's sensor, and the sensor at 25 degC: 1097 ohm at the divider's 4700 ohm.
 const SENSOR: usize = 2;
 const WARM: f64 = 1097.0 / (1097.0 + 4700.0);
-/// Periods until the settings are in force, and until the speed stands.
+/// Number of periods until the settings are in force, and until the speed has settled.
 const SETTLING: u64 = 12_000;
 const RISING: u64 = 15_000;
-/// Longest until the outputs are off, ms: with ENABLE open two looks and the end of the torque; by ramp from 300 rpm at 1000 rpm/s.
+/// Longest time until the outputs are off, ms: with ENABLE open, two checks and the end of the torque; by ramp from 300
+/// rpm at 1000 rpm/s.
 const COASTED_MS: f64 = 150.0;
 const RAMPED_MS: f64 = 600.0;
-/// Time of a fault, of what comes after it, and longest between two bounces, ms.
+/// Duration of a fault, of the time after it, and the longest time between two bounces, ms.
 const FAULT_MS: f64 = 650.0;
 const BOUNCE_MS: f64 = 15.0;
 
 const WIRES: [&str; 6] = ["ENABLE", "START", "REVERSE", "RESET", "PRESET1", "PRESET2"];
 
 impl Scene {
-    /// The drive off with ENABLE closed, or turning for the strip.
+    /// Goes to the drive off with ENABLE closed, or turning because of the strip.
     fn strip(&mut self, turns: bool) -> Result<()> {
         if self.strip.is_none() {
             self.off(0)?;
@@ -76,7 +77,7 @@ impl Scene {
     }
 }
 
-/// The time in which the outputs are watched for a fault: whether they came on, and when they went off, ms.
+/// Watches the outputs for the duration of a fault; returns whether they came on, and when they went off, ms.
 fn watch(
     board: &mut Board,
     mut each: impl FnMut(&mut Board, f64) -> Result<()>,
@@ -98,10 +99,11 @@ fn watch(
     Ok((starts, off))
 }
 
-/// A fault with the drive off or turning, and after it the wires as before: nothing starts, and what has to go off goes off.
+/// Runs a fault with the drive off or turning, and then restores the wires. Nothing may start, and the outputs must go
+/// off if the fault requires it.
 ///
 /// # Errors
-/// It does not.
+/// The drive does not behave so.
 pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Result<Outcome> {
     let turns = turn % 2 == 1;
     scene.strip(turns)?;
@@ -110,7 +112,7 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
     let wire = WIRES[rng.random_range(0..WIRES.len())];
     let ma = rng.random_range(0.0..24.0);
     let closed = wire == "ENABLE" || wire == "START" && turns;
-    // A bridge across START with ENABLE closed is a start: here it comes before ENABLE.
+    // A bridge across START with ENABLE closed is a start, so here it comes before ENABLE.
     let early = fault == Fault::Shorted && wire == "START" && !turns;
     if early {
         board.set_contact("ENABLE", false)?;
@@ -131,7 +133,7 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
         }
         Ok(())
     })?;
-    // START that was open for long is a switch that is closed again: it is not mended.
+    // If START was open for long, closing it again means that the switch is closed again, so it is not repaired.
     let mended = !(wire == "START" && fault == Fault::Open);
     let (again, _) = watch(board, |board, _| {
         board.set_reference([HALF_MA; 2]);
@@ -149,7 +151,7 @@ pub fn run(scene: &mut Scene, fault: Fault, turn: u64, rng: &mut dyn Rng) -> Res
     };
     let what = format!("{wire}, {ma:.1} mA, {}", if turns { "turning" } else { "off" });
     ensure!(!started && !again, "{what}: the outputs came on");
-    // What is not to stop goes on.
+    // If the fault does not require a stop, the drive continues.
     ensure!(board.chip().tim1.outputs_on() == (turns && bound.is_none()), "{what}: the outputs");
     let late = bound.is_some_and(|bound| off.is_none_or(|ms| ms > bound));
     let fault_is_told = board.terminal_outputs()[1] == (lost && turns);

@@ -1,4 +1,4 @@
-//! The bus: reads and writes of registers, each to the model that has it.
+//! The bus: reads and writes of registers, each passed to the model of its peripheral.
 
 use thiserror::Error;
 
@@ -7,12 +7,12 @@ use crate::memory;
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, On};
 use crate::periph::{Effect, Reset, gpio::IDR, uart};
 
-/// The peripherals whose clock can be off, a row each: name, first address, enable register and bit. The names become constants.
+/// The peripherals whose clock can be off, one per row: name, first address, enable register and bit. The names become constants.
 macro_rules! clocked {
     ($($name:ident = $first:literal, $register:ident, $bit:literal;)*) => {
         $(const $name: u32 = $first;)*
 
-        /// Name, enable register and bit of the clock behind an address; `None` has none of its own.
+        /// Returns name, enable register and bit of the clock for an address; `None` if it has no clock of its own.
         pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
             match address & !0x3ff {
                 $($name => Some((stringify!($name), $register, $bit)),)*
@@ -50,7 +50,7 @@ clocked! {
 const EXTI: u32 = 0x4001_0400;
 const IWDG: u32 = 0x4000_3000;
 const RCC: u32 = 0x4002_1000;
-/// What the factory has measured: the code of the reference inside the chip is at its address 0x1aa (datasheet, VREFINT_CAL).
+/// Address of the factory calibration; the counts of the chip's internal reference are at its offset 0x1aa (datasheet, VREFINT_CAL).
 const FACTORY: u32 = 0x1fff_7400;
 const BDTR: u32 = TIM1 + 0x44;
 /// Compare values of the three legs.
@@ -61,16 +61,16 @@ const TIM1_SR: u32 = 0x10;
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("unknown register {address:#010x} {}", written.map_or("read".into(), |value| format!("written with {value:#x}")))]
 pub struct Unknown {
-    /// Where.
+    /// Address of the access.
     pub address: u32,
-    /// The value to be written, of a write.
+    /// The value to be written, for a write.
     pub written: Option<u32>,
-    /// Last known place of the core: the instruction, in CCM the block.
+    /// Last known position of the core: the instruction, or in CCM the block.
     pub at: u32,
 }
 
 impl Chip {
-    /// Reads a register, `size` bytes.
+    /// Reads `size` bytes of a register.
     pub fn read(&mut self, address: u32, size: u8) -> u32 {
         self.begin_access();
         let value = if let Some((word, bit)) = bit_band(address) {
@@ -81,7 +81,7 @@ impl Chip {
         value.map_or_else(|| self.is_unknown(address, None), |value| value & mask(size))
     }
 
-    /// Writes a register, `size` bytes.
+    /// Writes `size` bytes to a register.
     pub fn write(&mut self, address: u32, size: u8, value: u32) {
         self.begin_access();
         let alias = bit_band(address);
@@ -115,7 +115,7 @@ impl Chip {
         0
     }
 
-    /// The value of a register, without the side effects of a read.
+    /// Returns the value of a register, without the side effects of a read.
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 | USART3 => Some(0),
@@ -147,7 +147,7 @@ impl Chip {
         self.read_clocked(address)
     }
 
-    /// A register of a peripheral that has its clock.
+    /// Reads a register of a peripheral whose clock is on.
     pub(super) fn read_clocked(&mut self, address: u32) -> Option<u32> {
         let (offset, now) = (address & 0x3ff, self.now);
         match address & !0x3ff {
@@ -240,7 +240,7 @@ impl Chip {
         self.follow(effect)
     }
 
-    /// What a write means for other parts of the chip.
+    /// Checks the rules that concern a write and other parts of the chip.
     fn check_rules(&mut self, address: u32, value: u32) {
         let offset = address & 0x3ff;
         match address & !0x3ff {
@@ -262,7 +262,7 @@ impl Chip {
                 self.monitor_supply();
             }
             SYSCFG if offset >= 0x200 => self.check_reference(offset),
-            // A break that lasts takes MOE away again.
+            // A persistent break clears MOE again.
             SYSCFG | TIM8 => self.monitor_supply(),
             _ => {}
         }
@@ -279,8 +279,8 @@ impl Chip {
     }
 }
 
-/// Whether a write may change the levels at the pins of the gates. Compare values change them at the top of the counter,
-/// where the gates are looked at in any case.
+/// Whether a write may change the levels at the pins of the gates. Compare values change them at the top of the
+/// counter, where the gates are checked in any case.
 fn moves_gates(address: u32) -> bool {
     match address & !0x3ff {
         TIM1 => !COMPARES.contains(&address) && address & 0x3ff != TIM1_SR,
@@ -289,7 +289,7 @@ fn moves_gates(address: u32) -> bool {
     }
 }
 
-/// The bits of an access of some bytes.
+/// Returns the mask of an access of some bytes.
 fn mask(size: u8) -> u32 {
     u32::MAX >> 32_u8.saturating_sub(8 * size)
 }
@@ -298,7 +298,7 @@ fn port(address: u32) -> usize {
     ((address - GPIOA) >> 10) as usize
 }
 
-/// The word and bit behind an address of the alias.
+/// Returns the word and bit for an address of the bit-band alias.
 fn bit_band(address: u32) -> Option<(u32, u32)> {
     let offset = address.checked_sub(memory::BIT_BAND).filter(|offset| *offset < 0x60_0000)?;
     Some((memory::PERIPHERALS + (offset >> 7 << 2), offset >> 2 & 31))

@@ -3,13 +3,13 @@
 use super::{Chip, bus::clock_of};
 use crate::rules::Rule;
 
-/// Cycles from the store that switches a clock on to the first store that arrives: two whole cycles lie between.
+/// Number of cycles from the store that switches a clock on to the first store that takes effect: two whole cycles lie between.
 const ENABLE_CYCLES: u64 = 3;
-/// Cycles that an access to a register takes beyond one.
+/// Number of cycles that an access to a register takes in excess of one.
 const BUS_CYCLES: u64 = 2;
-/// A step to more than this, Hz, needs half the bus clock for a while.
+/// Frequency, Hz; a step to a higher one needs half the bus clock for a while.
 const STEP_HZ: u64 = 80_000_000;
-/// That while, ticks: a microsecond.
+/// Duration of that while, ticks: a microsecond.
 const STEP_TICKS: u64 = 170;
 
 impl Chip {
@@ -23,7 +23,7 @@ impl Chip {
         };
         let Some(on) = on.filter(|_| !self.rules.coarse) else { return true };
         let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle;
-        // This access itself is counted.
+        // This access itself is counted as well.
         let accesses = self.accesses.saturating_sub(on.accesses + 1);
         self.rules.require(
             cycles + BUS_CYCLES * accesses >= ENABLE_CYCLES,
@@ -32,7 +32,7 @@ impl Chip {
         )
     }
 
-    /// The value of a register after a reset, of a peripheral that has no clock.
+    /// Returns the reset value of a register of a peripheral that has no clock.
     pub(super) fn at_reset(&self, address: u32) -> Option<u32> {
         Self::default().read_clocked(address)
     }

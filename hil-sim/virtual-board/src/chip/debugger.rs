@@ -1,23 +1,23 @@
-//! A debugger at the debug port: it halts the core and lets it go, and sets and clears bits of DBGMCU.
+//! A debugger at the debug port: it halts and continues the core, and sets and clears bits of DBGMCU.
 
 use super::{Chip, TICKS_PER_PERIOD};
 use crate::periph::bits;
 use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
 use crate::rules::Rule;
 
-// DBGMCU: the clock of the core goes on while it sleeps; the watchdogs and timers stop while the core is halted.
+// DBGMCU: the clock of the core runs on while it sleeps; the watchdogs and timers stop while the core is halted.
 bits! { SLEEP = 0 }
 bits! { pub(crate) TIM5_STOP = 3, pub(super) WWDG_STOP = 11, pub(super) IWDG_STOP = 12 }
 bits! { TIM1_STOP = 11, TIM8_STOP = 13 }
-/// DBGMCU: clocks go on in sleep, stop and standby.
+/// DBGMCU: clocks run on in sleep, stop and standby.
 pub const LOW_POWER: u32 = 7;
 /// DBGMCU: both watchdogs stop while the core is halted.
 pub const WATCHDOG_STOPS: u32 = IWDG_STOP | WWDG_STOP;
 
-/// The program may take this long to switch off outputs that come back as the core goes on, ticks: two periods.
+/// Time in which the program must switch off outputs that come back as the core continues, ticks: two periods.
 const NOTICED: u64 = 2 * TICKS_PER_PERIOD;
 
-/// A halt that lasts.
+/// A halt in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Halt {
     since: u64,
@@ -26,7 +26,7 @@ pub struct Halt {
 }
 
 impl Chip {
-    /// Halts the core. What DBGMCU says stops with it.
+    /// Halts the core. The peripherals that DBGMCU selects stop with it.
     pub fn halt(&mut self) {
         if self.halt.is_some() {
             return;
@@ -39,7 +39,7 @@ impl Chip {
         self.attention = true;
     }
 
-    /// Whether a halt has stopped the timer of the brake chopper, which takes its output off.
+    /// Whether a halt has stopped the timer of the brake chopper, which switches its output off.
     pub(super) fn stops_chopper(&self) -> bool {
         self.halt.is_some() && self.debug.get(DBG_APB2_FZ) & TIM8_STOP != 0
     }
@@ -49,7 +49,7 @@ impl Chip {
         self.halt.is_some() && self.debug.get(DBG_APB1_FZ) & bit != 0
     }
 
-    /// Lets the core go on.
+    /// Lets the core continue.
     pub fn resume(&mut self) {
         let Some(Halt { since, .. }) = self.halt else { return };
         let stood = self.now - since;
@@ -72,7 +72,7 @@ impl Chip {
         self.attention = true;
     }
 
-    /// Looks at outputs that came back with the core.
+    /// Checks outputs that came back with the core.
     pub(crate) fn check_outputs_back(&mut self) {
         if !self.tim1.outputs_on() {
             self.back_on = None;
@@ -91,7 +91,7 @@ impl Chip {
         self.halt.is_some()
     }
 
-    /// Time passes while the core sleeps.
+    /// Lets time pass while the core sleeps.
     pub fn sleep(&mut self, ticks: u64) {
         if self.debug.get(DBG_CR) & SLEEP == 0 {
             self.scs.stand_still(ticks);

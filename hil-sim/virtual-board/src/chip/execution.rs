@@ -1,4 +1,4 @@
-//! The execution of code: its time, and the blocks that are kept.
+//! The execution of code: its time, and the stored blocks.
 
 use super::Chip;
 use crate::cost::{self, Block};
@@ -7,13 +7,13 @@ use crate::{memory::Region, periph::plain, scs};
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
 #[derive(Clone, Debug, Default)]
 pub struct Watched {
-    /// Where it lies in the flash.
+    /// Its region in the flash.
     pub function: Region,
-    /// Estimated cycles of each call, interrupts not counted.
+    /// Estimated cycles of each call, without interrupts.
     pub calls: Vec<u32>,
-    /// The blocks of the longest.
+    /// The blocks of the longest call.
     pub longest: Vec<Block>,
-    /// The blocks of the present call, those of its callees too; none outside a call.
+    /// The blocks of the present call, including those of its callees; none outside a call.
     present: Vec<Block>,
     /// End of the last block before the present call: the return address.
     returns_to: u32,
@@ -25,7 +25,7 @@ impl Watched {
         Self { function, ..Self::default() }
     }
 
-    /// A block of the flash is about to be executed, perhaps outside a call.
+    /// Processes a block of the flash that is about to be executed, perhaps outside a call.
     fn block(&mut self, address: u32, size: u32, cycles: u32) {
         if address != self.function.address && self.present.is_empty() {
             self.returns_to = address + size;
@@ -49,20 +49,21 @@ impl Watched {
 }
 
 impl Chip {
-    /// Whether the core is to stop before the block that begins here; never before the first of a run, so
-    /// that each run gets on.
+    /// Whether the core must stop before the block that begins here; never before the first block of a run, so that
+    /// each run makes progress.
     #[inline]
     pub fn stops_here(&mut self) -> bool {
         !std::mem::take(&mut self.first) && self.wants_attention()
     }
 
-    /// Whether the core is to stop.
+    /// Whether the core must stop.
     #[inline]
     pub fn wants_attention(&self) -> bool {
         self.attention || self.now >= self.deadline
     }
 
-    /// A fetch or a read of some bytes of the flash: raises what their check code says. Whether the core waits before it goes on.
+    /// Processes a fetch or a read of some bytes of the flash: reports an error of their check code. Returns whether
+    /// the core waits before it continues.
     #[inline]
     pub fn fetch(&mut self, address: u32, size: u32) -> bool {
         if self.flash.has_bad_code() && self.flash.is_bad(address, size) {
@@ -76,7 +77,7 @@ impl Chip {
         waits
     }
 
-    /// The flash has read a double word that its check code cannot correct.
+    /// Processes a double word of the flash that its check code cannot correct.
     pub(super) fn flash_error(&mut self) {
         if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
             self.system_break();
@@ -85,7 +86,7 @@ impl Chip {
         self.attention = true;
     }
 
-    /// Instructions from the flash are about to be executed.
+    /// Processes instructions from the flash that are about to be executed.
     #[inline]
     pub fn instructions(&mut self, count: u64) {
         self.now += self.rcc.ticks_per_cycle * count * self.flash_cycles;
@@ -99,7 +100,7 @@ impl Chip {
         if self.attention { 0 } else { self.deadline.saturating_sub(self.now) / ticks }
     }
 
-    /// A block in the flash is about to be executed, of this size and cost.
+    /// Processes a block in the flash of this size and cost that is about to be executed.
     #[inline]
     pub fn watch(&mut self, address: u32, size: u32, cycles: u32) {
         let in_main = self.scs.running() == scs::THREAD;
@@ -108,7 +109,7 @@ impl Chip {
         }
     }
 
-    /// A block in CCM, or in the flash while the control interrupt runs, is about to be executed.
+    /// Processes a block in CCM, or in the flash while the control interrupt runs, that is about to be executed.
     #[inline]
     pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
         let taken = self.last_block.is_some_and(|(_, end)| end != address);
@@ -125,7 +126,7 @@ impl Chip {
         }
     }
 
-    /// The control interrupt begins: keeps the blocks from now on.
+    /// Begins the control interrupt: blocks are stored from now on.
     pub fn begin_interrupt(&mut self) {
         self.in_control = self.keep_blocks;
         self.blocks.clear();

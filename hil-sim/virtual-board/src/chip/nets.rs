@@ -1,27 +1,27 @@
-//! The nets at two pins of the chip, and what looks at them: that of the dc link with the comparators, and that of the fault
-//! input with the break of TIM1.
+//! The nets at two pins of the chip, and their observers: the dc link with the comparators, and the fault input with
+//! the break of TIM1.
 
 use super::{Chip, Damage};
 use crate::power_stage::driver::{self, CHIP_PULL_OHM, CHIP_V, Pull};
 use crate::power_stage::{CODES, DcLinkPin, channel};
 use crate::{periph::NEVER, rules::Rule, time::TICKS_PER_S};
 
-/// The strongest of the chip's own resistors, ohm (datasheet, RPU and RPD: 25 to 55 kOhm).
+/// The strongest of the chip's own pull resistors, ohm (datasheet, RPU and RPD: 25 to 55 kOhm).
 const STRONGEST_PULL_OHM: f64 = 25e3;
-/// Largest code of the analog signals.
+/// Largest ADC counts of the analog signals.
 const FULL_SCALE: f64 = CODES - 1.0;
-/// Looks at a pin that moves in a time constant.
+/// Number of checks of a moving pin per time constant.
 const LOOKS: f64 = 50.0;
 
 /// The net of the dc link at its pin (PA1).
 #[derive(Clone, Debug)]
 pub struct DcLinkNet {
-    /// What the pin is connected to.
+    /// The circuit at the pin.
     pub source: DcLinkPin,
-    /// Voltage at the pin, codes, at a time, ticks.
+    /// Voltage at the pin, ADC counts, and its time, ticks.
     code: f64,
     at: u64,
-    /// Where it goes, codes, and its time constant, ticks.
+    /// Final value, ADC counts, and time constant, ticks.
     towards: (f64, f64),
 }
 
@@ -30,7 +30,7 @@ impl DcLinkNet {
         Self { source, code: 0.0, at: 0, towards: (0.0, 0.0) }
     }
 
-    /// The code at the pin now, where the dc link alone would give `open` and the port pulls.
+    /// Returns the present counts at the pin, if the dc link alone would give `open` and the port pulls.
     fn follow(&mut self, open: u16, pull: Option<bool>, now: u64) -> u16 {
         let (end, tau) = self.towards;
         let left = if tau > 0.0 { (-((now - self.at) as f64) / tau).exp() } else { 0.0 };
@@ -46,14 +46,14 @@ impl DcLinkNet {
                 (open + share * (pulled - open), tau)
             }
         };
-        // Before power-on the capacitor had time.
+        // The capacitor was charged before power-up.
         if self.towards.1 == 0.0 || now == 0 {
             self.code = self.towards.0;
         }
         self.code.round() as u16
     }
 
-    /// When to look at it again.
+    /// Returns the time of its next check.
     pub fn next_event(&self) -> u64 {
         let (end, tau) = self.towards;
         let moves = tau > 0.0 && (self.code - end).abs() > 0.5;
@@ -62,14 +62,14 @@ impl DcLinkNet {
 }
 
 impl Chip {
-    /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
-    /// dc link here, comparator 3 PA0 or PC1.
+    /// Passes the analog signals to the comparators: comparator 1 has PA1 at its positive input, which is the dc link
+    /// here, comparator 3 has PA0 or PC1.
     pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
         self.analog = [current_a, current_b, dc_link];
         self.compare_now();
     }
 
-    /// The converter and channel whose level comparator 1 or 3, counted from 0, looks at.
+    /// Returns the DAC and channel whose level comparator 1 or 3, counted from 0, uses.
     fn level_of(&self, n: usize) -> Option<(usize, usize)> {
         // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
         match self.comp.reference_of(n) {
@@ -79,7 +79,7 @@ impl Chip {
         }
     }
 
-    /// The converters and the comparators see the pins as they are now.
+    /// Passes the present levels of the pins to the ADCs and the comparators.
     pub(super) fn compare_now(&mut self) {
         let [current_a, current_b, open] = self.analog;
         let dc_link = self.dc_link.follow(open, self.gpio[0].pull(1), self.now);
@@ -104,7 +104,7 @@ impl Chip {
         self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp.output(n)));
     }
 
-    /// A comparator was written: the level it looks at must have been seen ready.
+    /// Checks, after a write to a comparator, that the level it uses must have been seen ready.
     pub(super) fn check_reference(&mut self, offset: u32) {
         let n = ((offset - 0x200) / 4) as usize;
         if let (true, Some((which, channel))) = (self.comp.is_on(n), self.level_of(n)) {
@@ -115,8 +115,8 @@ impl Chip {
         }
     }
 
-    /// The level of the fault input (PA6) follows from the resistors of the board and of the port; it is sure below 0.3 and above 0.7 of
-    /// the supply (datasheet, VIL and VIH).
+    /// Updates the level of the fault input (PA6), which follows from the resistors of the board and of the port. It is
+    /// certain below 0.3 and above 0.7 of the supply (datasheet, VIL and VIH).
     pub(crate) fn follow_fault_pin(&mut self) {
         let port = self.gpio[0].pull(6).map(|up| (up, STRONGEST_PULL_OHM));
         let pulls = [(true, self.fault_pull_ohm)].into_iter().chain(port);

@@ -1,13 +1,13 @@
-//! The pins against their use (datasheet, tables of pins and alternate functions).
+//! Checks of the pins against their use (datasheet, tables of pins and alternate functions).
 
 use std::sync::LazyLock;
 
 use super::Chip;
 use crate::{periph::gpio::Pad, rules::Rule};
 
-/// A pin: its port, A is 0, and its number.
+/// A pin: its port (A is 0), and its number.
 pub type Pin = (usize, u32);
-/// A signal: its name, and the pins that it reaches, each with its alternate function, as in "A8:6 C0:2".
+/// A signal: its name, and the pins that it can use, each with its alternate function, as in "A8:6 C0:2".
 pub type Signal = (&'static str, &'static str);
 
 /// The outputs of TIM1 in the order of `TIM1_CCER`.
@@ -23,7 +23,7 @@ pub const OUTPUTS: [Signal; 6] = [
 pub const BREAK: Signal = ("TIM1_BKIN", "A6:6 A14:6 A15:9 B8:12 B10:12 B12:6 C13:2");
 /// The brake chopper.
 pub const CHOPPER: Signal = ("TIM8_CH1", "A15:2 B6:5 C6:4");
-/// Where the firmware has it, and the output for the precharge relay.
+/// The pins that the firmware uses for it, and for the precharge relay.
 const CHOPPER_PIN: Pin = (2, 6);
 const RELAY_PIN: Pin = (2, 8);
 /// The encoder.
@@ -35,7 +35,7 @@ pub const SERIAL: [Signal; 2] =
 pub const BUS: [Signal; 2] = [("USART3_TX", "B9:7 B10:7 C10:7"), ("USART3_RX", "B8:7 B11:7 C11:7")];
 /// The pin that enables the driver of the bus.
 const BUS_DRIVER: Pin = (2, 12);
-/// The pins of the channels of ADC1 to ADC4 from channel 1 on; `-` is inside the chip or at no pin of it.
+/// The pins of the channels of ADC1 to ADC4, starting with channel 1; `-` is inside the chip or at no pin of this package.
 const ANALOG: [&str; 4] = [
     "A0 A1 A2 A3 B14 C0 C1 C2 C3 F0 B12 B1 - B11 B0",
     "A0 A1 A6 A7 C4 C0 C1 C2 C3 F1 C5 B2 A5 B11 B15 - A4",
@@ -43,14 +43,14 @@ const ANALOG: [&str; 4] = [
     "- - B12 B14 B15",
 ];
 
-/// The pin of this name, as "A8".
+/// Returns the pin of this name, as "A8".
 pub fn pin(name: &str) -> Option<Pin> {
     let (port, number) = name.split_at_checked(1)?;
     let number = number.parse().ok()?;
     Some((usize::from(port.as_bytes()[0] - b'A'), number))
 }
 
-/// The pins that a signal reaches, with the alternate function of each.
+/// Returns the pins that a signal can use, with the alternate function of each.
 pub fn pins_of(signal: Signal) -> impl Iterator<Item = (Pin, u32)> {
     signal.1.split(' ').filter_map(|reach| {
         let (name, function) = reach.split_once(':')?;
@@ -58,11 +58,11 @@ pub fn pins_of(signal: Signal) -> impl Iterator<Item = (Pin, u32)> {
     })
 }
 
-/// [`ANALOG`], looked up at every conversion.
+/// [`ANALOG`] as a table for the look-up at every conversion.
 static ANALOG_PINS: LazyLock<[Vec<Option<Pin>>; 4]> =
     LazyLock::new(|| ANALOG.map(|names| names.split(' ').map(pin).collect()));
 
-/// The pin of a channel of ADC1 to ADC4, counted from 0; `None` is inside the chip.
+/// Returns the pin of a channel of ADC1 to ADC4, counted from 0; `None` if it is inside the chip.
 pub fn analog(converter: usize, channel: u32) -> Option<Pin> {
     *ANALOG_PINS[converter].get(channel.checked_sub(1)? as usize)?
 }
@@ -79,7 +79,7 @@ impl Chip {
         });
     }
 
-    /// The outputs of TIM1 were switched on.
+    /// Checks the pins when the outputs of TIM1 are switched on.
     pub(super) fn check_gate_pins(&mut self) {
         let (outputs, pin) = self.tim1.uses_pins();
         for (signal, used) in OUTPUTS.into_iter().zip(outputs) {
@@ -92,7 +92,7 @@ impl Chip {
         }
     }
 
-    /// Duty at the pin of the brake chopper. Released, the pin is pulled down.
+    /// Returns the duty at the pin of the brake chopper. If the pin is released, it is pulled down.
     pub fn chopper_duty(&self) -> f64 {
         let (duty, (port, pin)) = (self.tim8.duty(), CHOPPER_PIN);
         if duty == 0.0 {
@@ -104,13 +104,13 @@ impl Chip {
         if connected && !self.stops_chopper() { duty } else { 0.0 }
     }
 
-    /// Whether the pin of the precharge relay is high. Released, it is pulled down.
+    /// Returns whether the pin of the precharge relay is high. If the pin is released, it is pulled down.
     pub fn relay_pin(&self) -> bool {
         let (port, pin) = RELAY_PIN;
         self.gpio[port].pad(pin) == Pad::Output(true)
     }
 
-    /// The encoder counts.
+    /// Checks the pins when the encoder counts.
     pub(super) fn check_encoder_pins(&mut self) {
         if self.tim2.counting() {
             for signal in ENCODER {
@@ -124,7 +124,7 @@ impl Chip {
         self.gpio[BUS_DRIVER.0].pad(BUS_DRIVER.1) == Pad::Output(true)
     }
 
-    /// A byte was given to the port of the bus.
+    /// Checks the pins when a byte is given to the port of the bus.
     pub(super) fn check_bus_pins(&mut self) {
         for signal in BUS {
             self.require_pin(signal, "USART3_TDR is written");
@@ -135,7 +135,7 @@ impl Chip {
         });
     }
 
-    /// Channels were converted.
+    /// Checks the pins when channels are converted.
     pub(super) fn check_analog_pins(&mut self) {
         let converted = [self.adc.take_converted(), self.slow_adc.take_converted()];
         for (n, channels) in converted.as_flattened().iter().copied().enumerate() {
@@ -145,7 +145,7 @@ impl Chip {
             }
             for channel in (0..19).filter(|channel| channels >> channel & 1 != 0) {
                 let Some((port, pin)) = analog(n, channel) else { continue };
-                // Or an input on purpose: the port's own resistor against what is connected.
+                // Or the pin is an input on purpose, to measure the port's own resistor against the circuit.
                 let (pad, pulled) = (self.gpio[port].pad(pin), self.gpio[port].pull(pin).is_some());
                 let reads = pad == Pad::Analog || pad == Pad::Input && pulled;
                 self.rules.require(reads, Rule::PinMode, || {

@@ -1,11 +1,11 @@
-//! The supply: monitor, brown-out reset, and the break of TIM1 behind the monitor.
+//! The supply: monitor, brown-out reset, and the break of TIM1 that follows the monitor.
 
 use super::Chip;
 use crate::periph::{Reset, plain};
 use crate::rules::Rule;
 
 impl Chip {
-    /// Sets the supply of the chip, V. Below the level of the option bytes it is held in reset.
+    /// Sets the supply of the chip, V. Below the level of the option bytes the chip is held in reset.
     pub fn set_supply(&mut self, volts: f64) {
         let was = self.browned_out();
         self.pwr.supply_v = volts;
@@ -26,7 +26,7 @@ impl Chip {
         self.syscfg.get(plain::CFGR2) & plain::PVDL != 0
     }
 
-    /// The break of TIM1 follows the monitor.
+    /// Makes the break of TIM1 follow the monitor.
     pub(super) fn monitor_supply(&mut self) {
         if !self.monitor_is_locked() {
             return;

@@ -10,12 +10,12 @@ const FPCA: u64 = 1 << 2;
 pub(super) const BASIC: [R; 8] = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC, R::XPSR];
 const FLOAT: [R; 9] = [R::D0, R::D1, R::D2, R::D3, R::D4, R::D5, R::D6, R::D7, R::FPSCR];
 
-/// R4 to R11, and S16 to S31, which functions keep.
+/// R4 to R11, and S16 to S31, which functions preserve.
 const KEPT: [R; 8] = [R::R4, R::R5, R::R6, R::R7, R::R8, R::R9, R::R10, R::R11];
 const KEPT_FLOAT: [R; 8] = [R::D8, R::D9, R::D10, R::D11, R::D12, R::D13, R::D14, R::D15];
 
 impl Cpu {
-    /// Pushes the frame of an exception and goes to its `handler`; `false` if the stack is not in memory.
+    /// Pushes the frame of an exception and goes to its `handler`; returns `false` if the stack is not in memory.
     pub fn enter(&mut self, exception: u16, handler: u32) -> bool {
         let float = self.control() & FPCA != 0;
         let before = self.get(R::SP);
@@ -26,7 +26,7 @@ impl Cpu {
         for (place, value) in frame.chunks_exact_mut(4).zip(&basic) {
             place.copy_from_slice(&(*value as u32).to_le_bytes());
         }
-        // The stacked status says Thumb, and whether the stack was moved for its alignment.
+        // The stacked status contains the Thumb bit, and whether the stack was moved for its alignment.
         let xpsr = basic.get(7).map_or(0, |x| *x as u32) & !(1 << 9) | 1 << 24 | (before & 4) << 7;
         frame[0x1c..0x20].copy_from_slice(&xpsr.to_le_bytes());
         if float {
@@ -48,7 +48,7 @@ impl Cpu {
         stacked
     }
 
-    /// Pops the frame of an exception; `false` if the stack is not in memory.
+    /// Pops the frame of an exception; returns `false` if the stack is not in memory.
     pub fn leave(&mut self, exc_return: u32) -> bool {
         let sp = self.get(R::SP);
         let float = exc_return & BASIC_FRAME == 0;
@@ -77,16 +77,16 @@ impl Cpu {
         true
     }
 
-    /// The registers that an interrupt must leave as they are: R0 to PC, status, masks, CONTROL, S16 to S31, and where
-    /// floating point is used S0 to S15 and FPSCR.
+    /// Returns the registers that an interrupt must preserve: R0 to PC, status, masks, CONTROL, S16 to S31, and, if
+    /// floating point is used, S0 to S15 and FPSCR.
     pub fn registers(&self) -> Vec<u64> {
         let read = |register: &R| self.uc.reg_read(*register).unwrap_or(0);
         let special = [R::SP, R::PRIMASK, R::BASEPRI, R::CONTROL];
-        // All but XPSR, which is the last.
+        // All but XPSR, which is the last one.
         let basic = &BASIC[..BASIC.len() - 1];
         let whole = basic.iter().chain(&KEPT).chain(&KEPT_FLOAT).chain(&special);
         let mut values: Vec<u64> = whole.map(read).collect();
-        // Flags and exception number: the emulator says Thumb only while it runs.
+        // Flags and exception number; the emulator sets the Thumb bit only while it runs.
         values.push(read(&R::XPSR) & 0xf80f_01ff);
         if self.uses_float() {
             values.extend(FLOAT.iter().map(read));
@@ -99,7 +99,7 @@ impl Cpu {
         self.control() & FPCA != 0
     }
 
-    /// Fills S0 to S15 with not-a-numbers.
+    /// Fills S0 to S15 with values that are not numbers.
     pub fn spoil_float(&mut self) {
         for register in FLOAT.into_iter().take(8) {
             self.uc.reg_write(register, 0x7fa0_dead_7fa0_dead).ok();
@@ -114,7 +114,7 @@ impl Cpu {
         let mut write = |register, value| self.uc.reg_write(register, value);
         write(R::XPSR, u64::from(xpsr)).ok();
         write(R::IPSR, u64::from(xpsr & 0x1ff)).ok();
-        // This write tells the translator about handler mode.
+        // This write informs the translator about handler mode.
         write(R::APSR_NZCV, u64::from(xpsr & 0xf000_0000)).ok();
     }
 }

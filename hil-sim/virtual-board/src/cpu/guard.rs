@@ -1,5 +1,5 @@
-//! The guard of the memory protection: the page of RAM that holds it goes through the model, which faults accesses
-//! to it.
+//! The guard of the memory protection: accesses to the page of RAM that contains it go through the model, which turns
+//! accesses to the guard into faults.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,13 +11,13 @@ use super::Cpu;
 use crate::chip::Chip;
 use crate::memory::{GUARD_PAGE, Region};
 
-/// The page that goes through the model.
+/// The page whose accesses go through the model.
 pub(super) struct Guard {
     page: u32,
     bytes: Rc<RefCell<Vec<u8>>>,
 }
 
-/// Whether the core may access an address; if not, it stops there.
+/// Whether the core may access an address; if not, the core stops there.
 fn allowed(uc: &mut Unicorn<Chip>, address: u32) -> bool {
     let chip = uc.get_data_mut();
     if !(chip.core_runs && chip.scs.denies(address)) {

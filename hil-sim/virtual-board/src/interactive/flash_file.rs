@@ -1,5 +1,5 @@
-//! The part of the flash in which the firmware keeps its settings, in a file: a mark, the contents, and a bit for
-//! every double word that cannot be read because the power went while it was being written.
+//! The part of the flash in which the firmware stores its settings, as a file: a mark, the contents, and a bit for
+//! every double word that cannot be read because power failed while it was being written.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -11,25 +11,25 @@ use hil_sim::Error;
 use crate::memory::{FLASH, FLASH_SIZE, STORED};
 use crate::periph::flash::Flash;
 
-/// First bytes of the file, with its version.
+/// First bytes of the file, including its version.
 const MARK: &[u8; 16] = b"virtual flash 2\n";
-/// Contents, bytes.
+/// Number of bytes of the contents.
 const BANK: usize = (FLASH + FLASH_SIZE - STORED) as usize;
-/// Bytes with a bit for every double word.
+/// Number of bytes with a bit for every double word.
 const TORN: usize = BANK / 64;
 
 /// A file with the contents of the flash.
 pub struct FlashFile {
     path: PathBuf,
-    /// Operations of the flash that the file contains.
+    /// Number of flash operations that the file contains.
     operations: u64,
 }
 
 impl FlashFile {
-    /// Gives the flash the contents of a file. A missing file is created with those of the flash.
+    /// Loads the contents of a file into the flash. A missing file is created with the contents of the flash.
     ///
     /// # Errors
-    /// The file cannot be read or written, or it is none of these; nothing is changed then.
+    /// The file cannot be read or written, or it is not such a file; then nothing is changed.
     pub fn open(path: &Path, flash: &mut Flash) -> Result<Self> {
         let refused = |why: String| Error::Refused(format!("--flash {}: {why}", path.display()));
         let file = Self { path: path.to_owned(), operations: flash.operations };
@@ -37,7 +37,7 @@ impl FlashFile {
             Ok(bytes) => {
                 let (contents, torn) = parse(&bytes).map_err(refused)?;
                 flash.replace_contents(contents, &torn);
-                // Found out now, not at the first `save`.
+                // An error appears now, not at the first `save`.
                 let writable = fs::File::options().write(true).open(path);
                 writable.map_err(|e| refused(e.to_string()))?;
             }
@@ -61,7 +61,7 @@ impl FlashFile {
         Ok(())
     }
 
-    /// Writes the file whole or not at all.
+    /// Writes the file completely or not at all.
     fn write(&self, flash: &Flash) -> Result<()> {
         let (contents, torn) = flash.contents();
         let bits = torn.chunks(8).map(|eight| {
@@ -75,7 +75,7 @@ impl FlashFile {
     }
 }
 
-/// Contents and torn double words of a file.
+/// Returns contents and torn double words of a file.
 fn parse(bytes: &[u8]) -> Result<(&[u8], Vec<bool>), String> {
     let size = MARK.len() + BANK + TORN;
     if bytes.len() != size {
@@ -109,7 +109,7 @@ mod tests {
         let mut torn = vec![false; BANK / 8];
         torn[9] = true;
         flash.replace_contents(&contents, &torn);
-        // Written when the flash has done something, not before.
+        // The file is written only after an operation of the flash.
         file.follow(&flash, 0).unwrap();
         assert_eq!(FlashFile::open(&path, &mut Flash::default()).map(|_| ()).ok(), Some(()));
         assert_eq!(fs::read(&path).unwrap()[MARK.len() + 5], 0xff);

@@ -9,9 +9,9 @@ pub enum Own {
     Help,
     /// Presses the reset button.
     Reset,
-    /// Takes the supply of the controller away and gives it back.
+    /// Interrupts the supply of the controller for a moment.
     Unplug,
-    /// Closes these contacts of the terminal strip, opens the others, and gives the reference a current.
+    /// Closes these contacts of the terminal strip, opens the others, and sets the current of the reference.
     Wires(String),
     /// Switches the supplies of the power stage.
     Stage(bool),
@@ -25,17 +25,17 @@ static COMMANDS: [(&str, Own, &str); 7] = [
     ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
     ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
     ("!unplug", Own::Unplug, "unplugs the controller and plugs it in again: RAM is lost, flash stays"),
-    ("!stage off", Own::Stage(false), "takes the supplies of gate drivers and dc link away, as `update` needs it"),
-    ("!stage on", Own::Stage(true), "gives them back"),
-    ("!wires", Own::Wires(String::new()), "of the terminal strip: `!wires ENABLE START 12` closes these and no others, and gives 12 mA"),
+    ("!stage off", Own::Stage(false), "switches off the supplies of gate drivers and dc link, as `update` requires"),
+    ("!stage on", Own::Stage(true), "switches them on again"),
+    ("!wires", Own::Wires(String::new()), "terminal strip: `!wires ENABLE START 12` closes these contacts and no others, and sets 12 mA"),
     ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
 ];
 
 impl Own {
-    /// The command in a line; `None` for a line to the drive.
+    /// Parses the command in a line; `None` for a line to the drive.
     ///
     /// # Errors
-    /// The line begins with `!`, and there is no such command.
+    /// The line begins with `!`, but there is no such command.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
         let Some(line) = to_program(line) else { return Ok(None) };
         if let Some(wires) = line.strip_prefix("!wires ") {
@@ -48,7 +48,7 @@ impl Own {
         })
     }
 
-    /// A line about each command.
+    /// Returns a line about each command.
     pub fn help() -> impl Iterator<Item = String> {
         COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<10} {meaning}"))
     }

@@ -1,4 +1,4 @@
-//! The results of a session: a page with plots, and the same as one JSON object.
+//! The results of a session: a page with plots, and the same data as one JSON object.
 
 use hil_sim::outcome::{Figure, Panel, Series};
 use hil_sim::{Config, Outcome};
@@ -13,7 +13,7 @@ pub const NAME: &str = "board";
 pub const ABOUT: &str = "The firmware's image on an emulated STM32G474, with the simulated motor at its \
                          pins and a pseudo-terminal at its serial port.";
 
-/// Results of a session.
+/// Makes the results of a session.
 pub fn outcome(config: &Config, session: &Session) -> Outcome {
     let Session { board, record, lines, .. } = session;
     let mut outcome = Outcome::default();

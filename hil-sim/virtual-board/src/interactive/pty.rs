@@ -12,13 +12,13 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// Bytes kept for a slow reader; further bytes are lost, as on a port without a listener.
+/// Number of bytes that are kept for a slow reader; further bytes are lost, as on a port without a listener.
 const KEPT: usize = 64 * 1024;
 
 /// A pseudo-terminal.
 pub struct Pty {
     ours: OwnedFd,
-    /// Held open, so that programs come and go.
+    /// Kept open, so that programs may come and go.
     _theirs: OwnedFd,
     /// The device file for programs.
     pub path: PathBuf,
@@ -26,10 +26,10 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A new pseudo-terminal that changes no byte and echoes none.
+    /// Opens a new pseudo-terminal, which changes and echoes no bytes.
     ///
     /// # Errors
-    /// The system has none left, or no /dev/pts.
+    /// The system has no free pseudo-terminal, or no /dev/pts.
     pub fn open() -> Result<Self> {
         let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC);
         let ours = ours.context("cannot open a pseudo-terminal (/dev/ptmx)")?;
@@ -47,7 +47,7 @@ impl Pty {
         Ok(Self { ours, _theirs: theirs, path, waiting: VecDeque::new() })
     }
 
-    /// The bytes written to it since the last call, at most a few thousand; never waits.
+    /// Returns the bytes written to it since the last call, at most a few thousand; never waits.
     ///
     /// # Errors
     /// An error of the system.
@@ -61,7 +61,7 @@ impl Pty {
         Ok(buffer)
     }
 
-    /// Gives bytes to whoever reads; never waits.
+    /// Sends bytes to the reader; never waits.
     ///
     /// # Errors
     /// An error of the system.

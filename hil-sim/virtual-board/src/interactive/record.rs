@@ -1,4 +1,4 @@
-//! Curves of a session of any length: means over some control periods, over more when there are too many.
+//! Curves of a session of any length: means over some control periods, or over more periods if there are too many.
 
 use std::f64::consts::TAU;
 
@@ -10,8 +10,8 @@ use hil_sim::stats::Stats;
 
 use crate::board::Period;
 
-/// A curve of the page: the axis of its panel, its name there, how it is drawn, whether the drive reports it, so that it stands still
-/// while the outputs are off, and its value in a control interrupt.
+/// A curve of the page: the axis of its panel, its name there, its style, whether the drive reports it (then it does
+/// not change while the outputs are off), and its value in a control interrupt.
 pub type Curve = (&'static str, &'static str, Drawn, bool, fn(&Plant, &Telemetry) -> f64);
 type Drawn = fn(&'static str, Vec<(f64, f64)>) -> Series;
 
@@ -22,7 +22,7 @@ const RPM: f64 = 60.0 / TAU;
 #[rustfmt::skip]
 pub const CURVES: [Curve; 8] = [
     ("quadrature current (A)", "measured", Series::line, true, |_, drive| drive.current.q.into()),
-    // Filtered.
+    // The reference after its filter.
     ("quadrature current (A)", "reference", Series::reference, true, |_, drive| drive.reference.q.into()),
     ("torque (Nm)", "", Series::line, false, |plant, _| plant.torque()),
     ("rotor flux (Wb)", "", Series::line, false, |plant, _| plant.rotor_flux().norm()),
@@ -39,10 +39,10 @@ pub const CURVES: [Curve; 8] = [
 struct Bucket {
     periods: f64,
     time: f64,
-    /// Of these, with the outputs on.
+    /// Number of these periods with the outputs on.
     on: f64,
     sums: [f64; CURVES.len()],
-    /// Sum of unit vectors that show the angle error: angles have no mean of their own.
+    /// Sum of unit vectors at the angle errors, because a mean of angles is not defined otherwise.
     error: Complex,
 }
 
@@ -56,9 +56,9 @@ impl Bucket {
     }
 }
 
-/// Most buckets: more than a plot has pixels, and few enough for a page and for a long session.
+/// Largest number of buckets: more than a plot has pixels, and few enough for a page and for a long session.
 const BUCKETS: usize = 30_000;
-/// A flux below this has hardly an angle, Wb: under half of the drive's flux.
+/// Flux below which its angle is uncertain, Wb: less than half of the drive's flux.
 const FLUX_WB: f64 = 0.05;
 
 /// The record of a session.
@@ -66,11 +66,12 @@ const FLUX_WB: f64 = 0.05;
 pub struct Record {
     buckets: Vec<Bucket>,
     open: Bucket,
-    /// How often a bucket was doubled. It is a period of the carrier at first: its ripple would hide everything else.
+    /// Number of doublings of a bucket. At first it is an injection period, because the ripple of the injection would
+    /// hide everything else.
     doubled: u32,
-    /// Control interrupts.
+    /// Number of control interrupts.
     pub interrupts: u64,
-    /// Angle error, electrical degrees, where it is judged: outputs on, and a flux.
+    /// Angle error, electrical degrees, where it is judged: with outputs on, and with a flux.
     pub error: Stats,
     /// Largest phase current at a sample, A.
     pub peak_current: f64,
@@ -79,7 +80,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Takes a control interrupt: the plant at its sample, and the telemetry of the drive after it.
+    /// Adds a control interrupt: the plant at its sample, and the telemetry of the drive after it.
     pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, drive: &Telemetry) {
         let on = period.compare.enabled;
         let counted = f64::from(u8::from(on));
@@ -111,21 +112,21 @@ impl Record {
         }
     }
 
-    /// Points over time, s, of the curve with this place in [`CURVES`]; where the drive reports it, not-a-numbers while the outputs are
-    /// off.
+    /// Returns points over time, s, of the curve with this index in [`CURVES`]. If the drive reports it, the values are
+    /// not numbers while the outputs are off.
     pub fn curve(&self, place: usize) -> Vec<(f64, f64)> {
         self.points(|bucket| {
             bucket.sums[place] / if CURVES[place].3 { bucket.on } else { bucket.periods }
         })
     }
 
-    /// Whether the outputs are on, 0 to 1, over time, s.
+    /// Returns whether the outputs are on, 0 to 1, over time, s.
     pub fn outputs(&self) -> Vec<(f64, f64)> {
         self.points(|bucket| bucket.on / bucket.periods)
     }
 
-    /// True minus estimated rotor-flux angle over time, electrical degrees; a not-a-number where it is
-    /// not judged.
+    /// Returns the true minus the estimated rotor-flux angle over time, electrical degrees; where it is not judged, the
+    /// value is not a number.
     pub fn error_deg(&self) -> Vec<(f64, f64)> {
         let angle = |error: Complex| if error.norm() > 0.0 { error.arg() } else { f64::NAN };
         self.points(|bucket| angle(bucket.error).to_degrees())

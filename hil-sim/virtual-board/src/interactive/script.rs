@@ -1,4 +1,4 @@
-//! Sessions without a person: lines that are typed at their time, and checks of the answers.
+//! Sessions without a person: lines that are typed at given times, and checks of the answers.
 //!
 //! ```text
 //! # comment
@@ -14,7 +14,7 @@
 //! ```
 //!
 //! A strict script fails at the first answer `error:` that no following `expect` or `wait for` names, at the first text
-//! that does not come, and when a fault is latched at its end.
+//! that does not come, and if a fault is latched at its end.
 
 mod step;
 
@@ -28,7 +28,7 @@ use step::Step;
 
 /// Longest wait for a text, s.
 const PATIENCE_S: f64 = 30.0;
-/// From the last step to the end of the session, s: the last answer is still heard.
+/// Time from the last step to the end of the session, s, in which the last answer can still come.
 const LAST_ANSWER_S: f64 = 0.5;
 /// The line that asks for a latched fault, and the beginning of the answer if there is one.
 const FAULTS: (&str, &str) = ("faults", "latched");
@@ -36,13 +36,13 @@ const FAULTS: (&str, &str) = ("faults", "latched");
 /// The next action of a script.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Due {
-    /// Nothing.
+    /// No action.
     Nothing,
-    /// Type this.
+    /// Type this line.
     Type(String),
     /// A check has failed and is only noted.
     Note(String),
-    /// It is at its end.
+    /// The script is at its end.
     #[default]
     End,
 }
@@ -55,25 +55,25 @@ struct Placed {
     step: Step,
 }
 
-/// A script and how far it has come.
+/// A script and its progress.
 #[derive(Clone, Debug, Default)]
 pub struct Script {
     steps: Vec<Placed>,
     next: usize,
-    /// When the last step was done, s.
+    /// Time of the last step, s.
     since: f64,
-    /// The text of `wait for` has come.
+    /// Whether the text of `wait for` has come.
     heard: bool,
     /// The last step that typed a line.
     typed: Option<usize>,
-    /// Lines that have come since.
+    /// Lines that have come since then.
     answers: Vec<String>,
-    /// The first answer that is an error and not expected.
+    /// The first unexpected answer that is an error.
     unexpected: Option<String>,
     strict: bool,
-    /// The fault has been asked for.
+    /// Whether the question for a latched fault was sent.
     at_end: bool,
-    /// `quit`, if the script says so.
+    /// `quit`, if the script ends so.
     end_with: Due,
 }
 
@@ -81,7 +81,7 @@ impl Script {
     /// Reads a file.
     ///
     /// # Errors
-    /// It cannot be read; a line that is none of the forms.
+    /// The file cannot be read, or a line has none of the forms.
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display();
         let text = std::fs::read_to_string(path)
@@ -89,10 +89,10 @@ impl Script {
         Self::parse(&text).map_err(|why| Error::Refused(format!("{name}, {why}")).into())
     }
 
-    /// Understands the text of a script.
+    /// Parses the text of a script.
     ///
     /// # Errors
-    /// The number of the first line that is none of the forms, and why.
+    /// The number of the first line with none of the forms, and the reason.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut steps = Vec::new();
         for (index, line) in text.lines().enumerate() {
@@ -106,12 +106,12 @@ impl Script {
         Ok(Self { steps, ..Self::default() })
     }
 
-    /// Fails at unexpected errors and at a fault at the end.
+    /// Makes the script fail at unexpected errors and at a fault at the end.
     pub fn strict(self) -> Self {
         Self { strict: true, ..self }
     }
 
-    /// A line that console or log have said.
+    /// Processes a line from console or log.
     pub fn hear(&mut self, line: &str) {
         self.heard |= self.steps.get(self.next).is_some_and(|placed| placed.step.awaits(line));
         if line.starts_with("error:") && !self.expects(line) && self.unexpected.is_none() {
@@ -127,12 +127,12 @@ impl Script {
         steps.take_while(|step| !step.types()).any(|step| step.awaits(line))
     }
 
-    /// A line with this text since the last typed one.
+    /// Returns a line with this text that has come since the last typed one.
     fn answer(&self, text: &str) -> Option<&str> {
         self.answers.iter().map(String::as_str).find(|line| line.contains(text))
     }
 
-    /// A failure at a step, in words.
+    /// Describes a failure at a step.
     fn failure(&self, step: Option<usize>, why: &str) -> String {
         match step.and_then(|step| self.steps.get(step)) {
             Some(Placed { number, text, .. }) => format!("script, line {number}: `{text}`: {why}"),
@@ -140,15 +140,15 @@ impl Script {
         }
     }
 
-    /// The time of the session is over: the failure of a strict script that has heard an unexpected error or is not at
-    /// its end.
+    /// Handles the end of the session's time: returns the failure of a strict script that has received an unexpected
+    /// error or is not at its end.
     pub fn cut_short(&mut self) -> Option<String> {
         let over = (self.next < self.steps.len())
             .then(|| self.failure(Some(self.next), "the time of the session is over"));
         self.unexpected.take().or(over).filter(|_| self.strict)
     }
 
-    /// The action due at this time, s since power-on.
+    /// Returns the action due at this time, s since power-up.
     ///
     /// # Errors
     /// A check has failed.
@@ -194,7 +194,7 @@ impl Script {
         Ok(due)
     }
 
-    /// Behind the last step: the last answer is heard, then a strict script asks for a latched fault.
+    /// After the last step it waits for the last answer; then a strict script asks for a latched fault.
     fn end(&mut self, now: f64) -> Result<Due> {
         if now < self.since + LAST_ANSWER_S {
             return Ok(Due::Nothing);

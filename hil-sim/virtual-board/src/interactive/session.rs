@@ -1,4 +1,4 @@
-//! A session: the board goes on in small slices of time; between them bytes go to and fro.
+//! A session: the board runs in small slices of time; between them bytes are exchanged.
 
 use std::f64::consts::TAU;
 use std::io::Write as _;
@@ -18,41 +18,41 @@ use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 use crate::periph::Reset;
 
-/// Control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
+/// Number of control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;
-/// The board is looked at this long before a control interrupt, ticks: the one before has ended, and the
-/// motor stands where it was sampled for that.
+/// Time before a control interrupt at which the board is examined, ticks: the previous interrupt has ended, and the
+/// motor is in the state in which it was sampled for that interrupt.
 const BEFORE: u64 = PERIOD / 8;
-/// Later than this, time that was lost is not made up for: the board would race.
+/// Delay beyond which lost time is not made up for, because the board would run too fast.
 const LATE: Duration = Duration::from_millis(100);
 
-/// A session without a person shows its time after this long without a line.
+/// Time without a line after which a session without a person shows its time.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
-/// Why a session has ended, in words.
+/// The reason why a session has ended, in words.
 type End = &'static str;
 
 /// Inputs of a session besides the pseudo-terminal.
 pub struct Inputs {
     /// Lines typed at the terminal.
     pub terminal: Receiver<String>,
-    /// Set by Ctrl-C.
+    /// Whether Ctrl-C was pressed.
     pub stop: Arc<AtomicBool>,
-    /// Typed at its time, if there is one.
+    /// The script, if there is one.
     pub script: Option<Script>,
     /// Simulated time at which the session ends, s.
     pub seconds: Option<f64>,
     /// Whether simulated time follows the clock.
     pub paced: bool,
-    /// The file that keeps the flash, if there is one.
+    /// The file that stores the flash, if there is one.
     pub flash: Option<FlashFile>,
-    /// Least urgent lines of the log that are kept and shown.
+    /// Least urgent lines of the log that are stored and shown.
     pub log: LogLevel,
     /// Whether the flux is shown.
     pub flux: bool,
 }
 
-/// A board that is talked to.
+/// A board with its inputs and outputs.
 pub struct Session {
     /// The board.
     pub board: Board,
@@ -61,11 +61,11 @@ pub struct Session {
     inputs: Inputs,
     typed: Assembler,
     said: Assembler,
-    /// Passes over the frames of a stream.
+    /// Separates the frames of a stream.
     wire: Splitter,
     resets: usize,
     last: Option<Period>,
-    /// The dc link at the beginning, V.
+    /// Dc-link voltage at the beginning, V.
     dc_link_v: f64,
     /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
     flux: Option<[f64; 3]>,
@@ -73,12 +73,12 @@ pub struct Session {
     pub lines: Vec<Line>,
     /// All curves so far.
     pub record: Record,
-    /// Time by which the board fell behind the clock, s.
+    /// Delay of the board behind the clock, s.
     pub behind_s: f64,
 }
 
 impl Session {
-    /// A session with a board that has just been powered.
+    /// Makes a session with a board that has just been powered up.
     pub fn new(board: Board, pty: Pty, bus: Pty, inputs: Inputs) -> Self {
         Self {
             dc_link_v: board.plant.dc_link(),
@@ -98,10 +98,10 @@ impl Session {
         }
     }
 
-    /// Goes on until something ends it; every line is shown when it comes.
+    /// Runs until something ends the session; `show` gets every line when it comes.
     ///
     /// # Errors
-    /// The board cannot go on, or the script cannot.
+    /// The board or the script cannot continue.
     pub fn run(&mut self, mut show: impl FnMut(&Line)) -> Result<()> {
         let (mut clock, mut since) = (Instant::now(), self.board.time());
         let mut said = Instant::now();
@@ -143,7 +143,7 @@ impl Session {
         end.map(drop)
     }
 
-    /// Takes the inputs, goes on for a slice and shows the outputs; the reason of the end, if the session ends.
+    /// Reads the inputs, runs for a slice and shows the outputs; returns the reason of the end, if the session ends.
     fn slice(&mut self) -> Result<Option<End>> {
         let now = self.board.time();
         if self.inputs.stop.load(Ordering::Relaxed) {
@@ -159,7 +159,7 @@ impl Session {
         self.send(&typed);
         let asked = self.bus.read()?;
         self.board.send_bus(&asked);
-        // Without the terminal, script and pseudo-terminal go on.
+        // If the terminal is closed, script and pseudo-terminal continue.
         while let Ok(line) = self.inputs.terminal.try_recv() {
             if let Some(end) = self.enter(&line)? {
                 return Ok(Some(end));
@@ -173,7 +173,7 @@ impl Session {
                     }
                 }
                 Due::Note(text) => self.add(Source::Board, text),
-                // An end given by the time is later.
+                // If the session has a time, it ends later.
                 Due::End if self.inputs.seconds.is_none() => return Ok(Some("of the script")),
                 Due::End | Due::Nothing => {}
             }
@@ -183,14 +183,14 @@ impl Session {
         let went = (0..slice).try_for_each(|_| self.period());
         self.hear()?;
         if let Some([drive, motor, flux]) = self.flux.take().filter(|_| self.inputs.flux) {
-            // A reader that has gone away is no reason to stop.
+            // A reader that has gone away does not stop the session.
             let _ = writeln!(std::io::stdout(), "flux {drive:.4} {motor:.4} {flux:.3}");
         }
         self.keep_flash()?;
         went.map(|()| None)
     }
 
-    /// Does a command of the board, or sends the line to the console; the reason of the end, if the session ends.
+    /// Executes a command of the board, or sends the line to the console; returns the reason of the end, if the session ends.
     fn enter(&mut self, line: &str) -> Result<Option<End>> {
         match Own::parse(line) {
             Ok(None) => {
@@ -226,7 +226,7 @@ impl Session {
                 return;
             }
             for line in self.typed.push(bytes) {
-                // The person who asks for more of the log sees it.
+                // If the person asks for more of the log, it is shown.
                 let level = line.trim().strip_prefix("log ").and_then(LogLevel::named);
                 self.inputs.log = level.unwrap_or(self.inputs.log);
                 self.add(Source::Typed, line);
@@ -234,11 +234,11 @@ impl Session {
         }
     }
 
-    /// Goes on until just before the next control interrupt.
+    /// Runs until just before the next control interrupt.
     fn period(&mut self) -> Result<()> {
         let now = self.board.chip().now;
         let next = self.last.map_or(0, |period| period.began + 2 * PERIOD - BEFORE);
-        // Without control interrupts (start, resets) a period at a time.
+        // Without control interrupts (start, resets), one period at a time.
         let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
         self.board.run_ticks(end - now)?;
         while let Some(period) = self.board.next_period() {
@@ -253,7 +253,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes the output of console and log, and notes resets.
+    /// Fetches the output of console and log, and notes resets.
     fn hear(&mut self) -> Result<()> {
         for text in self.board.take_log()? {
             self.add(Source::Log, text);
@@ -262,7 +262,7 @@ impl Session {
             self.resets = n + 1;
             let cause = self.board.resets[n].1;
             self.add(Source::Board, cause.to_string());
-            // A frame that the reset cut short takes no text with it.
+            // A frame that the reset cut short must not swallow text.
             self.wire = Splitter::default();
         }
         let bytes = self.board.chip().lpuart.line.take();
@@ -298,7 +298,7 @@ impl Session {
     }
 }
 
-/// The level that a line of the log begins with. A line without one, such as the message of a panic, is an error.
+/// Returns the level at the beginning of a log line. A line without one, such as the message of a panic, is an error.
 fn log_level(line: &str) -> LogLevel {
     let word = line.split_whitespace().next().unwrap_or_default();
     LogLevel::named(word).unwrap_or(LogLevel::Error)

@@ -5,16 +5,16 @@ use std::fmt;
 use hil_sim::console::answer::split_tag;
 use induction_drive::console::line::UNASKED;
 
-/// Where a line came from, in the order of the marks before it.
+/// Origin of a line, in the order of the marks before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Typed to the console.
     Typed,
-    /// Said by the console.
+    /// Printed by the console.
     Said,
     /// Logged.
     Log,
-    /// The board itself: resets, its end.
+    /// From the board itself: resets, its end.
     Board,
 }
 
@@ -23,7 +23,7 @@ pub enum Source {
 pub struct Line {
     /// Simulated time since power-on, s.
     pub time: f64,
-    /// Where it came from.
+    /// Its origin.
     pub source: Source,
     /// Its text.
     pub text: String,
@@ -36,14 +36,14 @@ impl fmt::Display for Line {
     }
 }
 
-/// Commands that change what the drive does; those with a reference can be many in a session.
+/// Commands that change the behaviour of the drive; those with a reference can be numerous in a session.
 const CHANGES: [&str; 5] = ["start", "stop", "learn", "clear", "reboot"];
 const REFERENCES: [&str; 3] = ["torque", "speed", "position"];
-/// Events that a figure can name and still be read.
+/// Largest number of events that keep a figure readable.
 const MOST_EVENTS: usize = 24;
 
 impl Line {
-    /// The text of a line that changes what the drive does, or reports a fault or a reset.
+    /// Returns the text of a line that changes the behaviour of the drive, or reports a fault or a reset.
     fn event(&self, references: bool) -> Option<&str> {
         let text = self.text.trim();
         let text = split_tag(text).map_or(text, |(_, request)| request);
@@ -65,8 +65,9 @@ fn is_fault(text: &str) -> bool {
     number.is_some_and(|(number, _)| number.parse::<u8>().is_ok())
 }
 
-/// The events of a session: commands that change what the drive does, faults and resets, each at its time, s. A
-/// fault counts once until something else happens. Where there are too many, references are left out.
+/// Returns the events of a session: commands that change the behaviour of the drive, faults and resets, each with its
+/// time, s. A repeated fault counts once until something else happens. If there are too many events, references are
+/// left out.
 pub fn events(lines: &[Line]) -> Vec<(f64, String)> {
     let all = |references: bool| {
         let mut events: Vec<(f64, String)> = Vec::new();
@@ -82,7 +83,7 @@ pub fn events(lines: &[Line]) -> Vec<(f64, String)> {
     Some(all(true)).filter(|events| events.len() <= MOST_EVENTS).unwrap_or_else(|| all(false))
 }
 
-/// Texts of the faults that console or log have reported, each once.
+/// Returns the texts of the faults that console or log have reported, each once.
 pub fn faults(lines: &[Line]) -> Vec<String> {
     let mut faults: Vec<String> = Vec::new();
     for text in lines.iter().filter_map(|line| line.event(false)).filter(|text| is_fault(text)) {
@@ -93,17 +94,17 @@ pub fn faults(lines: &[Line]) -> Vec<String> {
     faults
 }
 
-/// Bytes of one direction, as they become lines.
+/// The bytes of one direction, which are assembled to lines.
 #[derive(Debug, Default)]
 pub struct Assembler {
     bytes: Vec<u8>,
 }
 
-/// Longest line that is put together.
+/// Longest line that is assembled.
 const LONGEST: usize = 4096;
 
 impl Assembler {
-    /// Takes bytes; gives the lines that have ended.
+    /// Adds bytes; returns the completed lines.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<String> {
         let mut lines = Vec::new();
         for byte in bytes {
@@ -118,13 +119,13 @@ impl Assembler {
         lines
     }
 
-    /// The line that has begun, if one has.
+    /// Returns the incomplete line, if there is one.
     pub fn rest(&mut self) -> Option<String> {
         (!self.bytes.is_empty()).then(|| readable(&std::mem::take(&mut self.bytes)))
     }
 }
 
-/// Text of bytes; those that cannot be shown are escaped.
+/// Converts bytes to text; bytes that cannot be shown are escaped.
 fn readable(bytes: &[u8]) -> String {
     let shown = |byte: &u8| match byte {
         b' '..=b'~' => char::from(*byte).to_string(),

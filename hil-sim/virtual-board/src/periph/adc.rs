@@ -1,5 +1,5 @@
-//! ADC1 and ADC2, or ADC3 and ADC4 (RM0440, section 21): start-up with its times, sequences started together by a trigger output of TIM1 or by
-//! software, analog watchdog 1 on single channels. Nothing else of them is modelled.
+//! ADC1 and ADC2, or ADC3 and ADC4 (RM0440, section 21): start-up with its times, sequences started together by a
+//! trigger output of TIM1 or by software, analog watchdog 1 on single channels. Nothing else of the ADCs is modelled.
 
 mod converter;
 
@@ -11,41 +11,41 @@ offsets! {
     ISR = 0x00, IER = 0x04, CR = 0x08, CFGR = 0x0c, SMPR1 = 0x14, TR1 = 0x20, SQR1 = 0x30, DR = 0x40, JSQR = 0x4c, JDR1 = 0x80,
     JDR4 = 0x8c
 }
-// Common to both.
+// Registers common to both.
 offsets! { CSR = 0x300, CCR = 0x308 }
 const VREFEN: u32 = 1 << 22;
 
-/// Codes at the pins by channel, 0 to 18.
+/// ADC counts at the pins by channel, 0 to 18.
 pub type Inputs = [u16; 19];
 
-/// Both converters.
+/// A pair of ADCs.
 #[derive(Clone, Debug, Default)]
 pub struct Adc {
     converters: [Converter; 2],
     common: u32,
-    /// Codes at their pins.
+    /// ADC counts at their pins.
     pub inputs: [Inputs; 2],
-    /// Code of the reference inside the chip, at channel 18 of the first while CCR connects it.
+    /// ADC counts of the chip's internal reference, at channel 18 of the first ADC while CCR connects it.
     pub own_reference: u16,
-    /// Triggers to be lost, for each converter.
+    /// Number of triggers to be lost, for each ADC.
     pub lose_triggers: [u32; 2],
-    /// Number of the first, less one.
+    /// Number of the first ADC, minus one.
     first: u32,
     /// Whether RCC gives them a clock of their own.
     pub kernel_clock: bool,
-    /// Channels that each converter has converted since they were taken.
+    /// Channels that each ADC has converted since the last fetch.
     converted: [u32; 2],
 }
 
 impl Adc {
-    /// A pair; the first has this number, less one.
+    /// Makes a pair; the first ADC has this number, minus one.
     pub fn from(first: u32) -> Self {
         Self { first, ..Self::default() }
     }
 
-    /// Ticks per converter clock; `None` is no clock.
+    /// Returns the ticks per ADC clock; `None` is no clock.
     fn clock(&self) -> Option<u64> {
-        // The own clock, taken as that of the core, divided by PRESC; or synchronous, divided by 1, 2 or 4.
+        // Either their own clock, assumed to be that of the core, divided by PRESC; or the synchronous clock, divided by 1, 2 or 4.
         const PRESCALERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
         match self.common >> 16 & 3 {
             0 if !self.kernel_clock => None,
@@ -54,7 +54,7 @@ impl Adc {
         }
     }
 
-    /// A trigger output of TIM1, 0 or 1, rises.
+    /// Processes a rising edge of a trigger output of TIM1, 0 or 1.
     pub fn trigger(&mut self, at: u64, output: usize) {
         let Some(clock) = self.clock() else { return };
         for (n, one) in self.converters.iter_mut().enumerate() {
@@ -68,7 +68,7 @@ impl Adc {
         }
     }
 
-    /// How long the reference inside the chip is sampled, ticks.
+    /// Returns the sampling time of the chip's internal reference, ticks.
     pub fn own_reference_ticks(&self) -> u64 {
         self.converters[0].sampling(18) * self.clock().unwrap_or(1) / 2
     }
@@ -83,14 +83,14 @@ impl Adc {
         self.converters.iter().any(Converter::samples_twice)
     }
 
-    /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,
-    /// else of those that a trigger at this time would start.
+    /// Returns the sampling instants of the conversions of each ADC, in order: channel and time, ticks. They belong to
+    /// the sequences in progress, or otherwise to those that a trigger at this time would start.
     pub fn samplings(&self, trigger: Option<u64>) -> [Vec<(u32, u64)>; 2] {
         let clock = self.clock().unwrap_or(1);
         [0, 1].map(|n| self.converters[n].samplings(trigger, clock))
     }
 
-    /// When the next conversion ends, or a converter gets ready.
+    /// Returns the time at which the next conversion ends, or an ADC gets ready.
     pub fn next_event(&self) -> u64 {
         self.converters[0].next_event().min(self.converters[1].next_event())
     }
@@ -104,17 +104,17 @@ impl Adc {
         }
     }
 
-    /// Channels that each converter has converted since the last call, as bits.
+    /// Returns the channels that each ADC has converted since the last call, as bits.
     pub fn take_converted(&mut self) -> [u32; 2] {
         std::mem::take(&mut self.converted)
     }
 
-    /// Whether any enabled event asks for the interrupt.
+    /// Whether any enabled event requests the interrupt.
     pub fn requests(&self) -> bool {
         self.converters.iter().any(Converter::requests)
     }
 
-    /// Whether the sequence of the second has ended and was not looked at yet, and whether all else was converted.
+    /// Returns whether the sequence of the second ADC has ended and its flag was not read yet, and whether everything else was converted.
     pub fn ended(&self) -> (bool, bool) {
         let [one, two] = &self.converters;
         let regular =
@@ -127,13 +127,13 @@ impl Adc {
         self.converters.iter().any(|one| one.status & converter::AWD1 != 0)
     }
 
-    /// Results of the last sequences, and of the regular conversions that TIM1 has started.
+    /// Returns the results of the last sequences, and of the regular conversions that TIM1 has started.
     pub fn data(&self) -> [([u16; 4], u16); 2] {
         let regular = |one: &Converter| if one.samples_twice() { one.regular } else { 0 };
         [0, 1].map(|n| (self.converters[n].data, regular(&self.converters[n])))
     }
 
-    /// Reads a register of the block that both share.
+    /// Reads a register of the block that both ADCs share.
     pub fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         self.happen(now);
         match offset {
@@ -144,7 +144,7 @@ impl Adc {
         }
     }
 
-    /// Writes one.
+    /// Writes a register of the block that both ADCs share.
     pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
         self.happen(rules.now);
         match offset {
@@ -160,11 +160,11 @@ impl Adc {
     }
 }
 
-/// The rules and the clock, for one converter.
+/// The rules and the clock, for one ADC.
 struct Named<'a> {
     rules: &'a mut Rules,
     n: u32,
-    /// Ticks per clock of the converter; none is no clock.
+    /// Ticks per clock of the ADC; none is no clock.
     clock: Option<u64>,
 }
 

@@ -1,55 +1,55 @@
 //! Comparators (RM0440, section 24).
 //!
-//! A comparator is given its input and its reference in codes of a 12-bit converter. Its output follows after its
-//! delay, with its hysteresis below the reference.
+//! A comparator gets its input and its reference as counts of a 12-bit ADC. Its output follows after its delay, with
+//! its hysteresis below the reference.
 
 use super::{Effect, NEVER, bits};
 
-/// Bits that can be written.
+/// Writable bits.
 const MASK: u32 = 0x80ff_8171;
 bits! { EN = 0, POL = 15, VALUE = 30, LOCK = 31 }
-/// From an input beyond the reference to the output, ticks: 31 ns (datasheet, tD, 50 mV overdrive).
+/// Delay from an input beyond the reference to the output, ticks: 31 ns (datasheet, tD, 50 mV overdrive).
 const DELAY: u64 = 5;
-/// From the enable bit to a valid output, ticks: 5 us (datasheet, tSTART).
+/// Time from the enable bit to a valid output, ticks: 5 us (datasheet, tSTART).
 const START: u64 = 5 * 170;
-/// A step of the hysteresis, 10 mV, codes at a reference of 3.3 V.
+/// A step of the hysteresis, 10 mV, as counts at a reference of 3.3 V.
 const HYSTERESIS: u16 = 12;
 
 /// The comparators 1 to 7.
 #[derive(Clone, Debug, Default)]
 pub struct Comparators {
     control: [u32; 7],
-    /// Codes at their positive inputs.
+    /// ADC counts at their positive inputs.
     pub inputs: [u16; 7],
-    /// The output of the first stays low.
+    /// Whether the output of the first comparator stays low.
     pub stuck_low: bool,
-    /// Codes at their negative inputs.
+    /// ADC counts at their negative inputs.
     pub references: [u16; 7],
-    /// What the inputs say, without polarity, and since when the output does not say so yet.
+    /// Result of the comparison, without polarity, and the time since which the output has not followed it yet.
     high: [bool; 7],
     output: [bool; 7],
     follows_at: [Option<u64>; 7],
-    /// When one that is on has started.
+    /// Time at which a comparator that is on has started.
     started_at: [Option<u64>; 7],
 }
 
 impl Comparators {
-    /// Whether it is on.
+    /// Whether a comparator is on.
     pub fn is_on(&self, n: usize) -> bool {
         self.control[n] & EN != 0
     }
 
-    /// Its INPSEL: the pin at its positive input.
+    /// Returns INPSEL, the pin at its positive input.
     pub fn input_of(&self, n: usize) -> u32 {
         self.control[n] >> 8 & 1
     }
 
-    /// Its INMSEL: the source of its negative input.
+    /// Returns INMSEL, the source of its negative input.
     pub fn reference_of(&self, n: usize) -> u32 {
         self.control[n] >> 4 & 7
     }
 
-    /// Compares inputs and references as they are now.
+    /// Compares the present inputs and references.
     pub fn look(&mut self, now: u64) {
         for n in 0..7 {
             let (input, reference) = (self.inputs[n], self.references[n]);
@@ -67,13 +67,13 @@ impl Comparators {
         }
     }
 
-    /// When an output changes next.
+    /// Returns the time of the next change of an output.
     pub fn next_event(&self) -> u64 {
         let starts = self.started_at.iter().flatten().filter(|at| **at > 0);
         self.follows_at.iter().flatten().chain(starts).copied().min().unwrap_or(NEVER)
     }
 
-    /// The output of comparator `n`, counted from 0, with its polarity.
+    /// Returns the output of comparator `n`, counted from 0, with its polarity.
     pub fn output(&self, n: usize) -> bool {
         let control = self.control[n];
         let valid = control & EN != 0 && self.started_at[n] == Some(0);
@@ -87,7 +87,7 @@ impl Comparators {
         Some(self.control.get(n)? | if self.output(n) { VALUE } else { 0 })
     }
 
-    /// Writes a register; a locked one stays as it is.
+    /// Writes a register; a locked register does not change.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
         let n = (offset / 4) as usize;
         let before = *self.control.get(n)?;

@@ -1,9 +1,9 @@
-//! The CRC unit (RM0440, section 16), with its polynomial after a reset, fed with words whose bits are reversed.
+//! The CRC unit (RM0440, section 16), with its reset polynomial, for words whose bits are reversed.
 
 use super::{Effect, bits};
 
 bits! { RESET = 0 }
-/// CR: words are reversed on their way in, the value on its way out.
+/// CR: the bits of words are reversed at the input, those of the value at the output.
 const REVERSED: u32 = 0xe0;
 const DR: u32 = 0x00;
 const CR: u32 = 0x08;
@@ -21,7 +21,7 @@ impl CrcUnit {
         [(DR, self.value), (CR, self.cr)].into_iter().find(|r| r.0 == offset).map(|r| r.1)
     }
 
-    /// Writes a register. Unknown are words in another order of their bits.
+    /// Writes a register. Words in another bit order are not modelled.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
         match offset {
             CR => {

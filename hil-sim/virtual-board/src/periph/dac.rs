@@ -1,4 +1,4 @@
-//! Two of the converters to analog (RM0440, section 22), 12 bits right-aligned, without triggers: 1 and 3.
+//! Two of the DACs (RM0440, section 22), 12 bits right-aligned, without triggers: 1 and 3.
 
 use super::{Effect, NEVER, Store, offsets};
 use crate::rules::{Rule, Rules};
@@ -8,9 +8,9 @@ const DHR: [u32; 2] = [0x08, 0x14];
 const DOR: [u32; 2] = [0x2c, 0x30];
 /// DACxRDY of channel 1; the bits of channel 2 are 16 places higher.
 const RDY: u32 = 1 << 11;
-/// From the enable bit to a valid output without buffer, ticks: 8 us (datasheet, tWAKEUP).
+/// Time from the enable bit to a valid output without buffer, ticks: 8 us (datasheet, tWAKEUP).
 const WAKE_UP: u64 = 8 * 170;
-/// From one code to another, ticks: 3 us (datasheet, tSETTLING).
+/// Time from one output value to another, ticks: 3 us (datasheet, tSETTLING).
 const SETTLING: u64 = 3 * 170;
 
 defaults! {
@@ -19,7 +19,7 @@ defaults! {
     struct Channel {
         ready_at: u64 = NEVER,
         settled_at: u64 = NEVER,
-        /// The code that the output had settled to before.
+        /// The counts to which the output had settled before.
         before: u16,
         code: u16,
         has_data: bool,
@@ -40,7 +40,7 @@ impl Channel {
 }
 
 defaults! {
-    /// One converter.
+    /// One DAC.
     #[derive(Clone, Debug)]
     struct Dac {
         store: Store = Store::of("DAC"),
@@ -48,22 +48,22 @@ defaults! {
     }
 }
 
-/// Both.
+/// Both DACs.
 #[derive(Clone, Debug, Default)]
 pub struct Dacs([Dac; 2]);
 
 impl Dacs {
-    /// The code that channel 1 or 2 of a converter puts out.
+    /// Returns the output of channel 1 or 2 of a DAC, counts.
     pub fn code(&self, which: usize, channel: usize, now: u64) -> u16 {
         self.0[which].channels[channel - 1].output(now)
     }
 
-    /// Whether a channel was read as ready.
+    /// Whether the program has read that a channel is ready.
     pub fn seen_ready(&self, which: usize, channel: usize) -> bool {
         self.0[which].channels[channel - 1].seen_ready
     }
 
-    /// When an output has settled next.
+    /// Returns the time at which an output settles next.
     pub fn next_event(&self, now: u64) -> u64 {
         let all = self.0.iter().flat_map(|dac| dac.channels.iter().map(|c| c.settled_at));
         all.filter(|at| *at > now).min().unwrap_or(NEVER)
@@ -117,7 +117,7 @@ impl Dacs {
         store.write(offset, value)?;
         for n in 0..2 {
             let channel = &mut channels[n];
-            // The code for double data mode lies above it.
+            // The data for double data mode are in the bits above.
             let data = (store.get(DHR[n]) & 0xfff) as u16;
             if offset == DHR[n] {
                 channel.has_data = true;

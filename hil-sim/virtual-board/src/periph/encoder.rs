@@ -1,5 +1,5 @@
-//! TIM2 as counter of the encoder (RM0440, section 30): counts with the plant's, from 0 at its start,
-//! in encoder mode 3 only.
+//! TIM2 as counter of the encoder (RM0440, section 30): it counts together with the plant's encoder, from 0 at its
+//! start, in encoder mode 3 only.
 
 use super::{Effect, Store, offsets};
 
@@ -10,7 +10,7 @@ defaults! {
     #[derive(Clone, Debug)]
     pub struct EncoderTimer {
         store: Store = Store::of("TIM2"),
-        /// Where the encoder is, counts.
+        /// Position of the encoder, counts.
         pub position: u32,
         from: u32,
         held: u32,
@@ -23,7 +23,7 @@ impl EncoderTimer {
         self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3
     }
 
-    /// The counter.
+    /// Returns the counter.
     pub fn count(&self) -> u32 {
         if self.counting() { self.position.wrapping_sub(self.from) } else { self.held }
     }

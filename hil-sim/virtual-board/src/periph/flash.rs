@@ -1,8 +1,8 @@
 //! The flash (RM0440, section 3): two banks, programmed by double words, erased by pages of 2 KiB.
 //!
-//! Only the part behind the code ([`STORED`]) can be written. A double word that was being written
-//! when the power went has a wrong check code: reading it raises the NMI. A page whose erasure was cut
-//! short holds such words too. So does, until a reset, the double word of the code that a test damages.
+//! Only the part behind the code ([`STORED`]) can be written. A double word that was being written when power failed
+//! has a wrong check code: reading it raises the NMI. A page whose erasure was cut short contains such words too. So
+//! does, until a reset, the double word of the code that a test damages.
 //!
 //! A fetch or a read from a bank that is being written waits for the end of the operation.
 
@@ -27,13 +27,13 @@ const OPTIONS: u32 = 0xffef_f8aa;
 const BROWN_OUT: [f64; 8] = [1.66, 2.0, 2.26, 2.57, 2.83, 2.83, 2.83, 2.83];
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
-/// Bytes of the part that can be written.
+/// Size of the writable part, bytes.
 const SIZE: usize = (FLASH + FLASH_SIZE - STORED) as usize;
 /// Bytes of a page.
 pub const PAGE: usize = 2048;
-/// Typical times, ticks: a double word 82 us, a page 22 ms (datasheet).
+/// Typical time, ticks, of programming a double word: 82 us (datasheet).
 pub const PROGRAM: u64 = 82 * 170;
-/// The same.
+/// Typical time, ticks, of erasing a page: 22 ms (datasheet).
 pub const ERASE: u64 = 22_000 * 170;
 
 defaults! {
@@ -55,21 +55,21 @@ defaults! {
         torn: Vec<bool> = vec![false; SIZE / 8],
         /// Address of a double word of the code whose check code is wrong.
         pub bad_code: Option<u32>,
-        /// Addresses in the code whose check code the boot loader has left wrong, when the power went.
+        /// Addresses in the code whose check code the boot loader has left wrong, because power failed.
         torn_code: Range<u32> = 0..0,
         /// Double words of the last operation.
         changing: Range<usize> = 0..0,
-        /// Operations since the beginning: double words programmed, pages erased.
+        /// Number of operations since the beginning: double words programmed, pages erased.
         pub operations: u64,
-        /// The power goes in this operation, counted from 1; its double word or page is torn.
+        /// The operation, counted from 1, in which power fails; its double word or page is torn.
         pub power_loss_at: Option<u64>,
-        /// The power has gone.
+        /// Whether power has failed.
         pub power_lost: bool,
     }
 }
 
 impl Flash {
-    /// The same contents after a reset.
+    /// Returns the flash with the same contents after a reset.
     pub fn after_reset(self) -> Self {
         Self {
             bytes: self.bytes,
@@ -81,12 +81,12 @@ impl Flash {
         }
     }
 
-    /// Wait states.
+    /// Returns the number of wait states.
     pub fn wait_states(&self) -> u32 {
         self.store.get(ACR) & 15
     }
 
-    /// Supply, V, below which the chip is held in reset.
+    /// Returns the supply, V, below which the chip is held in reset.
     pub fn brown_out_v(&self) -> f64 {
         BROWN_OUT[(self.options >> 8 & 7) as usize]
     }
@@ -98,12 +98,12 @@ impl Flash {
         }
     }
 
-    /// Contents of the stored part, and its double words whose check code is wrong.
+    /// Returns the contents of the stored part, and its double words whose check code is wrong.
     pub fn contents(&self) -> (&[u8], &[bool]) {
         (&self.bytes, &self.torn)
     }
 
-    /// Replaces the contents by those of another flash of this size.
+    /// Replaces the contents with those of another flash of this size.
     pub fn replace_contents(&mut self, bytes: &[u8], torn: &[bool]) {
         self.bytes.copy_from_slice(bytes);
         self.torn.copy_from_slice(torn);
@@ -114,7 +114,7 @@ impl Flash {
         now < self.busy_until
     }
 
-    /// Whether an access to this address waits for the end of an operation: both can be only in the part that is stored.
+    /// Whether an access to this address waits for the end of an operation: both can only be in the stored part.
     pub fn delays(&self, address: u32, now: u64) -> bool {
         self.is_busy(now) && (address >= BANK_2 || self.options & DBANK == 0)
     }
@@ -124,15 +124,15 @@ impl Flash {
         self.bad_code.is_some() || !self.torn_code.is_empty()
     }
 
-    /// A read or a fetch of some bytes: whether their check code is wrong.
+    /// Processes a read or a fetch of some bytes; returns whether their check code is wrong.
     pub fn is_bad(&mut self, address: u32, size: u32) -> bool {
         let bad = [self.bad_code.map_or(0..0, |bad| bad..bad + 8), self.torn_code.clone()];
         let bad = bad.into_iter().find(|bad| bad.start < address + size && address < bad.end);
         bad.inspect(|bad| self.note_error(bad.start)).is_some()
     }
 
-    /// The boot loader erases or programs these addresses, double words of the code or of the stored part, and may lose its
-    /// power. The stored part takes these bytes.
+    /// Lets the boot loader erase or program these addresses, double words of the code or of the stored part; power may
+    /// fail meanwhile. The stored part gets these bytes.
     pub fn by_loader(&mut self, range: Range<u32>, bytes: &[u8]) {
         let lost = self.power_goes();
         if let Some(at) = range.start.checked_sub(STORED) {
@@ -151,14 +151,14 @@ impl Flash {
         self.eccr = ECCD | bank << 21 | ((address - FLASH) % (FLASH_SIZE / 2) / 8);
     }
 
-    /// The power goes: an operation in progress leaves its double words torn.
+    /// Interrupts power: an operation in progress leaves its double words torn.
     pub fn cut(&mut self, now: u64) {
         if self.is_busy(now) {
             self.torn[self.changing.clone()].fill(true);
         }
     }
 
-    /// A word of the stored part, and whether its check code is wrong.
+    /// Returns a word of the stored part, and whether its check code is wrong.
     pub fn load(&mut self, address: u32) -> (u32, bool) {
         let at = (address - STORED) as usize & !3;
         let word =
@@ -170,14 +170,14 @@ impl Flash {
         (word, torn)
     }
 
-    /// Whether the operation that begins now is the one in which the power goes.
+    /// Whether power fails in the operation that begins now.
     fn power_goes(&mut self) -> bool {
         self.operations += 1;
         self.power_lost |= self.power_loss_at == Some(self.operations);
         self.power_lost
     }
 
-    /// Programs a word: two make an operation. `None` is a write that is not 32 bits wide or not allowed.
+    /// Programs a word; two words make an operation. `None` is a write that is not 32 bits wide or not allowed.
     pub fn store(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
         let cr = self.store.get(CR);
         if self.power_lost {
@@ -192,7 +192,7 @@ impl Flash {
             Some((at, low)) if address == at + 4 => self.program(at, low, value, now),
             _ => self.status |= PGSERR | SIZERR,
         }
-        // Others may have to wait from now on.
+        // Other accesses may have to wait from now on.
         Some(Effect::Look)
     }
 
@@ -201,7 +201,7 @@ impl Flash {
         let new = u64::from(low) | u64::from(high) << 32;
         let Some(place) = self.bytes.get_mut(at..at + 8) else { return };
         let old = place.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
-        // Only erased double words, or all zeros over anything.
+        // Only erased double words may be programmed, or any with all zeros.
         if old != u64::MAX && new != 0 {
             self.status |= PROGERR;
             return;
@@ -216,7 +216,7 @@ impl Flash {
     fn erase(&mut self, cr: u32, now: u64) {
         self.busy_until = now + ERASE;
         let number = (cr >> 3 & 0x7f) as usize;
-        // Counted from the beginning of a bank; one bank has pages twice as long.
+        // Pages are counted from the beginning of a bank; with a single bank they are twice as long.
         let (address, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
             (true, true) => (BANK_2 as usize + number * PAGE, PAGE),
             (true, false) => (FLASH as usize + number * PAGE, PAGE),
@@ -259,7 +259,7 @@ impl Flash {
             }
             SR => self.status &= !value,
             ECCR => self.eccr &= !value,
-            // Locked: only the lock itself may be set again.
+            // While locked, only the lock itself may be set again.
             CR if cr & LOCK != 0 => {}
             CR => {
                 let works = value & PG != 0 || value & (STRT | PER) == STRT | PER;

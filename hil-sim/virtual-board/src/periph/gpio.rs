@@ -1,10 +1,10 @@
-//! Pins (RM0440, section 9). Inputs are as they are pulled.
+//! Pins (RM0440, section 9). An input has the level of its pull resistor.
 
 use super::{Effect, Store, offsets};
 
 offsets! { MODER = 0x00, OTYPER = 0x04, OSPEEDR = 0x08, PUPDR = 0x0c, IDR = 0x10, ODR = 0x14, BSRR = 0x18, AFRL = 0x20, BRR = 0x28 }
 
-/// What a port does with a pin.
+/// The function of a pin in its port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pad {
     /// Input.
@@ -22,10 +22,10 @@ pub enum Pad {
 pub struct Gpio(Store);
 
 impl Gpio {
-    /// Port A is 0.
+    /// Makes a port; port A is 0.
     pub fn new(port: usize) -> Self {
         let mut store = Store::of("GPIO");
-        // The debug port's pins.
+        // The pins of the debug port.
         let values = match port {
             0 => [0x0c00_0000, 0xabff_ffff, 0x6400_0000],
             1 => [0x0000_00c0, 0xffff_febf, 0x0000_0100],
@@ -37,7 +37,7 @@ impl Gpio {
         Self(store)
     }
 
-    /// What the port does with a pin.
+    /// Returns the function of a pin.
     pub fn pad(&self, pin: u32) -> Pad {
         match self.0.get(MODER) >> (2 * pin) & 3 {
             0 => Pad::Input,
@@ -47,12 +47,12 @@ impl Gpio {
         }
     }
 
-    /// Whether the pin's output drives low only.
+    /// Whether the pin's output only drives low.
     pub fn open_drain(&self, pin: u32) -> bool {
         self.0.get(OTYPER) >> pin & 1 != 0
     }
 
-    /// The level that the port's own resistor pulls a pin to. It is off in analog mode.
+    /// Returns the level to which the port's own resistor pulls a pin. The resistor is off in analog mode.
     pub fn pull(&self, pin: u32) -> Option<bool> {
         match (self.pad(pin), self.0.get(PUPDR) >> (2 * pin) & 3) {
             (Pad::Analog, _) | (_, 0 | 3) => None,
@@ -60,7 +60,7 @@ impl Gpio {
         }
     }
 
-    /// Levels at the pins.
+    /// Returns the levels at the pins.
     fn levels(&self) -> u32 {
         let pulls = self.0.get(PUPDR);
         (0..16).fold(0, |w, n| w | u32::from(pulls >> (2 * n) & 3 == 1) << n)

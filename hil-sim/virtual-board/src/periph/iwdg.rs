@@ -4,9 +4,9 @@ use super::{Effect, NEVER};
 use crate::rules::{Rule, Rules};
 use crate::time::TICKS_PER_S;
 
-/// Frequency of the LSI oscillator, its clock, Hz (datasheet, typical).
+/// Frequency of the LSI oscillator, which clocks the watchdog, Hz (datasheet, typical).
 pub const LSI_HZ: f64 = 32_000.0;
-/// Clocks until a value written has arrived, at most.
+/// Largest number of clocks until a written value takes effect.
 const ARRIVES: u64 = 6;
 
 defaults! {
@@ -21,14 +21,14 @@ defaults! {
         pub quick: bool,
         /// Ticks per cycle of its clock.
         pub clock: u64 = (TICKS_PER_S as f64 / LSI_HZ) as u64,
-        /// Until when the last values of prescaler, reload and window are on their way.
+        /// Time until which the last values of prescaler, reload and window are being transferred.
         busy_until: [u64; 3],
         expires: u64 = NEVER,
     }
 }
 
 impl Iwdg {
-    /// When it resets the chip.
+    /// Returns the time at which it resets the chip.
     pub fn next_event(&self) -> u64 {
         self.expires
     }
@@ -37,12 +37,12 @@ impl Iwdg {
         u64::from(self.reload + 1) * self.count()
     }
 
-    /// Ticks per prescaled clock.
+    /// Returns the ticks per prescaled clock.
     fn count(&self) -> u64 {
         (4 << self.prescaler.min(6)) * self.clock
     }
 
-    /// Its clock stood still for some ticks.
+    /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
         if self.expires != NEVER {
             self.expires += ticks;
@@ -83,7 +83,7 @@ impl Iwdg {
                 let before = self.count();
                 *[&mut self.prescaler, &mut self.reload, &mut self.window][which] =
                     value & [7, 0xfff, 0xfff][which];
-                // With the longer of the two prescalers: the longest time.
+                // With the larger of the two prescalers, which gives the longest time.
                 let clock = if self.quick { self.clock } else { before.max(self.count()) };
                 self.busy_until[which] = now + ARRIVES * clock;
             }

@@ -4,7 +4,7 @@ use super::{Effect, Store, bits, offsets};
 
 offsets! { CR1 = 0x00, CR2 = 0x04, SR2 = 0x14, CR5 = 0x80 }
 bits! { PVDE = 0, DBP = 8, PVDO = 11 }
-/// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last is a pin.
+/// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last setting compares a pin.
 const LEVELS: [f64; 7] = [2.05, 2.2, 2.36, 2.52, 2.64, 2.81, 2.9];
 
 /// The core's voltage range.
@@ -19,7 +19,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// Largest system clock, and bus clock for each wait state of the flash and one more, Hz.
+    /// Returns the largest system clock, and the bus clock for each wait state of the flash and one more, Hz.
     pub fn clocks_hz(self) -> (u64, u64) {
         match self {
             Self::Boost => (170_000_000, 34_000_000),
@@ -28,7 +28,7 @@ impl Range {
         }
     }
 
-    /// Wait states of the flash that a bus clock in Hz needs.
+    /// Returns the wait states of the flash that a bus clock in Hz needs.
     pub fn wait_states(self, bus_hz: u64) -> u32 {
         (bus_hz.div_ceil(self.clocks_hz().1) as u32).saturating_sub(1)
     }

@@ -1,5 +1,5 @@
-//! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, but for
-//! a crystal that is dead.
+//! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, except for a dead
+//! crystal.
 
 use super::{Effect, NEVER, Reset, Store, bits, offsets};
 use induction_drive::board::{CLOCK_HZ, HSE_HZ, HSI_HZ};
@@ -16,21 +16,21 @@ bits! { CSSF = 8 }
 bits! { PIN = 26, BOR = 27, SFT = 28, IWDG = 29, WWDG = 30 }
 const FLAGS: u32 = 0xfe00_0000;
 
-/// When clocks of peripherals were switched on.
+/// Time at which clocks of peripherals were switched on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct On {
     /// Time, ticks.
     pub at: u64,
-    /// Accesses to registers until then.
+    /// Number of accesses to registers until then.
     pub accesses: u64,
 }
 
 defaults! {
-    /// The clocks; by default after power-on.
+    /// The clocks; by default after power-up.
     #[derive(Clone, Debug)]
     pub struct Rcc {
         store: Store = Store::of("RCC"),
-        /// Flags of resets, which stay until they are cleared.
+        /// Flags of resets, which stay set until they are cleared.
         pub flags: u32 = BOR | PIN,
         cifr: u32,
         /// Whether the crystal oscillates when it is on.
@@ -38,7 +38,7 @@ defaults! {
         /// Whether the PLL locks when it is on.
         pub pll_locks: bool = true,
         failed: bool,
-        /// The last clocks switched on by each enable register: their bits, and when.
+        /// The last clocks that each enable register has switched on: their bits, and the time.
         on: [(u32, On); 7],
         /// Ticks of 170 MHz per cycle of the core.
         pub ticks_per_cycle: u64 = HSI_TICKS,
@@ -46,7 +46,7 @@ defaults! {
 }
 
 impl Rcc {
-    /// After a reset.
+    /// Returns the state after a reset.
     pub fn new(cause: Reset) -> Self {
         let flags = match cause {
             Reset::Power => BOR | PIN,
@@ -58,7 +58,7 @@ impl Rcc {
         Self { flags, ..Self::default() }
     }
 
-    /// The system clock, Hz.
+    /// Returns the system clock, Hz.
     pub fn system_hz(&self) -> u64 {
         let oscillator = |select| if select == 3 { HSE_HZ } else { HSI_HZ };
         u64::from(match self.store.get(CFGR) & 3 {
@@ -72,15 +72,16 @@ impl Rcc {
         })
     }
 
-    /// The clock of the core and its bus, Hz.
+    /// Returns the clock of the core and its bus, Hz.
     pub fn bus_hz(&self) -> u64 {
-        // HPRE: 8 is a half; there is no 32nd.
+        // HPRE: 8 is a division by two; there is no division by 32.
         const DIVIDERS: [u64; 8] = [2, 4, 8, 16, 64, 128, 256, 512];
         let divider = self.store.get(CFGR) >> 4 & 15;
         self.system_hz() / if divider < 8 { 1 } else { DIVIDERS[divider as usize - 8] }
     }
 
-    /// When the clock of a peripheral was switched on, if it is on; unknown for all but the last of a register.
+    /// Returns the time at which the clock of a peripheral was switched on, if it is on; it is unknown for all clocks
+    /// of a register but the last.
     pub fn clock(&self, register: u32, bit: u32) -> Option<Option<On>> {
         if self.store.get(register) >> bit & 1 == 0 {
             return None;
@@ -94,18 +95,18 @@ impl Rcc {
         self.store.get(CSR) & 1 != 0
     }
 
-    /// Whether the converters 1 and 2 have a clock of their own.
+    /// Whether ADC1 and ADC2 have a clock of their own.
     pub fn adc_kernel_clock(&self) -> bool {
         self.store.get(CCIPR) >> 28 & 3 != 0
     }
 
-    /// When a failed crystal is found.
+    /// Returns the time at which a failed crystal is detected.
     pub fn next_event(&self) -> u64 {
         let watched = self.store.get(CR) & (HSEON | CSSON) == HSEON | CSSON;
         if watched && !self.crystal_lives && !self.failed { 0 } else { NEVER }
     }
 
-    /// Whether the crystal was found to have failed: to the break of TIM1, and an NMI.
+    /// Whether a failure of the crystal was detected, which acts on the break of TIM1 and raises an NMI.
     pub fn happen(&mut self, now: u64) -> bool {
         if now < self.next_event() {
             return false;
@@ -124,7 +125,7 @@ impl Rcc {
         let value = self.store.read(offset)?;
         Some(match offset {
             CR => {
-                // Ready flags follow their switches: HSI, HSE, PLL.
+                // Ready flags follow their enable bits: HSI, HSE, PLL.
                 let hse = if self.crystal_lives { value & HSEON } else { 0 };
                 value & !(1 << 10 | 1 << 17 | 1 << 25)
                     | (value & 1 << 8) << 2
@@ -159,7 +160,7 @@ impl Rcc {
     }
 }
 
-/// Place of an enable register.
+/// Returns the index of an enable register.
 fn place(register: u32) -> usize {
     ((register - AHB1ENR) / 4) as usize
 }

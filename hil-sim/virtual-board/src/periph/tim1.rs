@@ -1,7 +1,8 @@
 //! TIM1 in centre-aligned mode, as the timer of a power stage (RM0440, section 28).
 //!
-//! The counter is not stepped: where it is follows from time. Events are its two ends and the rising edges of OC4REF on the way
-//! up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the converters; or the update is output 1.
+//! The counter is not stepped: its value follows from time. Events are its two ends and the rising edges of OC4REF on
+//! the way up and of OC6REF on the way down, which are the trigger outputs 1 and 2 to the ADCs; alternatively the
+//! update is output 1.
 
 mod outputs;
 
@@ -22,7 +23,7 @@ bits! { OSSI = 10, OSSR = 11, BKE = 12, BKP = 13, MOE = 15 }
 /// An event and its time.
 #[derive(Clone, Copy, Debug)]
 pub enum Event {
-    /// A trigger output, 0 or 1, rises.
+    /// A rising edge of a trigger output, 0 or 1.
     Trigger(u64, usize),
     /// The counter is at its top.
     Crest(u64),
@@ -35,9 +36,9 @@ defaults! {
     #[derive(Clone, Debug)]
     pub struct Tim1 {
         store: Store = Store::of("TIM1"),
-        /// Counter at rest.
+        /// The counter while it does not run.
         held: u32,
-        /// When the counter was last at 0, on its way up.
+        /// Time at which the counter was last at 0, on its way up.
         from: u64,
         top: u32 = 0xffff,
         active: [u32; 4],
@@ -46,17 +47,17 @@ defaults! {
         /// Next end of the count, and whether it is the top.
         next_end: u64 = NEVER,
         at_top_next: bool = true,
-        /// When each trigger output rises next.
+        /// Time of the next rising edge of each trigger output.
         trigger_at: [u64; 2] = [NEVER; 2],
-        /// Level of the break pin; `None` is not sure.
+        /// Level of the break pin; `None` is uncertain.
         fault_pin: Option<bool> = Some(true),
         /// Outputs of the comparators.
         comparators: [bool; 7],
         /// LOCK of the first write to BDTR.
         first_lock: Option<u32>,
-        /// A debugger has stopped the counter, at this time.
+        /// Time at which a debugger has stopped the counter.
         frozen: Option<u64>,
-        /// Updates to be left out: compare values are not taken over, no flag is set.
+        /// Number of updates to be left out: compare values are not taken over, no flag is set.
         pub drop_update: u32,
     }
 }
@@ -66,7 +67,7 @@ impl Tim1 {
         self.store.get(CR1) & 1 != 0
     }
 
-    /// Counter, and whether it counts down.
+    /// Returns the counter, and whether it counts down.
     fn count(&self, now: u64) -> (u32, bool) {
         if !self.counting() {
             return (self.held, false);
@@ -76,12 +77,12 @@ impl Tim1 {
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
     }
 
-    /// A debugger halts the core: the counter stops, and the outputs go off as if MOE was reset (RM0440, TIM1, debug mode).
+    /// Stops the counter because a debugger halts the core; the outputs go off as if MOE had been reset (RM0440, TIM1, debug mode).
     pub fn freeze(&mut self, now: u64) {
         self.frozen.get_or_insert(now);
     }
 
-    /// The counter goes on.
+    /// Lets the counter continue.
     pub fn thaw(&mut self, now: u64) {
         let Some(since) = self.frozen.take() else { return };
         let stood = now - since;
@@ -91,17 +92,17 @@ impl Tim1 {
         }
     }
 
-    /// Lets an update come at the next end of the count, whatever the repetition counter says.
+    /// Makes an update come at the next end of the count, regardless of the repetition counter.
     pub fn extra_update(&mut self) {
         self.repetitions = 0;
     }
 
-    /// Compare values in force.
+    /// Returns the compare values in force.
     pub fn in_force(&self) -> [u32; 3] {
         [self.active[0], self.active[1], self.active[2]]
     }
 
-    /// Compare values written last.
+    /// Returns the compare values written last.
     pub fn written(&self) -> [u32; 3] {
         std::array::from_fn(|leg| self.store.get(CCR1 + 4 * leg as u32))
     }
@@ -111,24 +112,24 @@ impl Tim1 {
         self.frozen.is_none() && self.main_output()
     }
 
-    /// The bit MOE.
+    /// Returns the bit MOE.
     pub fn main_output(&self) -> bool {
         self.store.get(BDTR) & MOE != 0
     }
 
-    /// Whether the outputs CH1, CH1N, CH2 to CH3N are enabled, and whether the break pin is.
+    /// Returns whether the outputs CH1, CH1N, CH2 to CH3N are enabled, and whether the break pin is.
     pub fn uses_pins(&self) -> ([bool; 6], bool) {
         let ccer = self.store.get(CCER);
         let pin = self.store.get(BDTR) & BKE != 0 && self.store.get(AF1) & 1 != 0;
         (std::array::from_fn(|n| ccer >> (2 * n) & 1 != 0), pin)
     }
 
-    /// Whether a break has been seen and not cleared.
+    /// Whether a break has occurred and was not cleared.
     pub fn broken(&self) -> bool {
         self.status & (BIF | SBIF) != 0
     }
 
-    /// When the next event is.
+    /// Returns the time of the next event.
     pub fn next_event(&self) -> u64 {
         if self.frozen.is_some() {
             NEVER
@@ -137,7 +138,7 @@ impl Tim1 {
         }
     }
 
-    /// Lets the next event happen.
+    /// Processes the next event.
     pub fn happen(&mut self) -> Event {
         if let Some(output) = self.trigger_at.iter().position(|at| *at <= self.next_end) {
             return Event::Trigger(std::mem::replace(&mut self.trigger_at[output], NEVER), output);
@@ -163,13 +164,13 @@ impl Tim1 {
         Event::Valley(end)
     }
 
-    /// OC4REF rises on the way up where the counter reaches its compare value.
+    /// Plans the rising edge of OC4REF, which comes on the way up when the counter reaches its compare value.
     fn plan_trigger(&mut self) {
         let after = self.rises_after(0, self.active[3]);
         self.trigger_at[0] = after.map_or(NEVER, |ticks| self.from + ticks);
     }
 
-    /// The ticks between the counter at 0 and the edge of a trigger output at this compare value; none if there is none.
+    /// Returns the ticks between the counter at 0 and the edge of a trigger output at this compare value; none if there is no edge.
     fn rises_after(&self, output: usize, compare: u32) -> Option<u64> {
         // Channel 4 in PWM mode 2 as output 1, channel 6 in mode 1 as output 2.
         let (mode, wanted) = [(CCMR2, 7), (CCMR3, 6)][output];
@@ -200,25 +201,25 @@ impl Tim1 {
         register >> (3 + 8 * (channel % 2)) & 1 != 0
     }
 
-    /// A fault inside the chip: clock, supply, memory, lock-up.
+    /// Processes a fault inside the chip: clock, supply, memory, lock-up.
     pub fn system_break(&mut self) {
         self.pull_break(SBIF);
     }
 
-    /// Outputs of the comparators, from now on.
+    /// Sets the outputs of the comparators.
     pub fn set_comparators(&mut self, outputs: [bool; 7]) {
         self.comparators = outputs;
         self.update_break();
     }
 
-    /// Level of the break pin, from now on; `None` is not sure, and taken for the one that breaks.
+    /// Sets the level of the break pin; `None` is uncertain, and is assumed to be the level that breaks.
     pub fn set_fault_pin(&mut self, level: Option<bool>) {
         self.fault_pin = level;
         self.update_break();
     }
 
-    /// The break request: the enabled sources, each with its own polarity, go through one OR gate, and BKP
-    /// is the polarity behind it (section 28.3.16, overview of the break circuit).
+    /// Updates the break request: the enabled sources, each with its own polarity, go through one OR gate, and BKP is
+    /// the polarity after it (section 28.3.16, overview of the break circuit).
     fn update_break(&mut self) {
         let (af1, bdtr) = (self.store.get(AF1), self.store.get(BDTR));
         let bit = |n: usize| af1 >> n & 1 != 0;

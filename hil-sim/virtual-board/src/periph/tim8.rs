@@ -1,4 +1,5 @@
-//! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, upwards. Other modes are off here.
+//! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, counting up. In other modes the
+//! output is off in this model.
 
 use super::{Store, bits, offsets};
 
@@ -17,12 +18,12 @@ const PWM_1: u32 = 0x60;
 pub struct Tim8(pub Store);
 
 impl Tim8 {
-    /// After a reset.
+    /// Returns the state after a reset.
     pub fn at_reset() -> Self {
         Self(Store::of("TIM8"))
     }
 
-    /// Share of a period in which its first output is high. A new compare value counts at once, not from the next period on.
+    /// Returns the share of a period in which its first output is high. A new compare value takes effect at once, not in the next period.
     pub fn duty(&self) -> f64 {
         let get = |offset| self.0.get(offset);
         let runs = get(CR1) & CEN != 0 && get(CCER) & CC1E != 0 && get(BDTR) & MOE != 0;
@@ -32,12 +33,12 @@ impl Tim8 {
         f64::from(get(CCR1)) / (f64::from(get(ARR)) + 1.0)
     }
 
-    /// The bit MOE.
+    /// Returns the bit MOE.
     pub fn main_output(&self) -> bool {
         self.0.get(BDTR) & MOE != 0
     }
 
-    /// A fault inside the chip pulls the break.
+    /// Processes a fault inside the chip, which pulls the break.
     pub fn system_break(&mut self) {
         let bdtr = self.0.get(BDTR);
         if bdtr & BKE != 0 {

@@ -1,23 +1,23 @@
-//! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well. Channel 1
-//! captures every eighth edge of the LSI oscillator.
+//! TIM5 as time base (RM0440, section 30): it counts core clocks up while it is enabled, also while the core sleeps or
+//! is halted. Channel 1 captures every eighth edge of the LSI oscillator.
 
 use super::{Effect, Store, bits, offsets};
 
 offsets! { CR1 = 0x00, SR = 0x10, EGR = 0x14, CCMR1 = 0x18, CCER = 0x20, CNT = 0x24, CCR1 = 0x34, TISEL = 0x5c }
-// Of SR: a capture that was not read, and another one behind it.
+// SR: a capture that was not read, and another one after it.
 bits! { CC1IF = 1, CC1OF = 9 }
-/// Edges of the oscillator to a capture.
+/// Number of edges of the oscillator per capture.
 const EDGES: f64 = 8.0;
 
 defaults! {
-    /// The captures, as they come while the channel is on.
+    /// The captures while the channel is on.
     #[derive(Clone, Copy, Debug)]
     pub struct Captures {
-        /// Ticks from one to the next.
+        /// Ticks from one capture to the next.
         ticks: f64 = f64::INFINITY,
-        /// A time, and the captures up to it.
+        /// A time, and the number of captures until then.
         from: (u64, f64),
-        /// Captures up to the last one that was read.
+        /// Number of captures up to the last one that was read.
         read: u64,
     }
 }
@@ -34,17 +34,17 @@ defaults! {
 }
 
 impl TimeBase {
-    /// Its clock stood still for some ticks.
+    /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
         self.from += ticks;
     }
 
-    /// The same oscillator after a reset.
+    /// Returns the timer after a reset, with the same oscillator.
     pub fn after_reset(&self) -> Self {
         Self { captures: self.captures, ..Self::default() }
     }
 
-    /// From now on it takes so many ticks from one edge of the oscillator to the next; infinite: none comes.
+    /// Sets the ticks from one edge of the oscillator to the next; infinite stops it.
     pub fn set_oscillator(&mut self, ticks: f64, now: u64) {
         let captures = &mut self.captures;
         captures.from = (now, captures.so_far(now));
@@ -53,7 +53,7 @@ impl TimeBase {
 
     /// Reads a register at the time `now`, ticks.
     pub fn read(&mut self, offset: u32, now: u64, oscillates: bool) -> Option<u32> {
-        // Read in loops.
+        // The counter is read in loops.
         if offset == CNT {
             let counts = self.store.get(CR1) & 1 != 0;
             return Some(if counts { (now - self.from) as u32 } else { 0 });

@@ -1,5 +1,5 @@
-//! Serial ports with their FIFOs: LPUART1 (RM0440, section 38), the console, and USART3 (section 37), the field bus behind an
-//! RS-485 transceiver. They have most registers in common.
+//! Serial ports with their FIFOs: LPUART1 (RM0440, section 38), the console, and USART3 (section 37), the field bus
+//! with an RS-485 transceiver. Most of their registers are the same.
 
 use std::collections::VecDeque;
 
@@ -7,11 +7,11 @@ use super::{Effect, NEVER, Store, bits, offsets};
 
 offsets! { CR1 = 0x00, CR2 = 0x04, CR3 = 0x08, BRR = 0x0c, RTOR = 0x14, ISR = 0x1c, ICR = 0x20, RDR = 0x24, TDR = 0x28 }
 
-/// What the two differ in.
+/// The differences between the two ports.
 #[derive(Debug)]
 pub struct Kind {
     name: &'static str,
-    /// Least value of BRR, and its units in a tick.
+    /// Smallest value of BRR, and its units per tick.
     least: u32,
     units: u64,
 }
@@ -21,11 +21,11 @@ pub const LPUART1: Kind = Kind { name: "LPUART1", least: 0x300, units: 256 };
 /// USART3.
 pub const USART3: Kind = Kind { name: "USART3", least: 16, units: 1 };
 
-// CR1; PEIE asks for PE.
+// CR1; PEIE enables the interrupt of PE.
 bits! { UE = 0, RE = 2, TE = 3, PEIE = 8, PCE = 10, M0 = 12, RTOIE = 26, FIFOEN = 29, TXFEIE = 30 }
 // CR2.
 bits! { RTOEN = 23 }
-// ISR; RXFF is never asked for.
+// ISR; RXFF never requests an interrupt.
 bits! { PE = 0, FE = 1, NE = 2, ORE = 3, RXNE = 5, TC = 6, TXE = 7, RTOF = 11, TXFE = 23 }
 /// Bits of CR1 that can be changed only while the port is off: FIFOEN, OVER8, M1, M0, WAKE, PCE, PS.
 const FIXED: u32 = FIFOEN | 1 << 28 | 1 << 15 | M0 | 1 << 11 | PCE | 1 << 9;
@@ -33,20 +33,20 @@ const TWO_STOPS: u32 = 2 << 12;
 /// Bytes that a FIFO holds.
 const FIFO: usize = 8;
 
-/// A byte of the line whose parity is wrong has this bit beside its eight.
+/// Bit of a byte on the line, in addition to its eight, that marks a wrong parity.
 pub const WRONG_PARITY: u16 = 1 << 8;
 
 /// Bytes between the port and the line.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
-    /// To the chip, without gaps between them.
+    /// Bytes to the chip, without gaps between them.
     pub to_chip: VecDeque<u16>,
-    /// From the chip, each with the time of its end, ticks.
+    /// Bytes from the chip, each with the time of its end, ticks.
     pub from_chip: Vec<(u64, u8)>,
 }
 
 impl Line {
-    /// The bytes from the chip since the last call.
+    /// Returns the bytes from the chip since the last call.
     pub fn take(&mut self) -> Vec<u8> {
         self.from_chip.drain(..).map(|(_, byte)| byte).collect()
     }
@@ -58,7 +58,7 @@ defaults! {
     pub struct Uart {
         kind: &'static Kind = &LPUART1,
         store: Store = Store::of(LPUART1.name),
-        /// ISR but for the flags that follow from the FIFOs.
+        /// ISR without the flags that follow from the FIFOs.
         status: u32 = TC,
         received: VecDeque<u8>,
         to_send: VecDeque<u8>,
@@ -66,13 +66,13 @@ defaults! {
         sent_at: u64 = NEVER,
         arrives_at: u64 = NEVER,
         silent_at: u64 = NEVER,
-        /// Its other end.
+        /// The line at its other end.
         pub line: Line,
     }
 }
 
 impl Uart {
-    /// A port after a reset.
+    /// Makes a port after a reset.
     pub fn new(kind: &'static Kind) -> Self {
         Self { kind, store: Store::of(kind.name), ..Self::default() }
     }
@@ -81,12 +81,12 @@ impl Uart {
         self.store.get(CR1) & (UE | which) == UE | which
     }
 
-    /// Bytes that the receiver and the transmitter hold beside their shift registers.
+    /// Returns the number of bytes that receiver and transmitter hold besides their shift registers.
     fn depth(&self) -> usize {
         if self.store.get(CR1) & FIFOEN != 0 { FIFO } else { 1 }
     }
 
-    /// ISR but for the acknowledges.
+    /// Returns ISR without the acknowledge flags.
     fn flags(&self) -> u32 {
         let rxne = if self.received.is_empty() { 0 } else { RXNE };
         let txe = if self.to_send.len() < self.depth() { TXE } else { 0 };
@@ -94,19 +94,19 @@ impl Uart {
         self.status | rxne | txe | txfe
     }
 
-    /// Ticks of some bits.
+    /// Returns the duration of some bits, ticks.
     fn bits(&self, count: u64) -> u64 {
         count * u64::from(self.store.get(BRR).max(self.kind.least)) / self.kind.units
     }
 
-    /// Ticks of a byte: start bit, data with parity, stop bits.
+    /// Returns the duration of a byte, ticks: start bit, data with parity, stop bits.
     pub fn byte(&self) -> u64 {
         let parity = u64::from(self.store.get(CR1) & M0 != 0);
         let stops = if self.store.get(CR2) & 3 << 12 == TWO_STOPS { 2 } else { 1 };
         self.bits(9 + parity + stops)
     }
 
-    /// Bytes were put on the line.
+    /// Processes new bytes on the line.
     pub fn wake(&mut self, now: u64) {
         if self.arrives_at == NEVER && !self.line.to_chip.is_empty() {
             self.arrives_at = now + self.byte();
@@ -114,13 +114,14 @@ impl Uart {
         }
     }
 
-    /// When a byte has arrived or left, or the line was silent for long enough.
+    /// Returns the time at which a byte has arrived or left, or the line was idle for long enough.
     pub fn next_event(&self) -> u64 {
         self.sent_at.min(self.arrives_at).min(self.silent_at)
     }
 
-    /// Lets bytes arrive and leave. `driver`: whether the transceiver drives the line, and does not listen; without one the port
-    /// does both. Whether a byte was lost because it does not.
+    /// Lets bytes arrive and leave. `driver` tells whether the transceiver drives the line and does not listen; without
+    /// a transceiver the port does both. Returns whether a byte was lost because the transceiver does not drive the
+    /// line.
     pub fn happen(&mut self, now: u64, driver: Option<bool>) -> bool {
         if self.arrives_at <= now {
             self.arrives_at = NEVER;
@@ -174,7 +175,7 @@ impl Uart {
         }
     }
 
-    /// Whether any enabled event asks for the interrupt.
+    /// Whether any enabled event requests the interrupt.
     pub fn requests(&self) -> bool {
         let (cr1, cr3) = (self.store.get(CR1), self.store.get(CR3));
         let mut asked = cr1 & (RXNE | TC | TXE);
@@ -201,7 +202,7 @@ impl Uart {
         }
     }
 
-    /// Writes a register. Unknown is what the port takes only while it is off.
+    /// Writes a register. A write that the port accepts only while it is off is not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
         let changed = self.store.get(offset) ^ value;
         match offset {

@@ -1,4 +1,4 @@
-//! The window watchdog (RM0440, section 43) on a bus clock of one tick a cycle. Its prescaler runs on whatever is written.
+//! The window watchdog (RM0440, section 43) on a bus clock of one tick a cycle. Its prescaler keeps running at any write.
 
 use super::{Effect, NEVER};
 
@@ -7,35 +7,35 @@ const CLOCK: u64 = 4096;
 const WDGA: u32 = 1 << 7;
 /// Bits of the counter and of the window.
 const COUNT: u32 = 0x7f;
-/// A counter below this resets the chip.
+/// Counter value below which the chip is reset.
 const LAST: u32 = 0x40;
 
 defaults! {
     /// The watchdog.
     #[derive(Clone, Debug)]
     pub struct Wwdg {
-        /// Counter as it was written last, with WDGA; and when.
+        /// The counter as it was written last, with WDGA, and the time of that write.
         control: u32 = COUNT,
         written: u64,
         config: u32 = COUNT,
-        /// The counter ran out, or was written outside the window.
+        /// Time at which the counter runs out, or at which it was written outside the window.
         bites_at: u64 = NEVER,
     }
 }
 
 impl Wwdg {
-    /// When it resets the chip.
+    /// Returns the time at which it resets the chip.
     pub fn next_event(&self) -> u64 {
         self.bites_at
     }
 
-    /// Its clock stood still for some ticks.
+    /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
         self.written += ticks;
         self.bites_at = self.bites_at.saturating_add(ticks);
     }
 
-    /// Ticks per count.
+    /// Returns the ticks per count.
     fn divider(&self) -> u64 {
         CLOCK << (self.config >> 11 & 7)
     }

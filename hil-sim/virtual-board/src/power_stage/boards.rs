@@ -1,4 +1,4 @@
-//! The boards, each with its sources. "Assumed" is a value that no source gives.
+//! The boards, each with its sources. "Assumed" marks a value that no source gives.
 
 use drive_settings::Ntc;
 
@@ -6,32 +6,32 @@ use super::driver::{Driver, Input, Pull};
 use super::shunts::Shunts;
 use super::{DcLinkPin, GateLimits, PowerStage, Sensors, Switches};
 
-/// All of them.
+/// All boards.
 pub const ALL: [&PowerStage; 4] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B];
 
 /// TTL levels: below 0.8 V is low, above 2.0 V high.
 const TTL: (f64, f64) = (0.8, 2.0);
-/// L6398 (data sheet, p. 8: low up to 0.8 V, high from 1.9 to 2.25 V on, by the part), and L6390 (p. 11) alike.
+/// L6398 (data sheet, p. 8: low up to 0.8 V, high above 1.9 to 2.25 V, depending on the part), and L6390 (p. 11) alike.
 const L639X: (f64, f64) = (0.8, 2.25);
 /// Ringing at a turn-off: 20 nH of the loop, and a current that falls in 40 ns (assumed).
 const RINGING: f64 = 20e-9 / 40e-9;
 
-/// HIN of L6398 and L6390: active high; its pull-down draws 260 uA at most from 15 V (L6390 data sheet, p. 11), typically
-/// 175 uA.
+/// HIN of L6398 and L6390: active high; its pull-down draws 260 uA at most from 15 V (L6390 data sheet, p. 11),
+/// typically 175 uA.
 const HIN: Input = Input {
     on_at_high: true,
     pull: Some(Pull { volts: 0.0, ohm: 15.0 / 175e-6 }),
     thresholds: L639X,
 };
-/// LIN of L6398 and L6390: active low; it draws 3 to 20 uA at logic 0, next to nothing at logic 1 (L6398 data sheet,
-/// p. 8): a pull-up. Its voltage is assumed to be 5 V, its current 6 uA.
+/// LIN of L6398 and L6390: active low; it draws 3 to 20 uA at logic 0 and almost nothing at logic 1 (L6398 data sheet,
+/// p. 8), so it has a pull-up. Its voltage is assumed to be 5 V, its current 6 uA.
 const LIN: Input = Input {
     on_at_high: false,
     pull: Some(Pull { volts: 5.0, ohm: 5.0 / 6e-6 }),
     thresholds: L639X,
 };
 
-/// An active-high TTL input with the external pull-down of 10 kOhm that the documentation asks for.
+/// An active-high TTL input with the external pull-down of 10 kOhm that the documentation requires.
 const PULLED_DOWN: Input =
     Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
 
@@ -43,26 +43,27 @@ const AMPLIFIERS: Shunts = Shunts {
     rails_v: (0.010, 3.29),
     // Assumed: filter and slew of the amplifier.
     settling_s: 0.4e-6,
-    // Resistors of 1 % (assumed); one of each sign, the third right.
+    // Resistors of 1 % (assumed): one error of each sign, the third without.
     gain_error: [0.004, -0.004, 0.0],
     // Offset of the amplifiers through the gain (assumed), V.
     offset_v: [2e-3, -2e-3, 1e-3],
-    // One code, rms (assumed).
+    // One ADC count, rms (assumed).
     noise_v: 0.0008,
 };
 
-/// The inverter of the dissertation, of which the others have what they do not state: with sensors in the lines a and b. The dissertation does not describe its drivers:
-/// inputs active high with external pull-downs of 10 kOhm, as the documentation asks for, without interlock.
+/// The inverter of the dissertation, with sensors in the lines a and b. The other boards use its values for everything
+/// that they do not state. The dissertation does not describe its drivers: inputs active high with external pull-downs
+/// of 10 kOhm, as the documentation requires, without interlock.
 pub const REFERENCE: PowerStage = PowerStage {
     name: "reference",
     driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: false, dead_time_s: 0.0 },
-    // 2.2 us (section 3.9). A microsecond, less the rounding to counts.
+    // 2.2 us (section 3.9). A microsecond, minus the rounding to counts.
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
-    // Those of a drive for 230 V (assumed).
+    // Switches of a drive for 230 V (assumed).
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
-    // Without a capacitor (assumed).
+    // No capacitor (assumed).
     dc_link_pin: DcLinkPin::Divider { ohm: 10e3, farad: 0.0 },
-    // The pull-up that the documentation asks for (assumed on all boards).
+    // The pull-up that the documentation requires (assumed on all boards).
     fault_pull_ohm: 4700.0,
     analog_only: &[],
     terminals: ["B5 B7 B9 B10 B11 C4 C5", "C7 C9 A12", "B12 B13 B14"],
@@ -74,38 +75,38 @@ pub const REFERENCE: PowerStage = PowerStage {
     supply_v: None,
 };
 
-/// X-NUCLEO-IHM08M1 at 42 V: L6398 with STL220N6F7. PA11, PB14 and PB15 are at nets of the fault input and of a gate (R73,
-/// R74, R86).
+/// X-NUCLEO-IHM08M1 at 42 V: L6398 with STL220N6F7. PA11, PB14 and PB15 are at nets of the fault input and of a gate
+/// (R73, R74, R86).
 ///
 /// Pins, dividers and shunts: UM1996 and UM2505 as tabulated by okhsunrog/oxifoc, docs/hw/nucleo-g474re-ihm08m1.md
-/// (9e87244), which calculated gain and offset. The sign is that of a shunt between switch and ground at a non-inverting
-/// amplifier, and of ST's library (r3_2_g4xx_pwm_curr_fdbk.c: current = offset - code).
+/// (9e87244), which calculated gain and offset. The sign is that of a shunt between switch and ground at a
+/// non-inverting amplifier, and of ST's library (r3_2_g4xx_pwm_curr_fdbk.c: current = offset - code).
 const IHM08M1: PowerStage = PowerStage {
     name: "nucleo-g474re-ihm08m1",
-    // Truth table with interlock, and 320 ns of its own: L6398 data sheet.
+    // Truth table with interlock, and a dead time of its own of 320 ns: L6398 data sheet.
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 320e-9 },
     // Assumed: the MOSFETs switch in less than 100 ns, so the driver's own dead time is enough.
     limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
     switches: Switches { rated_v: 60.0, ringing_v_per_a: RINGING },
-    // 169 kOhm beside 9.31 kOhm. Whether there is a capacitor is not known.
+    // 169 kOhm in parallel with 9.31 kOhm. It is not known whether there is a capacitor.
     dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
     analog_only: &[(0, 11), (1, 14), (1, 15)],
     terminals: ["B5 B7 B9 - C7 - -", "- - -", "B12 - B13"],
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
     dc_link_divider: Some(19.15),
-    // 125 ns (L6398 data sheet). A switch drops little; assumed.
+    // 125 ns (L6398 data sheet). The voltage drop of a switch is small; assumed.
     delay_and_drop: Some((125e-9, 0.1)),
     motor: Some("rewound-48v"),
     supply_v: Some(42.0),
     ..REFERENCE
 };
 
-/// STEVAL-IHM023V3 behind X-NUCLEO-IHM09M1 at 320 V: L6390 with STGP10H60DF. Its sources are thin: shunts, gain, bias and
-/// divider from third parties that name UM1823 and ST's templates.
+/// STEVAL-IHM023V3 with X-NUCLEO-IHM09M1 at 320 V: L6390 with STGP10H60DF. There are few sources: shunts, gain, bias
+/// and divider come from third parties that name UM1823 and ST's templates.
 const IHM023V3: PowerStage = PowerStage {
     name: "nucleo-g474re-ihm023v3",
-    // Interlock: L6390 data sheet, truth table. Its dead time is set by a resistor: the shortest is assumed.
+    // Interlock: L6390 data sheet, truth table. A resistor sets its dead time: the shortest is assumed.
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 180e-9 },
     // Assumed: an IGBT is off within 0.5 us.
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
@@ -113,14 +114,14 @@ const IHM023V3: PowerStage = PowerStage {
     ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
-    // 125 ns (L6390 data sheet); drop of an IGBT, assumed.
+    // 125 ns (L6390 data sheet); voltage drop of an IGBT, assumed.
     delay_and_drop: Some((125e-9, 1.5)),
     supply_v: Some(320.0),
     ..REFERENCE
 };
 
-/// STEVAL-IPMM10B behind X-NUCLEO-IHM09M1 at 320 V: a SLLIMM module of the second series. Shunts and gain: UM2702, page 16; all
-/// else is assumed, the same as above where the adapter board is.
+/// STEVAL-IPMM10B with X-NUCLEO-IHM09M1 at 320 V: a SLLIMM module of the second series. Shunts and gain: UM2702, page
+/// 16. Everything else is assumed, as above for the adapter board.
 const IPMM10B: PowerStage = PowerStage {
     name: "nucleo-g474re-ipmm10b",
     driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: true, dead_time_s: 0.0 },

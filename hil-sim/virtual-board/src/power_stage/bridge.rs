@@ -1,4 +1,4 @@
-//! The gates of the six switches over a PWM period, behind the drivers.
+//! The gates of the six switches over a PWM period, after the drivers.
 
 use drive_core::Compare;
 use induction_drive::board::PWM_TOP;
@@ -16,7 +16,7 @@ const LEGS: [&str; 3] = ["a", "b", "c"];
 /// A violation at the gates.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum BadGates {
-    /// A switch is on, or may be, while the timer's outputs are off.
+    /// A switch is on, or may be on, while the timer's outputs are off.
     #[error("{} side {} {} on while the outputs are off", SIDES[*side], LEGS[*leg], if *undefined { "may be" } else { "is" })]
     OnWhileOff {
         /// Leg, 0 is a.
@@ -40,8 +40,8 @@ pub enum BadGates {
         /// Leg, 0 is a.
         leg: usize,
     },
-    /// Both inputs of a leg ask for on; the driver's interlock keeps both switches off.
-    #[error("both inputs of leg {} ask for on, and the driver blocks", LEGS[*leg])]
+    /// Both inputs of a leg request on; the driver's interlock keeps both switches off.
+    #[error("both inputs of leg {} request on, and the driver blocks", LEGS[*leg])]
     Interlocked {
         /// Leg, 0 is a.
         leg: usize,
@@ -51,10 +51,10 @@ pub enum BadGates {
     Short {
         /// Leg, 0 is a.
         leg: usize,
-        /// Time in which both are off, ticks.
+        /// Time for which both switches are off, ticks.
         dead_time: u32,
     },
-    /// A pin that the power stage ties to nets of others is not analog.
+    /// A pin that the board ties to nets of other signals is not analog.
     #[error("P{}{pin} is not analog", char::from(b'A' + *port as u8))]
     NotAnalog {
         /// Its port, 0 is A.
@@ -67,7 +67,7 @@ pub enum BadGates {
     Pulse {
         /// Leg, 0 is a.
         leg: usize,
-        /// Ticks.
+        /// Duration of the pulse, ticks.
         ticks: u32,
     },
 }
@@ -81,7 +81,7 @@ fn us(ticks: u32) -> f64 {
 pub struct Piece {
     /// Its beginning after the top of the counter, ticks.
     pub from: u32,
-    /// Its length, ticks.
+    /// Its duration, ticks.
     pub ticks: u32,
     /// The switches that are on: high side, low side.
     pub on: [bool; 2],
@@ -94,9 +94,9 @@ pub struct Leg {
     pub pieces: Vec<Piece>,
     /// Inputs whose level is not defined: high side, low side.
     undefined: [bool; 2],
-    /// Whether the interlock works.
+    /// Whether the interlock is active.
     interlocked: bool,
-    /// The compare value of a leg whose switches alternate; none of one whose switches do not.
+    /// The compare value of a leg whose switches alternate; none if they do not.
     compare: Option<u16>,
 }
 
@@ -107,12 +107,12 @@ pub struct Bridge {
     pub legs: [Leg; 3],
     /// Whether the timer's outputs are on.
     pub outputs_on: bool,
-    /// Time in which both switches of a leg are off at a change, ticks.
+    /// Time for which both switches of a leg are off at a change, ticks.
     pub dead_time: u32,
 }
 
 impl Bridge {
-    /// The gates that a power stage makes of the pins.
+    /// Computes the gates of a power stage from the pins.
     pub fn new(stage: &PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
         let own = ticks(stage.driver.dead_time_s);
         Self {
@@ -122,8 +122,8 @@ impl Bridge {
         }
     }
 
-    /// The compare values that the motor sees. A motor has no model for a bridge of which only some legs are driven: as
-    /// long as one leg's switches do not alternate, all are off.
+    /// Returns the compare values in force at the motor. The motor has no model for a bridge of which only some legs
+    /// are driven: while one leg's switches do not alternate, all legs are off.
     pub fn compare(&self) -> Compare {
         match [0, 1, 2].map(|leg| self.legs[leg].compare) {
             [Some(a), Some(b), Some(c)] => Compare { a, b, c, enabled: true },
@@ -131,12 +131,12 @@ impl Bridge {
         }
     }
 
-    /// Whether any switch is on at any time, or may be.
+    /// Whether any switch is on at any time, or may be on.
     pub fn any_on(&self) -> bool {
         self.legs.iter().any(|leg| leg.undefined != [false; 2] || leg.is_on(0) || leg.is_on(1))
     }
 
-    /// Checks for switches that are on while they must not be. Pulses are not looked at.
+    /// Checks for switches that are on while they must be off. The lengths of pulses are not checked.
     ///
     /// # Errors
     /// The first violation.
@@ -151,7 +151,7 @@ impl Bridge {
     /// Checks the lengths of the pulses.
     ///
     /// # Errors
-    /// The first one that is too short.
+    /// The first pulse that is too short.
     pub fn check_pulses(&self, stage: &PowerStage) -> Result<(), BadGates> {
         let shortest = ticks(stage.limits.pulse_s);
         for (leg, gates) in self.legs.iter().enumerate() {
@@ -179,7 +179,7 @@ impl Leg {
         let ideal = driver.requests(leg, gpio, tim1, false);
         let compare = match ideal {
             [Request::Known(high), Request::Known(low)] if low == high.inverted() => {
-                // As a share of the plant's top, whatever the timer's is.
+                // As a share of the plant's top, independent of the timer's.
                 Some((high.high() * u32::from(PWM_TOP) / period) as u16)
             }
             _ => None,
@@ -191,7 +191,7 @@ impl Leg {
         self.pieces.iter().any(|piece| piece.on[side])
     }
 
-    /// When a switch goes on, and for how long, ticks; none of one that is on or off throughout.
+    /// Returns the times at which a switch goes on, and the durations, ticks; none for a switch that does not change.
     fn times(&self, side: usize) -> impl Iterator<Item = (u32, u32)> {
         let count = self.pieces.len();
         let is_on = move |n: usize| self.pieces[n % count].on[side];
@@ -202,7 +202,7 @@ impl Leg {
         })
     }
 
-    /// Ticks from the end of the other switch's last pulse to each beginning of this one's.
+    /// Returns the ticks from the end of the other switch's last pulse to each beginning of this switch's pulses.
     fn gaps(&self, side: usize) -> impl Iterator<Item = u32> {
         let period: u32 = self.pieces.iter().map(|piece| piece.ticks).sum();
         let gap = move |begin: u32| {
@@ -235,7 +235,7 @@ impl Leg {
     }
 }
 
-/// The pieces of a period, and whether the interlock works.
+/// Returns the pieces of a period, and whether the interlock is active.
 fn pieces(high: Wave, low: Wave, interlock: bool) -> (Vec<Piece>, bool) {
     let mut instants: Vec<u32> = high.edges().chain(low.edges()).chain([0]).collect();
     instants.sort_unstable();
@@ -253,14 +253,14 @@ fn pieces(high: Wave, low: Wave, interlock: bool) -> (Vec<Piece>, bool) {
     (pieces.collect(), interlocked)
 }
 
-/// With the dead time that the driver adds where the inputs leave less.
+/// Adds the driver's own dead time if the inputs leave less.
 fn with_dead_time(mut pieces: Vec<Piece>, own: u32) -> Vec<Piece> {
     if own == 0 {
         return pieces;
     }
     let count = pieces.len();
     for side in [0, 1] {
-        // Ticks at the end of the period since the other switch was on last.
+        // Ticks at the end of the period since the other switch was last on.
         let mut since = own;
         let mut later = 0;
         for piece in pieces.iter().rev() {

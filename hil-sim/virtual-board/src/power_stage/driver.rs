@@ -1,4 +1,4 @@
-//! The gate drivers: levels at their inputs, and whether those ask for on.
+//! The gate drivers: levels at their inputs, and whether these request on.
 
 use super::{GATE_FUNCTION, GATE_PINS};
 use crate::periph::gpio::{Gpio, Pad};
@@ -12,20 +12,20 @@ pub const CHIP_V: f64 = 3.3;
 /// A resistor to a voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pull {
-    /// V.
+    /// Voltage, V.
     pub volts: f64,
-    /// Ohm.
+    /// Resistance, ohm.
     pub ohm: f64,
 }
 
 /// An input of a driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
-    /// Whether the switch is on at a high level, or at a low one.
+    /// Whether the switch is on at a high level; otherwise at a low level.
     pub on_at_high: bool,
-    /// What pulls the input, inside the driver or on the board; none floats.
+    /// Pull resistor of the input, inside the driver or on the board; if none, the input floats.
     pub pull: Option<Pull>,
-    /// Below the first voltage a level is low, above the second it is high, V.
+    /// Thresholds, V: a level below the first is low, above the second it is high.
     pub thresholds: (f64, f64),
 }
 
@@ -36,23 +36,23 @@ pub struct Driver {
     pub high: Input,
     /// Input of the low side.
     pub low: Input,
-    /// Whether both switches are off when both inputs ask for on.
+    /// Whether both switches are off if both inputs request on.
     pub interlock: bool,
-    /// Time in which it keeps a switch off after the other one went off, s.
+    /// Time for which it keeps a switch off after the other one went off, s.
     pub dead_time_s: f64,
 }
 
-/// What an input asks for over a PWM period.
+/// The request of an input over a PWM period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// On where high.
+    /// Whether the switch is requested on, at each time.
     Known(Wave),
     /// The level is not defined: on or off.
     Undefined,
 }
 
 impl Request {
-    /// The request, for a careful reader: on where it is not defined.
+    /// Returns the request in the worst case: on if the level is not defined.
     pub fn at_worst(self, period: u32) -> Wave {
         match self {
             Self::Known(wave) => wave,
@@ -61,11 +61,11 @@ impl Request {
     }
 }
 
-/// The level that resistors make, below the first threshold low, above the second high; none between.
+/// Returns the level that resistors set: low below the first threshold, high above the second, none in between.
 pub fn level(pulls: impl Iterator<Item = Pull> + Clone, thresholds: (f64, f64)) -> Option<bool> {
     let conductance: f64 = pulls.clone().map(|pull| 1.0 / pull.ohm).sum();
     let volts = pulls.map(|pull| pull.volts / pull.ohm).sum::<f64>() / conductance;
-    // Without any resistor not a number, which is neither.
+    // Without any resistor the voltage is not a number, which is neither level.
     match thresholds {
         (low, _) if volts < low => Some(false),
         (_, high) if volts > high => Some(true),
@@ -74,7 +74,7 @@ pub fn level(pulls: impl Iterator<Item = Pull> + Clone, thresholds: (f64, f64)) 
 }
 
 impl Input {
-    /// The level of a pin that nothing drives, beside the chip's own resistor.
+    /// Returns the level of a pin that nothing drives except the chip's own resistor.
     pub fn level(&self, chip_pull: Option<bool>) -> Option<bool> {
         let chip =
             chip_pull.map(|up| Pull { volts: if up { CHIP_V } else { 0.0 }, ohm: CHIP_PULL_OHM });
@@ -88,7 +88,7 @@ impl Input {
         let driven = match port.pad(number) {
             Pad::Output(level) => Output::Driven(Wave::constant(period, level)),
             Pad::Alternate(GATE_FUNCTION) => output,
-            // Another peripheral's: nobody knows.
+            // The pin belongs to another peripheral, so its level is unknown.
             Pad::Alternate(_) => Output::Unknown,
             Pad::Input | Pad::Analog => Output::Released,
         };
@@ -96,7 +96,7 @@ impl Input {
         match driven {
             Output::Driven(wave) if port.open_drain(number) => match level {
                 Some(true) => Request::Known(asks(wave)),
-                // The high level is not driven, and nothing else makes it.
+                // The high level is not driven, and nothing else sets it.
                 Some(false) => Request::Known(asks(Wave::constant(period, false))),
                 None => Request::Undefined,
             },
@@ -110,7 +110,7 @@ impl Input {
 }
 
 impl Driver {
-    /// What high and low side of a leg ask for, with the timer's dead time or as if it made none.
+    /// Returns the requests of high and low side of a leg, with the timer's dead time or as if it inserted none.
     pub fn requests(
         &self,
         leg: usize,
@@ -141,10 +141,10 @@ mod tests {
                 assert_eq!(input.level(Some(!input.on_at_high)), Some(!input.on_at_high));
             }
         }
-        // The chip's resistor wins against the weak ones in the driver, not against 10 kOhm.
+        // The chip's resistor overrides the weak ones in the driver, but not 10 kOhm.
         let [_, ihm08m1, ..] = ALL;
         assert_eq!(ihm08m1.driver.low.level(Some(false)), Some(false));
-        // 2.2 V: some parts take it for high.
+        // 2.2 V: some parts regard it as high.
         assert_eq!(ihm08m1.driver.high.level(Some(true)), None);
         assert_eq!(REFERENCE.driver.high.level(Some(true)), Some(false));
         let floating = Input { pull: None, ..REFERENCE.driver.high };

@@ -1,8 +1,8 @@
 //! Shunts between the low sides and ground, with their amplifiers.
 //!
-//! A shunt carries the current of its leg only while the low side conducts: its switch, or, while both switches are off,
-//! its diode, which takes a current that flows into the motor. Otherwise it carries nothing. The amplifier follows with a
-//! time constant: `v = zero_v + volts_per_a i + offset` behind a first-order lag, between its rails.
+//! A shunt carries the current of its leg only while the low side conducts: its switch, or, while both switches are
+//! off, its diode, which takes a current that flows into the motor. Otherwise it carries no current. The amplifier
+//! follows with a time constant: `v = zero_v + volts_per_a i + offset` after a first-order lag, between its rails.
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -11,7 +11,7 @@ use super::bridge::{Bridge, Piece};
 use super::{CODES, REFERENCE_V};
 use crate::time::TICKS_PER_S;
 
-/// Shunts and amplifiers, those of the legs a, b, c alike but for their errors.
+/// Shunts and amplifiers; those of the legs a, b, c are alike except for their errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shunts {
     /// Output for a current into the motor, V/A.
@@ -33,7 +33,7 @@ pub struct Shunts {
 /// The currents of a period, as far as they are known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Currents {
-    /// At the beginning, A.
+    /// Currents at the beginning, A.
     pub at: [f64; 3],
     /// Their slopes, A/s.
     pub slope: [f64; 3],
@@ -42,12 +42,12 @@ pub struct Currents {
 /// The amplifiers at an instant.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Amplifiers {
-    /// Currents that their outputs stand for, A.
+    /// Currents that correspond to their outputs, A.
     lagged: [f64; 3],
 }
 
 impl Amplifiers {
-    /// Follows the shunts for some ticks, from `phase` ticks after the top of the counter on. `currents` begin there.
+    /// Follows the shunts for some ticks, starting `phase` ticks after the top of the counter. `currents` begin at that time.
     pub fn follow(
         &mut self,
         shunts: &Shunts,
@@ -60,7 +60,7 @@ impl Amplifiers {
             let (at, slope) = (currents.at[leg], currents.slope[leg]);
             for (after, length, on) in cut(&bridge.legs[leg].pieces, phase, ticks) {
                 let seconds = |ticks: u32| f64::from(ticks) / TICKS_PER_S as f64;
-                // The lag turns a ramp into one that is late by the time constant.
+                // The lag delays a ramp by the time constant.
                 let (begin, end) =
                     (at + slope * seconds(after), at + slope * seconds(after + length));
                 let conducts = on[1] || !on[0] && begin > 0.0;
@@ -72,14 +72,14 @@ impl Amplifiers {
         }
     }
 
-    /// Output of an amplifier, V.
+    /// Returns the output of an amplifier, V.
     pub fn volts(&self, shunts: &Shunts, leg: usize, noise: f64) -> f64 {
         let gain = shunts.volts_per_a * (1.0 + shunts.gain_error[leg]);
         let volts = shunts.zero_v + shunts.offset_v[leg] + gain * self.lagged[leg];
         volts.clamp(shunts.rails_v.0, shunts.rails_v.1) + noise
     }
 
-    /// The code of a conversion that samples now.
+    /// Returns the counts of a conversion that samples now.
     pub fn code(&self, shunts: &Shunts, leg: usize, rng: &mut Xoshiro256PlusPlus) -> u16 {
         let unit: f64 = StandardNormal.sample(rng);
         let volts = self.volts(shunts, leg, unit * shunts.noise_v);
@@ -87,8 +87,8 @@ impl Amplifiers {
     }
 }
 
-/// The pieces that the gates have in `ticks` ticks from `phase` on, which repeats with the period: beginning after
-/// `phase`, length, and switches.
+/// Returns the pieces of the gates in `ticks` ticks from `phase`, which repeat with the period: beginning after
+/// `phase`, duration, and switches.
 fn cut(pieces: &[Piece], phase: i64, ticks: u32) -> impl Iterator<Item = (u32, u32, [bool; 2])> {
     let period: u32 = pieces.iter().map(|piece| piece.ticks).sum();
     let mut phase = phase.rem_euclid(i64::from(period.max(1))) as u32;
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn the_amplifier_ends_at_its_rails() {
         let shunts = shunts();
-        // 3.29 V less 1.71 V at 51.8 mV/A are 30.5 A; a current into the motor lowers the output.
+        // 3.29 V minus 1.71 V at 51.8 mV/A are 30.5 A; a current into the motor lowers the output.
         for (amperes, volts) in [(30.0, 0.156), (40.0, 0.010), (-29.0, 3.2122), (-40.0, 3.29)] {
             let seen = Amplifiers { lagged: [0.0, 0.0, amperes] }.volts(&shunts, 2, 0.0);
             assert!((seen - volts).abs() < 1.1e-3, "{amperes} A: {seen} V");

@@ -1,16 +1,16 @@
-//! The watch at the gates: it looks whenever anything changes that the gates depend on.
+//! The check of the gates: it runs whenever anything changes on which the gates depend.
 
 use super::PowerStage;
 use super::bridge::{BadGates, Bridge};
 use crate::periph::gpio::{Gpio, Pad};
 use crate::periph::tim1::Tim1;
 
-/// A violation, and where and when it was seen.
+/// A violation, with its place and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The violation.
     pub what: BadGates,
-    /// Last known place of the core.
+    /// Last known position of the core.
     pub at: u32,
     /// Time, ticks.
     pub time: u64,
@@ -21,25 +21,25 @@ pub struct Seen {
 pub struct GateWatch {
     /// The power stage.
     pub stage: &'static PowerStage,
-    /// The gates as they are.
+    /// The present gates.
     pub bridge: Bridge,
-    /// The gate drivers have no supply: every switch is off.
+    /// Whether the gate drivers have no supply, so that every switch is off.
     pub without_supply: bool,
     seen: Option<Seen>,
 }
 
 impl GateWatch {
-    /// Of a chip whose pins are released.
+    /// Makes the check for a chip whose pins are released.
     pub fn new(stage: &'static PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
         Self { stage, bridge: Bridge::new(stage, gpio, tim1), without_supply: false, seen: None }
     }
 
-    /// The first violation since the last call.
+    /// Returns the first violation since the last call.
     pub fn take(&mut self) -> Option<Seen> {
         self.seen.take()
     }
 
-    /// Looks at the gates at the core's place `at` and at a time.
+    /// Checks the gates, with the core's position `at` and the time.
     pub fn look(&mut self, gpio: &[Gpio], tim1: &Tim1, at: u32, time: u64) {
         self.bridge = Bridge::new(self.stage, gpio, tim1);
         if self.without_supply {

@@ -1,4 +1,4 @@
-//! Memory protection (ARMv7-M, B3.5): the registers, and regions in RAM that nothing may access.
+//! Memory protection (ARMv7-M, B3.5): the registers, and regions in RAM that must not be accessed.
 
 use crate::memory::{self, Region};
 
@@ -6,7 +6,7 @@ const TYPE: u32 = 0xe000_ed90;
 const CTRL: u32 = 0xe000_ed94;
 const RNR: u32 = 0xe000_ed98;
 const RBAR: u32 = 0xe000_ed9c;
-/// Eight regions.
+/// Number of regions.
 const REGIONS: usize = 8;
 
 /// The registers.
@@ -26,7 +26,7 @@ impl Mpu {
             TYPE => (REGIONS as u32) << 8,
             CTRL => self.control,
             RNR => self.number as u32,
-            // RBAR and RASR with three aliases each.
+            // RBAR and RASR have three aliases each.
             _ if (address - RBAR).is_multiple_of(8) => base | self.number as u32,
             _ => attributes,
         })
@@ -39,7 +39,7 @@ impl Mpu {
             CTRL => self.control = value & 7,
             RNR => self.number = (value as usize).min(REGIONS - 1),
             _ if (address - RBAR).is_multiple_of(8) => {
-                // VALID: the region comes with the write.
+                // VALID: the write contains the number of the region.
                 if value & 1 << 4 != 0 {
                     self.number = (value as usize & 15).min(REGIONS - 1);
                 }
@@ -50,12 +50,12 @@ impl Mpu {
         Some(())
     }
 
-    /// Whether it holds in hard faults and NMI too.
+    /// Whether the protection applies in hard faults and NMI as well.
     pub fn holds_in_faults(&self) -> bool {
         self.control & 2 != 0
     }
 
-    /// The region in RAM that nothing may access (AP 0), if there is one. Other regions are not enforced.
+    /// Returns the region in RAM that must not be accessed (AP 0), if there is one. Other regions are not enforced.
     pub fn guard(&self) -> Option<Region> {
         if self.control & 1 == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! Helpers of the tests.
+//! Functions for the tests.
 
 pub mod program;
 pub mod script;
@@ -8,15 +8,15 @@ use drive_core::State;
 use hil_sim::Config;
 use virtual_board::{Board, Image, Options, Pair};
 
-/// Longest from a reset to the greeting, and from an order to its answer, periods.
+/// Longest time from a reset to the greeting, and from a request to its answer, periods.
 const LONGEST: u64 = 30_000;
 
-/// A board with the image that was built last, beside its shadow, started.
+/// Returns a started board with the image that was built last, together with its shadow.
 pub fn pair(config: &Config, seed: u64) -> Result<Pair> {
     Pair::new(Image::built()?, Options::new(config, seed))
 }
 
-/// The same, regulating torque without a sensor.
+/// Returns such a board that regulates torque without a sensor.
 pub fn regulating(seed: u64) -> Result<Pair> {
     let mut pair = pair(&Config::default(), seed)?;
     pair.order("start torque")?;
@@ -24,7 +24,7 @@ pub fn regulating(seed: u64) -> Result<Pair> {
     Ok(pair)
 }
 
-/// Goes on until the console says a line with this text; all that it has said.
+/// Runs until the console prints a line with this text; returns all its output.
 pub fn until_said(board: &mut Board, text: &str) -> Result<String> {
     let mut said = String::new();
     for _ in 0..LONGEST / 60 {

@@ -1,11 +1,11 @@
-//! The program of `cargo sim board`, and a folder for what it writes.
+//! The program of `cargo sim board`, and a folder for its output.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use virtual_board::board::simulated;
 
-/// A session that writes to a folder.
+/// Returns a session that writes to a folder.
 pub fn command(out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
     command.env(simulated::TEST, simulated::test());
@@ -13,7 +13,7 @@ pub fn command(out: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// A folder of its own for each test.
+/// Returns a folder for a test.
 pub fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);

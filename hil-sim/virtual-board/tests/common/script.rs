@@ -1,4 +1,4 @@
-//! Register scripts: a board whose core stands still after reset, and writes to its registers instead.
+//! Register scripts: the core of the board stands still after reset, and the script writes to its registers.
 
 use anyhow::Result;
 use drive_core::Compare;
@@ -22,45 +22,45 @@ pub const CCER: u32 = 0x20;
 pub const CR2: u32 = 0x04;
 pub const BDTR: u32 = 0x44;
 const MOE: u32 = 1 << 15;
-/// Top of the counter, as the firmware has it.
+/// Top of the counter, as in the firmware.
 pub const TOP: u32 = 14_167;
 /// Ticks of a period.
 pub const PERIOD: u64 = 2 * TOP as u64;
 /// Ticks of a microsecond.
 pub const US: u64 = 170;
 
-/// The set-up of the timer that a script makes.
+/// The set-up of the timer by a script.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup {
     /// CCER: enables and polarities of channels 1 to 3.
     pub ccer: u32,
     /// The idle levels of CR2.
     pub idle: u32,
-    /// BDTR but for MOE.
+    /// BDTR without MOE.
     pub bdtr: u32,
 }
 
 impl Setup {
-    /// Both outputs of the legs, inputs active high; off means driven low. Dead time of 2.2 us at two clocks a tick.
+    /// Both outputs of the legs for inputs that are active high; off means driven low. Dead time of 2.2 us at two clocks a tick.
     pub const ACTIVE_HIGH: Self = Self { ccer: 0x555, idle: 0, bdtr: 0xc9e };
-    /// The low sides active low: CCxNP and OISxN are set.
+    /// The low sides are active low: CCxNP and OISxN are set.
     pub const LOW_SIDES_LOW: Self = Self { ccer: 0xddd, idle: 0x2a00, bdtr: 0xc9e };
 
-    /// The one that suits a board.
+    /// Returns the set-up that suits a board.
     pub fn of(stage: &PowerStage) -> Self {
         if stage.driver.low.on_at_high { Self::ACTIVE_HIGH } else { Self::LOW_SIDES_LOW }
     }
 }
 
-/// A board that does what the script says.
+/// A board that executes the script.
 pub struct Script {
     pub board: Board,
-    /// It goes on in spite of violations.
+    /// Whether it continues in spite of violations.
     pub regardless: bool,
 }
 
 impl Script {
-    /// The board after power-on, its core at rest, with the motor that suits it.
+    /// Makes a board after power-up, with its core at rest, and with its motor.
     pub fn new(stage: &'static PowerStage) -> Result<Self> {
         let config = stage.config()?;
         let mut board = Board::new(Image::built()?, Options::on(stage, &config, 1))?;
@@ -70,13 +70,13 @@ impl Script {
         Ok(script)
     }
 
-    /// Clocks of the ports, of TIM1, the system configuration and the converters.
+    /// Switches the clocks of the ports, of TIM1, the system configuration and the ADCs on.
     pub fn clocks(&mut self) -> Result<()> {
         self.write(RCC_AHB2ENR, 0x2007)?;
         self.write(RCC_APB2ENR, 0x801)
     }
 
-    /// A write, and time for it to act.
+    /// Writes a register, and waits for the effect.
     pub fn write(&mut self, address: u32, value: u32) -> Result<()> {
         self.board.chip().write(address, 4, value);
         self.wait(16)
@@ -104,7 +104,7 @@ impl Script {
         }
     }
 
-    /// The timer with its outputs off, not counting yet.
+    /// Sets the timer up with its outputs off, not counting yet.
     pub fn timer(&mut self, setup: Setup) -> Result<()> {
         for (register, value) in [
             (0x2c, TOP),
@@ -129,7 +129,7 @@ impl Script {
         Ok(())
     }
 
-    /// The pins of the gates to the timer.
+    /// Connects the pins of the gates to the timer.
     pub fn pins(&mut self) -> Result<()> {
         self.modify(GPIOA + 0x20, 0xff << 24, 0x66 << 24)?;
         self.modify(GPIOA + 0x24, 0xfff, 0x666)?;
@@ -139,7 +139,7 @@ impl Script {
         self.modify(GPIOB + MODER, 0xf, 0xa)
     }
 
-    /// Timer and pins, counting, outputs off.
+    /// Sets timer and pins up: counting, with the outputs off.
     pub fn bring_up(&mut self, setup: Setup) -> Result<()> {
         self.timer(setup)?;
         self.pins()?;
@@ -147,7 +147,7 @@ impl Script {
         self.wait(2 * PERIOD)
     }
 
-    /// Compare values from the next period on.
+    /// Sets compare values for the next period.
     pub fn compare(&mut self, values: [u32; 3]) -> Result<()> {
         for (leg, value) in values.into_iter().enumerate() {
             self.write(TIM1 + 0x34 + 4 * leg as u32, value)?;
@@ -160,7 +160,7 @@ impl Script {
         self.modify(TIM1 + BDTR, MOE, if on { MOE } else { 0 })
     }
 
-    /// Both converters, with these channels and the SMP fields of all, started by the timer.
+    /// Sets both ADCs up with these channels and the same SMP fields for all, started by the timer.
     pub fn converters(&mut self, channels: [&[u32]; 2], sampling: u32) -> Result<()> {
         for port in [GPIOA, GPIOC] {
             // Analog, as after reset.
@@ -195,27 +195,27 @@ impl Script {
         Ok(())
     }
 
-    /// The results of a converter.
+    /// Returns the results of an ADC.
     pub fn results(&mut self, converter: u32, count: u32) -> Vec<u16> {
         (0..count)
             .map(|rank| self.read(ADC1 + 0x100 * converter + 0x80 + 4 * rank) as u16)
             .collect()
     }
 
-    /// The motor sees this now.
+    /// Returns the compare values in force at the motor.
     pub fn applied(&mut self) -> Compare {
         self.board.gates().compare()
     }
 }
 
-/// The violation that a run must end with.
+/// Returns the violation with which a run must end.
 pub fn violation(result: Result<()>) -> String {
     let why = result.expect_err("nothing was noticed").to_string();
     let violation = why.strip_prefix("bad gate signals: ");
     violation.unwrap_or_else(|| panic!("{why}")).to_owned()
 }
 
-/// The text of a violation.
+/// Whether a text is that of a violation.
 pub fn is(violation: &str, bad: BadGates) -> bool {
     violation.starts_with(&bad.to_string())
 }

@@ -18,7 +18,7 @@ fn places(array: &Option<Array>) -> Vec<u32> {
     }
 }
 
-/// Names of blocks and registers are written in two ways.
+/// Whether two names are the same; names of blocks and registers are written in two ways.
 fn same(a: &str, b: &str) -> bool {
     let plain = |name: &str| name.replace('_', "").to_lowercase();
     plain(a) == plain(b)
@@ -59,10 +59,10 @@ fn collect(ir: &IR, block: &str, base: u32, into: &mut BTreeMap<u32, u32>) {
     }
 }
 
-/// Fields of the registers of a peripheral, by offset.
+/// Returns the fields of the registers of a peripheral, by offset.
 pub fn registers(name: &str) -> BTreeMap<u32, u32> {
     let mut all = BTreeMap::new();
-    // Each comparator is a peripheral of its own.
+    // Each comparator is a separate peripheral.
     let names: Vec<_> = match name {
         "COMP" => (1..=7).map(|n| (format!("COMP{n}"), 4 * (n - 1))).collect(),
         _ => vec![(name.to_owned(), 0)],
@@ -75,7 +75,7 @@ pub fn registers(name: &str) -> BTreeMap<u32, u32> {
     all
 }
 
-/// Enable register and bit of the clock of a peripheral.
+/// Returns enable register and bit of the clock of a peripheral.
 pub fn clock(name: &str) -> Option<(u32, u32)> {
     let enable = peripheral(name)?.rcc.as_ref()?.enable.as_ref()?;
     let rcc = peripheral("RCC")?.registers.as_ref()?;
@@ -95,7 +95,7 @@ fn pin(name: &str) -> Option<Pin> {
     Some((usize::from(port), name[2..].parse().ok()?))
 }
 
-/// The pins of a signal such as `TIM1_CH1N`, with the alternate function of each.
+/// Returns the pins of a signal such as `TIM1_CH1N`, with the alternate function of each.
 pub fn pins_of(signal: &str) -> Vec<(Pin, u32)> {
     let Some((name, signal)) = signal.split_once('_') else { return Vec::new() };
     let all = peripheral(name).map_or(&[][..], |known| known.pins);
@@ -103,7 +103,7 @@ pub fn pins_of(signal: &str) -> Vec<(Pin, u32)> {
     mine.filter_map(|known| Some((pin(known.pin)?, u32::from(known.af?)))).collect()
 }
 
-/// The pin of a channel of ADC1 to ADC4, counted from 0.
+/// Returns the pin of a channel of ADC1 to ADC4, counted from 0.
 pub fn analog_pin(converter: usize, channel: u32) -> Option<Pin> {
     let known = peripheral(["ADC1", "ADC2", "ADC3", "ADC4"][converter])?;
     let signal = format!("IN{channel}");

@@ -11,13 +11,13 @@ pub struct Register {
     pub name: String,
     pub offset: u32,
     pub reset: u32,
-    /// Bits of its fields that can be written.
+    /// Writable bits of its fields.
     pub fields: u32,
     pub readable: bool,
     pub writable: bool,
 }
 
-/// The folder of the chip in the source of the crate.
+/// Returns the folder of the chip in the source of the crate.
 fn folder() -> Result<&'static PathBuf> {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     if let Some(folder) = FOLDER.get() {
@@ -37,7 +37,7 @@ fn folder() -> Result<&'static PathBuf> {
     Ok(FOLDER.get_or_init(|| folder))
 }
 
-/// The number at the beginning of a text.
+/// Returns the number at the beginning of a text.
 fn number(text: &str) -> Option<u32> {
     let digits: String =
         text.chars().take_while(|c| c.is_ascii_hexdigit() || *c == '_' || *c == 'x').collect();
@@ -48,7 +48,7 @@ fn number(text: &str) -> Option<u32> {
     }
 }
 
-/// Bits of `Bits 8:9 - ` or `Bit 15 - `.
+/// Returns the bits of `Bits 8:9 - ` or `Bit 15 - `.
 fn bits(line: &str) -> Option<u32> {
     let rest = line.trim().strip_prefix("///Bit")?.trim_start_matches('s').trim_start();
     let (range, _) = rest.split_once(" - ")?;
@@ -65,7 +65,7 @@ fn fields(source: &str) -> u32 {
     })
 }
 
-/// The registers of a module.
+/// Returns the registers of a module.
 pub fn registers(module: &str) -> Result<Vec<Register>> {
     let folder = folder()?;
     // TIM5 is a copy of TIM2.

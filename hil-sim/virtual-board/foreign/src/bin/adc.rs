@@ -5,7 +5,7 @@
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, SampleTime};
 use embassy_stm32::triggers::TIM1_TRGO2;
 
-/// The last samples, where the virtual board finds them.
+/// The last samples, at a place where the virtual board finds them.
 #[unsafe(no_mangle)]
 static mut SAMPLES: [u32; 2] = [0; 2];
 

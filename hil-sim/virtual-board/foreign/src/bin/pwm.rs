@@ -22,7 +22,7 @@ fn main() -> ! {
         Hertz(6000),
         CountingMode::CenterAlignedBothInterrupts,
     );
-    // 2.35 us: what the power stage of the reference board needs.
+    // 2.35 us, as the power stage of the reference board requires.
     pwm.set_dead_time(400);
     let half = pwm.get_max_duty() / 2;
     for channel in [Channel::Ch1, Channel::Ch2, Channel::Ch3] {

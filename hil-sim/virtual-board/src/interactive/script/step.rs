@@ -2,7 +2,7 @@
 
 use crate::interactive::own::Own;
 
-/// Time within which an expected text comes, s, if the script states none: four times that of the slowest answer.
+/// Time within which an expected text must come, s, if the script states none: four times that of the slowest answer.
 const EXPECTED_S: f64 = 8.0;
 /// Time in which a text must not come, s, if the script states none.
 const NOT_EXPECTED_S: f64 = 1.0;
@@ -14,9 +14,9 @@ const LONGEST_S: f64 = 3600.0;
 pub enum Step {
     /// Types a line at a time since power-on, s.
     At(f64, String),
-    /// Types a line so long after the step before, s.
+    /// Types a line this long after the previous step, s.
     After(f64, String),
-    /// Goes on when a line with this text has come.
+    /// Continues when a line with this text has come.
     For(String),
     /// A line with this text must have come since the last typed one, or come within a time, s.
     Expect(f64, String),
@@ -25,10 +25,10 @@ pub enum Step {
 }
 
 impl Step {
-    /// Understands a line.
+    /// Parses a line.
     ///
     /// # Errors
-    /// It is none of the forms; the reason.
+    /// The line has none of the forms; the error states the reason.
     pub fn parse(line: &str) -> Result<Self, String> {
         if let Some(text) = line.strip_prefix("wait for ") {
             return Ok(Self::For(text.trim().to_owned()));
@@ -52,18 +52,18 @@ impl Step {
         }
     }
 
-    /// Whether it types a line.
+    /// Whether the step types a line.
     pub fn types(&self) -> bool {
         matches!(self, Self::At(..) | Self::After(..))
     }
 
-    /// Whether it waits for a text that this line contains.
+    /// Whether the step waits for a text that this line contains.
     pub fn awaits(&self, line: &str) -> bool {
         matches!(self, Self::For(text) | Self::Expect(_, text) if line.contains(text.as_str()))
     }
 }
 
-/// Time and text behind `expect`; a first word such as `2s` or `0.5s` is a time.
+/// Returns time and text after `expect`; a first word such as `2s` or `0.5s` is a time.
 fn within(text: &str, default: f64) -> Result<(f64, String), String> {
     let text = text.trim();
     let (first, rest) = text.split_once(' ').unwrap_or((text, ""));

@@ -1,4 +1,4 @@
-//! One converter.
+//! One ADC.
 
 use super::{
     CFGR, CR, DR, IER, ISR, Inputs, JDR1, JDR4, JSQR, NEVER, Named, SMPR1, SQR1, Store, TR1, bits,
@@ -13,16 +13,16 @@ bits! { ADEN = 0, ADDIS = 1, ADSTART = 2, JADSTART = 3, VREGEN = 28, DEEPPWD = 2
 // CFGR.
 bits! { CONT = 13, JQDIS = 31 }
 
-/// Sampling times, halves of a converter clock.
+/// Sampling times, halves of an ADC clock.
 const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
-/// A conversion after it, halves of a converter clock.
+/// Duration of a conversion after the sampling, halves of an ADC clock.
 const CONVERSION: u64 = 25;
 /// Start-up of the regulator, ticks: 20 us (datasheet).
 const REGULATOR: u64 = 20 * 170;
-/// A calibration, and the wait behind it, converter clocks (datasheet, tCAL; RM0440, ADCAL).
+/// Duration of a calibration, and of the wait after it, ADC clocks (datasheet, tCAL; RM0440, ADCAL).
 const CALIBRATION: u64 = 116;
 const AFTER_CALIBRATION: u64 = 4;
-/// Start-up, converter clocks: a conversion (datasheet, tSTAB).
+/// Start-up time, ADC clocks: one conversion (datasheet, tSTAB).
 const START_UP: u64 = 15;
 
 /// Kind of a sequence.
@@ -35,16 +35,16 @@ pub(super) enum Sequence {
 }
 
 impl Sequence {
-    /// Both.
+    /// Both kinds.
     pub const ALL: [Self; 2] = [Self::Regular, Self::Injected];
 
-    /// The bit of CR that it waits or runs by.
+    /// Returns the bit of CR that is set while it waits or runs.
     fn started(self) -> u32 {
         [ADSTART, JADSTART][self as usize]
     }
 }
 
-/// A sequence that runs: its rank, and when that is converted.
+/// A running sequence: its rank, and the time at which that rank is converted.
 #[derive(Clone, Copy, Debug)]
 struct Running {
     rank: u32,
@@ -54,7 +54,7 @@ struct Running {
 const IDLE: Running = Running { rank: 0, done_at: NEVER };
 
 defaults! {
-    /// A converter.
+    /// An ADC.
     #[derive(Clone, Debug)]
     pub(super) struct Converter {
         store: Store = Store::of("ADC"),
@@ -66,9 +66,9 @@ defaults! {
         pub data: [u16; 4],
         /// Regular data.
         pub regular: u16,
-        /// Since when the regulator is on.
+        /// Time since which the regulator is on.
         regulator_from: u64 = NEVER,
-        /// End of the last calibration, and of the start-up.
+        /// End of the last calibration, and end of the start-up.
         calibrated_at: u64,
         ready_at: u64 = NEVER,
         ready: bool,
@@ -76,7 +76,7 @@ defaults! {
 }
 
 impl Converter {
-    /// Whether any enabled event asks for the interrupt.
+    /// Whether any enabled event requests the interrupt.
     pub fn requests(&self) -> bool {
         self.status & self.store.get(IER) != 0
     }
@@ -99,7 +99,7 @@ impl Converter {
         self.control & ADSTART != 0 && self.is_triggered(Sequence::Regular)
     }
 
-    /// The trigger of a sequence, and in the two bits above its edges.
+    /// Returns the trigger of a sequence, with its edges in the two bits above.
     fn selection(&self, sequence: Sequence) -> u32 {
         let (register, place) = [(CFGR, 5), (JSQR, 2)][sequence as usize];
         self.store.get(register) >> place & 0x7f
@@ -115,8 +115,8 @@ impl Converter {
         self.running[sequence as usize] = Running { rank: 0, done_at };
     }
 
-    /// When the injected conversions sample: channel and time. Of the sequence in progress, else of that which a
-    /// trigger at this time would start.
+    /// Returns the sampling instants of the injected conversions: channel and time. They belong to the sequence in
+    /// progress, or otherwise to the one that a trigger at this time would start.
     pub fn samplings(&self, trigger: Option<u64>, clock: u64) -> Vec<(u32, u64)> {
         let sequence = Sequence::Injected;
         let lasts = |rank| self.conversion(sequence, rank) * clock / 2;
@@ -136,16 +136,16 @@ impl Converter {
         samplings
     }
 
-    /// When the next conversion ends, or the start-up does.
+    /// Returns the time at which the next conversion or the start-up ends.
     pub fn next_event(&self) -> u64 {
         self.running[0].done_at.min(self.running[1].done_at).min(self.ready_at)
     }
 
     fn channel(&self, sequence: Sequence, rank: u32) -> u32 {
         match sequence {
-            // JSQ1 begins at bit 9, the others follow, six bits apart.
+            // JSQ1 begins at bit 9; the others follow in steps of six bits.
             Sequence::Injected => self.store.get(JSQR) >> (9 + 6 * rank) & 0x1f,
-            // SQ1 begins at bit 6 of SQR1; five to a register.
+            // SQ1 begins at bit 6 of SQR1; five fit in a register.
             Sequence::Regular => {
                 let place = rank + 1;
                 self.store.get(SQR1 + 4 * (place / 5)) >> (6 * (place % 5)) & 0x1f
@@ -153,24 +153,24 @@ impl Converter {
         }
     }
 
-    /// The last rank of a sequence.
+    /// Returns the last rank of a sequence.
     fn last(&self, sequence: Sequence) -> u32 {
         let (register, mask) = [(SQR1, 15), (JSQR, 3)][sequence as usize];
         self.store.get(register) & mask
     }
 
-    /// Sampling and conversion of a rank, halves of a clock.
+    /// Returns the time of sampling and conversion of a rank, halves of a clock.
     fn conversion(&self, sequence: Sequence, rank: u32) -> u64 {
         self.sampling(self.channel(sequence, rank)) + CONVERSION
     }
 
-    /// Sampling of a channel, halves of a clock.
+    /// Returns the sampling time of a channel, halves of a clock.
     pub fn sampling(&self, channel: u32) -> u64 {
         let register = self.store.get(SMPR1 + 4 * (channel / 10).min(1));
         SAMPLING[(register >> (3 * (channel % 10)) & 7) as usize]
     }
 
-    /// Ends what is due; the channels converted, as bits.
+    /// Ends conversions that are due; returns the converted channels, as bits.
     pub fn happen(&mut self, now: u64, clock: u64, inputs: &Inputs) -> u32 {
         if self.ready_at <= now {
             self.ready_at = NEVER;
@@ -206,13 +206,13 @@ impl Converter {
         self.watch(sequence, channel, code);
     }
 
-    /// A sequence has ended: what runs now.
+    /// Ends a sequence; returns the sequences that run now.
     fn end(&mut self, sequence: Sequence, at: u64) -> Running {
         self.status |= [EOS, JEOS][sequence as usize];
         if sequence == Sequence::Regular && self.store.get(CFGR) & CONT != 0 {
             return Running { rank: 0, done_at: at + self.conversion(sequence, 0) };
         }
-        // Without a trigger it has run once.
+        // Without a trigger it runs once.
         if !self.is_triggered(sequence) {
             self.control &= !sequence.started();
         }
@@ -285,7 +285,7 @@ impl Converter {
             );
             let has_clock = rules.require(clock.is_some(), Rule::AdcClock, "ADCAL without a clock");
             if allowed {
-                // Without a clock it never ends.
+                // Without a clock the calibration never ends.
                 let lasts = if has_clock { CALIBRATION * clock.unwrap_or(1) } else { NEVER };
                 self.calibrated_at = now.saturating_add(lasts);
             }

@@ -3,16 +3,16 @@
 
 use super::{BDTR, CCER, CCMR1, CCMR2, CR1, CR2, OSSI, OSSR, Tim1};
 
-/// A level over a PWM period, which begins at the top of the counter: one of the two for a while, else the other.
+/// A level over a PWM period, which begins at the top of the counter: one of the two levels for a while, otherwise the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wave {
-    /// Ticks of a period.
+    /// Duration of the period, ticks.
     pub period: u32,
-    /// When it changes to `inside`, ticks.
+    /// Time of the change to `inside`, ticks.
     pub from: u32,
-    /// For how long, ticks; 0 of a constant level.
+    /// Duration of `inside`, ticks; 0 for a constant level.
     pub ticks: u32,
-    /// The level in that time.
+    /// The level during that time.
     pub inside: bool,
 }
 
@@ -21,19 +21,19 @@ pub struct Wave {
 pub enum Output {
     /// The timer does not drive the pin.
     Released,
-    /// The level that it drives.
+    /// The level to which the timer drives the pin.
     Driven(Wave),
     /// The mode of the channel is not modelled.
     Unknown,
 }
 
 impl Wave {
-    /// The same level throughout.
+    /// Makes a constant level.
     pub fn constant(period: u32, level: bool) -> Self {
         Self { period, from: 0, ticks: 0, inside: !level }
     }
 
-    /// High in a window in the middle of the period, in which the counter is below `compare`.
+    /// Makes a level that is high in a window in the middle of the period, in which the counter is below `compare`.
     fn below(compare: u32, top: u32) -> Self {
         match compare {
             0 => Self::constant(2 * top, false),
@@ -42,35 +42,35 @@ impl Wave {
         }
     }
 
-    /// The level some ticks after the top of the counter.
+    /// Returns the level some ticks after the top of the counter.
     pub fn at(&self, ticks: u32) -> bool {
         let since = (ticks % self.period + self.period - self.from) % self.period;
         (since < self.ticks) == self.inside
     }
 
-    /// The opposite level throughout.
+    /// Returns the inverse level.
     pub fn inverted(self) -> Self {
         Self { inside: !self.inside, ..self }
     }
 
-    /// Inverted or not.
+    /// Inverts the level if `invert` is set.
     fn inverted_if(self, invert: bool) -> Self {
         if invert { self.inverted() } else { self }
     }
 
-    /// The instants at which it changes, ticks.
+    /// Returns the instants of its changes, ticks.
     pub fn edges(&self) -> impl Iterator<Item = u32> {
         let [first, second] = [self.from, (self.from + self.ticks) % self.period];
         let count = if self.ticks == 0 { 0 } else { 2 };
         [first, second].into_iter().take(count)
     }
 
-    /// How long it is high in a period, ticks.
+    /// Returns the time for which it is high in a period, ticks.
     pub fn high(&self) -> u32 {
         if self.inside { self.ticks } else { self.period - self.ticks }
     }
 
-    /// With its rising edge later.
+    /// Delays the rising edge.
     fn rising_later(self, by: u32) -> Self {
         if self.ticks == 0 {
             self
@@ -85,12 +85,12 @@ impl Wave {
 }
 
 impl Tim1 {
-    /// Ticks of a period.
+    /// Returns the duration of a period, ticks.
     pub fn period(&self) -> u32 {
         2 * self.top
     }
 
-    /// Dead time, ticks.
+    /// Returns the dead time, ticks.
     pub fn dead_time(&self) -> u32 {
         let code = self.store.get(BDTR) & 0xff;
         // CKD: the dead time counts every clock, every second or every fourth.
@@ -104,7 +104,7 @@ impl Tim1 {
             }
     }
 
-    /// OCx and OCxN of leg `leg` with the compare value in force, the dead time inserted or not.
+    /// Returns OCx and OCxN of leg `leg` with the compare value in force, with or without dead time.
     pub fn outputs(&self, leg: usize, dead_time: bool) -> [Output; 2] {
         let bdtr = self.store.get(BDTR);
         let bits = self.store.get(CCER) >> (4 * leg);
@@ -133,7 +133,7 @@ impl Tim1 {
         }
     }
 
-    /// OCxREF; none in a mode that is not modelled.
+    /// Returns OCxREF; none in a mode that is not modelled.
     fn reference(&self, leg: usize) -> Option<Wave> {
         let register = self.store.get([CCMR1, CCMR2][leg / 2]) >> (8 * (leg % 2));
         let below = if self.counting() {
@@ -152,8 +152,8 @@ impl Tim1 {
         }
     }
 
-    /// The time of a top of the counter after which the compare value of channel 4 triggers, ticks from that top; none
-    /// when it does not.
+    /// Returns the time after a top of the counter, ticks, at which the compare value of channel 4 triggers; none if it
+    /// does not.
     pub fn trigger_after_top(&self) -> Option<u64> {
         let after = self.rises_after(0, self.active[3]).filter(|_| self.counting());
         after.map(|ticks| u64::from(self.top) + ticks)
@@ -170,7 +170,7 @@ mod tests {
             let wave = Wave::below(compare, 10);
             assert_eq!(wave.high(), 2 * compare.min(10));
             for tick in 0..20_u32 {
-                // Down from the top, and up again; the tick between two counts.
+                // Down from the top, and up again; evaluated at the tick between two counts.
                 let below =
                     (2 * tick.abs_diff(10)).saturating_sub(u32::from(tick >= 10)) < 2 * compare;
                 let edge = tick.abs_diff(10) == compare;
@@ -188,7 +188,7 @@ mod tests {
         let low = Wave::below(3, 10).inverted().rising_later(2);
         let on: Vec<_> = (0..20).filter(|t| low.at(*t)).collect();
         assert_eq!(on, [0, 1, 2, 3, 4, 5, 6, 15, 16, 17, 18, 19]);
-        // A pulse not longer than the dead time vanishes; a constant level has no edge.
+        // A pulse that is not longer than the dead time vanishes; a constant level has no edge.
         assert_eq!(Wave::below(1, 10).rising_later(2), Wave::constant(20, false));
         assert_eq!(Wave::below(0, 10).inverted().rising_later(2), Wave::constant(20, true));
     }
