@@ -48,11 +48,11 @@ pub const WAIT_STATES: u8 = 4;
 
 // Power stage ---------------------------------------------------------------------------------
 
-/// Control rate, Hz, and that of the legs with one pulse in a control period. The drive's filters and the carrier that it
-/// injects are designed for this rate alone.
+/// Control rate, Hz. With one pulse per control period it is the switching frequency as well. The drive's filters and the injected
+/// voltage are designed for this rate only.
 pub const PWM_HZ: u32 = 6000;
-/// Half a control period in ticks of the core clock, rounded: with one pulse in a control period the largest count of TIM1,
-/// which counts up and down once per pulse. With more it is [`Timer::top`].
+/// Half a control period in ticks of the core clock, rounded. With one pulse per control period it is the largest count of TIM1, which
+/// counts up and down once per pulse. With more pulses the largest count is [`Timer::top`].
 pub const PWM_TOP: u16 = {
     let top = (CLOCK_HZ + PWM_HZ) / (2 * PWM_HZ);
     assert!(top <= u16::MAX as u32);
@@ -70,19 +70,19 @@ const _: () = {
     }
 };
 
-/// What TIM1 makes of the settings from one reset to the next.
+/// Values for TIM1 that follow from the settings; they stay in force until the next reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timer {
     /// The DTG field of TIM1_BDTR.
     pub dead_time_code: u8,
     /// Dead time, s.
     pub dead_time_s: f32,
-    /// Rate of the legs.
+    /// Switching frequency.
     pub carrier_khz: Carrier,
 }
 
 impl Timer {
-    /// The timer for these settings, which are within the ranges of the board.
+    /// The timer values for these settings, which are within the ranges of the board.
     pub fn of(inverter: &Inverter) -> Self {
         let (dead_time_code, dead_time_s) = dead_time(inverter.dead_time_s);
         Self { dead_time_code, dead_time_s, carrier_khz: inverter.carrier_khz }
@@ -93,21 +93,21 @@ impl Timer {
         PWM_TOP / self.carrier_khz.pulses()
     }
 
-    /// By how much that is less than with one pulse: the control interrupt, which has no time to ask, takes it for later by so
-    /// much.
+    /// Difference between the top with one pulse and this top, ticks. The control interrupt measures its start from the top with one
+    /// pulse, so it reads a start that is later by this difference.
     pub fn below_the_top(&self) -> u32 {
         u32::from(PWM_TOP - self.top())
     }
 
-    /// The RCR field: update events skipped. They occur at both ends of the count; used is one in a control period, at the
-    /// top (low sides on).
+    /// The RCR field: update events skipped. Update events occur at both ends of the count; one per control period is used, at the top
+    /// (low sides on).
     pub fn updates_left_out(&self) -> u16 {
         2 * self.carrier_khz.pulses() - 1
     }
 
-    /// The MMS field: the trigger output of the currents' sampling. With one pulse that of channel 4 at [`SAMPLE_AT`], so that
-    /// the sampling ends at the top. It would come with every pulse; with more of them the update starts the sampling, which
-    /// ends [`CURRENT_SAMPLING`] behind the top.
+    /// The MMS field: the trigger output that starts the sampling of the currents. With one pulse the trigger is channel 4 at
+    /// [`SAMPLE_AT`], so that the sampling ends at the top. Channel 4 triggers at every pulse, so with more pulses the update event
+    /// starts the sampling, which then ends [`CURRENT_SAMPLING`] after the top.
     pub fn trigger_output(&self) -> u8 {
         if self.carrier_khz == Carrier::Khz6 { 7 } else { 2 }
     }
@@ -115,7 +115,7 @@ impl Timer {
 
 /// Core clocks per tick of the dead time (TIM1_CR1.CKD = 1). With one, the longest would be 5.93 us.
 pub const DEAD_TIME_CLOCKS: u32 = 2;
-// The timer can make the longest.
+// The timer can generate the longest dead time.
 const _: () = assert!(
     (dead_time::LONGEST * DEAD_TIME_CLOCKS) as f32 >= SELECTED.dead_time_max_s * CLOCK_HZ as f32
 );
@@ -142,27 +142,26 @@ pub const TIM1_BDTR: u32 = 0x4001_2c44;
 /// Its bit MOE: outputs on.
 pub const TIM1_BDTR_MOE: u32 = 1 << 15;
 
-// Converters ----------------------------------------------------------------------------------
+// ADCs =>----------------------------------------------------------------------------------
 
-/// Clock of the converters, Hz: a quarter of the core clock and synchronous to it, so the sampling
-/// instant does not jitter.
+/// Clock of the ADCs, Hz: a quarter of the core clock and synchronous to it, so the sampling instant does not jitter.
 pub const ADC_HZ: u32 = CLOCK_HZ / ADC_CLOCK_DIVIDER;
-/// Core clocks per converter clock.
+/// Core clocks per ADC clock.
 pub const ADC_CLOCK_DIVIDER: u32 = 4;
-// Two converters at a time: 52 MHz (datasheet, single-ended, all converters in operation).
+// Two ADCs at a time: 52 MHz (datasheet, single-ended, all ADCs in operation).
 const _: () = assert!(ADC_HZ <= 52_000_000);
 
-/// A sampling time of the converter.
+/// A sampling time of the ADC.
 #[derive(Clone, Copy)]
 pub struct SamplingTime {
     /// SMP field.
     pub code: u8,
-    /// Halves of a converter clock.
+    /// Halves of an ADC clock.
     pub half_clocks: u32,
 }
 
 impl SamplingTime {
-    /// In ticks of [`CLOCK_HZ`].
+    /// The sampling time in ticks of [`CLOCK_HZ`].
     pub const fn ticks(self) -> u32 {
         self.half_clocks * ADC_CLOCK_DIVIDER / 2
     }
@@ -179,12 +178,12 @@ const _: () = assert!(REFERENCE_SAMPLING.ticks() >= 4 * CYCLES_PER_US);
 /// A 12-bit conversion after the sampling: 12.5 clocks.
 const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 
-/// Compare value of the trigger, with one pulse in a control period. The sampling of the currents starts while the counter goes up and ends, which
-/// fixes the sampled value, when the counter is at the top and all low sides are on.
+/// Compare value of the trigger, with one pulse per control period. The sampling of the currents starts while the counter goes up. It
+/// ends, which fixes the sampled value, when the counter is at the top and all low sides are on.
 pub const SAMPLE_AT: u16 = PWM_TOP - CURRENT_SAMPLING.ticks() as u16;
-/// The same in the upper zero vector, on the way down: this sampling ends when the counter is at 0.
+/// Compare value of the trigger in the upper zero vector, on the way down: this sampling ends when the counter is at 0.
 pub const UPPER_SAMPLE_AT: u32 = CURRENT_SAMPLING.ticks();
-/// From the end of the sampling to the control interrupt, in ticks. A third current is converted after the first two.
+/// Time from the end of the sampling to the control interrupt, in ticks. A third current is converted after the first two.
 pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
     + SLOW_SAMPLING.ticks()
     + if SELECTED.currents.shunts.is_some() { THIRD_CURRENT_TICKS } else { 0 };
@@ -195,57 +194,56 @@ const _: () = assert!(THIRD_CURRENT_TICKS < CYCLES_PER_US);
 // More than nine tenths of the period are left for the control.
 const _: () = assert!(SAMPLES_READY_TICKS * 10 < 2 * PWM_TOP as u32);
 
-/// Start-up time of the converter's regulator, us (datasheet: 20 at most).
+/// Start-up time of the ADC's regulator, us (datasheet: 20 at most).
 pub const ADC_REGULATOR_START_US: u32 = 20;
-/// Longest wait for the calibration or for the readiness of a converter, us; both take less than
-/// 10.
+/// Longest wait for the calibration or for the readiness of an ADC, us; both take less than 10.
 pub const ADC_TIMEOUT_US: u32 = 1000;
 
-/// Largest code of a conversion: 12 bits.
+/// Full scale of a conversion, ADC counts (12 bits).
 pub const ADC_FULL_SCALE: u16 = 4095;
 
 /// The analog watchdogs trip at this multiple of the software's limit, which acts first at slow currents.
 const ANALOG_TRIP_SHARE: f32 = 1.02;
 
-/// Lowest and highest code that do not trip an analog watchdog, for currents up to `trip_a` in both directions, A. Codes
-/// at the ends of the range always trip.
+/// Lowest and highest ADC counts that do not trip an analog watchdog, for currents up to `trip_a` in both directions, A. Counts at the
+/// ends of the range always trip.
 fn window(line: Line, trip_a: f32) -> (u16, u16) {
     // The casts saturate.
     let code =
         |amperes: f32| (((amperes - line.offset) / line.gain) as u16).clamp(1, ADC_FULL_SCALE - 1);
     let (negative, positive) = (code(-trip_a), code(trip_a));
-    // With a negative gain the positive current has the smaller code.
+    // With a negative gain the positive current has the smaller count.
     (negative.min(positive), negative.max(positive))
 }
 
-// Second opinions -----------------------------------------------------------------------------
+// Cross-checks --------------------------------------------------------------------------------
 
-/// Periods of the watchdog's oscillator that are timed at once, by the prescaler of the capture.
+/// Periods of the watchdog's oscillator that one capture spans, by the prescaler of the capture.
 const LSI_PERIODS: u32 = 8;
-/// Lowest and highest frequency of it, Hz, beside a core clock that is right, and what the internal oscillator in the place of
-/// the crystal adds on either side: 2 % (datasheet, over all temperatures).
+/// Lowest and highest frequency of the watchdog's oscillator, Hz, measured with a correct core clock. If the internal oscillator replaces
+/// the crystal, its error widens the range by [`INTERNAL_HZ`] on either side: 2 % (datasheet, over all temperatures).
 const LSI_HZ: (u32, u32) = (29_000, 35_000);
 const INTERNAL_HZ: u32 = 700;
 const _: () = assert!(LSI_HZ.0 < WATCHDOG_HZ && LSI_HZ.1 > WATCHDOG_HZ_MAX);
-/// Longest wait for one capture behind another, us.
+/// Longest wait from one capture to the next, us.
 pub const LSI_TIMEOUT_US: u32 = 600;
 const _: () = assert!(LSI_TIMEOUT_US > 2 * LSI_PERIODS * 1_000_000 / (LSI_HZ.0 - INTERNAL_HZ));
 
-/// Whether core clock and watchdog's oscillator agree, with so many core clocks in a capture.
+/// Whether the core clock and the watchdog's oscillator agree, from the core `clocks` between two captures.
 pub fn clocks_agree(clocks: u32, internal: bool) -> bool {
     let more = if internal { INTERNAL_HZ } else { 0 };
     let hz = LSI_PERIODS * CLOCK_HZ / clocks.max(1);
     (LSI_HZ.0 - more..=LSI_HZ.1 + more).contains(&hz)
 }
 
-/// Address of the code that the chip's own reference had in the factory (datasheet, VREFINT_CAL), and the reference of the
-/// converters then, V.
+/// Address of the ADC counts that the chip's own reference gave in the factory (datasheet, VREFINT_CAL), and the ADC reference voltage
+/// there, V.
 pub const REFERENCE_CALIBRATION: u32 = 0x1fff_75aa;
 const CALIBRATED_AT_V: f32 = 3.0;
-/// Largest error of the converters' reference. The other, with its calibration, may be wrong by 1 % (datasheet).
+/// Largest error of the ADC reference voltage. The chip's own reference, with its calibration, may be off by 1 % (datasheet).
 const REFERENCE_ERROR: f32 = 0.03;
 
-/// Whether the reference of the converters is that of the board, with this code of the chip's own.
+/// Whether the ADC reference voltage is the board's, from the ADC counts of the chip's own reference.
 pub fn references_agree(code: u16, calibration: u16) -> bool {
     let right = f32::from(calibration) * (CALIBRATED_AT_V / REFERENCE_V);
     (f32::from(code) / right - 1.0).abs() <= REFERENCE_ERROR
@@ -253,15 +251,15 @@ pub fn references_agree(code: u16, calibration: u16) -> bool {
 
 // Reaction times --------------------------------------------------------------------------------
 
-/// The fault input of the power stage, from its edge to the outputs off, ns: the filter and a few
-/// clocks of the timer, no software.
+/// Reaction time of the fault input of the power stage, from its edge to the outputs off, ns: the filter and a few clocks of the timer,
+/// no software.
 pub const BREAK_REACTION_NS: u32 = BREAK_FILTER_NS + 4 * 1000 / CYCLES_PER_US;
-/// An analog watchdog, from an over-current to the outputs off, ns: up to a period until the next
-/// sample, the conversion, and the latest start of the interrupt that is allowed.
+/// Reaction time of an analog watchdog, from an over-current to the outputs off, ns: up to a period until the next sample, the
+/// conversion, and the latest start of the interrupt that is allowed.
 pub const WATCHDOG_REACTION_NS: u32 =
     (2 * PWM_TOP as u32 + CONVERSION.ticks()) * 1000 / CYCLES_PER_US + LATEST_START_US * 1000;
-/// The software, from an over-current to the outputs off, ns: up to a period until the next sample, the whole
-/// sequence, the latest allowed start of the interrupt, and the control step.
+/// Reaction time of the software, from an over-current to the outputs off, ns: up to a period until the next sample, the whole sequence,
+/// the latest allowed start of the interrupt, and the control step.
 pub const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS) * 1000
     / CYCLES_PER_US
     + (LATEST_START_US + LONGEST_STEP_US) * 1000;
@@ -269,8 +267,8 @@ pub const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS)
 /// interrupt, not even the log: only its entry and the interrupted instruction remain, below 1 us. `status`
 /// shows the latest start so far.
 pub const LATEST_START_US: u32 = 10;
-/// Longest control interrupt that the window watchdog allows, cycles: one that takes a start command. The next interrupt may be
-/// late by so much, and the one after it early. `cargo xtask cycles` fails above it.
+/// Longest control interrupt that the window watchdog allows, cycles: one that takes a start command. The next interrupt may be late by
+/// this time, and the one after it early. `cargo xtask cycles` fails above it.
 pub const LONGEST_INTERRUPT_CYCLES: u32 = 12_000;
 /// Longest control step assumed here, us; `status` shows the longest so far, in cycles.
 const LONGEST_STEP_US: u32 = 20;
@@ -283,26 +281,26 @@ const _: () = {
 
 // Over-voltage ----------------------------------------------------------------------------------
 
-/// The comparator of the dc link pulls the break at this multiple of the software's limit, which acts first, or where the
-/// board's limits end.
+/// Ratio of the comparator's trip to the software's limit, which acts first. If the board's limits are lower, the comparator trips at
+/// these.
 const OVER_VOLTAGE_SHARE: f32 = 1.075;
 
 /// The protection that works without the control step. It is set up at start from the settings in force then, and holds
 /// until the next reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// Lowest and highest code of current a that do not trip its analog watchdog.
+    /// Lowest and highest ADC counts of current a that do not trip its analog watchdog.
     pub window_a: (u16, u16),
-    /// The same of current b.
+    /// Lowest and highest ADC counts of current b that do not trip its analog watchdog.
     pub window_b: (u16, u16),
-    /// Code of the dc link at which the comparator trips. The DAC that makes the level has the reference and the 12 bits
-    /// of the ADC that measures the dc link.
+    /// ADC counts of the dc link at which the comparator trips. The DAC that generates the level has the reference and the 12 bits of the
+    /// ADC that measures the dc link.
     pub over_voltage: u16,
 }
 
-/// The protection for these settings on a board: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
-/// `limits.dc_over_v` but not above the limit of the board, which is a code that no setting lifts; both within the range of
-/// the converters.
+/// The protection for these settings on a board. Analog watchdogs trip at 1.02 times `limits.trip_a`, the comparator at 1.075 times
+/// `limits.dc_over_v`, but not above the board's limit. The board's limit is in ADC counts, so no setting raises it. All are within the
+/// range of the ADCs.
 pub fn protection(board: &Board, settings: &Settings) -> Protection {
     let Scales { current_a, current_b, dc_link, .. } = settings.scales;
     let trip_a = ANALOG_TRIP_SHARE * settings.trip_a();
@@ -325,18 +323,18 @@ pub const COMP_HYSTERESIS: u8 = 1;
 pub const DAC_START_US: u32 = 10;
 /// Start-up time of the comparator, us (datasheet: 5 at most).
 pub const COMP_START_US: u32 = 5;
-/// Longest until the chip's pull-up has lifted the pin of the dc link above the offsets of DAC and comparator, us: 100 nF and
-/// 9.31 kOhm take 0.8 ms for nine tenths.
+/// Longest time until the chip's pull-up has lifted the pin of the dc link above the offsets of DAC and comparator, us: with 100 nF and
+/// 9.31 kOhm it rises to 90 % in 0.8 ms.
 pub const LIFT_US: u32 = 5000;
-/// Code of the dc link, a tenth of the range, from which on its own comparator can be tested by it.
+/// ADC counts of the dc link, a tenth of the range, above which the comparator of the dc link can be tested with the dc link itself.
 pub const COMPARABLE: u16 = 410;
 
 // Dc link ---------------------------------------------------------------------------------------
 
-/// Output for the brake chopper, on at a high level. To be pulled down: it floats in reset.
+/// Output for the brake chopper, on at a high level. It needs an external pull-down: it floats in reset.
 pub const CHOPPER: Pin = pc(6);
 const _: () = assert!(CHOPPER.is(&pin::TIM8_CH1));
-/// Output for the precharge relay, the same.
+/// Output for the precharge relay, on at a high level, with a pull-down as well.
 pub const RELAY: Pin = pc(8);
 
 // Encoder -------------------------------------------------------------------------------------
@@ -365,19 +363,18 @@ const _: () = {
     assert!(serial_divider(CLOCK_HZ, SERIAL_BAUD) <= 0xf_ffff);
     assert!(serial_divider(HSI_HZ, SERIAL_BAUD_MAX) >= 0x300);
 };
-/// Without a valid line for so long the port goes back to [`SERIAL_BAUD`], ms.
+/// Time without a valid line after which the port goes back to [`SERIAL_BAUD`], ms.
 pub const SERIAL_FALL_BACK_MS: u32 = 1000;
 /// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
 pub const STREAM_SHARE: u32 = 80;
-/// Size of the receive queue, which holds one byte less: 22 ms at full rate; the main loop reads a thousand times
-/// as often.
+/// Size of the receive queue, bytes; it holds one byte less, 22 ms at full rate. The main loop reads it a thousand times as often.
 pub const SERIAL_RECEIVE: usize = 256;
-/// Size of the transmit queue, which holds one byte less: the longest line waits 39 ms at most.
+/// Size of the transmit queue, bytes; it holds one byte less. The longest line waits 39 ms at most.
 pub const SERIAL_TRANSMIT: usize = 448;
 /// Records of the longest trace, 32 bytes each.
 pub const TRACE_RECORDS: usize = 1024;
-/// Control periods in the ring for stream, identification and commissioning in the main loop. It keeps one less: 5.2 ms if every
-/// period is recorded, longer than the watchdog allows the main loop to be late, with its slowest clock.
+/// Size of the ring of control periods for stream, identification and commissioning in the main loop. It holds one less: 5.2 ms if every
+/// period is recorded. The watchdog allows the main loop to be late by less, even with its slowest clock.
 pub const RECORDED_PERIODS: usize = 32;
 const _: () = assert!(
     (RECORDED_PERIODS as u32 - 1) * WATCHDOG_HZ > (WATCHDOG_RELOAD as u32 + 1) * 4 * PWM_HZ
@@ -405,7 +402,7 @@ pub const WATCHDOG_LONG_PRESCALER: u8 = 6;
 /// The RLR field then: ten seconds. The design of the control takes more than one, because the core computes double
 /// precision in software.
 pub const WATCHDOG_LONG_RELOAD: u16 = 1249;
-/// Longest wait until the watchdog has taken both over, us: six of its clocks divided by 256, 52 ms with the slowest
+/// Longest wait until the watchdog has taken both values, us: six of its clocks divided by 256, 52 ms with the slowest clock
 /// (`stm32g4xx_hal_iwdg.c`).
 pub const WATCHDOG_SET_US: u32 = 60_000;
 const _: () = assert!(WATCHDOG_SET_US > 6 * 256 * 1_000_000 / WATCHDOG_HZ);
@@ -427,12 +424,11 @@ const _: () = assert!(
 
 // Option bytes --------------------------------------------------------------------------------
 
-/// Bits of FLASH_OPTR (RM0440): the level of PB8 counts at a reset; without it, this one starts the firmware.
+/// Bit of FLASH_OPTR (RM0440): the level of PB8 counts at a reset; without this bit, the next one starts the firmware.
 const N_SWBOOT0: u32 = 1 << 26;
 const N_BOOT0: u32 = 1 << 27;
 
-/// Whether these option bytes let the pin PB8 choose between the firmware and ST's boot loader at a reset, as those from the
-/// factory do.
+/// Whether these option bytes let the pin PB8 choose between the firmware and ST's boot loader at a reset. The factory's option bytes do.
 pub fn boot_pin_counts(option_bytes: u32) -> bool {
     option_bytes & (N_SWBOOT0 | N_BOOT0) != N_BOOT0
 }

@@ -125,10 +125,10 @@ pub struct FaultInput {
     pub pull_ohm: Stated<f32>,
 }
 
-/// Voltages of the dc link that the power stage stands, V.
+/// Voltages of the dc link that the power stage withstands, V.
 #[derive(Clone, Copy, Debug)]
 pub struct DcLinkLimits {
-    /// Highest in operation: generating torque ends there.
+    /// Maximum operating voltage: the braking limit is at most here.
     pub operation: Stated<f32>,
     /// Absolute maximum of the switches.
     pub switches: Stated<f32>,
@@ -136,12 +136,12 @@ pub struct DcLinkLimits {
     pub capacitors: Stated<f32>,
 }
 
-/// Share of the switches' absolute maximum that the comparator leaves them: ringing at a turn-off comes on top.
+/// Share of the switches' absolute maximum at which the comparator trips: the ringing at a turn-off adds to it.
 const OF_SWITCHES: f32 = 0.9;
-/// Largest error of the measured dc link, relative: what the bench step for its scale allows.
+/// Largest relative error of the measured dc link: the bench step for its scale allows it.
 const SENSING_ERROR: f32 = 0.03;
-/// Least distance from the software's trip to the comparator's, relative: offsets of comparator and DAC, which have divider and
-/// reference in common with the software.
+/// Least distance from the software's trip to the comparator's, relative. It covers the offsets of comparator and DAC, which share
+/// divider and reference with the software.
 const COMPARATOR_ERROR: f32 = 0.03;
 
 impl DcLinkLimits {
@@ -164,18 +164,19 @@ pub struct Analog {
 /// The current sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct Currents {
-    /// Sensor of a.
+    /// Sensor of current a.
     pub a: Analog,
-    /// Sensor of b.
+    /// Sensor of current b.
     pub b: Analog,
-    /// Where all are shunts below the low sides: the rest of them. Without, a and b are measured in the lines, at any time.
+    /// Third shunt and settling time, if all three currents are measured by shunts below the low sides. Without shunts, sensors in the
+    /// lines measure a and b at any time.
     pub shunts: Option<Shunts>,
 }
 
 /// Shunts below the low sides: each sees its current only while its low side is on.
 #[derive(Clone, Copy, Debug)]
 pub struct Shunts {
-    /// That of c.
+    /// Shunt of current c.
     pub c: Analog,
     /// Time from the turn-on of a low side until its amplifier has settled, s, without the dead time.
     pub settle_s: Stated<f32>,
@@ -194,19 +195,19 @@ pub struct Board {
     pub low: Gates,
     /// Fault output.
     pub fault: FaultInput,
-    /// Dead time that the timer makes, s: the default of `inverter.dead_time_s`. Dead time of the drivers comes on top.
+    /// Dead time that the timer generates, s: the default of `inverter.dead_time_s`. The dead time of the drivers adds to it.
     pub dead_time_s: Stated<f32>,
-    /// Longest that the setting takes, s; the shortest is the board's own.
+    /// Longest dead time that the setting accepts, s; the shortest is the board's own.
     pub dead_time_max_s: f32,
-    /// Largest rate of the legs that its switches take. (Shunts refuse more than 6 kHz by themselves.)
+    /// Highest switching frequency that its switches allow. (With shunts the limit is 6 kHz anyway.)
     pub carrier_max_khz: Carrier,
     /// Phase currents.
     pub currents: Currents,
     /// Delay of the analog filters of the currents, s.
     pub current_delay_s: Stated<f32>,
-    /// Dc link. Its pin is the one that comparator 1 reaches.
+    /// Dc link. Its pin is the input of comparator 1.
     pub dc_link: Analog,
-    /// Thermistor of the heat sink: its pin.
+    /// Pin of the heat sink's thermistor.
     pub heat_sink: Pin,
     /// The thermistor.
     pub ntc: Stated<Ntc>,
@@ -214,14 +215,14 @@ pub struct Board {
     pub dc_link_v: f32,
     /// Flux of the motor: the default of `sequence.flux`.
     pub flux: Flux,
-    /// Voltages that the power stage stands.
+    /// Voltages that the power stage withstands.
     pub dc_link_limits: DcLinkLimits,
-    /// Over-current shut-down of the power stage that needs no sample, up to 60 V none: the converters see a short circuit too
-    /// late.
+    /// Over-current shut-down of the power stage that needs no sample. Up to 60 V a board may do without; above, the ADCs detect a short
+    /// circuit too late.
     pub over_current: Option<Stated<&'static str>>,
-    /// Pins that the power stage ties to nets of others: they stay analog.
+    /// Pins that the power stage ties to nets of other signals: they stay analog.
     pub analog_only: &'static [Pin],
-    /// The port of the field bus, on pins that the power stage leaves free; `None` is a board without a bus.
+    /// The port of the field bus, on pins that the power stage leaves free; `None` for a board without a bus.
     pub bus: Option<Rs485>,
     /// The terminal strip, on pins that the power stage leaves free.
     pub strip: Strip,
@@ -234,7 +235,7 @@ pub struct Board {
 pub struct Rs485 {
     /// Data to the transceiver (DI).
     pub transmit: Pin,
-    /// Data from it (RO).
+    /// Data from the transceiver (RO).
     pub receive: Pin,
     /// Driver enable (DE, with its inverse at /RE: one wire to both).
     pub driver: Pin,
@@ -243,8 +244,8 @@ pub struct Rs485 {
 /// A pin for each of the [`TERMINALS`] that a board has.
 pub type TerminalPins = [Option<Pin>; TERMINALS.len()];
 
-/// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open one to the other level than a closed one
-/// has. Outputs are high where they are active, and are to be pulled down: they float in reset.
+/// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open contact to the level opposite to a closed
+/// one. Active outputs are high. They need external pull-downs: they float in reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Strip {
     /// Pins in the order of [`TERMINALS`]; analog ones are at ADC3 or ADC4.
@@ -272,7 +273,7 @@ impl PartialEq for Board {
 }
 
 impl Board {
-    /// Code of the highest dc link in operation, which no setting of the scale lifts.
+    /// ADC counts of the maximum operating voltage of the dc link, which no setting of the scale raises.
     pub const fn highest_dc_link(&self) -> u16 {
         let Line { gain, offset } = self.dc_link.line.value;
         // Rounded up: the limit itself is allowed.
@@ -300,12 +301,12 @@ impl Board {
     }
 }
 
-/// Resistors of the chip at a pin at the least, ohm (datasheet: 25 to 55 kOhm).
+/// Least resistance of the chip's resistor at a pin, ohm (datasheet: 25 to 55 kOhm).
 const CHIP_PULL_OHM: f32 = 25e3;
-/// Share of the supply that is left for a level that must be sure: 2.6 V of 3.3, where the input needs 0.7 of it.
+/// Share of the supply that remains as a reliable high level: 2.6 V of 3.3, where the input needs 0.7 of the supply.
 const SURE_LEVEL: f32 = 2.6 / 3.3;
-/// Dc link from which on an over-current shut-down is required, V: extra-low voltage ends there, and so do switches that stand a
-/// short circuit until the next sample.
+/// Dc link voltage above which an over-current shut-down is required, V. Above it the voltage is no longer extra-low, and switches do not
+/// withstand a short circuit until the next sample.
 pub const EXTRA_LOW_V: f32 = 60.0;
 
 /// Checks a board when compiling.
@@ -319,9 +320,9 @@ const fn check(board: &Board) {
     }
     assert!(board.fault.pin.is(&pin::TIM1_BKIN), "the fault input is not a break input");
     let Currents { a, b, shunts } = board.currents;
-    assert!(a.pin.adc1().is_some() && b.pin.adc2().is_some(), "a current has no converter");
+    assert!(a.pin.adc1().is_some() && b.pin.adc2().is_some(), "a current has no ADC");
     if let Some(Shunts { c, .. }) = shunts {
-        assert!(c.pin.adc1().is_some(), "current c has no converter");
+        assert!(c.pin.adc1().is_some(), "current c has no ADC");
         assert!(!c.pin.equals(a.pin) && !c.pin.equals(b.pin), "two currents on one pin");
     }
     assert!(board.dc_link.pin.equals(pin::COMP1_INPUT), "comparator 1 does not reach the dc link");
@@ -353,24 +354,24 @@ const fn check(board: &Board) {
             let others = board.strip.pins.split_at(i + 1).1;
             let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
             assert!(free, "a terminal has the pin of another signal");
-            assert!(i >= ANALOG || pin.adc34().is_some(), "a terminal has no converter");
+            assert!(i >= ANALOG || pin.adc34().is_some(), "a terminal has no ADC");
         }
         i += 1;
     }
-    // Nominal dc link < end of generating torque <= operation < trip of the software < comparator <= what switches and capacitors
-    // stand.
+    // Nominal dc link < braking limit <= maximum operating voltage < trip of the software < trip of the comparator <= voltages that
+    // switches and capacitors withstand.
     let limits = &board.dc_link_limits;
     let (operation_v, comparator_v) = (limits.operation.value, limits.comparator_v());
     assert!(
         board.dc_link_v > 0.0 && HIGHEST_OF_NOMINAL * board.dc_link_v <= operation_v,
-        "the nominal dc link leaves no room below the highest in operation"
+        "the nominal dc link is too close to the maximum operating voltage"
     );
     assert!(
         OVER_OF_HIGHEST * operation_v * (1.0 + COMPARATOR_ERROR) <= comparator_v,
-        "the highest dc link in operation leaves no room for two trips below what switches and capacitors stand"
+        "no two trips fit between the maximum operating voltage and the limits of switches and capacitors"
     );
     let range_v = board.dc_link.line.value.gain * 4095.0 + board.dc_link.line.value.offset;
-    assert!(comparator_v <= range_v, "the converter does not reach the trips of the dc link");
+    assert!(comparator_v <= range_v, "the ADC does not reach the trips of the dc link");
     assert!(
         board.over_current.is_some() || operation_v <= EXTRA_LOW_V,
         "above 60 V the power stage needs an over-current shut-down of its own"

@@ -6,7 +6,7 @@ use drive_settings::Settings;
 
 use crate::link::ring::Record as Period;
 
-/// News of a commissioning.
+/// Event of a commissioning.
 // Exists once at a time.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,10 +29,10 @@ pub struct Session {
     sums: Collector,
     /// Number of the next period, if there is no gap.
     next: u32,
-    /// Until the console has taken it nothing goes on.
+    /// Event that the console has not taken yet; until it has, nothing goes on.
     news: Option<News>,
-    /// [`ORDERED`] from the order to the end: a second fact beside the state of the commissioning, without which a flipped bit there
-    /// energises no motor.
+    /// [`ORDERED`] from the request to the end. It is a second condition beside the state of the commissioning, so that a flipped bit in
+    /// that state energises no motor.
     ordered: u32,
 }
 
@@ -40,7 +40,7 @@ pub struct Session {
 const ORDERED: u32 = 0x695a_3cc3;
 
 impl Session {
-    /// For a drive with these settings; what an earlier one has found is forgotten.
+    /// A session for a drive with these settings, without results.
     pub fn new(settings: &Settings) -> Self {
         Self {
             commissioning: Commissioning::new(settings),
@@ -51,7 +51,7 @@ impl Session {
         }
     }
 
-    /// Forgets what was found: the drive has taken these settings.
+    /// Discards the results so far: the drive has taken these settings.
     #[inline(never)]
     pub fn configured(&mut self, settings: &Settings) {
         self.commissioning = Commissioning::new(settings);
@@ -71,7 +71,7 @@ impl Session {
         self.ordered == ORDERED && self.commissioning.is_running()
     }
 
-    /// Takes the next period of those that are [observed](Period::observed).
+    /// Takes the next [observed](Period::observed) period.
     pub fn take(&mut self, seen: &Period) {
         if seen.period != self.next {
             self.sums.gap();
@@ -82,8 +82,8 @@ impl Session {
         self.sums.push_motion(signals.reference.q, signals.rotor_freq);
     }
 
-    /// Goes on; the command for the drive, if there is one: [`refused`](Self::refused) if it does not take it. `design` designs the
-    /// current loop, which takes long, with the outputs off.
+    /// Advances the commissioning and returns a command for the drive, if there is one. If the drive does not take it, call
+    /// [`refused`](Self::refused). `design` designs the current loop, which takes long, with the outputs off.
     pub fn poll(
         &mut self,
         drive: &TestReport,
@@ -115,12 +115,12 @@ impl Session {
         self.news = Some(News::Report(self.commissioning.refuse(refusal)));
     }
 
-    /// The news since the last call.
+    /// The event since the last call.
     pub fn news(&mut self) -> Option<News> {
         self.news.take()
     }
 
-    /// These settings with what has been found; `None` if that changes nothing.
+    /// These settings with the results so far; `None` if they change nothing.
     pub fn found(&self, settings: &Settings) -> Option<Settings> {
         let found = self.commissioning.settings(settings);
         (found != *settings).then_some(found)

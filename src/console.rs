@@ -3,8 +3,8 @@
 //! Replies begin with `ok` or `error:`, except for requests of data. Some requests answer with many lines and end with
 //! `ok`; the next line that comes in cuts them short. An invalid line changes nothing.
 //!
-//! A request may carry a tag, `@17 speed 300`; the last line of its answer repeats it, `@17 ok`. Lines that come unasked (faults,
-//! changes of state, progress) begin with [`line::UNASKED`], which begins no answer and no request.
+//! A request may carry a tag, `@17 speed 300`; the last line of its answer repeats it, `@17 ok`. Unrequested lines (faults, changes of
+//! state, progress) begin with [`line::UNASKED`], which begins no answer and no request.
 
 mod announce;
 mod answer;
@@ -43,20 +43,20 @@ pub const LINE_MS: u32 = 30_000;
 #[derive(Default)]
 pub struct Console {
     reader: LineReader,
-    /// Text that waits for room in the transmit queue.
+    /// Text that waits for space in the transmit queue.
     out: OutputLine,
     list: Option<List>,
     /// Start of the incoming line.
     began_ms: Option<u32>,
-    /// Time of the last valid line; `None` to begin anew.
+    /// Time of the last valid line; `None` restarts the time.
     line_ms: Option<u32>,
-    /// Number of the desk's last design that was noticed.
+    /// Number of the arbiter's last design that was noticed.
     designs: u32,
     /// The last trace.
     traced: Option<Plan>,
-    /// Whether it waits for its trigger.
+    /// Whether the trace waits for its trigger.
     armed: bool,
-    /// News of the commissioning, and the number of the next line about it.
+    /// Event of the commissioning, and the number of the next line about it.
     commissioned: Option<(News, usize)>,
     restore: Restore,
     /// The stream, and the rate of the port.
@@ -91,7 +91,7 @@ impl Console {
         if port.take_damage() {
             self.reader.spoil(LineError::Lost);
         }
-        // The time that a design takes is not silence.
+        // The time that a design takes does not count as silence.
         if desk.has_designed(&mut self.designs) {
             self.line_ms = None;
         }
@@ -113,7 +113,7 @@ impl Console {
             let Some(byte) = port.read() else { break };
             self.take(byte, desk, drive, now_ms);
         }
-        // What has come is heard first: the main loop may have designed for seconds.
+        // The watches come after the received bytes: the main loop may have designed for seconds.
         self.watch_link(desk, drive, now_ms);
         self.watch_rate(port, drive, now_ms);
         match self.began_ms {
@@ -126,7 +126,7 @@ impl Console {
             None if self.reader.begun() => self.began_ms = Some(now_ms),
             _ => {}
         }
-        // One line: what it costs to compute must not hold up the main loop. Frames first: a list has time.
+        // One line per pass: its computation must not hold up the main loop. Frames come first, because a list can wait.
         if self.flushed(port) && self.send_frames(port, desk, drive) {
             self.next_of_list(desk, drive);
             self.flushed(port);
@@ -141,7 +141,7 @@ impl Console {
         self.out.answer(format_args!("error: {why}"));
     }
 
-    /// Sends the waiting text; whether none waits any more.
+    /// Sends the waiting text; returns whether none waits any more.
     fn flushed(&mut self, port: &mut impl Port) -> bool {
         let text = self.out.as_str();
         let sent = text.is_empty() || port.write(text.as_bytes());
@@ -192,7 +192,7 @@ impl Console {
         self.line_ms = Some(now_ms);
     }
 
-    /// Answers an invalid line; for a value with the allowed range.
+    /// Answers an invalid line; for an invalid value the answer states the allowed range.
     fn refuse(&mut self, why: &ParseError<'_>, desk: &Desk) {
         let range = match why {
             ParseError::Value { key, .. } => {

@@ -1,8 +1,9 @@
-//! The desk: who commands, which settings are staged, which task runs, and what is new. Types in, types out: no text and no bytes.
+//! The command arbiter: decides who commands, which settings are staged, which task runs, and which events to report. It exchanges typed
+//! values, neither text nor bytes.
 //!
-//! Console ([`crate::console`]), field bus ([`crate::modbus`]) and terminal strip ([`crate::strip`]) are its front ends: they turn lines, registers
-//! and wires into an [`Order`], and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the time-out of the one that commands
-//! are the same for all.
+//! Its interfaces are console ([`crate::console`]), field bus ([`crate::modbus`]) and terminal strip ([`crate::strip`]). They turn lines,
+//! registers and wires into an [`Order`] (a request), and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the
+//! commander's time-out are the same for all.
 
 pub mod handle;
 pub mod news;
@@ -28,73 +29,73 @@ use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
 use shaft::Shaft;
 use stage_faults::StageFaults;
 
-/// From the answer to a reset, ms: the transmit queue empties in 39.
+/// Time from the answer to a reset, ms: the transmit queue empties in 39.
 const REBOOT_MS: u32 = 100;
 /// Time between two readings of the motor's temperature sensor, ms.
 const MOTOR_MS: u32 = 100;
 
-/// The answer to an order.
+/// The answer to a request.
 pub type Answer = Result<Reply, Refusal>;
-/// Remarks on settings that an order has put in force, beside its answer.
+/// Remarks on settings that a request has put in force, beside its answer.
 type Done = (Applied, Answer);
 
 /// See [`Desk::waits`].
 const WAITS: u32 = 0xa53c_5a96;
 
-/// An order that takes long and waits until its answer is on the way.
+/// A request that takes long and waits until its answer has been sent.
 struct Task {
     from: Commander,
     order: Order,
-    /// Once its settings are in force: remarks on them.
+    /// Remarks on its settings, once these are in force.
     applied: Option<Applied>,
 }
 
-/// See the head of the module.
+/// The command arbiter, see the head of the module.
 pub struct Desk {
     settings: Staging,
     /// Whether settings in force were changed since they were saved.
     unsaved: bool,
-    /// The board that lines belong to, if it is another than this one.
+    /// The board that the received lines belong to, if it is not this one.
     foreign: Option<&'static str>,
-    /// The board that the settings in the flash were saved on, if it is another.
+    /// The board that the settings in the flash were saved on, if it is not this one.
     saved_on: Option<&'static str>,
     task: Option<Task>,
-    /// [`WAITS`] while a task waits: a second fact, without which a flipped bit carries out no order of the past.
+    /// [`WAITS`] while a task waits. It is a second condition, so that a flipped bit carries out no past request.
     waits: u32,
-    /// Time of an order to reset the chip.
+    /// Time of a request to reset the chip.
     reboot_ms: Option<u32>,
-    /// How the console's last task has ended, until the console takes it.
+    /// The result of the console's last task, until the console takes it.
     pub(crate) done: Option<Done>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
     designs: u32,
     announcer: Announcer,
-    /// Faults of the power stage, which are not cleared as often as one likes.
+    /// Faults of the power stage, whose clearing is limited.
     stage: StageFaults,
     shaft: Shaft,
     /// Whether the drive was told that there is a brake.
     braked: bool,
     /// Time of the present pass, ms, wrapping.
     now_ms: u32,
-    /// Time of the last sign of life of the one that commands; `None` to begin anew.
+    /// Time of the commander's last sign of life; `None` restarts the time-out.
     last_activity_ms: Option<u32>,
-    /// A stop after this silence, s, or why the drive did not take it, until that is announced.
+    /// A stop after this silence, s, or the reason why the drive did not take it, until it is announced.
     stopped: Option<Result<f32, CommandError>>,
-    /// While the wiring is being checked: the periods of the status at its start.
+    /// Periods of the status at the start of a wiring check, while the check lasts.
     checking: Option<u32>,
-    /// Result of the last learning, if it is not believable.
+    /// Result of the last self-commissioning, if it is not plausible.
     rejected_learning: Option<Learned>,
-    /// Whether a learning has ended that is not announced yet.
+    /// Whether a self-commissioning has ended that is not announced yet.
     learned: bool,
-    /// A homing, and how the last one has ended, until that is announced.
+    /// A homing, and the result of the last one until it is announced.
     homing: Option<Homing>,
     homed: Option<Result<(), Failure>>,
-    /// The last refusal of bus or strip, and whose, if it is still to be announced.
+    /// The last refusal of bus or strip, and its source if it is still to be announced.
     refusal: Option<Refusal>,
     refused: Option<Commander>,
-    /// Wires of the terminal strip that are closed, and its contacts at the last look.
+    /// Closed wires of the terminal strip, and its contacts when they were last read.
     pub(crate) wires: Wires,
     pub(crate) contacts: Wires,
-    /// Why the strip's reference was lost, until that is cleared.
+    /// Reason why the strip's reference was lost, until that is cleared.
     pub(crate) lost: Option<Lost>,
     /// Last reading of the motor's temperature sensor, °C, and its time.
     motor: Option<Result<f32, Fault>>,
@@ -102,7 +103,7 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// A desk; the drive has these settings.
+    /// A command arbiter; the drive has these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
         Self {
             settings: Staging::new(settings),
@@ -136,8 +137,8 @@ impl Desk {
         }
     }
 
-    /// Notes that the settings in the flash were saved on another board. The gates stay unconnected until somebody says which of both
-    /// this is.
+    /// Notes that the settings in the flash were saved on another board. The gates stay unconnected until the user confirms which of the
+    /// two boards this is.
     pub fn saved_on(&mut self, theirs: &'static str) {
         self.saved_on = Some(theirs);
     }
@@ -147,18 +148,18 @@ impl Desk {
         &self.settings
     }
 
-    /// The result of the last learning: whether it is in use, and the result itself.
+    /// The result of the last self-commissioning: whether it is in use, and the result itself.
     pub fn learned(&self) -> Option<(bool, &Learned)> {
         let in_use = self.settings.in_force().learned.as_ref().map(|result| (true, result));
         self.rejected_learning.as_ref().map(|result| (false, result)).or(in_use)
     }
 
-    /// Whether a task waits: orders are not taken.
+    /// Whether a task waits: requests are not accepted.
     pub fn is_busy(&self) -> bool {
         self.task.is_some()
     }
 
-    /// Whether controllers were designed, for seconds, since the call before with the same `seen`.
+    /// Whether controllers were designed, which takes seconds, since the previous call with the same `seen`.
     pub fn has_designed(&self, seen: &mut u32) -> bool {
         core::mem::replace(seen, self.designs) != self.designs
     }
@@ -168,7 +169,7 @@ impl Desk {
         self.refusal.as_ref()
     }
 
-    /// Notes a refusal of bus or strip; a master that repeats itself is announced once.
+    /// Notes a refusal of bus or strip. If a master repeats a refused request, the refusal is announced once.
     pub fn note_refusal(&mut self, from: Commander, why: Refusal) {
         if from == Commander::Strip || self.refusal.as_ref() != Some(&why) {
             self.refused = Some(from);
@@ -176,7 +177,7 @@ impl Desk {
         self.refusal = Some(why);
     }
 
-    /// The stop with which the terminal strip keeps the drive from running, whoever commands.
+    /// The stop by which the terminal strip keeps the drive from running, for every commander.
     pub fn interlock(&self) -> Option<Stop> {
         self.settings.in_force().strip.interlock(self.wires)
     }
@@ -187,20 +188,20 @@ impl Desk {
         self.note_refusal(Commander::Strip, Refusal::Reference(why));
     }
 
-    /// Who commands: by the staged settings, which a start puts in force.
+    /// The commander by the staged settings, which a start puts in force.
     pub fn commander(&self) -> Commander {
         self.settings.latest().bus.commander
     }
 
-    /// Notes a sign of life: silence of the one that commands stops the drive. `now_ms` wraps.
+    /// Notes a sign of life: if the commander is silent, the drive stops. `now_ms` wraps.
     pub fn note_activity(&mut self, from: Commander, now_ms: u32) {
         if self.commander() == from {
             self.last_activity_ms = Some(now_ms);
         }
     }
 
-    /// Silence of the one that commands after which the drive stops, s; 0: never. A line of the bus that breaks is not
-    /// seen by anybody, so the bus always has a limit.
+    /// Time for which the commander may be silent before the drive stops, s; 0: no limit. Nobody sees a bus line break, so the bus always
+    /// has a limit.
     fn timeout_s(&self) -> f32 {
         let set = self.settings.in_force().command.timeout_s;
         if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
@@ -225,8 +226,8 @@ impl Desk {
         }
     }
 
-    /// Tells the drive what the motor's temperature sensor reads, by its code of 12 bits; `None`: the board has no input for it, or its
-    /// converter gives none. `now_ms` wraps.
+    /// Tells the drive the reading of the motor's temperature sensor, from ADC counts of 12 bits. `None` if the board has no input for
+    /// it, or its ADC gives no result. `now_ms` wraps.
     pub fn read_motor(&mut self, code: Option<u16>, drive: &mut impl DriveHandle, now_ms: u32) {
         if now_ms.wrapping_sub(self.motor_ms) < MOTOR_MS {
             return;
@@ -234,7 +235,7 @@ impl Desk {
         self.motor = self.settings.in_force().drive.motor_sensor.celsius(code);
         self.motor_ms = now_ms;
         if let Some(reading) = self.motor {
-            // It is taken in every state; without an answer there is no control.
+            // The command is accepted in every state; if there is no answer, the control does not run.
             let _ = drive.command(Command::MotorTemperature(reading));
         }
     }
@@ -249,8 +250,8 @@ impl Desk {
         self.motor
     }
 
-    /// Stops the drive when the one that commands is silent for too long. Called at the end of each pass of the main loop: what has come
-    /// meanwhile is heard first. `now_ms` wraps.
+    /// Stops the drive if the commander is silent for too long. Called at the end of each pass of the main loop, so that lines received
+    /// meanwhile are processed first. `now_ms` wraps.
     pub fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         let limit_s = self.timeout_s();
         let silence_ms = now_ms.wrapping_sub(*self.last_activity_ms.get_or_insert(now_ms));
@@ -259,7 +260,7 @@ impl Desk {
         }
     }
 
-    /// Stops the drive: nobody was heard for this time, s.
+    /// Stops the drive: no sign of life came for this time, s.
     pub fn stop_after_silence(&mut self, limit_s: f32, drive: &mut impl DriveHandle, now_ms: u32) {
         if !drive.is_off() {
             self.last_activity_ms = Some(now_ms);
@@ -268,7 +269,7 @@ impl Desk {
         }
     }
 
-    /// The next news, if there is any.
+    /// The next event, if there is any.
     pub fn news(&mut self, drive: &mut impl DriveHandle, now_ms: u32) -> Option<News> {
         let status = drive.status()?;
         if let Some(stopped) = self.stopped.take() {
@@ -285,7 +286,7 @@ impl Desk {
             .or_else(|| self.refused.take().map(News::Refused))
     }
 
-    /// Notes when the drive has passed the check of the wiring: it need not be repeated.
+    /// Notes when the drive has passed the check of the wiring, so that the check is not repeated.
     fn watch_wiring(&mut self, drive: &impl DriveHandle) {
         let (Some(began), Some(status)) = (self.checking, drive.status()) else { return };
         // A report from before the start does not count.
@@ -296,7 +297,7 @@ impl Desk {
         }
     }
 
-    /// Goes on with the homing, if there is one; how it has ended.
+    /// Continues a homing; returns its result when it has ended.
     fn go_on_homing(&mut self, drive: &mut impl DriveHandle) -> Option<Result<(), Failure>> {
         let (homing, status) = (self.homing.as_mut()?, drive.status()?);
         let seen = Seen {
@@ -309,7 +310,7 @@ impl Desk {
         let outcome = match homing.poll(&seen) {
             Next::Wait => return None,
             Next::Command(command) => {
-                // Refused when the drive has just stopped: the next report says so.
+                // The drive refuses it if it has just stopped: the next report says so.
                 let _ = drive.command(command);
                 return None;
             }
@@ -319,10 +320,10 @@ impl Desk {
         Some(outcome)
     }
 
-    /// Carries out an order, or takes it as a task ([`Reply::Designing`]).
+    /// Carries out a request, or accepts it as a task ([`Reply::Designing`]).
     ///
     /// # Errors
-    /// Nothing has changed, for this reason. A refusal of bus or strip is announced.
+    /// The reason why nothing has changed. A refusal of bus or strip is announced.
     pub fn order(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         let answer = if order.is_for_the_commander(from) && self.commander() != from {
             Err(Refusal::Authority(self.commander()))
@@ -381,7 +382,7 @@ impl Desk {
             Order::Reboot(now) => self.reboot(from, order, now, drive).map(|()| Reply::Rebooting),
             Order::Update => {
                 let line = self.settings.in_force().drive.scales.dc_link;
-                // Measured now: while the drive is off, its own value stands still.
+                // Measured now: while the drive is off, its own value is not updated.
                 let dc_link = drive.status().map_or(0.0, |status| line.at(status.sample.dc_link));
                 if dc_link > LOADER_DC_LINK_V {
                     return Err(Refusal::Charged(dc_link));
@@ -407,7 +408,7 @@ impl Desk {
         }
     }
 
-    /// Clears the latched fault, if it has been reported: one that came since then is told first, and counted.
+    /// Clears the latched fault, if it has been reported. A fault that came since then is reported first, and counted.
     fn clear(&mut self, drive: &mut impl DriveHandle) -> Answer {
         let Some(status) = drive.status() else { return give(Command::Clear, "", drive) };
         let latched = self.stage.watch(&status, self.now_ms);
@@ -428,10 +429,10 @@ impl Desk {
         if self.settings.is_staged() { Err(Refusal::Staged) } else { Ok(()) }
     }
 
-    /// Passes if the lines belong to this board.
+    /// Passes if the received lines belong to this board.
     ///
     /// # Errors
-    /// They belong to another.
+    /// The lines belong to another board.
     fn is_own_board(&self) -> Result<(), Refusal> {
         let own = self.settings.in_force().board.name;
         self.foreign.map_or(Ok(()), |theirs| Err(Refusal::WrongBoard { theirs, own }))
@@ -440,7 +441,7 @@ impl Desk {
     /// Passes if the settings in the flash were not saved on another board.
     ///
     /// # Errors
-    /// They were.
+    /// The settings were saved on another board.
     fn is_own_record(&self) -> Result<(), Refusal> {
         let own = self.settings.in_force().board.name;
         self.saved_on.map_or(Ok(()), |theirs| Err(Refusal::SavedOn { theirs, own }))
@@ -483,10 +484,10 @@ impl Desk {
         if self.settings.is_staged() { Reply::Staged } else { Reply::AsInForce }
     }
 
-    /// Performs an order that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
+    /// Carries out a request that needs the staged settings in force; later if controllers are designed, which takes more than a moment.
     fn design(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         match order {
-            // The drive says why it does not start.
+            // The drive itself gives the reason why it does not start.
             Order::Start(mode) if !drive.is_off() => return self.start(mode, drive),
             Order::Learn { .. } if !drive.is_off() => return self.start(Mode::Learning, drive),
             _ => must_be_off(drive)?,
@@ -497,7 +498,7 @@ impl Desk {
             if !self.settings.latest().board_is_confirmed() {
                 return Err(Refusal::NotConfirmed);
             }
-            // A setting that was put back has made it the confirmed board again.
+            // A setting that was put back has made the board a confirmed one again.
             drive.connect();
         }
         let learned = self.settings.in_force().learned.is_some();
@@ -513,8 +514,8 @@ impl Desk {
         self.complete(&order, applied, drive).1
     }
 
-    /// Performs the task that waits, if there is one, when its answer is on the way. Takes seconds. `now_ms` wraps.
-    #[inline(never)] // its stack does not add to that of the front ends
+    /// Carries out the waiting task, if there is one, once its answer has been sent. Takes seconds. `now_ms` wraps.
+    #[inline(never)] // its stack does not add to that of the interfaces
     pub fn run_pending(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
         let task = self.task.take();
         let waits = core::mem::take(&mut self.waits) == WAITS;
@@ -526,12 +527,12 @@ impl Desk {
             }
             return self.wait(Task { from, order, applied });
         }
-        // The time that it takes is not silence of the user.
+        // The time that the task takes does not count as silence of the user.
         self.last_activity_ms = None;
         let done = match applied {
             Some(applied) => self.complete(&order, applied, drive),
             None => match self.apply(&order, drive) {
-                // In the next pass: a stop that has come meanwhile, and an ENABLE that was opened, are seen first.
+                // The start follows in the next pass, so that a stop received meanwhile and an opened ENABLE are seen first.
                 Ok(applied) if order.starts() => {
                     return self.wait(Task { from, order, applied: Some(applied) });
                 }
@@ -547,7 +548,7 @@ impl Desk {
         (self.task, self.waits) = (Some(task), WAITS);
     }
 
-    /// Drops a start that waits for its controllers: a stop has come.
+    /// Drops a start that waits for its controllers, because a stop has come.
     fn cancel_start(&mut self, from: Commander) {
         if let Some(task) = self.task.take_if(|task| task.order.starts()) {
             let applied = task.applied.unwrap_or_default();
@@ -557,7 +558,7 @@ impl Desk {
         }
     }
 
-    /// Tells how a task has ended.
+    /// Notes the result of a task.
     fn close(&mut self, from: Commander, done: Done) {
         match (from, done) {
             (Commander::Console, done) => self.done = Some(done),
@@ -566,7 +567,7 @@ impl Desk {
         }
     }
 
-    /// Finishes an order whose settings are in force, with these remarks, which the answer to [`Order::Apply`] takes.
+    /// Completes a request whose settings are in force. The answer to [`Order::Apply`] takes these remarks.
     fn complete(&mut self, order: &Order, applied: Applied, drive: &mut impl DriveHandle) -> Done {
         let answer = match *order {
             Order::Apply => return (Applied::default(), Ok(Reply::Applied(applied))),
@@ -575,7 +576,7 @@ impl Desk {
                 Err(Refusal::NothingLearned)
             }
             Order::Learn { again } => {
-                // The drive has been given the settings without what is learned, if that must not act.
+                // If the learned values must not act, the drive has been given the settings without them.
                 let begun = self.settings.begin_learning(again, |_| Ok(()));
                 begun.and_then(|()| self.start(Mode::Learning, drive))
             }
@@ -592,8 +593,8 @@ impl Desk {
         Ok(reply)
     }
 
-    /// Designs for the staged settings and puts them in force; for a learning, gives the drive those without what is learned. If they
-    /// are refused, the drive stays as it is and they stay staged.
+    /// Designs for the staged settings and puts them in force; for a self-commissioning, gives the drive those without the learned
+    /// values. If they are refused, the drive keeps its settings and the new ones stay staged.
     fn apply(&mut self, order: &Order, drive: &mut impl DriveHandle) -> Result<Applied, Refusal> {
         self.designs = self.designs.wrapping_add(1);
         let mut applied = Applied::default();
@@ -610,15 +611,15 @@ impl Desk {
         Ok(applied)
     }
 
-    /// Takes the prepared settings as those in force, and notes which of those that protect have changed.
+    /// Takes the prepared settings as those in force, and notes which protective settings have changed.
     fn adopt(&mut self, drive: &mut impl DriveHandle) -> Applied {
         let staging = &self.settings;
         guarded().filter(|key| staging.differs(*key)).for_each(|key| drive.changed(key));
         self.settings.adopt()
     }
 
-    /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
-    /// boost is a check at every start.
+    /// Starts the drive; the first start since the defaults were set checks the wiring. With V/f control the boost serves as a check at
+    /// every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
         self.not_held()?;
         let strip = self.settings.in_force().strip;
@@ -637,7 +638,7 @@ impl Desk {
         Ok(Reply::WiringFirst)
     }
 
-    /// Passes if the terminal strip lets the drive run. A contact that has just opened does not.
+    /// Passes if the terminal strip lets the drive run. A contact that has just opened does not let it run.
     fn not_held(&self) -> Result<(), Refusal> {
         let closed = Wires(self.wires.0 & self.contacts.0);
         let hold = self.settings.in_force().strip.interlock(closed);
@@ -657,7 +658,7 @@ impl Desk {
         }
     }
 
-    /// Puts in force what the commissioning has found, and saves it.
+    /// Puts the results of the commissioning in force, and saves them.
     fn accept(&mut self, from: Commander, drive: &mut impl DriveHandle) -> Answer {
         may_stage(drive)?;
         let found = drive.session().found(&self.settings.latest().drive);
@@ -665,7 +666,7 @@ impl Desk {
         self.design(from, Order::Save, drive)
     }
 
-    /// Lets the drive look for a stop of the shaft.
+    /// Starts the search for a stop of the shaft.
     fn home(&mut self, plan: Plan, drive: &mut impl DriveHandle) -> Answer {
         let homing = Homing::new(plan, self.settings.in_force().drive.current_limit_a())?;
         drive.command(homing.begin())?;
@@ -690,7 +691,7 @@ impl Desk {
     }
 }
 
-/// Gives the drive a command; `unit` is that of its reference.
+/// Gives the drive a command; `unit` is the unit of its set-point.
 fn give(command: Command, unit: &'static str, drive: &mut impl DriveHandle) -> Answer {
     Ok(match drive.command(command)? {
         Accepted::AsGiven => Reply::Done,
@@ -713,7 +714,8 @@ pub fn may_stage(drive: &impl DriveHandle) -> Result<(), Refusal> {
     }
 }
 
-/// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
+/// Designs the controllers for settings, and gives them to the drive. This function is the only place that does, because the coefficients
+/// take much stack.
 #[inline(never)]
 fn configure(drive: &mut impl DriveHandle, settings: &mut FirmwareSettings) -> Result<(), Refusal> {
     let coefficients = drive.build(settings).map_err(Refusal::Design)?;

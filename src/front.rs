@@ -1,4 +1,5 @@
-//! The front of the firmware: the desk with its front ends, and the order in which the main loop serves them.
+//! The user interfaces of the firmware: command arbiter, console, field bus and terminal strip, and the order in which the main loop
+//! serves them.
 
 use crate::console::Console;
 use crate::console::handle::{Firmware, Port};
@@ -7,9 +8,9 @@ use crate::modbus::{self, bus::Bus};
 use crate::settings::FirmwareSettings;
 use crate::strip::{self, Strip};
 
-/// See the head of the module.
+/// The command arbiter with its interfaces, see the head of the module.
 pub struct Front {
-    /// The desk.
+    /// The command arbiter.
     pub desk: Desk,
     /// The console.
     pub console: Console,
@@ -20,13 +21,14 @@ pub struct Front {
 }
 
 impl Front {
-    /// The drive has these settings.
+    /// The interfaces of a drive with these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
         let (desk, console) = (Desk::new(settings), Console::default());
         Self { desk, console, bus: Bus::default(), strip: Strip::default() }
     }
 
-    /// A pass of the main loop. Takes seconds if controllers are designed; `line` answers by itself meanwhile. `now_ms` wraps.
+    /// Runs one pass of the main loop. It takes seconds if controllers are designed; meanwhile the port `line` answers by itself.
+    /// `now_ms` wraps.
     pub fn pass(
         &mut self,
         port: &mut impl Port,

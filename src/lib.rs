@@ -2,7 +2,7 @@
 //!
 //! Start reading at `main.rs`.
 #![cfg_attr(not(test), no_std)]
-// Used in constants, where `Default` is not available.
+// `new` is used in constants, where `Default` is not available.
 #![allow(clippy::new_without_default)]
 
 pub mod board;

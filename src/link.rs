@@ -31,14 +31,14 @@ pub struct Status {
     pub worst_latency: u32,
     /// Events of [`Hardware`] since the last status.
     pub hardware: Hardware,
-    /// While the drive learns: the point that is being measured, from 1 on, and the number of points.
+    /// Point that is being measured, from 1, and number of points, while the self-commissioning runs.
     pub learning: Option<(usize, usize)>,
-    /// Why the torque is smaller than asked for.
+    /// Reason why the torque is smaller than requested.
     pub limiting: Limiting,
     /// Limits of the torque.
     pub torque_limits: TorqueLimits,
     /// Tracked stator resistance relative to the settings, less one.
     pub stator_resistance: Option<f32>,
-    /// For the commissioning.
+    /// Report of the test currents, for the commissioning.
     pub test_report: TestReport,
 }

@@ -2,18 +2,17 @@
 //!
 //! Order of events:
 //!
-//! * the start block (`chip/start.rs`): ST's loader if it was asked for, the check sum of the image, the control code to CCM.
-//! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, converters, the
-//!   drive (`task/bring_up.rs`).
+//! * the start block (`chip/start.rs`): ST's loader if it was requested, the check sum of the image, the control code to CCM.
+//! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, ADCs, the drive (`task/bring_up.rs`).
 //! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,
 //!   `Drive::step`, compare values out, then one command from the console if there is one.
 //! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`chip/rs485.rs`): a byte in, a byte out.
-//! * the loop at the end of `main`, between interrupts: desk, console and field bus (`front.rs`), the log ten times a second, the
-//!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory and registers
-//!   (`task/check.rs`), and the second opinions on clock and reference (`task/sources.rs`).
+//! * the loop at the end of `main`, between interrupts: command arbiter, console and field bus (`front.rs`), the log ten times a second,
+//!   the tracking of the rotor time constant (`task/supervisor.rs`), the check of the control's memory and registers (`task/check.rs`),
+//!   and the cross-checks of clock and reference voltage (`task/sources.rs`).
 //! * `chip/stop.rs`, when the firmware cannot go on: outputs off, the reason kept for the next boot, reset.
-//! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls, and the window
-//!   watchdog (`chip/window.rs`), when the control interrupt stays away for three periods.
+//! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls, and the window watchdog
+//!   (`chip/window.rs`), when the control interrupt does not come for three periods.
 //!
 //! The drive starts off; `start` at the console switches the outputs on.
 //!
@@ -25,7 +24,7 @@ mod chip;
 #[cfg(target_os = "none")]
 mod task;
 
-/// See the top of this file.
+/// Entry of the firmware, see the top of this file.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -43,7 +42,7 @@ fn main() -> ! {
 
 /// The main loop.
 #[cfg(target_os = "none")]
-#[inline(never)] // its stack comes in the place of that of the start
+#[inline(never)] // its stack replaces that of the start
 fn run(board: task::bring_up::Board) -> ! {
     let task::bring_up::Board { front, mut port, mut line, mut wires, supervisor } = board;
     front.console.greet(supervisor);
@@ -51,7 +50,7 @@ fn run(board: task::bring_up::Board) -> ! {
         let now_ms = supervisor.listen();
         front.pass(&mut port, &mut line, &mut wires, supervisor, now_ms);
         supervisor.feed_watchdog();
-        // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
+        // Sleeps until an interrupt. The sleep is at the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.
         chip::sleep::until_interrupt();
     }

@@ -1,7 +1,7 @@
 //! The field bus: a Modbus RTU slave on an RS-485 line, for PLCs, spindle controllers and scripts.
 //!
-//! Shapes: a [`Frame`] comes in whole, [`slave::answer`] makes the frame that goes out, and asks [`slave::Registers`] for
-//! words. [`bus::Bus`] has the registers: it turns writes into orders to the desk ([`crate::desk`]).
+//! Data flow: a whole [`Frame`] comes in, [`slave::answer`] makes the frame that goes out, and asks [`slave::Registers`] for words.
+//! [`bus::Bus`] has the registers: it turns writes into requests to the command arbiter ([`crate::desk`]).
 
 pub mod bus;
 pub mod cia402;
@@ -23,15 +23,16 @@ pub type Frame = heapless::Vec<u8, LONGEST>;
 
 /// The bus's end of the RS-485 port.
 pub trait Port {
-    /// Sets rate and format of the bytes, and the address that the port answers for; cheap if they are so already.
+    /// Sets rate and format of the bytes, and the address that the port answers for; cheap if they have not changed.
     fn set_line(&mut self, settings: &Settings);
-    /// The next frame: bytes with a silence before and behind.
+    /// The next frame: bytes between two silent intervals.
     fn receive(&mut self) -> Option<Frame>;
-    /// Sends a frame, after the one before.
+    /// Sends a frame, after the previous one.
     fn send(&mut self, frame: &Frame);
     /// While the slave is busy, the port itself answers its requests with [`slave::busy`].
     fn set_busy(&mut self, busy: bool);
-    /// A stop that came while the slave was busy, or before it had taken the frame before: acknowledged, and still to be carried out.
+    /// A stop that came while the slave was busy, or had not yet taken the previous frame. It is acknowledged, and still to be carried
+    /// out.
     fn take_stop(&mut self) -> Option<Written>;
 }
 

@@ -1,4 +1,4 @@
-//! Supervision of the control from the main loop: its memory, its registers, its rate, and why the last run ended.
+//! Supervision of the control from the main loop: its memory, its registers, its rate, and the reason why the last run ended.
 
 pub mod memory_check;
 pub mod record;

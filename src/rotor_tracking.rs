@@ -12,7 +12,7 @@ use rotor_id::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use crate::board;
 use crate::link::ring::Record;
 
-/// Control periods from one fit of the machine to the next: ten a second.
+/// Control periods from one fit of the machine to the next: ten fits per second.
 const PERIODS_PER_FIT: u32 = board::PWM_HZ / 10;
 
 /// The estimate, and the value that the drive uses.
@@ -37,7 +37,7 @@ pub struct Report {
 }
 
 impl Tracking {
-    /// For a drive that has just taken these settings; `None` if they do not enable it.
+    /// The tracking for a drive that has just taken these settings; `None` if they do not enable it.
     pub fn new(settings: &Settings) -> Option<Self> {
         if !settings.track_rotor {
             return None;
@@ -51,11 +51,11 @@ impl Tracking {
         })
     }
 
-    /// Takes the next period of those that are [observed](Record::observed). Ten times a second it returns the estimated rotor time constant, s, for
+    /// Takes the next [observed](Record::observed) period. Ten times a second it returns the estimated rotor time constant, s, for
     /// [`Command::RotorTimeConstant`](drive_core::Command::RotorTimeConstant), if there is one.
     pub fn take(&mut self, seen: &Record) -> Option<f32> {
         if seen.period != self.next {
-            // The drive did not regulate, or the main loop came too late.
+            // Either the drive did not regulate, or the main loop came too late.
             self.online.restart();
             self.wait = PERIODS_PER_FIT;
             self.report.estimate = Err(NoEstimate::Settling);
@@ -111,8 +111,7 @@ mod tests {
     use super::*;
     use crate::link::ring::Ring;
 
-    /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than it believes, and its
-    /// tracking.
+    /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than in the settings, and its tracking.
     fn tracked() -> (Rig, Tracking) {
         let mut config = Config::default();
         config.drive.angle_source = AngleSource::Encoder;
@@ -143,7 +142,7 @@ mod tests {
         let (mut rig, mut tracking) = tracked();
         let truth = rig.plant.tau_r();
         let mut ordered = Vec::new();
-        // The numbers wrap on the way.
+        // The numbers wrap during the run.
         for n in 0..60_000_u32 {
             let number = (u32::MAX - 9).wrapping_add(n);
             if let Some(tau_r) = tracking.take(&observe(&mut rig, number)) {
@@ -153,9 +152,9 @@ mod tests {
                 ordered.push(tau_r);
             }
         }
-        // Ten a second after three seconds of settling.
+        // Ten estimates per second after three seconds of settling.
         assert!((65..=71).contains(&ordered.len()), "{}", ordered.len());
-        // Within 6 %, as measured by `cargo sim run online-tracking`, and what the drive uses is that.
+        // Within 6 %, as measured by `cargo sim run online-tracking`; the drive uses this value.
         for tau_r in [ordered[ordered.len() - 1], tracking.report().used] {
             assert!((f64::from(tau_r) / truth - 1.0).abs() < 0.06, "{tau_r} for {truth}");
         }
@@ -170,7 +169,7 @@ mod tests {
         for n in 0..60_000_u32 {
             let seen = observe(&mut rig, n);
             writer.write(|record| *record = seen);
-            // It hangs for 100 periods once, and else comes every 20.
+            // The main loop hangs for 100 periods once, and comes every 20 otherwise.
             if n % 20 == 19 && !(30_000..30_100).contains(&n) {
                 for seen in reader.by_ref() {
                     taken += 1;

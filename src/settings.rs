@@ -1,5 +1,5 @@
-//! The settings of the firmware: those of the drive, those of the firmware around it, and what was learned on the
-//! motor. [`keys`] lists them by name.
+//! The settings of the firmware: those of the drive, those of the firmware around it, and the values learned on the motor. [`keys`] lists
+//! them by name.
 
 pub mod bus;
 pub mod keys;
@@ -17,32 +17,33 @@ use drive_settings::{Inverter, Settings, SettingsError};
 use crate::board;
 use crate::boards::{Board, SELECTED};
 
-/// Why a board refuses a carrier.
+/// Reason why a board refuses a switching frequency.
 const TOO_FAST: &str = "the switches of the board do not take it; set a lower one";
 
 /// All settings of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirmwareSettings {
-    /// The board that they belong to.
+    /// The board that the settings belong to.
     pub board: &'static Board,
     /// Settings of the drive.
     pub drive: Settings,
-    /// Settings of the firmware around it.
+    /// Settings of the firmware around the drive.
     pub command: CommandSettings,
     /// Settings of the field bus.
     pub bus: bus::Settings,
     /// Settings of the terminal strip.
     pub strip: strip::Settings,
-    /// Whether a pin chooses at a reset what starts: see [`board::boot_pin_counts`]. A state of the chip, which is not saved.
+    /// Whether a pin selects at a reset the program that starts: see [`board::boot_pin_counts`]. It is a state of the chip, which is not
+    /// saved.
     pub boot_pin_counts: bool,
-    /// Accepted result of a learning with these settings; it overrides them where both give a value.
+    /// Accepted result of a self-commissioning with these settings; it overrides them where both give a value.
     pub learned: Option<Learned>,
 }
 
 /// Settings for the handling of commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandSettings {
-    /// The drive is stopped when no valid line arrived for this long, s; 0 disables the time-out.
+    /// Time without a valid line after which the drive is stopped, s; 0 disables the time-out.
     pub timeout_s: f32,
     /// Longest time in which the shaft coasts to rest, s.
     pub coasts_s: f32,
@@ -63,12 +64,12 @@ impl Default for CommandSettings {
 }
 
 impl FirmwareSettings {
-    /// The defaults: those of the drive with the numbers of the board that the firmware is built for.
+    /// The defaults of the board that the firmware is built for.
     pub fn of_the_board() -> Self {
         Self::of(SELECTED)
     }
 
-    /// The same for any board.
+    /// The defaults of any board.
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
         let (command, bus) = (CommandSettings::default(), bus::Settings::default());
@@ -76,8 +77,8 @@ impl FirmwareSettings {
         Self { board, drive, command, bus, strip, boot_pin_counts: true, learned: None }
     }
 
-    /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option
-    /// bytes as they are.
+    /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option bytes
+    /// as they are now.
     pub fn board_is_confirmed(&self) -> bool {
         self.command.confirmed == self.confirmation()
     }
@@ -89,13 +90,13 @@ impl FirmwareSettings {
 
     fn confirmation(&self) -> u32 {
         let hardware = keys::all().filter(|key| key.hardware()).map(|key| key.to_bits(self));
-        // The trip in effect: its rule follows the nameplate, which anybody may set.
+        // The trip in effect, because its rule follows the nameplate, which anybody may set.
         let trip = self.drive.trip_a().to_bits();
         self.board.confirmation(hardware.chain([trip, u32::from(self.boot_pin_counts)]))
     }
 
-    /// Takes the result of a learning, if it was accepted: instead of what was learned before, or, where it was learned `again`
-    /// with that in force, on top of it.
+    /// Takes the result of a self-commissioning, if it was accepted. It replaces the values learned before, or adds to them if it was
+    /// learned `again` with them in force.
     pub fn learn(&mut self, result: &Learned, again: bool) {
         if result.verdict.is_accepted() {
             let before = self.learned.filter(|_| again);
@@ -103,7 +104,7 @@ impl FirmwareSettings {
         }
     }
 
-    /// Drops what was learned, unless it would be the same with the settings `before`.
+    /// Drops the learned values, unless they hold for the settings `before` as well.
     pub fn forget_unless_as(&mut self, before: &Self) {
         if self.drive.learned_with_another(&before.drive).is_some() {
             self.learned = None;
@@ -119,14 +120,14 @@ impl FirmwareSettings {
         own.build_for(&board::Timer::of(&self.drive.inverter))
     }
 
-    /// The same as [`build`](Self::build) for a timer whose dead time or carrier differs from the setting: it takes new ones
+    /// As [`build`](Self::build), for a timer whose dead time or switching frequency differs from the setting, because it takes new ones
     /// only at a reset.
     ///
     /// # Errors
     /// As [`build`](Self::build).
     pub fn build_for(&mut self, timer: &board::Timer) -> Result<Coefficients, SettingsError> {
         self.check()?;
-        // Changed in place and back, as the coefficients are: copies would take 2 KiB more of the stack.
+        // Changed in place and back, as the coefficients are, because copies would take 2 KiB more of the stack.
         let own = self.drive.inverter;
         let &board::Timer { dead_time_s, carrier_khz, .. } = timer;
         self.drive.inverter = Inverter { dead_time_s, carrier_khz, ..own };
@@ -148,7 +149,7 @@ impl FirmwareSettings {
         if carrier > self.board.carrier_max_khz {
             return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), TOO_FAST));
         }
-        // Those of the board are narrower.
+        // The ranges of the board are narrower.
         keys::all().try_for_each(|key| key.check(self))
     }
 }

@@ -1,13 +1,12 @@
 //! Settings that outlast a reset: two slots in the flash, written in turn.
 //!
-//! One slot holds the valid set; the next `save` writes the other: it is erased, then the record is programmed, the
-//! double word with sequence number and checksum last. Wherever the power fails, that double word is missing, torn or
-//! whole, so that either the old or the new set is valid, at every instant. A double word torn by a power failure is
-//! read as an error of the flash, never as data.
+//! One slot holds the valid set; the next `save` writes the other: it is erased, then the record is programmed, the double word with
+//! sequence number and checksum last. At any instant of a power failure that double word is missing, torn or whole, so either the old or
+//! the new set is valid. A double word torn by a power failure is read as an error of the flash, never as data.
 //!
-//! Own code instead of `sequential-storage` (8.0.2), which moves its contents through one page that it erases: that
-//! crate recognises a page in use by four bits of its first and last word. With a page half erased it takes the rest
-//! of it for the source, and erases the good copy.
+//! Own code replaces `sequential-storage` (8.0.2), which moves its contents through one page that it erases. That crate recognises a page
+//! in use by four bits of its first and last word. If a page is half erased, the crate takes the rest of it for the source, and erases
+//! the good copy.
 
 pub mod codec;
 mod flash;
@@ -29,7 +28,7 @@ pub enum Loaded {
     Nothing,
     /// The saved settings.
     Settings(FirmwareSettings),
-    /// A record that cannot be used; it stays in the flash at least until the next save.
+    /// A record that cannot be used; it stays in the flash until the next save or longer.
     Rejected(Rejected),
 }
 
@@ -44,7 +43,7 @@ pub struct Saved<F> {
 }
 
 impl<F: Flash> Saved<F> {
-    /// Reads both slots. Keys that the record does not hold keep their value of `defaults`.
+    /// Reads both slots. Keys that the record does not hold keep their value from `defaults`.
     pub fn load(mut flash: F, defaults: &FirmwareSettings) -> (Self, Loaded) {
         let newest =
             newer([0, 1].map(|slot| codec::whole_record(&mut |word| flash.read(slot, word))));
@@ -60,12 +59,12 @@ impl<F: Flash> Saved<F> {
         (Self { flash, newest, free }, loaded)
     }
 
-    /// The flash, for what else is stored in it.
+    /// The flash, for the other data stored in it.
     pub fn flash(&mut self) -> &mut F {
         &mut self.flash
     }
 
-    /// Writes the settings. Takes up to two erasures; only with the outputs off.
+    /// Writes the settings. Takes up to two page erasures; only with the outputs off.
     ///
     /// # Errors
     /// The flash failed; the previous set stays valid.

@@ -1,7 +1,7 @@
-//! The terminal strip: wires to a panel or a PLC as a front end of the desk, beside console and field bus.
+//! The terminal strip: wires to a panel or a PLC as an interface of the command arbiter, beside console and field bus.
 //!
-//! Shapes: [`Port`] is what the pins show; the [`Debounce`] makes [`Wires`] of it, once a millisecond; [`Desk::hold`] says whether they
-//! let the drive run; the [`Sequence`] makes starts and stops of START; a [reference](mod@reference) is a speed. Nothing here waits.
+//! Data flow: [`Port`] reads the pins; [`Debounce`] turns them into [`Wires`], once a millisecond; [`Desk::hold`] says whether they let
+//! the drive run; the [`Sequence`] turns START into starts and stops; a [reference](mod@reference) gives a speed. Nothing here waits.
 
 pub mod debounce;
 pub mod reference;
@@ -23,40 +23,40 @@ use crate::terminals::{ANALOG, Lost, Wires};
 use debounce::Debounce;
 use sequence::{Act, Seen, Sequence};
 
-/// The pins of the strip. Where the board has none, nothing is closed.
+/// The pins of the strip. Without a pin a contact counts as open.
 pub trait Port {
-    /// The contacts that are closed now; called once a millisecond, in which another analog input is converted.
+    /// The contacts that are closed now. Called once a millisecond; each call converts another analog input.
     fn look(&mut self) -> Wires;
-    /// The last codes of reference, second reference, and the sensor in the motor's winding; `None`: the board does not have it, or its
-    /// converter gives none.
+    /// The last ADC counts of reference, second reference, and the sensor in the motor's winding; `None` if the board has no such input,
+    /// or its ADC gives no result.
     fn codes(&self) -> [Option<u16>; ANALOG];
     /// Sets the outputs RUN, FAULT and BRAKE.
     fn show(&mut self, outputs: [bool; 3]);
 }
 
-/// Speed at and below which the brake closes in a stop by ramp, rpm.
+/// Speed at and below which the brake closes during a stop by ramp, rpm.
 pub const BRAKE_RPM: f32 = 30.0;
-/// Time between two references to the drive, ms: each costs the main loop up to two.
+/// Time between two set-points to the drive, ms: each costs the main loop up to two.
 const REFERENCE_MS: u32 = 8;
 
-/// See the head of the module.
+/// The terminal strip, see the head of the module.
 #[derive(Default)]
 pub struct Strip {
     debounce: Debounce,
-    /// Time of the last look, ms, wrapping.
+    /// Time of the last reading, ms, wrapping.
     looked: u8,
     sequence: Sequence,
     reverse: bool,
-    /// Whether RESET was open at the last look.
+    /// Whether RESET was open at the last reading.
     reset_open: bool,
-    /// Looks in a row at a reference that is lost.
+    /// Consecutive readings of a lost reference.
     lost: u8,
     /// The speed that the drive was given last since its start, rpm.
     given: Option<i16>,
 }
 
 impl Strip {
-    /// Looks at the wires, once a millisecond, and gives the orders that they mean. `now_ms` wraps.
+    /// Reads the wires, once a millisecond, and makes the requests that they stand for. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of a design
     pub fn serve(
         &mut self,
@@ -79,7 +79,7 @@ impl Strip {
         let state = status.map_or(State::Off, |status| status.state);
         let (off, hold) = (drive.is_off(), desk.interlock());
         let commands = desk.commander() == Commander::Strip;
-        // The desk shows a refusal at the console.
+        // The arbiter shows a refusal at the console.
         let mut give = |desk: &mut Desk, order| drop(desk.order(Commander::Strip, order, drive));
         let reset = core::mem::replace(&mut self.reset_open, !closed.has(Wires::RESET));
         if commands && own.reset && reset && closed.has(Wires::RESET) {
@@ -123,7 +123,7 @@ impl Strip {
         }
     }
 
-    /// The speed that the wires ask for, rpm; while a reference that is lost may come back, the last one.
+    /// The requested speed, rpm; the last one while a lost reference may come back.
     fn speed(
         &mut self,
         settings: &FirmwareSettings,

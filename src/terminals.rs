@@ -1,4 +1,4 @@
-//! The terminals of the strip by their names, and what can be said of their wires.
+//! The terminals of the strip by their names, and the states of their wires.
 
 use core::fmt;
 
@@ -11,7 +11,7 @@ pub const TERMINALS: [&str; 13] = [
     "ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2",
     "RUN", "FAULT", "BRAKE",
 ];
-/// Number of the analog ones, and of the contacts.
+/// Number of analog terminals, and of contacts.
 pub const ANALOG: usize = 3;
 /// See [`ANALOG`].
 pub const CONTACTS: usize = 7;
@@ -28,7 +28,7 @@ impl Wires {
     pub const REVERSE: Self = Self(1 << 3);
     pub const RESET: Self = Self(1 << 4);
 
-    /// Whether all of these are among them.
+    /// Whether all of these wires are closed.
     pub const fn has(self, others: Self) -> bool {
         self.0 & others.0 == others.0
     }
@@ -50,8 +50,8 @@ impl fmt::Display for Wires {
 /// Reason why a reference counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Lost {
-    /// No code.
-    #[error("its converter does not answer")]
+    /// The ADC gives no result.
+    #[error("its ADC does not answer")]
     Silent,
     /// Below 3.6 mA.
     #[error("below 3.6 mA: a broken wire, or no supply")]
@@ -59,10 +59,10 @@ pub enum Lost {
     /// Above 21 mA.
     #[error("above 21 mA: a short circuit")]
     High,
-    /// At the end of the converter's range.
-    #[error("at the end of the converter's range")]
+    /// At the end of the ADC's range.
+    #[error("at the end of the ADC's range")]
     End,
-    /// Two inputs that should be the same.
+    /// Two inputs that should agree differ.
     #[error("the two inputs differ by more than 0.3 V")]
     Differ,
 }

@@ -1,4 +1,4 @@
-//! Procedure: the sensors drift after the drive has learned. Its next start measures by how much they differ now, so that torque at
+//! Procedure: the sensors drift after the self-commissioning. The next start measures by how much they differ, so that torque at
 //! standstill has the right angle.
 
 use crate::common::{Rig, config};
@@ -6,7 +6,7 @@ use drive_core::{Command, Fault, Mode, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Load, Plant};
 
-/// A motor of iron at high flux.
+/// A motor with saturation, at high flux.
 const IRON: [&str; 4] = ["plant=r", "flux_level=high", "sequence.flux=high", "prepare.learn=yes"];
 
 /// A drive that has learned, with these changes since then.
@@ -17,7 +17,7 @@ fn changed(changes: &[&str]) -> Rig {
     Rig::of(Plant::new(&plant, 7).unwrap(), learned.drive)
 }
 
-/// Mean angle error, degrees, of the third second under torque, with these changes since the learning.
+/// Mean angle error, degrees, in the third second under torque, with these changes since the self-commissioning.
 fn mean_error(changes: &[&str], i_q: f32) -> f64 {
     let mut rig = changed(changes);
     rig.start(Mode::Torque).unwrap();
@@ -29,7 +29,7 @@ fn mean_error(changes: &[&str], i_q: f32) -> f64 {
     sum / points
 }
 
-/// Unmeasured, a gain that is 2 % higher stops the drive by fault 26.
+/// If it is not measured, a gain that is 2 % higher stops the drive by fault 26.
 #[test]
 fn a_start_measures_what_has_changed_since_the_learning() {
     for changes in [
@@ -46,7 +46,7 @@ fn a_start_measures_what_has_changed_since_the_learning() {
     }
 }
 
-/// A sensor whose gain is 30 % off is no drift: the start ends before there is flux.
+/// A gain error of 30 % is more than drift: the start ends before there is flux.
 #[test]
 fn more_asymmetry_than_a_learning_accepts_is_a_fault() {
     for change in ["measurement.gain_error_a=0.3", "measurement.gain_error_b=-0.3"] {

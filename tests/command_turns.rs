@@ -1,5 +1,5 @@
-//! Procedure: a command acts the same whichever of the ten samples of the carrier period it comes behind. Each sample has
-//! its own task (`drive-core/src/drive/in_turn.rs`), and a command may come between any two.
+//! Procedure: a command has the same effect after each of the ten samples of the injection period. Each sample has its own task
+//! (`drive-core/src/drive/in_turn.rs`), and a command may come between any two.
 
 use crate::common::config;
 use drive_core::AngleSource;
@@ -7,7 +7,7 @@ use drive_core::carrier::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Dq, Mode, Refused, State, Stop, TestSignal};
 use hil_sim::rig::Rig;
 
-/// Time behind a command, s: a stop by ramp is over.
+/// Time after a command, s: a stop by ramp has ended.
 const BEHIND_S: f64 = 0.7;
 /// Largest error of the angle while the drive tracks the flux, electrical degrees.
 const TRACKED_DEG: f64 = 25.0;
@@ -20,7 +20,7 @@ struct Bench {
     commands: Vec<Command>,
 }
 
-/// Result of a command: the answer, the state behind it, and the last reference and current, A.
+/// Result of a command: the answer, the state after it, and the last reference and current, A.
 #[derive(Debug)]
 struct Outcome {
     answer: Result<Accepted, Refused>,
@@ -77,7 +77,7 @@ impl Bench {
         }
     }
 
-    /// Gives the command behind `turn` samples, and watches.
+    /// Gives the command after `turn` samples, and observes the drive.
     fn outcome(&self, command: &Command, turn: usize) -> Outcome {
         let name = format!("{}: {command:.20?} at {turn}", self.name);
         let mut rig = self.rig.clone();
@@ -99,7 +99,7 @@ impl Bench {
         let state = rig.drive.state();
         assert_eq!(state.fault(), None, "{name}");
         if answer.is_err() || *command == Command::Clear {
-            // It has changed nothing: to the last bit.
+            // A refused command has changed nothing, to the last bit.
             undisturbed.wait(BEHIND_S);
             assert_eq!(rig.drive.telemetry(), undisturbed.drive.telemetry(), "{name}");
         }
@@ -111,7 +111,7 @@ impl Bench {
         Outcome { answer, state, reference, current }
     }
 
-    /// Gives every command behind each sample of the carrier period; returns how many of them are taken.
+    /// Gives every command after each sample of the injection period; returns how many of them are accepted.
     fn try_all(&self) -> usize {
         let mut taken = 0;
         for command in &self.commands {
@@ -121,7 +121,7 @@ impl Bench {
                 let other = self.outcome(command, turn);
                 let name = format!("{}: {command:.20?} at {turn}: {first:?} {other:?}", self.name);
                 assert_eq!((other.answer, other.state), (first.answer, first.state), "{name}");
-                // A third of an ampere of noise and ripple, and a ramp that began up to nine periods later.
+                // About a third of an ampere of noise and ripple, and a ramp that began up to nine periods later.
                 assert!((other.reference - first.reference).abs() < 0.35, "{name}");
                 assert!((other.current - first.current).abs() < 0.35, "{name}");
             }
@@ -156,7 +156,7 @@ fn by_voltage_and_frequency_learning_and_commissioning() {
     assert_eq!(Bench::new(&[FREE], Mode::Commissioning).try_all(), 5);
 }
 
-/// Settings are taken only while the outputs are off, and whole: between two steps of the drive.
+/// Settings are accepted only while the outputs are off, and as a whole: between two steps of the drive.
 #[test]
 fn settings_are_taken_while_off() {
     let config = config(&[FREE, "angle.source=encoder"]);

@@ -1,5 +1,5 @@
-//! Procedure: what do the demodulators really see (Figure 19)? The chain as printed sees the
-//! fundamental leaking through its band-pass; the rectified one sees the saliency.
+//! Procedure: which signals do the demodulators really measure (Figure 19)? The chain as printed measures the fundamental that leaks
+//! through its band-pass; the rectified one measures the saliency.
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
@@ -8,14 +8,13 @@ use drive_core::carrier::{CarrierPeriod, CarrierSample, Demodulate, Literal, Rec
 use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 
-/// One step of a chain, dm along `axis`.
+/// One step of a chain with the injection axis dm along `axis`.
 fn step(chain: &mut impl Demodulate, current: AlphaBeta, axis: Angle) -> f32 {
     let axis = (axis + Angle::EIGHTH).unit_vector();
     chain.step(&CarrierSample { current, axis, carrier: CarrierPeriod::default() })
 }
 
-/// Mean output, A, of a chain fed with the true current, its injection axis at phi2 - theta = `x`
-/// rad.
+/// Mean output, A, of a chain fed with the true current, its injection axis at phi2 - theta = `x` rad.
 fn delta_i(rig: &mut Rig, mut chain: impl Demodulate, x: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for k in 0..1500 {
@@ -24,7 +23,7 @@ fn delta_i(rig: &mut Rig, mut chain: impl Demodulate, x: f64) -> f64 {
         let axis = Angle::from_radians(theta as f32) - Angle::EIGHTH;
         let current = AlphaBeta::new(i.re as f32, i.im as f32);
         let out = step(&mut chain, current, axis);
-        // Settled after 50 ms; then whole carrier periods.
+        // Settled after 50 ms; then whole injection periods.
         if k >= 300 {
             sum += f64::from(out);
             count += 1;
@@ -34,11 +33,11 @@ fn delta_i(rig: &mut Rig, mut chain: impl Demodulate, x: f64) -> f64 {
     sum / f64::from(count)
 }
 
-/// Gain at dc of the low-pass as printed. The source leaves it in, so its real currents are this much
-/// larger than it believes; here they are asked for.
+/// Dc gain of the printed low-pass. The source leaves it in, so its real currents are larger than its estimates by this factor; here
+/// these real currents are requested.
 const LPF_DC: f64 = 0.944_061;
 
-/// A motor in which the source believes 0.7 A and `iq` to flow, with the encoder.
+/// A motor with the encoder in which the source takes 0.7 A and `iq` for the currents.
 fn encoder_rig(iq: f64, amplitude_v: f64, parts: &[&[&'static str]]) -> Rig {
     let mut changes = all(parts);
     let amplitude = format!("injection.amplitude_v={amplitude_v}");
@@ -54,12 +53,12 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
         let mut rig = encoder_rig(iq, 50.0, &[&IDEAL, &ISOTROPIC]);
         let mut at = |x: f64| delta_i(&mut rig, Literal::default(), x);
 
-        // theta - phi2 = +90°: sqrt2 * 0.01 * i_d whatever i_q.
+        // At theta - phi2 = +90° the output is sqrt2 * 0.01 * i_d for any i_q.
         let here = at(-FRAC_PI_2);
         let predicted = SQRT_2 * 0.01 * 0.7;
         assert!((here - predicted).abs() < 0.15e-3, "iq {iq}: {} mA", here * 1e3);
 
-        // Zero where atan(i_q / i_d) says.
+        // The zero is at atan(i_q / i_d).
         let gamma = (iq / 0.7_f64).atan();
         let (x0, h) = (-gamma, 0.02);
         let (below, above) = (at(x0 - h), at(x0 + h));
@@ -78,8 +77,8 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
     }
 }
 
-/// The injection makes no difference to the printed chain. In the motor, to within what the converter leaves
-/// uncertain of the mean current (0.1 %); with given currents, to within 1 µA.
+/// The injection makes no difference to the printed chain. In the motor the difference is within the ADC's uncertainty of the mean
+/// current (0.1 %); with given currents, within 1 µA.
 #[test]
 fn the_printed_chain_does_not_see_the_injection() {
     let out = |amplitude_v| {
@@ -90,7 +89,7 @@ fn the_printed_chain_does_not_see_the_injection() {
     println!("in the motor {:.3} uA", difference * 1e6);
     assert!(difference.abs() < 10e-6, "{difference} A");
 
-    // 0.7 A along d, 1 A along q, flux at rest, 0.26 A of carrier along theta = phi + 90°.
+    // 0.7 A along d, 1 A along q, flux at rest, 0.26 A of injection current along theta = phi + 90°.
     let given = |carrier: f64| {
         let (mut chain, mut sum) = (Literal::default(), 0.0);
         let axis = Angle::QUARTER - Angle::EIGHTH;
@@ -107,7 +106,7 @@ fn the_printed_chain_does_not_see_the_injection() {
     assert!(difference.abs() < 1e-6, "{difference} A");
 }
 
-/// The angle is moved by 50°; 50 ms later the printed chain gives what it gave before.
+/// The angle is moved by 50°; 50 ms later the printed chain gives the same output as before.
 #[test]
 fn the_printed_chain_is_blind_and_the_rectified_is_not() {
     let moved_by = |demodulator: &'static str| {
@@ -120,8 +119,7 @@ fn the_printed_chain_is_blind_and_the_rectified_is_not() {
             },
         ]));
         let mut rig = beside_encoder(&config, 1, 2.0, 0.4);
-        // Mean delta_i (mA) and angle error (degrees) while the encoder is moved on by `counts` a
-        // period.
+        // Mean delta_i (mA) and angle error (degrees) while the encoder is moved on by `counts` per period.
         let mut offset = 0_u32;
         let mut mean = |counts: i32, periods: u32| {
             let (mut sum, mut error) = (0.0, 0.0);
@@ -150,9 +148,8 @@ fn the_printed_chain_is_blind_and_the_rectified_is_not() {
     assert!(moved_by("rectified").abs() > 5.0);
 }
 
-/// Without any saliency the rectified chain still gives 2.4 mA per ampere, whatever the angle. That is
-/// not the leak but the 8.83 samples by which the band-pass delays the carrier while the flux slips:
-/// seen from the delayed axis it is gone.
+/// Without any saliency the rectified chain still gives 2.4 mA per ampere, at any angle. The cause is not the leak but the 8.83 samples
+/// by which the band-pass delays the injection while the flux slips: measured from the delayed axis, the offset is zero.
 #[test]
 fn the_bias_of_the_rectified_chain_is_the_delay_of_the_band_pass() {
     for iq in [1.0, 3.0] {
@@ -161,17 +158,17 @@ fn the_bias_of_the_rectified_chain_is_the_delay_of_the_band_pass() {
         let undelayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2) * 1e3;
         let delayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2 + 8.83 * slip) * 1e3;
         println!("iq {iq}: {undelayed:.2} mA, from the delayed axis {delayed:.2} mA");
-        // An independent study found 2.84 mA per ampere with the carrier put 1.5 samples behind.
+        // An independent study found 2.84 mA per ampere with the injection delayed by 1.5 samples.
         let expected = 2.84 * iq * 8.83 / (8.83 + 1.5);
         assert!((undelayed - expected).abs() < 0.05 * expected, "iq {iq}: {undelayed} mA");
         assert!(delayed.abs() < 0.05 * undelayed, "iq {iq}: {delayed} mA");
     }
 }
 
-/// The sensorless drive cannot run on the printed chain: it coasts.
+/// The sensorless drive cannot run on the printed chain: the drive coasts.
 #[test]
 fn the_printed_chain_cannot_track() {
-    // Without the watches on the voltage, which end it before that.
+    // Without the voltage monitors, which would end the run before that.
     let changes = ["injection.demodulator=literal", "limits.unexplained_v=300"];
     let config = config(&all(&[&IDEAL, &changes]));
     let mut rig = regulating(&config, 1, 1.0, 0.5);

@@ -1,5 +1,5 @@
-//! Procedure: nothing starts or goes on turning that nobody asked for. Console, bus, strip, desk, drive and motor work together here, a
-//! pass of the main loop each millisecond.
+//! Procedure: no motor starts, or continues to turn, without a request. Console, bus, strip, command arbiter, drive and motor work
+//! together here, one pass of the main loop per millisecond.
 
 #[path = "../src/console/tests/doubles.rs"]
 #[allow(dead_code)]
@@ -36,12 +36,12 @@ struct Stand {
     strip: FakeStrip,
     rig: Rig,
     now_ms: u32,
-    /// Seen by the drive in each period.
+    /// Hardware events that the drive sees in each period.
     hardware: Hardware,
 }
 
 impl Stand {
-    /// By the encoder, with these changes of the configuration, and these settings of the firmware.
+    /// A firmware with the encoder, with these changes of the configuration, and these settings of the firmware.
     fn new(changes: &[&str], settings: &str) -> Self {
         let usual = ["angle.source=encoder", "sequence.magnetise_s=0.3"];
         let config = config(&[&usual[..], changes].concat());
@@ -71,7 +71,7 @@ impl Stand {
         stand
     }
 
-    /// Milliseconds pass.
+    /// Lets milliseconds pass.
     fn wait(&mut self, ms: u32) {
         for _ in 0..ms {
             self.now_ms += 1;
@@ -127,7 +127,7 @@ impl Stand {
         u16::from_be_bytes([answer[3], answer[4]])
     }
 
-    /// The milliseconds until the outputs are off; `None` if they are on still after this time.
+    /// The milliseconds until the outputs are off; `None` if they are still on after this time.
     fn off_within(&mut self, ms: u32) -> Option<u32> {
         (0..=ms).find(|_| {
             let off = self.rig.drive.is_off();
@@ -162,7 +162,7 @@ impl Stand {
     }
 }
 
-/// A way to stop, and who commands.
+/// A way to stop, and the commander.
 const WAYS: [(&str, &str); 8] = [
     ("console", "stop"),
     ("console", "ENABLE"),
@@ -174,11 +174,11 @@ const WAYS: [(&str, &str); 8] = [
     ("strip", "ENABLE"),
 ];
 
-/// The bound of the manual, ms.
+/// The limit in the manual, ms.
 const OFF_MS: u32 = 200;
 
-/// Each setting of the stop path at both ends of its range, a locked shaft and one that turns: a stop that coasts is off within 200 ms from
-/// full torque, whoever gives it. At the default slope it takes the torque to zero first.
+/// Each setting of the stop path at both ends of its range, with a locked shaft and a turning one: a coasting stop is off within 200 ms
+/// from full torque, from any source. With the default slope of the current it takes the torque to zero first.
 #[test]
 fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
     let settings = [
@@ -208,7 +208,7 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
         if from == "strip" {
             stand.strip.closed.0 |= Wires::START.0;
         }
-        // Until the torque is there, the one that commands is not silent.
+        // Until the torque is reached, the commander is not silent.
         for n in 0..10 {
             match (from, n) {
                 ("console", 0) => stand.say("start torque\ntorque 1000"),
@@ -224,7 +224,7 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
         }
         let what = format!("{from}, {way}, {setting}, {shaft:?}");
         let i_q = stand.rig.drive.telemetry().current.q;
-        // A slow ramp asks for no torque of a shaft that is at its speed.
+        // A slow ramp needs no torque if the shaft is at its speed.
         let full = i_q > 2.0 || (from != "console" && setting.starts_with("speed."));
         assert!(stand.state().regulates() && full, "{what}: {:?}, {i_q} A", stand.state());
         let patience = match way {
@@ -256,7 +256,7 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
     println!("longest: {} ms by {}", worst.0, worst.1);
 }
 
-/// `stop now`, disable voltage of CiA 402, the base block and ENABLE set to `now`: off in the same pass, from full torque.
+/// `stop now`, disable voltage of CiA 402, the base block and ENABLE set to `now` switch off in the same pass, from full torque.
 #[test]
 fn a_stop_at_once_is_off_in_the_same_pass() {
     for way in ["console", "disable voltage", "base block", "ENABLE"] {
@@ -269,7 +269,7 @@ fn a_stop_at_once_is_off_in_the_same_pass() {
             "base block" => stand.write(RESET, 4),
             _ => {
                 stand.strip.closed = Wires(0);
-                // Two looks tell an open wire from a disturbance.
+                // Two readings distinguish an open wire from a disturbance.
                 stand.wait(1);
             }
         }
@@ -278,7 +278,7 @@ fn a_stop_at_once_is_off_in_the_same_pass() {
     }
 }
 
-/// Ramps keep their time.
+/// Stops by ramp take the time of their ramp.
 #[test]
 fn a_stop_by_ramp_keeps_its_ramp() {
     let mut stand = Stand::new(&["load.mode=free"], "speed.ramp_rpm_per_s=300");
@@ -291,8 +291,8 @@ fn a_stop_by_ramp_keeps_its_ramp() {
     assert!(stand.off_within(1500).is_some());
 }
 
-/// A frame each 400 ms after a run command, with a time-out of 1 s: only what is valid, for this drive, and touches command, frequency or
-/// control word keeps it running; with `bus.alive any` each valid request to its address does.
+/// A frame every 400 ms after a run command, with a time-out of 1 s. Only a valid frame for this drive that writes command, frequency or
+/// control word keeps the drive running; with `bus.alive any` each valid request to its address does.
 #[test]
 fn only_a_valid_command_is_a_sign_of_life() {
     let write = |at: u16, word: u16| {
@@ -334,12 +334,12 @@ fn only_a_valid_command_is_a_sign_of_life() {
     }
 }
 
-/// A stop that comes while the controllers are designed cancels the start, on each way.
+/// A stop that comes while the controllers are designed cancels the start, from each source.
 #[test]
 fn a_stop_during_a_design_cancels_the_start() {
     for (from, way) in [("bus", "bus"), ("bus", "late"), ("bus", "ENABLE"), ("console", "bus")] {
         let mut stand = Stand::new(&[], &format!("bus.commands={from};strip.enable=yes"));
-        // A setting that needs a design.
+        // The setting requires a design.
         if from == "bus" {
             let at = (0x4000 + 2 * keys::find("motor.inertia").unwrap().id()).to_be_bytes();
             let value = 0.02_f32.to_be_bytes();
@@ -354,7 +354,7 @@ fn a_stop_during_a_design_cancels_the_start() {
         assert!(stand.front.desk.is_busy() || from == "console", "{from}, {way}");
         let stop = [1, 6, 0x20, 0, 0, STOP as u8];
         match way {
-            // As the port takes it in its interrupt.
+            // The stop is handled as in the interrupt of the port.
             "bus" => {
                 let sum = modbus_core::rtu::crc16(&stop).to_be_bytes();
                 let (answer, stop) =
@@ -362,7 +362,7 @@ fn a_stop_during_a_design_cancels_the_start() {
                 assert!(answer.is_some_and(|answer| answer[1] == 6), "acknowledged");
                 stand.bus.stop = stop;
             }
-            // It came before the port was told that the slave is busy.
+            // The stop came before the port was told that the slave is busy.
             "late" => stand.send(&stop),
             _ => stand.strip.closed = Wires(0),
         }
@@ -376,8 +376,8 @@ fn a_stop_during_a_design_cancels_the_start() {
     }
 }
 
-/// A master that writes reset and run in turn, with the reset bit set or as an edge, against a power stage that trips: three faults in 10 s
-/// at most.
+/// A master writes reset and run in turn, with the reset bit set or as an edge, while the power stage trips: at most three faults in 10
+/// s.
 #[test]
 fn a_short_circuit_is_not_started_into_without_end() {
     for words in [[0x0086, 0x008f], [0x0006, 0x008f], [0x0086, 0x000f]] {
@@ -396,8 +396,8 @@ fn a_short_circuit_is_not_started_into_without_end() {
     }
 }
 
-/// With a brake the output opens it only after the drive has put out torque against it, closes it at the stop, and keeps the shaft for the
-/// time that the brake needs. A fault and `stop now` do not wait.
+/// With a brake, the output opens it only after the drive has produced torque against it, closes it at the stop, and holds the shaft for
+/// the time that the brake needs. A fault and `stop now` do not wait.
 #[test]
 fn a_brake_opens_behind_the_torque_and_closes_before_it_ends() {
     let own = "strip.brake=yes;strip.brake_s=0.3";
@@ -411,7 +411,7 @@ fn a_brake_opens_behind_the_torque_and_closes_before_it_ends() {
         proof = proof.max(stand.rig.plant.torque());
         ms += 1;
     }
-    // A quarter of the largest, 1 Nm with the low flux.
+    // A quarter of the largest torque, 1 Nm with the low flux.
     assert!((0.2..0.35).contains(&proof), "{proof} Nm");
     stand.wait(200);
     assert!(stand.strip.outputs[2]);
@@ -435,7 +435,7 @@ fn a_brake_opens_behind_the_torque_and_closes_before_it_ends() {
     }
 }
 
-/// A stop by ramp keeps the shaft at rest until the brake has closed, against a load that would turn it.
+/// A stop by ramp holds the shaft at rest until the brake has closed, against a load that would turn it.
 #[test]
 fn a_load_does_not_fall_before_the_brake_has_closed() {
     let free = ["load.mode=free", "load.torque_nm=0.4"];
@@ -460,8 +460,9 @@ fn a_load_does_not_fall_before_the_brake_has_closed() {
     assert!(ms - closed.expect("it closes") >= 300, "{closed:?} of {ms}");
 }
 
-/// After a stop that coasts and after a fault the registers show no torque and no current, and the last measured speed, marked as assumed,
-/// until `stop.coasts_s` has passed. After a stop by ramp the shaft stands, and nothing is assumed. Console and stream say the same.
+/// After a coasting stop and after a fault the registers show no torque and no current, and the last measured speed, marked as assumed,
+/// until `stop.coasts_s` has passed. After a stop by ramp the shaft is at rest, and nothing is assumed. Console and stream show the same
+/// values.
 #[test]
 fn a_drive_that_is_off_shows_no_torque_and_the_last_speed() {
     for end in ["coast", "fault", "ramp"] {

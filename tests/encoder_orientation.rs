@@ -1,5 +1,5 @@
-//! Procedure: field orientation with the encoder on a dynamometer. Is the flux where the drive says
-//! it is, and the torque what the current should give?
+//! Procedure: field orientation with the encoder on a dynamometer. Does the flux have the estimated angle, and the torque the value that
+//! the current should give?
 
 use crate::common::{IDEAL, ISOTROPIC, all, config, regulating_with};
 use hil_sim::config::plant_settings;
@@ -19,7 +19,7 @@ fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
         let (mut error, mut ratio) = (Stats::default(), Stats::default());
         rig.run(0.2, |p| {
             error.push(p.angle_error_deg);
-            // 3/2 P (Lm/Lr) psi i_q
+            // Factor 3/2 P (Lm/Lr) psi i_q.
             ratio.push(p.torque / (p.torque_per_flux_ampere * p.flux * f64::from(i_q)));
         });
         worst = worst.max(error.largest());

@@ -1,5 +1,5 @@
-//! Procedure: five demodulations on one motor. What each sees, where its carrier lies, and how each
-//! tracks without a position sensor.
+//! Procedure: five demodulations on one motor. The tests compare their signals, the axes of their injection, and their tracking without a
+//! position sensor.
 
 use crate::common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::Command;
@@ -11,8 +11,7 @@ use hil_sim::experiments::learning;
 use hil_sim::plant::{Load, PlantSettings};
 use hil_sim::rig::{RATE_HZ, Rig};
 
-/// Name, and how large its signal is beside that of the rectified chain, by the gains of the filters
-/// and of the detector.
+/// Name, and the ratio of its signal to the rectified chain's, by the gains of the filters and of the detector.
 const ALL: [(&str, f64); 5] = [
     ("literal", 1.0),
     ("rectified", 1.0),
@@ -21,7 +20,7 @@ const ALL: [(&str, f64); 5] = [
     ("synchronous", 1.0),
 ];
 
-/// With one of the demodulations beside the encoder.
+/// A rig with one of the demodulations beside the encoder.
 fn demodulating(name: &str, parts: &[&[&'static str]], iq: f32) -> Rig {
     let demodulator = format!("injection.demodulator={name}");
     let mut changes = all(parts);
@@ -36,8 +35,8 @@ fn signal(rig: &mut Rig) -> f64 {
     sum / count
 }
 
-/// The literal chain gives the same without saliency; the others give next to nothing, and answer to
-/// a turn of the axis in the direction that lets one loop serve them all.
+/// The literal chain gives the same signal without saliency. The others give next to nothing, and respond to a rotation of the axis in
+/// the direction that lets one loop serve them all.
 #[test]
 fn all_but_the_literal_chain_see_the_saliency() {
     for (name, _) in ALL {
@@ -53,18 +52,18 @@ fn all_but_the_literal_chain_see_the_saliency() {
         if name == "literal" {
             assert!((share - 1.0).abs() < 0.02, "{share}");
         } else {
-            // What is left is the inverter's voltage drop.
+            // The remainder is the inverter voltage error.
             assert!(share < 0.12, "{name}: {share}");
         }
     }
 }
 
-/// Where the 600 Hz lie in the motor: along the flux for Ha and Sul, across it for the others.
+/// Axis of the 600 Hz in the motor: along the flux for Ha and Sul, across it for the others.
 #[test]
 fn the_carrier_lies_where_the_method_wants_it() {
     for (name, _) in ALL {
         let mut rig = demodulating(name, &[&ISOTROPIC], 0.5);
-        // Component of the current at the carrier, along the flux and across it.
+        // Component of the current at the injection frequency, along the flux and across it.
         let mut parts = [[0.0_f64; 2]; 2];
         for k in 0..600 {
             let x = std::f64::consts::TAU * f64::from(k) / 10.0;
@@ -87,7 +86,7 @@ fn the_carrier_lies_where_the_method_wants_it() {
     }
 }
 
-/// Rms and largest angle error at standstill and at 150 rpm, degrees; at 1.5 A, given at rest.
+/// Rms and largest angle error at standstill and at 150 rpm, degrees; at 1.5 A, applied at rest.
 fn tracked(drive: &Settings, config: &Config) -> [(f64, f64); 2] {
     [0.0, 150.0].map(|rpm: f64| {
         let mut rig = regulating_with(&held(config), drive, 11, 1.5, 0.5);
@@ -123,9 +122,9 @@ fn error(rig: &mut Rig) -> (f64, f64) {
     ((squares / RATE_HZ).sqrt(), worst)
 }
 
-/// Each with a learned reference and, but for the synchronous one, the same PII controller: 2.5° rms and
-/// 9° (the bounds for the rectified chain at standstill; measured 0.7° to 1.9° and up to 4.8°). The
-/// literal chain is lost, learned reference or not.
+/// Each chain has a learned saliency offset and, except for the synchronous one, the same PII controller: 2.5° rms and 9° (the limits for
+/// the rectified chain at standstill; measured 0.7° to 1.9° and up to 4.8°). The literal chain loses the lock with and without a learned
+/// offset.
 #[test]
 fn all_but_the_literal_chain_track() {
     for (name, gain) in ALL {
@@ -142,7 +141,7 @@ fn all_but_the_literal_chain_track() {
     }
 }
 
-/// A bench, and a drive with a learned reference and the controller that `demodulators` calls retuned.
+/// A bench, and a drive with a learned saliency offset and the controller that `demodulators` calls retuned.
 fn retuned(name: &str, gain: f64) -> (Config, Settings) {
     let config = config(&[&format!("injection.demodulator={name}")]);
     let table = learning::reference_of(config.drive.injection.demodulator, &config, 7).unwrap();
@@ -153,9 +152,9 @@ fn retuned(name: &str, gain: f64) -> (Config, Settings) {
     (config, drive)
 }
 
-/// As `demodulators` does it: the shaft is brought to 150 rpm without torque, and then comes a step to 1.5 A. The rectified chain
-/// has lost the angle before the step (53° to 73° off), with the controller that holds it where the torque is there before the
-/// speed; with one seed of these the step brings it back. The others are at most 15° off on the way, and track then.
+/// The sequence of `demodulators`: the shaft is brought to 150 rpm without torque, and then comes a step to 1.5 A. The rectified chain
+/// has lost the lock before the step (53° to 73° off), with the controller that keeps the lock if the torque comes before the speed; with
+/// one of these seeds the step recovers it. The others are at most 15° off meanwhile, and track afterwards.
 #[test]
 fn without_torque_the_retuned_rectified_chain_does_not_follow_the_shaft() {
     for (name, gain) in &ALL[1..] {

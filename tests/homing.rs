@@ -8,7 +8,7 @@ use hil_sim::rig::Rig;
 
 /// Stiffness of the stop, N m/rad.
 const STIFFNESS: f64 = 100.0;
-/// Where the stops are, turns.
+/// Position of the stops, turns.
 const STOPS: f64 = 1.3;
 
 fn rig(changes: &[&str], seed: u64) -> Rig {
@@ -26,7 +26,7 @@ fn seen(rig: &Rig) -> Seen {
     Seen { periods, state: rig.drive.state(), turns: t.turns, i_q: t.reference.q, room }
 }
 
-/// Lets the drive home; the outcome, and the mean torque in the last second of pressing, N m.
+/// Lets the drive home; returns the outcome, and the mean torque in the last second of pressing, N m.
 fn home(rig: &mut Rig, plan: Plan) -> (Result<(), Failure>, f64) {
     let mut homing = Homing::new(plan, 3.0).unwrap();
     rig.command(&homing.begin()).unwrap();
@@ -53,9 +53,9 @@ fn turns(rig: &mut Rig) -> f64 {
     turns
 }
 
-/// Position 0 is where the stop yields to the torque, and positions count from there. A heavy shaft swings at its elastic stop for
-/// longer than is waited: 0.0315 turns at most in 96 runs; without an encoder the position drifts under torque: 0.0139 turns at most in 192
-/// runs, and 0.0255 a turn away.
+/// Position 0 is where the stop yields to the torque, and positions count from there. A heavy shaft swings at its elastic stop for longer
+/// than the wait: 0.0315 turns at most in 96 runs. Without an encoder the position drifts under torque: 0.0139 turns at most in 192 runs,
+/// and 0.0255 one turn away.
 #[test]
 fn the_stop_becomes_position_0() {
     let heavier = ["motor.inertia=0.06", "drive.motor.inertia=0.06"];
@@ -72,7 +72,7 @@ fn the_stop_becomes_position_0() {
             outcome.unwrap();
             let stop = f64::from(rpm.signum()) * STOPS + torque / STIFFNESS / TAU;
             let wrong = turns(&mut rig) - stop - f64::from(rig.drive.telemetry().turns);
-            // Away from it by a turn, and there.
+            // Away from it by a turn.
             rig.command(&Command::Position(-rpm.signum())).unwrap();
             rig.wait(4.0);
             let there = turns(&mut rig) - stop + f64::from(rpm.signum());
@@ -80,7 +80,7 @@ fn the_stop_becomes_position_0() {
                 "{source} {heavier:?} {rpm} rpm {i_q} A: {wrong:.4} turns, a turn away {there:.4}"
             );
             assert!(wrong.abs() < accuracy, "{wrong}");
-            // The position without an encoder drifts by some 3 degrees on the way.
+            // The position without an encoder drifts by about 3 degrees during the motion.
             assert!(there.abs() < accuracy + 0.013, "{there}");
         }
     }
@@ -93,8 +93,8 @@ fn friction_that_holds_the_shaft_is_no_stop() {
     assert_eq!(home(&mut held, plan).0, Err(Failure::Held));
 }
 
-/// With the encoder a start finds position 0 again, and does not move the shaft; without it the start moves it by 0.0487 turns at most in
-/// 95 runs.
+/// With the encoder a start finds position 0 again, and does not move the shaft. Without it the start moves the shaft by 0.0487 turns at
+/// most in 95 runs.
 #[test]
 fn position_0_outlives_a_stop_with_the_encoder() {
     for (source, keeps, moved) in [("encoder", true, 0.01), ("injection", false, 0.06)] {

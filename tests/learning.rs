@@ -1,4 +1,4 @@
-//! Procedure: the drive learns on its motor with the shaft locked, then drives it.
+//! Procedure: the drive learns the saliency of its motor with the shaft locked, then drives it.
 
 use crate::common::{all, config, run};
 use drive_core::learned::Learned;
@@ -15,7 +15,7 @@ fn learned(changes: &[&str], seed: u64) -> Learned {
     learned
 }
 
-/// The reference that the drive has by default is what it learns on the default motor.
+/// The drive's default saliency offset equals the one that it learns on the default motor.
 #[test]
 fn learning_finds_the_default_reference() {
     let ideal = ["measurement.noise_a=0", "measurement.lsb_a=0.00014"];
@@ -28,14 +28,14 @@ fn learning_finds_the_default_reference() {
             let difference = found.reference.at(i_q) - default.at(i_q);
             assert!(difference.abs() < most, "{i_q} A: {difference}");
         }
-        // The saliency of the current is 0.036 /A in the motor; the law leaves out what turns with it.
+        // The saliency of the current is 0.036 /A in the motor; the law leaves out the part that rotates with it.
         assert!(found.current_saliency.accepted);
         assert!((found.current_saliency.value - 0.0338).abs() < 0.002);
         assert!((found.flux_saliency + 0.035).abs() < 0.006, "{}", found.flux_saliency);
     }
 }
 
-/// A difference of the gains is found to a quarter of a percent, whichever channel it is in.
+/// A gain difference is found to a quarter of a percent, in either channel.
 #[test]
 fn a_gain_mismatch_of_the_sensors_is_found() {
     for (change, mismatch) in [
@@ -49,7 +49,7 @@ fn a_gain_mismatch_of_the_sensors_is_found() {
     }
 }
 
-/// With 1 % between the sensors: what it costs, and what is left after learning.
+/// A gain difference of 1 % between the sensors: the angle error before the self-commissioning, and the remaining one after it.
 #[test]
 fn after_learning_a_mismatch_costs_no_accuracy() {
     let mismatch = ["runs=24", "measurement.gain_error_a=0.01"];
@@ -64,10 +64,10 @@ fn after_learning_a_mismatch_costs_no_accuracy() {
     assert_eq!(after.get("lost_runs"), Some(0.0));
 }
 
-/// A shaft that turns, freely or driven slowly, is noticed, and nothing is changed.
+/// If the shaft turns, freely or driven slowly, this is detected, and nothing is changed.
 #[test]
 fn a_shaft_that_moves_is_refused() {
-    // Without the check at the start, which refuses a turning shaft by itself.
+    // Without the check at the start, which itself refuses a rotating shaft.
     let config = config(&["injection.check=false"]);
     for load in [Load::Free { torque: 0.0 }, Load::Speed { speed: 6.0 }] {
         let mut rig = Rig::from_config(&config, 5).unwrap();
@@ -80,8 +80,7 @@ fn a_shaft_that_moves_is_refused() {
     }
 }
 
-/// It can be stopped at any time; torque commands mean nothing to it; it stands still without
-/// injection.
+/// The self-commissioning can be stopped at any time and does not accept torque commands; without injection it is refused.
 #[test]
 fn learning_takes_stop_and_no_other_reference() {
     let mut rig = Rig::from_config(&config(&[]), 6).unwrap();
@@ -105,7 +104,7 @@ fn learning_takes_stop_and_no_other_reference() {
     }
 }
 
-/// The rectified chain of the source with a learned reference, shaft locked.
+/// The rectified chain of the source with a learned saliency offset, shaft locked.
 #[test]
 fn the_rectified_chain_tracks_with_a_learned_reference() {
     let changes = ["injection.demodulator=rectified"];
@@ -123,7 +122,7 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
                 largest = largest.max(p.angle_error_deg.abs());
             });
             rig.command(&Command::Stop(Stop::Coast)).unwrap();
-            rig.wait(1.5); // until the flux is gone
+            rig.wait(1.5); // until the flux has decayed
         }
         let rms: f64 = (squares / count).sqrt();
         println!("seed {seed}: {rms:.2} rms, {largest:.2} largest");

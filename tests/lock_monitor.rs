@@ -1,11 +1,10 @@
-//! Procedure: throw the sensorless drive off its flux, and see whether it notices; see whether it
-//! leaves a sound one alone.
+//! Procedure: throw the sensorless drive off its flux, and check that it detects this; check that it does not stop a healthy one.
 
 use crate::common::{config, regulating, run};
 use drive_core::{Command, Fault, Mode, State};
 use hil_sim::rig::Rig;
 
-/// A share of what `cargo sim run lock-monitor --set runs=1000` shows.
+/// A part of the runs of `cargo sim run lock-monitor --set runs=1000`.
 #[test]
 fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
     let outcome = run("lock-monitor", &["runs=12"], 31);
@@ -23,11 +22,11 @@ fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
     ] {
         assert_eq!(outcome.metrics.get(metric), Some(0.0), "{metric}");
     }
-    // 0.22 is the most of 10 000 runs; the limit is 0.55.
+    // 0.22 is the largest of 10 000 runs; the limit is 0.55.
     assert!(outcome.metrics.get("healthy_loss_max").unwrap() < 0.35);
 }
 
-/// Without the monitor and the observer the same trials end in false locks.
+/// Without the monitor and the observer the same trials end in undetected false locks.
 #[test]
 fn without_the_monitor_a_false_lock_stays() {
     let blind = ["runs=6", "injection.monitor=false", "observer.enabled=false"];
@@ -78,7 +77,7 @@ fn a_relock_on_request_goes_on_without_torque() {
         }
         assert!(verified && rig.drive.state() == State::Torque, "{}", rig.drive.state());
         assert!(rig.drive.telemetry().reference.q.abs() < 1e-6);
-        // The flux that was there does not show as a resistance.
+        // The remaining flux is not taken for a resistance.
         let deviation = rig.drive.stator_resistance().unwrap();
         assert!(deviation.abs() < 0.05, "seed {seed}: {deviation}");
         rig.command(&Command::Torque(i_q)).unwrap();
@@ -88,7 +87,7 @@ fn a_relock_on_request_goes_on_without_torque() {
     }
 }
 
-/// A dc link that has no room for all of the carrier: it is made smaller, and the angle stays right.
+/// If the dc link is too low for the full injected voltage, the voltage is reduced, and the angle stays right.
 #[test]
 fn a_carrier_that_does_not_fit_is_made_smaller_and_the_angle_stays_right() {
     let low = config(&["inverter.vdc=203", "injection.amplitude_v=103"]);

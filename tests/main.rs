@@ -1,4 +1,4 @@
-//! The procedures of the drive on the simulated bench, and recorded runs: one program, a module a procedure.
+//! The procedures of the drive on the simulated bench, and recorded runs: one program, one module per procedure.
 
 mod asymmetry_at_start;
 mod command_turns;

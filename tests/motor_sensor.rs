@@ -28,7 +28,8 @@ const WRONG: [(Result<f32, Fault>, Fault); 4] = [
     (Ok(f32::NAN), Fault::MotorHot),
 ];
 
-/// A start needs a reading, and one without a fault; settings in force begin anew. Without a sensor nothing is read.
+/// A start needs a reading, and one without a fault; after settings are put in force a new reading is needed. Without a sensor nothing is
+/// read.
 #[test]
 fn a_start_is_refused_without_a_sound_reading() {
     let mut rig = Rig::from_config(&sensed(), 1).unwrap();
@@ -56,8 +57,8 @@ fn a_start_is_refused_without_a_sound_reading() {
     assert_eq!(rig.drive.state(), State::Torque);
 }
 
-/// A defect and a hot motor switch off within a period, at rest and at speed, while it regulates and by voltage and frequency; a
-/// start is refused after a clear.
+/// A defective sensor and a hot motor switch off within a period, at rest and at speed, in regulated modes and with V/f control; a start
+/// is refused after a clear.
 #[test]
 fn a_defect_switches_off() {
     for (mode, rpm) in [
@@ -84,7 +85,7 @@ fn a_defect_switches_off() {
             assert_eq!(rig.drive.state(), State::Fault(fault), "{mode:?} {rpm}");
             rig.wait(1.0);
             assert!(rig.plant.current().norm() < 1e-3, "{}", rig.plant.current().norm());
-            // A sound reading takes no latched fault back.
+            // A good reading does not remove a latched fault.
             rig.command(&Command::MotorTemperature(Ok(60.0))).unwrap();
             assert_eq!(rig.drive.state(), State::Fault(fault));
             read(&mut rig, reading);
@@ -94,7 +95,7 @@ fn a_defect_switches_off() {
     }
 }
 
-/// From 120 to 140 °C the square of the current falls in proportion: at 130 °C the vector is 0.71 of the limit.
+/// From 120 to 140 °C the square of the current decreases linearly: at 130 °C the vector is 0.71 of the limit.
 #[test]
 fn the_torque_falls_with_the_temperature() {
     let mut rig = Rig::from_config(&sensed(), 3).unwrap();
@@ -112,7 +113,7 @@ fn the_torque_falls_with_the_temperature() {
         let why = if share < 1.0 { Limiting::Motor } else { Limiting::None };
         assert_eq!((rig.drive.state(), rig.drive.limiting()), (State::Torque, why), "{celsius}");
     }
-    // Settings without a sensor take the limit away.
+    // Settings without a sensor remove the limit.
     rig.command(&Command::Stop(Stop::Coast)).unwrap();
     rig.wait(1.0);
     let mut without = sensed();

@@ -1,5 +1,5 @@
-//! Procedure: the rotor warms up while the drive runs. Does the drive find the rotor time constant
-//! from the terminals, and does the flux stay where it believes it to be?
+//! Procedure: the rotor warms up while the drive runs. Does the drive find the rotor time constant from the terminal quantities, and does
+//! the flux stay at its estimated angle?
 
 use std::f64::consts::TAU;
 
@@ -23,8 +23,8 @@ const CASE: WarmingCase = WarmingCase {
     seconds: 14.0,
 };
 
-/// The last three seconds: largest relative error of tau_r where there is an estimate and how many there
-/// are, largest flux angle error in degrees.
+/// Results of the last three seconds: largest relative error of tau_r where there is an estimate and how many there are, largest flux
+/// angle error in degrees.
 fn end(moments: &[WarmingMoment]) -> (f64, usize, f64) {
     let last = &moments[moments.len() - 30..];
     let errors: Vec<f64> = last
@@ -64,7 +64,7 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
     for moment in &still {
         assert!(moment.estimate.is_err(), "speed and tau_r cannot be told apart: {moment:?}");
     }
-    // The lock monitor knows one direct current: with it the drive refuses another.
+    // The lock monitor is valid for one d-axis current: with it the drive refuses another.
     let config = config(&[residual, "injection.monitor=no"]);
     let case = WarmingCase { used: false, excitation: (0.1, 2.0), ..CASE };
     let runs: Vec<_> = (1..=8).map(|seed| run(&config, &case, seed).unwrap()).collect();
@@ -78,7 +78,7 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
         assert!((speed - moment.omega_m).abs() < 2.4, "{moment:?}");
     }
     let moved = &runs[2];
-    // The inverse of the four coefficients themselves has nothing to do with the machine.
+    // The inverse of the four coefficients themselves says nothing about the machine.
     let inverse = moved[moved.len() - 30..].iter().map(|m| m.model_d.tau_r.unwrap_or(0.0));
     let off = inverse.zip(&moved[moved.len() - 30..]).map(|(tau, m)| (tau / m.tau_r - 1.0).abs());
     assert!(off.sum::<f64>() / 30.0 > 0.1);
@@ -86,17 +86,17 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
 
 #[test]
 fn no_torque_no_estimate() {
-    // At i_q = 0 the rotor carries no current: nothing shows its resistance.
+    // At i_q = 0 the rotor carries no current, so its resistance cannot be identified.
     let config = config(&["angle.source=encoder"]);
     let moments = run(&config, &WarmingCase { iq_a: 0.0, seconds: 6.0, ..CASE }, 1).unwrap();
     assert!(moments.iter().all(|m| m.estimate.is_err()));
 }
 
-/// Seconds and torque current, A.
+/// Seconds and q-axis current, A.
 type Profile = [(f64, f32)];
 
-/// Tracks over a profile of the torque with the encoder: the error of each estimate, and at its end of
-/// what the drive uses, relative.
+/// Tracks over a profile of the torque with the encoder. Returns the relative error of each estimate, and at the end that of the value in
+/// use.
 fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>, f64) {
     let mut config = config(&["angle.source=encoder"]);
     let settings = Settings { track_rotor: true, ..config.drive };
@@ -152,13 +152,13 @@ fn a_torque_that_changes_does_not_mislead() {
             assert!(errors.len() > 25 && worst < 0.07 && used.abs() < 0.07, "{worst} {used}");
         }
     }
-    // Faster than it can follow: nothing is said, nothing is touched.
+    // If the current changes faster than the tracking can follow, no estimate is given, and the value in use stays.
     let fast = [2.0, -2.0, 1.0, 0.0, 3.0, 0.5, 2.0, -1.0].map(|i_q| (1.0, i_q));
     let (errors, used) = over(&fast, 0.0, 1.0, 0.82);
     assert!(errors.is_empty() && used.abs() < 1e-5, "{errors:?} {used}");
 }
 
-/// At the ends of the ranges that the settings are checked against.
+/// Motors at the ends of the ranges against which the settings are checked.
 #[test]
 fn every_motor_in_range_can_be_tracked() {
     for r_s in [0.001, 1000.0] {
@@ -218,7 +218,7 @@ fn the_drive_takes_a_time_constant_only_if_it_is_wanted_bounded_and_slowly() {
     }
     let nan = rig.drive.command(&Command::RotorTimeConstant(f32::NAN));
     assert_eq!(nan, Err(Refused::NotFinite));
-    // 11 % more rate by steps of 2 %.
+    // An increase of 11 % of the rate in steps of 2 %.
     for n in 1..=5 {
         let Ok(Accepted::Limited(now)) = rig.drive.command(&asked) else { panic!() };
         assert!((nominal / now - 1.0 - 0.02 * f32::from(n as u8)).abs() < 1e-5, "{now}");

@@ -7,7 +7,7 @@ use drive_core::{Command, Limiting, Mode, State};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig};
 
-/// What a window of time shows.
+/// Statistics over a window of time.
 #[derive(Debug, Default)]
 struct Seen {
     /// Mean current from the dc link, A.
@@ -15,9 +15,9 @@ struct Seen {
     /// Largest and smallest mean over 20 ms, A.
     most_a: f64,
     least_a: f64,
-    /// Share of the time in which the power limits.
+    /// Share of the time in which the power is the limiting factor.
     limited: f64,
-    /// Mean, largest and smallest reference of the torque current, A.
+    /// Mean, largest and smallest reference of the q-axis current, A.
     i_q: f64,
     i_q_most: f64,
     i_q_least: f64,
@@ -103,7 +103,7 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
                     error.abs() < 0.03 && seen.limited > 0.99,
                     "{changes:?} {rpm} {i_q}: {seen:?}"
                 );
-                // No chatter, and the step goes beyond by less than a tenth.
+                // There is no chatter, and the step overshoots by less than a tenth.
                 assert!(seen.i_q_most - seen.i_q_least < 0.2, "{changes:?} {seen:?}");
                 assert!(beyond < 0.1 * limit.abs() + 0.01, "{changes:?} {rpm} {i_q}: {beyond} A");
                 worst = worst.max(error.abs());
@@ -113,7 +113,7 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
     println!("worst {worst:.4}");
 }
 
-/// The power is held while the speed goes through all quadrants, with the torque that was asked for where there is room.
+/// The power is held while the speed passes through all quadrants, with the requested torque where the power allows it.
 #[test]
 fn the_power_is_held_over_all_speeds() {
     let limits = ["limits.motoring_w=150", "limits.generating_w=50", "angle.source=encoder"];
@@ -141,8 +141,8 @@ fn the_power_is_held_over_all_speeds() {
     }
 }
 
-/// At rest. With no power back into the link a position is held against a load that pulls, and given way slowly. A motoring limit
-/// that the losses use up leaves no torque; one below what the direct current takes is refused.
+/// At rest: if no power may flow back into the link, a position is held against a pulling load, and the shaft yields slowly. A motoring
+/// limit that the losses use up leaves no torque; a limit below the need of the d-axis current is refused.
 #[test]
 fn at_rest_torque_is_not_reversed() {
     let none = [

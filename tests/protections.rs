@@ -1,5 +1,5 @@
-//! Procedure: break a sensor while the motor runs. The drive must switch off before the current in
-//! any phase leaves the range of the sensors, and must not switch off without reason.
+//! Procedure: break a sensor while the motor runs. The drive must switch off before the current in any phase leaves the range of the
+//! sensors, and must not switch off without reason.
 
 use crate::common::{config, regulating};
 use drive_core::{Command, Fault, Mode, State, Stop};
@@ -9,8 +9,8 @@ use hil_sim::rig::Rig;
 /// End of the sensors' range, A.
 const RANGE_A: f64 = 4.47;
 
-/// Steps until the drive has switched off, at most `periods`: how many it took, the fault, and the
-/// largest phase current on the way and after it, A.
+/// Steps until the drive has switched off, at most `periods`. Returns the number of steps, the fault, and the largest phase current until
+/// then and afterwards, A.
 fn until_off(rig: &mut Rig, periods: u32) -> (u32, Option<Fault>, f64) {
     let mut peak = 0.0_f64;
     let mut took = None;
@@ -52,8 +52,7 @@ fn a_broken_current_sensor_switches_off_in_time() {
 
 #[test]
 fn a_dead_encoder_switches_off() {
-    // At standstill nothing tells a dead encoder from a still shaft; from 600 rpm on the back-emf
-    // does.
+    // At standstill a dead encoder cannot be distinguished from a shaft at rest; at 600 rpm and above the back-EMF reveals it.
     for rpm in [600, -900, 1440] {
         let speed = format!("load.speed_rpm={rpm}");
         let config = config(&["angle.source=encoder", "load.mode=speed", &speed]);
@@ -76,7 +75,7 @@ fn the_dc_link_is_watched() {
     }
 }
 
-/// Full reversals, starts, stops and a turning shaft, over seeds: no fault.
+/// Full reversals, starts, stops and flying starts, over seeds, cause no fault.
 #[test]
 fn nothing_trips_without_reason() {
     for seed in 1..=6 {
@@ -95,7 +94,7 @@ fn nothing_trips_without_reason() {
             rig.command(&Command::Stop(Stop::Coast)).unwrap();
             rig.wait(0.5);
             assert_eq!(rig.drive.state(), State::Off, "seed {seed}");
-            // Off is off: the motor is without current before it is started again.
+            // The motor is without current before it is started again.
             assert!(rig.plant.current().norm() < 1e-6);
             rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
             rig.set_load(Load::Free { torque: 0.0 }).unwrap();

@@ -1,9 +1,9 @@
-//! Recorded samples and orders, replayed through the host drive: the same outputs and the same beliefs as ever.
+//! Recorded samples and requests, replayed through the host drive, give unchanged outputs and estimates.
 //!
 //! [`board`] has two runs of the image, [`scenes`] runs of the simulated bench that lead through the other states.
 //!
-//! A change that is meant to leave the control as it is leaves these hashes as they are. One that changes the
-//! control on purpose changes them too; its commit names the cause.
+//! If a change is meant to leave the control as it is, these hashes stay as they are. If a change alters the control on purpose, the
+//! hashes change too, and its commit names the cause.
 
 mod board;
 mod packed;
@@ -22,7 +22,7 @@ fn recorded(name: &str) -> String {
     format!("{}/tests/recorded/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Replays a recorded scene: the drive at its end, and the hashes of each block.
+/// Replays a recorded scene; returns the drive at its end, and the hashes of each block.
 fn replayed(name: &str) -> (Drive, Vec<Hashes>) {
     let scene = SCENES.iter().find(|scene| scene.name == name).unwrap();
     let path = recorded(name);
@@ -31,7 +31,7 @@ fn replayed(name: &str) -> (Drive, Vec<Hashes>) {
     replay(scene, &samples, &orders)
 }
 
-/// The result of the recorded learning.
+/// The result of the recorded self-commissioning.
 fn learned() -> Learned {
     *replayed("learning").0.learned().unwrap()
 }
@@ -63,7 +63,7 @@ fn every_scene_is_tested() {
     assert_eq!(names, TESTED);
 }
 
-/// Records the scenes whose names contain the value of `SCENE` anew:
+/// Records again the scenes whose names contain the value of `SCENE`:
 /// `SCENE=stops cargo test --release --test procedures record_again -- --ignored`.
 #[test]
 #[ignore = "it replaces the yardstick"]

@@ -7,7 +7,7 @@ use drive_core::{AngleSource, Command, Fault, Mode, State};
 use hil_sim::Config;
 use hil_sim::rig::RATE_HZ;
 
-/// Shares of the expected saliency, and whether a drive starts with it.
+/// Shares of the expected saliency, and whether a drive starts with each.
 const SHARES: [(f64, bool); 5] =
     [(0.0, false), (0.1, false), (0.5, true), (1.0, true), (1.5, true)];
 /// Seeds of the starts in the long proof.
@@ -48,7 +48,7 @@ fn starts(seeds: u64) {
     }
 }
 
-/// 3.8 standard deviations lie between the limit and either a tenth or half.
+/// The limit is 3.8 standard deviations from a tenth and from half of the saliency.
 #[test]
 fn a_motor_without_saliency_is_refused_and_one_with_half_of_it_is_not() {
     starts(60);

@@ -1,5 +1,4 @@
-//! Procedure: position without an encoder, on the simulated rotor: a step, and what holds it and what
-//! does not.
+//! Procedure: position without an encoder, on the simulated rotor: a step, and the conditions under which the position is held.
 
 use std::f64::consts::TAU;
 
@@ -32,7 +31,7 @@ fn a_step_arrives_without_an_encoder() {
         });
         let error = degrees(&rig) - origin - turns * 360.0;
         println!("{turns} turns: {error:.1} off, furthest {furthest:.1}, angle {angle:.1} deg");
-        // The error of the slip while the motor accelerates: noise of the angle, integrated.
+        // Error of the slip while the motor accelerates: noise of the angle, integrated.
         assert!(error.abs() < 35.0, "{turns} turns: {error} degrees off");
         assert!(furthest < turns.abs() * 360.0 + 40.0, "{turns}: {furthest}");
         assert!(angle < 14.0, "{turns}: {angle}");
@@ -40,8 +39,7 @@ fn a_step_arrives_without_an_encoder() {
     }
 }
 
-/// A minute without a load: the current is zero, there is no slip to be wrong, and what is left is
-/// the noise of the angle.
+/// A minute without a load: the current is zero, so there is no slip error, and only the noise of the angle remains.
 #[test]
 fn a_minute_at_rest_costs_a_few_degrees() {
     let mut rig = started(&config(&["load.mode=free"]), 4);
@@ -53,8 +51,8 @@ fn a_minute_at_rest_costs_a_few_degrees() {
     assert!(drift.abs() < 25.0, "{drift}");
 }
 
-/// Under load the drift is that of the believed rotor resistance: dslip = i_q / i_d / T_r times its
-/// error, half of it mechanical. This is what the documentation says it is, not more and not less.
+/// Under load the drift is that of the rotor resistance in the settings: dslip = i_q / i_d / T_r times its error, half of it mechanical.
+/// This equals the statement in the documentation.
 #[test]
 fn under_load_the_drift_is_the_error_of_the_slip() {
     let believed = 1.1;
@@ -83,7 +81,7 @@ fn under_load_the_drift_is_the_error_of_the_slip() {
     println!(
         "{known:.1} deg in 10 s with the resistance known, {wrong:.1} with +10 %: {expected:.1}"
     );
-    // Noise walks by 10 degrees, a bias of 0.3 degrees makes 25.
+    // Noise walks by 10 degrees, a bias of 0.3 degrees causes 25.
     assert!(known.abs() < 45.0, "{known}");
     assert!((wrong / expected - 1.0).abs() < 0.25, "{wrong} against {expected}");
 }

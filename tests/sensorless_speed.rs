@@ -46,7 +46,7 @@ fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
             println!(
                 "{rpm} rpm: mean {mean:.2}, largest {most:.2} rpm; {on_the_way:.1}, {angle:.1} deg"
             );
-            // Without a load there is no slip to be wrong: what is left is noise.
+            // Without a load there is no slip error: only noise remains.
             assert!(mean.abs() < 2.0 && most < 6.0, "{rpm} rpm: {mean} {most}");
             assert!(on_the_way < 14.0 && angle < 11.0, "{rpm} rpm: {on_the_way} {angle}");
             before = rpm;
@@ -55,28 +55,28 @@ fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
     }
 }
 
-/// Half the largest torque at standstill, forwards and backwards; the angle is kept and the speed comes
-/// back to within the error of the slip.
+/// With a load step of half the largest torque at standstill, forwards and backwards, the lock is kept and the speed returns to within
+/// the error of the slip.
 #[test]
 fn a_load_step_is_carried() {
     for (seed, rpm) in [(11, 0.0), (12, 30.0), (13, -150.0)] {
         let mut rig = regulating(&config(&[FREE]), seed, rpm);
         rig.set_load(Load::Free { torque: 0.6 }).unwrap();
         let (_, dip, angle) = watch(&mut rig, rpm, 1.0);
-        // The zero of the controller, at a quarter of the crossover, leaves a tail of half a second.
+        // The zero of the controller, at a quarter of the crossover, causes a tail of half a second.
         watch(&mut rig, rpm, 1.0);
         let (mean, ..) = watch(&mut rig, rpm, 1.0);
         println!("{rpm} rpm: dip {dip:.1} rpm, then {mean:.2}; angle {angle:.1} deg");
-        // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop answers with its crossover of 1.4 Hz.
+        // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop responds with its crossover of 1.4 Hz.
         assert!((10.0..70.0).contains(&dip), "{rpm}: {dip}");
         assert!(mean.abs() < 4.0, "{rpm}: {mean}");
-        // Peak of the mean response 8, and noise.
+        // The peak of the mean response is 8, and noise adds to it.
         assert!(angle < 12.0, "{rpm}: {angle}");
         assert_eq!(rig.drive.state(), State::Speed);
     }
 }
 
-/// An inertia that the drive does not know: half and twice what it was designed for.
+/// The drive has the wrong inertia: half and twice the value that it was designed for.
 #[test]
 fn the_inertia_need_not_be_known_well() {
     for factor in [0.5, 2.0] {
@@ -96,8 +96,8 @@ fn the_inertia_need_not_be_known_well() {
     }
 }
 
-/// A shaft that is blocked while the speed is asked for: the current stays at its limit, the angle
-/// holds, and the shaft turns when it is let go.
+/// The shaft is blocked while a speed is requested: the current stays at its limit, the lock is kept, and the shaft turns when it is
+/// released.
 #[test]
 fn a_blocked_shaft_is_survived() {
     let mut rig = regulating(&config(&[FREE]), 7, 0.0);
@@ -114,7 +114,7 @@ fn a_blocked_shaft_is_survived() {
     assert_eq!(rig.drive.state(), State::Speed);
 }
 
-/// The same mode with the encoder.
+/// The speed mode with the encoder.
 #[test]
 fn with_the_encoder_the_speed_is_exact() {
     let config = config(&[FREE, "angle.source=encoder", "speed.limit_rpm=1440"]);
@@ -129,8 +129,9 @@ fn with_the_encoder_the_speed_is_exact() {
     assert!((truth - 600.0).abs() < 1.0, "{truth}");
 }
 
-/// Half of the rated torque on the free shaft of a motor with saturation at 80 % of its rated speed, at the default and with a stiff shaft's
-/// margin: lowest speed, rpm below the reference, area of the dip, percent of the rated speed times s, and largest angle error, degrees.
+/// Half of the rated torque on the free shaft of a motor with saturation at 80 % of its rated speed, at the default and with the phase
+/// margin for a stiff shaft: lowest speed, rpm below the reference, area of the dip, percent of the rated speed times s, and largest
+/// angle error, degrees.
 #[test]
 fn the_speed_falls_no_further_than_with_an_encoder() {
     const RPM: f64 = 1150.0;
@@ -142,7 +143,7 @@ fn the_speed_falls_no_further_than_with_an_encoder() {
             format!("angle_source={source}"),
             format!("speed.phase_margin_deg={margin}"),
             "speed.ramp_rpm_per_s=3000".to_owned(),
-            // Its rule is far lower with an encoder.
+            // Its rule gives a far lower limit with an encoder.
             "speed.limit_rpm=1400".to_owned(),
         ];
         let config = Config::load(Some("motulator-2kw2"), None, &settings).unwrap();
@@ -171,8 +172,8 @@ fn the_speed_falls_no_further_than_with_an_encoder() {
     }
 }
 
-/// A start on a shaft that turns freely goes on from the speed that it finds: it does not brake the shaft. (Speed control began at rest, and
-/// braked a light shaft to a standstill.)
+/// A flying start continues from the speed that it finds: it does not brake the shaft. (Speed control once began at rest, and braked a
+/// light shaft to a standstill.)
 #[test]
 fn a_start_on_a_turning_shaft_does_not_brake_it() {
     let settings = ["plant=r", FREE, "prepare.learn=yes", "speed.ramp_rpm_per_s=3000"];

@@ -7,8 +7,7 @@ const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];
 /// The source compensates no delay.
 const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
 
-/// Rectified, 10 mA, k_s 0.132546, z_s 0.9, without noise: with the delays left as in
-/// the source, and compensated.
+/// Rectified, 10 mA, k_s 0.132546, z_s 0.9, without noise: with the delays left as in the source, and compensated.
 #[test]
 fn the_rectified_chain_tracks_within_13_degrees() {
     for name in ["torque-steps", "torque-ramp"] {
@@ -21,7 +20,7 @@ fn the_rectified_chain_tracks_within_13_degrees() {
     }
 }
 
-/// With converter, noise and dead-time residual, several seeds: rectified, and the default.
+/// With ADC, noise and dead-time residual, several seeds: rectified, and the default.
 #[test]
 fn the_drive_holds_torque_with_a_realistic_measurement() {
     // Rectified: 3.7 to 4.1 rms and 10.7 to 12.8 largest over the first six seeds; synchronous: 1.3
@@ -37,8 +36,8 @@ fn the_drive_holds_torque_with_a_realistic_measurement() {
     }
 }
 
-/// The default drive without measurement errors: what is left is the reference's own error, which
-/// was learned with a dead-time residual.
+/// The default drive without measurement errors: the remainder is the error of the saliency offset itself, which was learned with a
+/// dead-time residual.
 #[test]
 fn the_synchronous_chain_is_exact_to_a_degree() {
     for (name, sign) in [("torque-steps", "1"), ("torque-steps", "-1"), ("torque-ramp", "1")] {
@@ -47,13 +46,13 @@ fn the_synchronous_chain_is_exact_to_a_degree() {
         changes.push(&iq);
         let outcome = run(name, &changes, 1);
         println!("{name}: {:?}", outcome.metrics);
-        // 1.3 seen: 0.9 of the reference and 0.4 in the steps.
+        // 1.3 measured: 0.9 from the saliency offset and 0.4 in the steps.
         assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 2.0);
     }
 }
 
-/// Steps up to full reversal, and with a rotor 30 % warmer than the drive believes. Eight seeds give 5.8 to 10.0 degrees, and 6.5
-/// to 9.3 without the observer: the noise of the injection at the reversal.
+/// Steps up to full reversal, and with a rotor resistance 30 % above the settings. Eight seeds give 5.8 to 10.0 degrees, and 6.5 to 9.3
+/// without the observer: the noise of the injection at the reversal.
 #[test]
 fn reversals_keep_the_angle() {
     for (changes, limit) in [(vec![], 11.0), (vec!["drive.motor.rr=0.846"], 18.0)] {
@@ -67,7 +66,7 @@ fn reversals_keep_the_angle() {
     }
 }
 
-/// Random operating points: a share of what `cargo sim run monte-carlo --set runs=1000` shows.
+/// Random operating points: a part of the runs of `cargo sim run monte-carlo --set runs=1000`.
 #[test]
 fn no_angle_is_lost_within_150_and_300_rpm() {
     for (speed, seed) in [("0", 21), ("300", 22)] {
@@ -75,24 +74,23 @@ fn no_angle_is_lost_within_150_and_300_rpm() {
         let outcome = run("monte-carlo", &["runs=100", &speed], seed);
         println!("{speed}: {:?}", outcome.metrics);
         assert_eq!(outcome.metrics.get("lost_runs"), Some(0.0));
-        // 1.6 pooled, 9 to 12 largest of 1000.
+        // 1.6 pooled; the largest of 1000 is 9 to 12.
         assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 2.3);
         assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 14.0);
     }
 }
 
-/// The torque follows Eq. 4.4 with the true flux and angle, whatever the angle error.
+/// The torque follows Eq. 4.4 with the true flux and angle, for any angle error.
 #[test]
 fn torque_follows_equation_4_4() {
     let outcome = run("torque-steps", &[], 3);
     let difference = outcome.metrics.get("torque_minus_eq_4_4_rms_nm").unwrap();
-    // The carrier on the torque axis makes 0.083 Nm peak of ripple; the equation has none of it.
+    // The injection on the torque axis causes 0.083 Nm peak of ripple; the equation has none of it.
     assert!(difference < 0.075, "{difference} Nm");
 }
 
-/// A weak saliency with the constant 10 mA reference does not explain the 40° to 60° of the source, which states them at
-/// every level: with a tenth of the assumed saliency the same chain errs by tens of degrees, three times as much at 2 A as
-/// at 1 A.
+/// A weak saliency with the constant 10 mA offset does not explain the 40° to 60° of the source, which states them at every level: with a
+/// tenth of the assumed saliency the same chain errs by tens of degrees, three times as much at 2 A as at 1 A.
 #[test]
 fn a_tenth_of_the_saliency_gives_tens_of_degrees() {
     let weak = ["saliency.a_psi=-0.0035"];
@@ -115,9 +113,8 @@ fn negative_torque_works_as_well() {
     assert!(outcome.steps.unwrap().iter().all(|s| s.torque_nm < -0.2));
 }
 
-/// Torque over the torque current at standstill, and over time: linear within 5 % to 2 A and 8 % to
-/// 3 A; no 2-s mean of the angle error differs from the first by more than 1.3°: such means scatter
-/// by 0.35° at 3 A.
+/// Torque over the q-axis current at standstill, and over time: linear within 5 % to 2 A and 8 % to 3 A; no 2-s mean of the angle error
+/// differs from the first by more than 1.3°: such means scatter by 0.35° at 3 A.
 #[test]
 fn torque_is_linear_in_the_current_and_does_not_drift() {
     let per_ampere = |i_q: f32| {

@@ -1,5 +1,5 @@
-//! Procedure: at speed, where the carrier is off, a current sensor opens or sticks. The drive must switch off within half a turn of
-//! the flux or 8 ms, whichever is later.
+//! Procedure: at speed, where the injection is off, a current sensor opens or sticks. The drive must switch off within half a turn of the
+//! flux or 8 ms, whichever is later.
 #![allow(clippy::disallowed_methods)]
 
 use std::f64::consts::TAU;
@@ -12,10 +12,10 @@ use hil_sim::rig::{RATE_HZ, Rig};
 
 /// Pole pairs of the motor.
 const POLE_PAIRS: f64 = 2.0;
-/// Longest time where half a turn of the flux is shorter, s.
+/// Longest time if half a turn of the flux is shorter, s.
 const LONGEST_S: f64 = 0.008;
 
-/// A drive that has learned and regulates torque on a shaft of this speed.
+/// A drive that has learned and regulates torque on a shaft at this speed.
 fn at_speed(rpm: f64) -> Rig {
     let config = Config::load(None, None, &["prepare.learn=yes"]).unwrap();
     let mut rig = Rig::from_config(&for_the_range(&config).unwrap(), 5).unwrap();
@@ -36,7 +36,7 @@ fn spread(n: u32, step: f64) -> f64 {
 
 #[test]
 fn a_silent_sensor_is_noticed_at_speed() {
-    // 300 faults a speed and kind with RUNS=300.
+    // With RUNS=300 there are 300 faults per speed and kind.
     let runs = std::env::var("RUNS").map_or(30, |runs| runs.parse().unwrap());
     for rpm in [900.0_f64, 1800.0, -3000.0] {
         let rig = at_speed(rpm);
@@ -82,7 +82,7 @@ fn a_silent_sensor_is_noticed_at_speed() {
                 at(1.0)
             );
             assert!(late.is_empty(), "{rpm} rpm, open {open}: {late:?}");
-            // The slower the flux turns, the more the prediction of the current finds alone.
+            // The slower the flux rotates, the more faults the prediction of the current finds alone.
             assert!(silent > 0 || rpm == 900.0, "{rpm} rpm, open {open}");
         }
     }

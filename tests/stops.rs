@@ -4,7 +4,7 @@ use crate::common::config;
 use drive_core::{Command, Mode, State, Stop};
 use hil_sim::rig::Rig;
 
-/// Turns the shaft at `rpm`, stops it so, and returns the seconds until the outputs are off and the speed then, rpm.
+/// Turns the shaft at `rpm`, stops in this way, and returns the seconds until the outputs are off and the speed then, rpm.
 fn stopped(changes: &[&str], mode: Mode, rpm: f64, stop: Stop) -> (f64, f64) {
     let mut rig = Rig::from_config(&config(changes), 1).unwrap();
     rig.start(mode).unwrap();
@@ -28,8 +28,8 @@ fn stopped(changes: &[&str], mode: Mode, rpm: f64, stop: Stop) -> (f64, f64) {
     (rig.time() - began, turning)
 }
 
-/// The ramp takes 1 s for 300 rpm, 0.4 s at most go by until the loop has settled, and 0.1 s at rest are waited for. A quick
-/// stop with 3 A is 2.6 times as fast. A shaft that coasts turns on.
+/// The ramp takes 1 s for 300 rpm, the loop settles within another 0.4 s, and the drive waits 0.1 s at rest. A quick stop with 3 A is 2.6
+/// times as fast. A coasting shaft keeps turning.
 #[test]
 fn ramp_and_quick_stop_bring_the_shaft_to_rest_and_coast_does_not() {
     for changes in
@@ -49,7 +49,7 @@ fn ramp_and_quick_stop_bring_the_shaft_to_rest_and_coast_does_not() {
     }
 }
 
-/// Above the nominal voltage of the link the braking torque gives way, whichever ramp is asked for: no trip.
+/// Above the nominal voltage of the link the braking torque is reduced, for every ramp: no trip.
 #[test]
 fn the_dc_link_holds_a_quick_stop_back() {
     let changes = [
@@ -67,8 +67,8 @@ fn the_dc_link_holds_a_quick_stop_back() {
     assert!(takes > 4.0 && rpm.abs() < 12.0, "{takes} s, {rpm} rpm");
 }
 
-/// With an S-ramp the acceleration comes and goes in half a second: 300 rpm at 300 rpm/s take 1.5 s instead of 1 s, up as by
-/// `stop ramp`, without the speed passing its goal by more than the noise; and nothing jerks.
+/// With an S-ramp the acceleration rises and falls in half a second: 300 rpm at 300 rpm/s take 1.5 s instead of 1 s, for a start as for
+/// `stop ramp`. The speed does not overshoot by more than the noise, and there is no jerk.
 #[test]
 fn an_s_ramp_rounds_speed_and_stop() {
     let changes = ["load.mode=free", "angle.source=encoder", "speed.s_ramp_s=0.5"];
@@ -82,7 +82,7 @@ fn an_s_ramp_rounds_speed_and_stop() {
     assert_eq!(rig.drive.state(), State::Off);
     let at = |t: f64| speeds[(t * 6000.0) as usize];
     println!("{:.1} {:.1} {:.1} {:.1}", at(0.5), at(1.0), at(1.6), at(3.0));
-    // a t^2/(2 s) while the acceleration rises, and the same from the other end; 8 rpm are 30 ms of lag at 300 rpm/s.
+    // a t^2/(2 s) while the acceleration rises, and the same at the other end; 8 rpm are 30 ms of lag at 300 rpm/s.
     for (t, expected) in
         [(0.5, 75.0), (0.75, 150.0), (1.0, 225.0), (2.4, 300.0), (3.0, 225.0), (3.5, 75.0)]
     {

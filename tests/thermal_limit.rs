@@ -1,10 +1,10 @@
-//! Procedure: more torque asked for than motor or inverter carry for any time, at standstill.
+//! Procedure: at standstill more torque is requested than motor or inverter carry continuously.
 
 use crate::common::config;
 use drive_core::{Command, Limiting, Mode, State};
 use hil_sim::rig::Rig;
 
-/// Largest load of an i²t body of `tau_s` s that carries `carried` A for ever, with the true current; the mean current of the last
+/// Largest load of an i²t body of `tau_s` s that carries `carried` A continuously, with the true current; the mean current of the last
 /// second, A; share of the next second in which this limits.
 fn settles(
     changes: &[&str],
@@ -34,7 +34,7 @@ fn settles(
     (most, (sum / n).sqrt(), limited as f64 / 100.0)
 }
 
-/// The shaft is locked, 3 A are asked for. The current settles at what is carried for ever, with its direct part: from half the
+/// The shaft is locked, and 3 A are requested. The current settles at the continuous limit, including its d-axis part: from half the
 /// limit to nearly all of it, with slow bodies and with the fastest that the settings allow.
 #[test]
 fn the_torque_falls_back_to_what_is_carried_for_ever() {
@@ -59,7 +59,7 @@ fn the_torque_falls_back_to_what_is_carried_for_ever() {
     }
 }
 
-/// A direct current that alone is too large is nothing that the torque can give way for: it trips.
+/// If the d-axis current alone is too large, less torque does not help: the drive trips.
 #[test]
 fn what_cannot_fall_back_trips() {
     let changes =

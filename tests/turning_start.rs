@@ -1,4 +1,4 @@
-//! Procedure: start on a shaft that turns, at low speed, where the injection gives the angle.
+//! Procedure: flying start at low speed, where the injection gives the angle.
 
 use std::f64::consts::TAU;
 
@@ -8,8 +8,8 @@ use hil_sim::experiments::{self, full_range::for_the_range};
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
 
-/// The search for the speed and the flux that builds up do not move the stator resistance that is tracked, with and without flux
-/// that was left by a stop. (They did by up to 40 %.)
+/// The search for the speed and the build-up of the flux do not change the tracked stator resistance, with and without flux that remains
+/// after a stop. (They once did by up to 40 %.)
 #[test]
 fn a_start_on_a_turning_shaft_keeps_the_resistance() {
     let mut refused = 0;
@@ -36,8 +36,8 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
         for pause in [0.05, 0.15, 0.25, 0.37, 1.5] {
             let mut rig = stopped.clone();
             rig.wait(pause);
-            // The residual flux and the flux of the search can cancel. The drive then takes the shaft for standing, and the
-            // saliency check refuses the start.
+            // The residual flux and the flux of the search can cancel. Then the drive takes the shaft to be at rest, and the saliency
+            // check refuses the start.
             if rig.start(Mode::Torque).is_err() {
                 refused += 1;
                 assert_eq!(rig.drive.state(), State::Fault(Fault::NoSaliency));
@@ -52,15 +52,15 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
                 100.0 * before
             );
             assert_eq!(state, State::Torque);
-            // The filter begins with a deviation of 30 %: noise of the first carrier periods moves it by up to 3.8 % here.
+            // The filter begins with a deviation of 30 %: noise of the first injection periods moves it by up to 3.8 % here.
             assert!((more - before).abs() < 0.06, "{more}");
         }
     }
     assert!(refused <= 1, "{refused}");
 }
 
-/// On iron the carrier current changes with the flux that builds up: the lock monitor begins to measure its baseline 0.2 s later, and
-/// does not stop a drive whose angle is right.
+/// With saturation, the injection current changes with the flux that builds up. The lock monitor begins to measure its baseline 0.2 s
+/// later, and does not stop a drive whose angle is right.
 #[test]
 fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
     for (seed, plant, rpm, torque) in
@@ -82,8 +82,8 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
     }
 }
 
-/// Sensors and leakage that have changed since the learning change the carrier current, and so does its baseline, which a start on a
-/// turning shaft measures anew: no run is stopped. (Against the baseline of the learning most runs below 550 rpm were.)
+/// Sensors and leakage that have changed since the self-commissioning change the injection current. A flying start measures the baseline
+/// again, so it changes too, and no run is stopped. (With the baseline of the self-commissioning most runs below 550 rpm were.)
 #[test]
 fn a_change_since_the_learning_stops_no_start_on_a_turning_shaft() {
     const GAINS: &[(&str, f64)] =
@@ -97,7 +97,7 @@ fn a_change_since_the_learning_stops_no_start_on_a_turning_shaft() {
         settings.extend(changes.iter().map(|(key, value)| format!("after.{key}={value}")));
         let config = Config::load(None, None, &settings).unwrap();
         let outcome = experiments::run("full-range", &config, 3).unwrap();
-        // Shafts that turn too fast are refused: see below.
+        // Shafts that rotate too fast are refused, see below.
         for region in
             ["0_150", "150_350", "350_550", "550_750", "750_1200", "1200_1800", "1800_2700"]
         {
@@ -109,8 +109,8 @@ fn a_change_since_the_learning_stops_no_start_on_a_turning_shaft() {
     }
 }
 
-/// Above 2700 rpm the voltage of the rotor drowns in the noise of the sensors: the drive refuses, with either direction, and no current
-/// goes on.
+/// Above 2700 rpm the noise of the sensors hides the voltage of the rotor: the drive refuses the start in either direction, and no
+/// current remains.
 #[test]
 fn a_shaft_that_turns_too_fast_is_refused() {
     for (seed, rpm, caught) in

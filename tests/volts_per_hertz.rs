@@ -1,5 +1,5 @@
-//! Procedure: turn a motor of which only the nameplate is known, by voltage and frequency. The parameters in `motor.*` are
-//! those of another motor throughout.
+//! Procedure: run a motor of which only the nameplate is known, with V/f control. The parameters in `motor.*` are those of another motor
+//! throughout.
 
 use crate::common::{config, plant_settings};
 use drive_core::{Command, Fault, Limiting, Mode, Motor, Refused, State, Stop};
@@ -8,10 +8,10 @@ use hil_sim::Config;
 use hil_sim::plant::{Channel, CurrentFault, Load};
 use hil_sim::rig::Rig;
 
-/// Time until the boost stands and the flux has built up, s.
+/// Time until the boost is reached and the flux has built up, s.
 const BUILT_S: f64 = 1.5;
 
-/// Settings that know the nameplate and the pairs of poles alone.
+/// Settings with only the nameplate and the pole pairs.
 fn unidentified(config: &Config) -> Settings {
     let own = &config.drive;
     let motor = Motor { pole_pairs: own.motor.pole_pairs, ..Motor::default() };
@@ -20,7 +20,7 @@ fn unidentified(config: &Config) -> Settings {
     settings
 }
 
-/// A free shaft that is turned at `rpm`, settled.
+/// A free shaft that rotates at `rpm`, settled.
 fn turning(config: &Config, rpm: f64, seed: u64) -> Rig {
     let settings = unidentified(config);
     let mut rig = Rig::new(&plant_settings(config), &settings, seed).unwrap();
@@ -32,7 +32,7 @@ fn turning(config: &Config, rpm: f64, seed: u64) -> Rig {
     rig
 }
 
-/// Mean speed, rpm, and largest current, A, of a second.
+/// Mean speed, rpm, and largest current, A, over a second.
 fn seen(rig: &mut Rig) -> (f64, f64) {
     let (mut sum, mut n, mut peak) = (0.0, 0.0, 0.0_f64);
     rig.run(1.0, |p| {
@@ -41,8 +41,8 @@ fn seen(rig: &mut Rig) -> (f64, f64) {
     (sum / n, peak)
 }
 
-/// Half the rated speed, with and without a third of the rated torque, both ways. Without load the slip is that of the
-/// friction; under load the nameplate's slip is off by up to 1.5 % of the rated speed (the temperature of the rotor).
+/// Half the rated speed, with and without a third of the rated torque, in both directions. Without load the slip is caused by friction;
+/// under load the nameplate's slip is off by up to 1.5 % of the rated speed (the temperature of the rotor).
 #[test]
 fn motors_turn_by_their_nameplates() {
     for (seed, motor) in [
@@ -59,7 +59,7 @@ fn motors_turn_by_their_nameplates() {
         let plate = &config.drive.nameplate;
         let rated_rpm = f64::from(plate.speed_rpm);
         let rated_nm = f64::from(plate.power_w) / (rated_rpm * std::f64::consts::TAU / 60.0);
-        // The current limit of the reference bears less than its rated flux.
+        // The current limit of the reference board allows less than its rated flux.
         let torque = if motor.is_some() { 0.3 * rated_nm } else { 0.08 * rated_nm };
         let limit = f64::from(config.drive.current_limit_a());
         for sign in [1.0, -1.0] {
@@ -84,7 +84,7 @@ fn motors_turn_by_their_nameplates() {
     }
 }
 
-/// Two and a half times the rated torque: the shaft is dragged away, and the drive does not turn on as if nothing were.
+/// At two and a half times the rated torque the load drags the shaft away, and the drive switches off.
 #[test]
 fn a_load_beyond_the_limit_switches_off() {
     for seed in 1..4 {
@@ -95,7 +95,7 @@ fn a_load_beyond_the_limit_switches_off() {
         rig.run(4.0, |p| peak = peak.max(p.current));
         println!("{:?}, {peak:.2} A", rig.drive.state());
         assert!(matches!(rig.drive.state(), State::Fault(_)), "{}", rig.drive.state());
-        // The trip, and a period in which the current rises on.
+        // The trip, and one more period in which the current rises.
         assert!(peak < 1.3 * f64::from(config.drive.trip_a()), "{peak}");
     }
 }
@@ -141,7 +141,7 @@ fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
     assert_eq!(rig.drive.state(), State::Off);
 }
 
-/// A shaft of five times the inertia is braked from speed: the frequency follows the link.
+/// A shaft with five times the inertia is braked from speed: the frequency follows the link.
 #[test]
 fn braking_keeps_the_link_below_its_limit() {
     let config = config(&["motor.inertia=0.06", "load.mode=free"]);
@@ -159,7 +159,7 @@ fn braking_keeps_the_link_below_its_limit() {
     assert_eq!(rig.drive.state(), State::VoltsPerHertz);
 }
 
-/// With a hot heat sink the shaft gives way under a load that it carries when cold, and the drive says why.
+/// With a hot heat sink the shaft slows down under a load that it carries when cold, and the drive states the reason.
 #[test]
 fn a_hot_heat_sink_takes_torque_and_is_named() {
     for (celsius, why) in [(25.0, Limiting::None), (79.0, Limiting::HeatSink)] {
@@ -177,7 +177,7 @@ fn a_hot_heat_sink_takes_torque_and_is_named() {
     }
 }
 
-/// A load that needs more power than allowed takes speed until it does not, within 5 % in two seconds. Measured: 211 W of 210 W.
+/// If a load needs more power than allowed, the speed falls until it does not, within 5 % in two seconds. Measured: 211 W of 210 W.
 #[test]
 fn a_power_limit_takes_speed() {
     let mut config = Config::of_motor(Some("motulator-2kw2")).unwrap();

@@ -1,5 +1,4 @@
-//! Procedure: the first start after the defaults, with the wiring right and wrong. No current may reach
-//! 0.5 A while the wiring is looked at.
+//! Procedure: the first start after the defaults, with the wiring right and wrong. No current may reach 0.5 A during the check.
 
 use crate::common::config;
 use drive_core::{Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State};
@@ -8,21 +7,20 @@ use hil_sim::config::motors::Motor;
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Channel, CurrentFault, Plant};
 
-/// What is wrong between the drive and the motor.
+/// Error between the drive and the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wiring {
     Right,
     /// The gates of two legs are exchanged.
     Legs(usize, usize),
-    /// Each sensor is on the other's phase.
+    /// The sensors are exchanged between the two phases.
     Sensors,
     /// Sensor a, or b, is the wrong way round.
     Reversed(Channel),
     Open(Channel),
 }
 
-/// Starts with the check and runs to its end: the state after it, and the largest phase current on the
-/// way, A.
+/// Starts with the check and runs to its end; returns the state after it, and the largest phase current until then, A.
 fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
     check_of(wiring, &config(changes), seed)
 }
@@ -79,8 +77,8 @@ fn exchanged(wiring: Wiring, compare: Compare) -> Compare {
     Compare { a, b, c, ..compare }
 }
 
-/// Every motor file with the dead time of the reference board, which a pulse for the leakage of a spindle hardly exceeds, at each rate of the
-/// legs.
+/// Every motor file with the dead time of the reference board, which a pulse for the leakage of a spindle hardly exceeds, at each
+/// switching frequency.
 #[test]
 fn the_right_wiring_of_every_motor_is_accepted() {
     for motor in Motor::all() {
@@ -101,8 +99,8 @@ fn the_right_wiring_of_every_motor_is_accepted() {
 /// Largest current while checking, A.
 const BOUND_A: f64 = 0.5;
 
-/// The motor may have half or twice the resistance and the transient inductance that the settings say
-/// (both leakages in proportion: the transient inductance is theirs but for 7 %).
+/// The motor may have half or twice the resistance and the transient inductance of the settings (both leakages in proportion: they make
+/// up the transient inductance except for 7 %).
 #[test]
 fn the_right_wiring_is_accepted_over_motors_and_seeds() {
     let mut largest = 0.0_f64;
@@ -113,7 +111,7 @@ fn the_right_wiring_is_accepted_over_motors_and_seeds() {
                     format!("motor.rs={resistance}"),
                     format!("motor.lls={leakage}"),
                     format!("motor.llr={leakage}"),
-                    // What the drive believes stays.
+                    // The resistance in the drive's settings stays.
                     "drive.motor.rs=5.4".into(),
                     "drive.motor.lls=0.0276".into(),
                     "drive.motor.llr=0.0276".into(),
@@ -150,7 +148,7 @@ fn every_wrong_wiring_is_named_and_no_current_comes_near_half_an_ampere() {
     }
 }
 
-/// A motor with a fifth of the inductance of the settings: found at the first sample.
+/// A motor with a fifth of the inductance of the settings is detected at the first sample.
 #[test]
 fn a_motor_that_is_far_from_its_settings_is_refused_below_the_bound() {
     for seed in 0..10 {

@@ -1,5 +1,5 @@
-//! Any frames on the bus, with wires, lines and samples between them: every answer is whole, and a drive whose commanding bus falls
-//! silent stops.
+//! Any frames on the bus, with wires, lines and samples between them: every answer is whole, and the drive stops if the bus commands it
+//! and becomes silent.
 #![no_main]
 
 use crc::{CRC_16_MODBUS, Crc};
@@ -22,7 +22,7 @@ fn sum(bytes: &[u8]) -> [u8; 2] {
     Crc::<u16>::new(&CRC_16_MODBUS).checksum(bytes).to_le_bytes()
 }
 
-/// A request with its sum.
+/// A request with its checksum.
 fn whole(head: &[u8], register: u16, rest: &[u8]) -> Vec<u8> {
     let body = [head, &register.to_be_bytes(), rest].concat();
     [&body[..], &sum(&body)].concat()
@@ -35,24 +35,22 @@ fuzz_target!(|bytes: &[u8]| {
     let (mut bus, mut strip) = (Some(FakeBus::default()), FakeStrip::default());
     let mut port = FakePort { room: usize::MAX, ..FakePort::default() };
     let (mut now_ms, mut at) = (0_u32, bytes.iter().copied());
-    // 400 passes at most.
+    // At most 400 passes.
     for _ in 0..400 {
         let Some(what) = at.next() else { break };
         let mut next = || at.next().unwrap_or(0);
         let register = |n: u8| REGISTERS[usize::from(n) % REGISTERS.len()];
-        let request = match what % 12 {
-            0 => {
-                now_ms = now_ms.wrapping_add(u32::from(next()) * 8);
-                None
-            }
-            // Any function, to the drive or to all; then any bytes.
+        let mut request = None;
+        match what % 12 {
+            0 => now_ms = now_ms.wrapping_add(u32::from(next()) * 8),
+            // Any function, to the drive or as a broadcast; then any bytes.
             1 | 2 => {
                 let body: Vec<u8> = (0..next().min(251)).map(|_| next()).collect();
                 let body = [&[what % 2][..], &body].concat();
-                Some([&body[..], &sum(&body)].concat())
+                request = Some([&body[..], &sum(&body)].concat());
             }
-            3 => Some((0..next()).map(|_| next()).collect()),
-            4 => Some(whole(&[1, 6], register(next()), &[next() & 3, next()])),
+            3 => request = Some((0..next()).map(|_| next()).collect()),
+            4 => request = Some(whole(&[1, 6], register(next()), &[next() & 3, next()])),
             // A number for any setting.
             5 => {
                 let setting = 0x4000 + 2 * u16::from(next());
@@ -67,34 +65,26 @@ fuzz_target!(|bytes: &[u8]| {
                     _ => f32::from_bits(u32::from_be_bytes([next(), next(), next(), next()])),
                 };
                 let value = [&[0, 2, 4][..], &value.to_bits().to_be_bytes()].concat();
-                Some(whole(&[1, 16], setting, &value))
+                request = Some(whole(&[1, 16], setting, &value));
             }
             6 => {
                 let first = register(next()).wrapping_add(u16::from(next()));
-                Some(whole(&[1, 3], first, &[0, next()]))
+                request = Some(whole(&[1, 3], first, &[0, next()]));
             }
             7 => {
                 let sample = Measured { dc_link: 2.0 * f32::from(next()), ..Measured::default() };
                 for _ in 0..next() {
                     drive.drive.step(&sample);
                 }
-                None
             }
-            8 => {
-                strip.closed = Wires(next());
-                None
-            }
+            8 => strip.closed = Wires(next()),
             9 => {
                 let line = LINES.split('|').nth(usize::from(next()) % 10).unwrap_or_default();
                 port.sent.extend(line.bytes().chain([b'\n']));
-                None
             }
-            10 => {
-                strip.codes = [0, 1, 2].map(|n| (n != 1).then(|| u16::from(next()) << 4));
-                None
-            }
-            _ => None,
-        };
+            10 => strip.codes = [0, 1, 2].map(|n| (n != 1).then(|| u16::from(next()) << 4)),
+            _ => {}
+        }
         if let (Some(request), Some(bus)) = (request, &mut bus) {
             bus.asked.push_back(Frame::from_slice(&request).expect("a frame"));
         }
@@ -109,7 +99,7 @@ fuzz_target!(|bytes: &[u8]| {
             assert!([before, own(&front)].contains(&body[0]), "{answer:?}");
         }
     }
-    // Whatever came: nobody says anything from here on.
+    // After any input: no side sends anything from here on.
     while !port.sent.is_empty() || front.desk.is_busy() {
         front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
     }

@@ -1,5 +1,5 @@
-//! Any bytes on the port, at any pace, with any room to answer: the console goes on, every line gets
-//! its answer, and an order that reached the drive came from a line that was answered without error.
+//! Any bytes on the port, at any pace, with any space to answer: the console goes on, every line gets its answer, and a request that
+//! reached the drive came from a line that was answered without error.
 #![no_main]
 
 use std::sync::LazyLock;
@@ -21,8 +21,8 @@ fuzz_target!(|bytes: &[u8]| {
     let (mut front, mut bus) = (Front::new(settings), None::<FakeBus>);
     let (mut port, mut strip) = (FakePort::default(), FakeStrip::default());
     let mut now_ms = 0_u32;
-    // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
-    // drive. The byte behind 0xf7 stands for a word, which the fuzzer does not find letter by letter.
+    // Bytes above 0xf0 are not sent: they stand for a learned result, pauses, space, damage, and samples for the drive. The byte after
+    // 0xf7 stands for a word, which the fuzzer does not find letter by letter.
     static WORDS: LazyLock<Vec<&str>> = LazyLock::new(words);
     let mut bytes = bytes.iter().copied();
     while let Some(byte) = bytes.next() {
@@ -45,10 +45,10 @@ fuzz_target!(|bytes: &[u8]| {
             _ => port.sent.push_back(byte),
         }
     }
-    // Whatever came: from here on it answers, and stops the drive. What it says unasked comes behind that.
+    // After any input the console answers, and stops the drive. Unrequested lines come after that.
     port.room = usize::MAX;
     port.sent.extend(b"\nstop\n");
-    // A design or a reset that was asked for comes first, and takes its time.
+    // A requested design or reset comes first, and takes its time.
     let mut polls = 0;
     while !port.sent.is_empty() || polls < 200 {
         polls = if port.sent.is_empty() { polls + 1 } else { 0 };
@@ -74,7 +74,7 @@ fn words() -> Vec<&'static str> {
     words
 }
 
-/// A result that is not believable.
+/// A result that is not plausible.
 fn doubtful() -> Learned {
     let mut found = found();
     found.carrier = None;

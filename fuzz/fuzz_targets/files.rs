@@ -1,4 +1,4 @@
-//! Any file of a user of the simulator: it is taken, or refused by a message that a terminal may get.
+//! Any file of a user of the simulator is accepted, or refused by a message that may be sent to a terminal.
 #![no_main]
 
 use std::path::Path;
@@ -18,7 +18,7 @@ const OTHERS: &str = "time_s torque_current_a speed_rpm position_turns load_nm l
     measured over_torque_current twin step name value deviation unit experiment seed shard index count runs run record version \
     sources schema_version settings commissioning: learned: nameplate refused spread effective";
 
-/// The text of an input: a byte from 0xe0 on and the next one stand for a word, which the fuzzer does not find letter by letter.
+/// The text of an input: a byte from 0xe0 and the next one stand for a word, which the fuzzer does not find letter by letter.
 fn text(bytes: &[u8]) -> String {
     static WORDS: LazyLock<Vec<&str>> =
         LazyLock::new(|| OTHERS.split_whitespace().chain(Key::all().map(Key::name)).collect());
@@ -35,7 +35,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
-/// An image for `cargo sim update`, with changes of it: place and value of a word, and whether the check sum is right.
+/// An image for `cargo sim update`, and changes of it: place and value of a word, and whether the check sum is correct.
 fn image(bytes: &[u8]) -> Vec<u8> {
     const LIST: usize = 0x200;
     let mut words = vec![0xffff_ffff_u32; 3 * 512];

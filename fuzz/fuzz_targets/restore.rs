@@ -1,5 +1,5 @@
-//! Any words of a learned result, with the right check sum, at the console: each line is answered, what is taken stands in the
-//! backup as it came, and a drive can be built with it.
+//! Any words of a learned result, with the right check sum, at the console: each line is answered, an accepted result is in the backup as
+//! it came, and a drive can be built with it.
 #![no_main]
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     let (settings, initial) = START.clone();
-    // Place, what to do, and four bytes.
+    // Place, kind of change, and four bytes.
     let mut words = learned::to_words(&found(), settings.drive.scales.both_zero_vectors);
     for change in bytes.chunks_exact(6) {
         let word = &mut words[usize::from(change[0]) % learned::WORDS];
@@ -62,7 +62,7 @@ fuzz_target!(|bytes: &[u8]| {
         let both = settings.drive.scales.both_zero_vectors;
         let again = learned::from_words(&learned::to_words(&found, both));
         assert_eq!(again, Some(found));
-        // It regulates, or refuses to.
+        // The drive regulates, or refuses to.
         let _ = drive.drive.command(&Command::Start(Mode::Torque));
         let sample = Measured { dc_link: 311.0, ..Measured::default() };
         for _ in 0..2000 {

@@ -1,5 +1,5 @@
-//! Any contents of the flash: looked at without harm, what is loaded can be built or is refused (tried with one input in a hundred,
-//! for a design takes longer than all else), and a save after it is loaded again.
+//! Any contents of the flash are read without harm. Loaded settings can be built or are refused (tried with one input in a hundred,
+//! because a design takes longer than everything else), and a save after that is loaded again.
 #![no_main]
 
 use induction_drive::settings::FirmwareSettings;
@@ -28,7 +28,7 @@ impl Flash for &mut Fake {
 fuzz_target!(|bytes: &[u8]| {
     let defaults = FirmwareSettings::of_the_board();
     let mut fake = Fake([[Some(u64::MAX); SLOT_WORDS]; SLOTS]);
-    // A whole record with everything in each slot, and changes of it: slot, place, what to do, eight bytes.
+    // A whole record with everything in each slot, and changes of it: slot, place, kind of change, eight bytes.
     for slot in 0..SLOTS {
         for (word, value) in codec::record(&full(), slot as u32).into_iter().enumerate() {
             fake.0[slot][word] = Some(value);
@@ -42,7 +42,7 @@ fuzz_target!(|bytes: &[u8]| {
             0 => None,
             1 => Some(value),
             2 => fake.0[slot][word].map(|old| old ^ value),
-            // A value for a key, as if it had been saved: the checksum made right.
+            // A value for a key, as if it had been saved: the checksum is corrected.
             _ => fake.0[slot][word].map(|old| old & 0xffff_ffff | value << 32),
         };
         if change[2] % 4 == 3 {
@@ -61,14 +61,14 @@ fuzz_target!(|bytes: &[u8]| {
     assert_eq!(Saved::load(&mut fake, &defaults).1, Loaded::Settings(other));
 });
 
-/// Settings, and what may have been learned with them.
+/// Settings, and a result that may have been learned with them.
 fn full() -> FirmwareSettings {
     let mut settings = FirmwareSettings::of_the_board();
     settings.learn(&found(), false);
     settings
 }
 
-/// Makes the checksum right, with the number of entries that this firmware writes.
+/// Corrects the checksum, with the number of entries that this firmware writes.
 fn reseal(slot: &mut [Option<u64>; SLOT_WORDS]) {
     let words: Vec<u64> = slot[..codec::WORDS].iter().map(|word| word.unwrap_or(0)).collect();
     let mut bytes = words[0].to_le_bytes().to_vec();

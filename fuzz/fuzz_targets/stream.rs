@@ -1,4 +1,4 @@
-//! Any bytes on the wire: the receiver goes on, gives back text as it came, and finds every frame that follows.
+//! Any bytes on the wire: the receiver goes on, returns text as it came, and finds every frame that follows.
 #![no_main]
 
 use drive_stream::{Frame, LONGEST, Piece, Splitter};
@@ -9,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
     for byte in bytes {
         match splitter.push(*byte) {
             Piece::Text(text) => assert_eq!(text, *byte),
-            // Whatever is taken for a frame is written as it is read.
+            // Bytes that are accepted as a frame equal those that this frame is written as.
             Piece::Frame(frame) => {
                 let length = frame.write(&mut wire);
                 let again = Frame::read(&wire[1..length - 1]).expect("a frame");
@@ -20,7 +20,7 @@ fuzz_target!(|bytes: &[u8]| {
             Piece::Nothing | Piece::Damaged => {}
         }
     }
-    // Two frames later it is in step.
+    // At most two frames later the receiver is in step.
     let values = [1.0, -2.5].into_iter().collect();
     let frame = Frame { sequence: 7, period: 9, values };
     let length = frame.write(&mut wire);

@@ -36,7 +36,7 @@ function connect() {
   socket.onmessage = event => {
     if (event.data instanceof ArrayBuffer) return takeFrames(new DataView(event.data));
     for (const message of JSON.parse(event.data)) heard(message);
-    // It says that this page lives and shows what it gets: without it the drive is stopped.
+    // Tells the server that this page lives and shows its data: without it the drive is stopped.
     socket.send('"ack"');
   };
   socket.onclose = () => {
@@ -77,7 +77,7 @@ function lost(why) {
   gone = why;
   state('not connected');
   alarm('gone', [why]);
-  // What the drive says meanwhile is not heard: a step of the set-up that waits for it ends.
+  // Lines of the drive are lost meanwhile, so a step of the set-up that waits for one ends.
   announced(`stopped: ${why}`);
 }
 /** A line of the console: an announcement, `* TEXT`. */
@@ -93,7 +93,7 @@ function announced(said) {
 const views = [...document.querySelectorAll('main > section')];
 
 // --- head ----------------------------------------------------------------------------------------
-// The reference that this page has given last, by mode.
+// The last set-point of this page, by mode.
 let alarms = {}, present = '', asked = {};
 function alarm(name, lines) {
   alarms[name] = lines;
@@ -127,7 +127,7 @@ function showStatus(line) {
   $('limit').parentElement.hidden = !$('limit').textContent;
   $('reading').textContent = [/fault input trips/, /sensors .* A(?=, torque)/, /dc link [\d.]+ V/, /heat sink -?\d+ degC/].map(part => line.match(part)?.[0]).filter(Boolean).join(', ');
 }
-// What a control waits for, by its attribute data-when.
+// State that a control needs, by its attribute data-when.
 const WHEN = {
   off: [/^off/, 'the drive must be off'],
   rest: [/^(off|in fault)/, 'the drive must be off'],
@@ -227,7 +227,7 @@ function draw() {
   const newest = times.slice(from);
   for (const { plot, indices } of plots) {
     plot.setData([newest, ...indices.map(i => columns[i].slice(from))]);
-    // Behind the plot's own update, which shows the values at the cursor.
+    // After the plot's own update, which shows the values at the cursor.
     if (plot.cursor.left < 0) queueMicrotask(() => plot.setLegend({ idx: newest.length - 1 }));
   }
 }

@@ -44,11 +44,11 @@ function pretty(value, unit) {
   const power = Math.max(-3, Math.min(2, Math.floor(Math.log10(size) / 3)));
   return `${+(value / 1000 ** power).toPrecision(5)} ${['n', 'µ', 'm', '', 'k', 'M'][power + 3]}${unit}`;
 }
-// What one sets first; in this order.
+// Settings to set first, in this order.
 const FIRST = ['nameplate.power_w', 'nameplate.voltage_v', 'nameplate.current_a', 'nameplate.frequency_hz', 'nameplate.speed_rpm', 'inverter.dc_link_v',
   'angle_source', 'sequence.flux', 'limits.current_a', 'speed.limit_rpm', 'speed.ramp_rpm_per_s', 'bus.commands'];
 const TITLES = { first: 'Set these first', motor: 'Motor', inverter: 'Inverter', scales: 'Sensors', current_plant: 'Current loop', injection: 'Injection', observer: 'Observer', limits: 'Limits',
-  sequence: 'Start and stop', speed: 'Speed and position', braking: 'Braking', vf: 'Voltage and frequency', bus: 'Field bus', other: 'Other', board: 'Of the board' };
+  sequence: 'Start and stop', speed: 'Speed and position', braking: 'Braking', vf: 'V/f control', bus: 'Field bus', other: 'Other', board: 'Board' };
 const groupOf = s => FIRST.includes(s.name) ? 'first' : s.change === 'board' ? 'board' : s.name.split('.')[0] in TITLES ? s.name.split('.')[0] : 'other';
 const opened = new Set(['first']);
 function showSettings() {
@@ -59,7 +59,7 @@ function showSettings() {
     const effective = s.value === 'auto' && s.effective != null ? s.effective : s.value, plain = `${number7(effective)} ${s.unit}`.trim();
     const said = s.words.length || (s.value !== 'auto' && pretty(effective, s.unit) === plain) ? '' : ` = ${pretty(effective, s.unit)}`;
     const range = s.min == null ? s.words.join(', ') : `${pretty(s.min, s.unit)} to ${pretty(s.max, s.unit)}${s.auto ? ', or auto' : ''}`;
-    const note = [s.help, s.change === 'reset' ? 'from the next reset on' : '', s.learned ? 'a change forgets what was learned' : '',
+    const note = [s.help, s.change === 'reset' ? 'changes at the next reset' : '', s.learned ? 'a change drops the learned values' : '',
       compared.has(s.name) ? `in the file: ${compared.get(s.name)}` : ''].filter(Boolean).join('; ');
     return make('tr', { className: `${s.staged ? 'staged' : ''} ${compared.has(s.name) ? 'other' : ''}` }, make('td', { textContent: s.name }), make('td', {}, entry(s, sayOfSettings), said),
       ...[s.unit, range, pretty(s.default, s.unit), note].map(text => make('td', { textContent: text })));
@@ -94,7 +94,7 @@ $('from-file').onchange = async event => {
   sayOfSettings(`${file.name}: ${lines.length} lines are in force; "Save in the drive" keeps them over a reset`);
   loadSettings();
 };
-/** Compares with a file of `backup` lines: what it does not name has the value of the image. */
+/** Compares with a file of `backup` lines: settings that it does not name have the value of the image. */
 $('compare').onchange = async event => {
   const [file] = event.target.files, named = new Map();
   for (const line of await linesOf(file)) {
@@ -199,9 +199,9 @@ const BOARD = { name: 'Check the board', about: 'Do the bench steps of the board
 const STEPS = [
   { name: 'Check the wiring', about: 'The drive starts once with a check of the phases and the current sensors, and stops again. The shaft may turn a little.',
     lines: ['set wiring_checked no', 'apply', 'start torque'], good: /^running: /, then: () => tell('stop', quiet).then(() => 'the wiring is as it should be') },
-  { name: 'Commission', about: 'The drive measures the motor at rest, from its nameplate, in ten seconds; the shaft stays still. "Accept" puts what was found in force and saves it.',
+  { name: 'Commission', about: 'The drive measures the motor at rest, from its nameplate, in ten seconds; the shaft stays still. "Accept" puts the results in force and saves them.',
     lines: ['commission'], good: /^commissioning: ended; `accept`/, bad: /^commissioning: ended; the settings/, after: [['Accept', 'accept']] },
-  { name: 'Learn', about: 'Lock the shaft. The drive learns how the angle follows from the carrier, about a minute. "Save" keeps it over a reset; "Learn again" at another rotor position adds to it.',
+  { name: 'Learn', about: 'Lock the shaft. The drive learns how the saliency changes with the current, which takes about a minute. "Save" keeps it over a reset; "Learn again" at another rotor position adds to it.',
     lines: ['learn'], good: /^learned: /, bad: /^refused: /, after: [['Learn again', 'learn again'], ['Save', 'save']] },
   { name: 'Start with a tenth of the current', about: 'The drive regulates a tenth of its current limit for three seconds, then stops. A free shaft turns: forwards, phase a towards b towards c.',
     lines: ['start torque'], good: /^running: /, then: tenth },

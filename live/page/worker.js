@@ -1,5 +1,5 @@
 'use strict';
-// The firmware's drive and console and a simulated motor, as WebAssembly. To the page it is what `cargo live` is, message for message.
+// The firmware's drive and console and a simulated motor, as WebAssembly. To the page it behaves like `cargo live`, message for message.
 const TICK_MS = 40;
 let wasm, last, queue = [];
 const bytes = (place, length) => new Uint8Array(wasm.memory.buffer, place, length);
@@ -15,7 +15,7 @@ function take(said) {
 }
 onmessage = ({ data }) => wasm ? take(data) : queue.push(data);
 
-/** Time passes as by the clock; faster while the drive learns. A page that slept does not make up for it. */
+/** Time passes as by the clock; faster while the drive learns. Time during which the page slept is skipped. */
 function tick() {
   const now = performance.now();
   let hurries = wasm.advance(Math.round(Math.min(now - last, 5 * TICK_MS)));

@@ -21,7 +21,7 @@ struct Arguments {
     options: Options,
 }
 
-/// A running board. It ends with this value, or with this program, whose end closes its standard input.
+/// A running board. It ends when this value is dropped, and with this program, whose end closes the board's standard input.
 pub struct VirtualBoard {
     child: Child,
     input: Option<ChildStdin>,
@@ -30,8 +30,7 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// Builds what is not built yet and starts the board, with the options of `cargo sim board`. The flux of its motor goes
-    /// to `shared`.
+    /// Builds the missing programs and starts the board, with the options of `cargo sim board`. The flux of its motor goes to `shared`.
     ///
     /// # Errors
     /// An option is refused, a build fails, or the board does not start.

@@ -1,5 +1,5 @@
-//! The connection to the drive: questions of the page one after the other, the drive's state between them, and a sign of
-//! life as long as the page is there.
+//! The connection to the drive: questions of the page one after the other, the drive's state between them, and a sign of life as long as
+//! the page is connected.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,13 +10,13 @@ use serde_json::json;
 
 use crate::shared::{Ask, Shared};
 
-/// From one question about the drive's state to the next.
+/// Time from one question about the drive's state to the next.
 const STATUS: Duration = Duration::from_millis(200);
-/// From one sign of life to the next.
+/// Time from one sign of life to the next.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
-/// Without a line for so long the firmware stops the drive, s.
+/// Time without a line after which the firmware stops the drive, s.
 const ALIVE_S: f64 = 0.4;
-/// From one try to open the port to the next.
+/// Time from one attempt to open the port to the next.
 const RETRY: Duration = Duration::from_secs(1);
 /// Longest line that the console takes.
 const LONGEST: usize = 120;
@@ -37,13 +37,13 @@ pub fn checked(line: &str) -> Result<String, String> {
     }
     match word.as_str() {
         "baud" => Err("`baud` is sent by this program itself".to_owned()),
-        // With the time after which the firmware stops the drive of a program that is lost.
+        // The time after which the firmware stops the drive if this program no longer sends is added.
         "stream" if line.contains(' ') => Ok(format!("{line} alive {ALIVE_S}")),
         _ => Ok(line.to_owned()),
     }
 }
 
-/// Sends signs of life while the page is there, and stops the drive when it is lost. Never returns.
+/// Sends signs of life while the page is connected, and stops the drive when the page is lost. Never returns.
 pub fn watch(shared: &Shared) {
     loop {
         if shared.page_is_alive() {
@@ -91,7 +91,7 @@ fn converse(shared: &Shared, link: &mut Link) {
                     }
                     Err(why) => json!({ "id": id, "error": why.to_string() }),
                 };
-                // Its frames come behind the answer.
+                // The frames of the stream come after the answer.
                 if line.starts_with("stream ") {
                     shared.new_stream();
                 }
@@ -104,7 +104,7 @@ fn converse(shared: &Shared, link: &mut Link) {
             asked = Instant::now();
             match link.ask("status", |_| ()) {
                 Ok(mut answer) => show_status(shared, &answer.lines.pop().unwrap_or_default()),
-                // It was reset, or has another rate: connected anew.
+                // The drive was reset, or has another rate: the caller connects again.
                 Err(LinkError::Silence(..)) => return,
                 Err(_) => {}
             }
@@ -121,7 +121,7 @@ fn show_status(shared: &Shared, status: &str) {
     shared.tell(json!({ "status": status }));
 }
 
-/// Tells the page who the drive is, and whether this program understands it.
+/// Tells the page which drive this is, and whether this program understands it.
 fn hello(shared: &Shared, link: &mut Link) {
     let mut ask = |line: &str| link.ask(line, |_| ());
     match (ask("version"), ask("describe stream")) {

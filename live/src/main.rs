@@ -24,31 +24,31 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 2_000_000)]
     #[arg(value_parser = clap::value_parser!(u32).range(i64::from(USUAL_BAUD)..=2_000_000))]
     baud: u32,
-    /// TCP port of the page at 127.0.0.1; 0 takes a free one
+    /// TCP port of the page at 127.0.0.1; 0 selects a free port
     #[arg(long, value_name = "N", default_value_t = 0)]
     listen: u16,
     /// Prints the address and opens no browser
     #[arg(long)]
     no_browser: bool,
-    /// A simulated motor and the firmware's drive in this program, in place of the virtual board: no emulator, no
-    /// pseudo-terminals. So it is where there are none
+    /// A simulated motor and the firmware's drive in this program, instead of the virtual board: no emulator, no pseudo-terminals. It is
+    /// the default on systems without pseudo-terminals
     #[arg(long)]
     simulated: bool,
-    /// Seed of its noise
+    /// Seed of the simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Options of the virtual board, as of `cargo sim board`
+    /// Options of the virtual board, as for `cargo sim board`
     #[arg(last = true, value_name = "OPTION")]
     board: Vec<String>,
 }
 
-/// Bits per second of a drive that was reset, or that has heard nothing for a second.
+/// Bits per second of a drive that was reset, or that has received nothing for a second.
 const USUAL_BAUD: u32 = 115_200;
-/// A drive that was left at another rate is back at the usual one after this.
+/// Time after which a drive that was left at another rate is back at the usual one.
 const FALLEN_BACK: Duration = Duration::from_millis(1200);
-/// The drive has changed its rate this long after its answer.
+/// Time after the answer to `baud` by which the drive has changed its rate.
 const CHANGED: Duration = Duration::from_millis(30);
-/// The last lines are on their way, and the drive answers.
+/// Time for the last lines to leave and for the drive to answer.
 const FAREWELL: Duration = Duration::from_millis(100);
 
 #[tokio::main]
@@ -121,7 +121,7 @@ fn connect(shared: &Arc<Shared>, port: &str, baud: u32, real: bool) -> Result<Li
     if baud != USUAL_BAUD {
         link.begin();
         let answer = link.ask(&format!("baud {baud}"), |_| ()).map_err(|why| why.to_string())?;
-        // Firmware without the command stays as it is.
+        // Firmware that does not know the command keeps its rate.
         if answer.error().is_none() {
             std::thread::sleep(CHANGED);
             own.set_baud_rate(baud).map_err(|why| format!("{port}: {baud} baud: {why}"))?;

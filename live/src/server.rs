@@ -1,7 +1,8 @@
 //! One browser's page: HTTP and WebSocket at 127.0.0.1, with a token in the address.
 //!
-//! Refused are other hosts in the request (a name that somebody points to this computer), other origins, and requests
-//! without the token. Messages are short; one that is longer or not understood ends or changes nothing at the drive.
+//! The server refuses other hosts in the request (a name that somebody points to this computer), other origins, and requests without the
+//! token. Messages are short; a message that is too long ends the connection, and one that is not understood changes nothing at the
+//! drive.
 
 use std::collections::HashMap;
 use std::net::SocketAddr;
@@ -31,13 +32,13 @@ use tokio::time::{interval, timeout};
 use crate::drive;
 use crate::shared::Shared;
 
-/// From one message to the page to the next.
+/// Time from one message to the page to the next.
 const TICK: Duration = Duration::from_millis(40);
-/// A page that takes nothing for so long is disconnected.
+/// Time after which a page that accepts no message is disconnected.
 const SLOW: Duration = Duration::from_secs(2);
-/// The head of a request takes no longer; also the next one of a connection.
+/// Longest time for the head of a request, also for the next request of a connection.
 pub const HEAD: Duration = Duration::from_secs(5);
-/// Most connections at a time, without those of WebSockets, of which there is one; others wait.
+/// Most connections at a time, apart from the one WebSocket; further ones wait.
 const MOST_CONNECTIONS: usize = 256;
 /// Longest message of the page, bytes.
 pub const LONGEST: usize = 8192;
@@ -62,7 +63,7 @@ pub fn token() -> Result<String, getrandom::Error> {
 /// Serves the page until the program ends.
 ///
 /// # Errors
-/// Those of the listener.
+/// Errors of the listener.
 pub async fn serve(
     mut listener: TcpListener,
     token: String,
@@ -82,7 +83,7 @@ pub async fn serve(
         tokio::spawn(async move {
             let mut http = Builder::new(TokioExecutor::new()).http1_only();
             http.http1().timer(TokioTimer::new()).header_read_timeout(HEAD);
-            // A client that goes away, or is too slow, is no error of this program.
+            // A client that disconnects, or is too slow, is no error of this program.
             let _ = http.serve_connection_with_upgrades(TokioIo::new(stream), service).await;
             drop(permit);
         });
@@ -106,7 +107,7 @@ async fn guard(
     let own_origin = is(ORIGIN, &|origin| {
         origin.strip_prefix("http://").is_some_and(|host| names.iter().any(|name| name == host))
     });
-    // A browser names the origin of every WebSocket; that of a page that is opened it does not name.
+    // A browser sends the origin with every WebSocket, but not with a page that the user opens.
     let origin_is_due = request.uri().path() == "/ws" || headers.contains_key(ORIGIN);
     let refuse = |why: &'static str| (StatusCode::FORBIDDEN, why).into_response();
     if query.get("token") != Some(&access.token) {
@@ -118,7 +119,7 @@ async fn guard(
     }
 }
 
-/// The whole page in one document, so that it needs nothing else.
+/// The whole page in one document, so that it loads nothing else.
 async fn page() -> Response {
     let style = |text: &str| format!("<style>{text}</style>");
     let script = |text: &str| format!("<script>{text}</script>");
@@ -152,13 +153,13 @@ async fn upgrade(State(access): State<Arc<Access>>, socket: WebSocketUpgrade) ->
         .on_upgrade(move |socket| converse(socket, shared))
 }
 
-/// A message of the page: one of these.
+/// A message of the page.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Said {
-    /// It has shown the last tick.
+    /// The page has shown the last tick.
     Ack,
-    /// Stop the drive, past everything that waits.
+    /// Stop the drive, ahead of all waiting messages.
     Stop,
     /// A line for the console, with a number for the answer.
     Ask(u64, String),
@@ -176,7 +177,7 @@ async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
                     break;
                 }
                 let (texts, frames) = shared.take();
-                // Texts first: the answer to a new stream tells what its frames are.
+                // Texts come first, because the answer to a new stream describes its frames.
                 let messages = [
                     Some(Message::text(json!(texts).to_string())),
                     (!frames.is_empty()).then(|| Message::binary(frames)),
@@ -200,7 +201,7 @@ async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
     shared.page_goes(number);
 }
 
-/// Does what a message of the page says.
+/// Carries out a message of the page.
 fn take(shared: &Shared, number: u64, text: &str) {
     if !shared.is_present(number) {
         return;

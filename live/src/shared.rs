@@ -1,5 +1,4 @@
-//! What the connection to the drive and the page have in common: what is to be told to the page, its questions, and
-//! whether it is there.
+//! State shared by the connection to the drive and the page: texts for the page, its questions, and whether it is connected.
 
 use std::collections::VecDeque;
 use std::io::Write as _;
@@ -11,11 +10,11 @@ use drive_web::talk::Frames;
 use hil_sim::console::link::Urgent;
 use serde_json::{Value, json};
 
-/// A page that answers nothing for so long is lost, and the drive is stopped.
+/// Time without an answer after which a page counts as lost, and the drive is stopped.
 pub const PAGE_LOST: Duration = Duration::from_millis(350);
-/// A drive that says nothing for so long is busy with a design: signs of life would only fill its memory for what comes in.
+/// Time of silence after which a drive counts as busy with a design: signs of life would only fill its receive queue.
 const BUSY: Duration = Duration::from_secs(1);
-/// Most texts that wait for a slow page; the oldest go first.
+/// Most texts that wait for a slow page; the oldest are dropped first.
 const MOST_TEXTS: usize = 2000;
 /// Most questions that wait for the drive: a page has one or two.
 pub const MOST_ASKS: usize = 64;
@@ -23,13 +22,13 @@ pub const MOST_ASKS: usize = 64;
 /// A question of the page.
 #[derive(Debug)]
 pub enum Ask {
-    /// Who the drive is, for a new page.
+    /// The identity of the drive, for a new page.
     Hello,
     /// A line to the console; the answer gets this number.
     Line(u64, String),
 }
 
-/// See the head of the module.
+/// The shared state, see the head of the module.
 pub struct Shared {
     inner: Mutex<Inner>,
     asked: Condvar,
@@ -41,28 +40,28 @@ struct Inner {
     asks: VecDeque<Ask>,
     frames: Frames,
     flux: Option<[f64; 3]>,
-    /// Number of the page that is connected, and when it has answered last.
+    /// Number of the connected page, and the time of its last answer.
     page: u64,
     answered: Option<Instant>,
-    /// Whether the drive is to be stopped when no page is there.
+    /// Whether the drive is to be stopped when no page is connected.
     watched: bool,
     urgent: Option<Urgent>,
-    /// When the drive has said something last.
+    /// Time of the drive's last byte.
     heard: Option<Instant>,
 }
 
 impl Shared {
-    /// Nothing yet.
+    /// An empty state.
     pub fn new() -> Arc<Self> {
         Arc::new(Self { inner: Mutex::default(), asked: Condvar::new() })
     }
 
-    /// A thread that panicked leaves whole texts and frames.
+    /// If a thread panicked, texts and frames are still whole.
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Tells the page something.
+    /// Queues a text for the page.
     pub fn tell(&self, text: Value) {
         let mut inner = self.inner();
         if inner.texts.len() >= MOST_TEXTS {
@@ -77,27 +76,27 @@ impl Shared {
         self.inner().frames.push(frame);
     }
 
-    /// The drive has said something.
+    /// Notes that the drive has sent something.
     pub fn heard(&self) {
         self.inner().heard = Some(Instant::now());
     }
 
-    /// Whether the drive has said something of late.
+    /// Whether the drive has sent something recently.
     pub fn drive_listens(&self) -> bool {
         self.inner().heard.is_some_and(|heard| heard.elapsed() < BUSY)
     }
 
-    /// A new stream begins: its signals are others.
+    /// A new stream begins, with other signals.
     pub fn new_stream(&self) {
         self.inner().frames = Frames::default();
     }
 
-    /// The flux of the virtual board: the drive's angle, the motor's, turns, and the motor's flux, Wb.
+    /// Queues the flux of the virtual board: the drive's angle, the motor's, turns, and the motor's flux, Wb.
     pub fn flux(&self, flux: [f64; 3]) {
         self.inner().flux = Some(flux);
     }
 
-    /// All that is to be told now: texts, and [frames](Frames::take).
+    /// Everything that is due for the page: texts, and [frames](Frames::take).
     pub fn take(&self) -> (Vec<Value>, Vec<u8>) {
         let mut inner = self.inner();
         let mut texts: Vec<Value> = inner.texts.drain(..).collect();
@@ -105,10 +104,10 @@ impl Shared {
         (texts, inner.frames.take())
     }
 
-    /// A page has come; its number. It takes over from another one. The drive is stopped then: nobody is to drive what
-    /// another has started.
+    /// Notes a new page and returns its number. The new page takes over from the previous one. Then the drive is stopped, so that nobody
+    /// runs a drive that another page has started.
     pub fn page_comes(&self) -> u64 {
-        // Also one that has gone so lately that its loss was not noticed yet: a reload.
+        // The previous page may have gone so recently that its loss was not noticed yet, as with a reload.
         if self.inner().watched {
             self.stop("another page took over");
         }
@@ -117,18 +116,18 @@ impl Shared {
         (inner.answered, inner.watched) = (Some(Instant::now()), true);
         inner.texts.clear();
         inner.frames.take();
-        // Those of the page before are nobody's.
+        // Questions of the previous page are dropped.
         inner.asks = VecDeque::from([Ask::Hello]);
         self.asked.notify_one();
         inner.page
     }
 
-    /// Whether this page is still the one.
+    /// Whether this page is still the connected one.
     pub fn is_present(&self, page: u64) -> bool {
         self.inner().page == page
     }
 
-    /// The page has answered.
+    /// Notes an answer of the page.
     pub fn page_answers(&self, page: u64) {
         let mut inner = self.inner();
         if inner.page == page {
@@ -136,7 +135,7 @@ impl Shared {
         }
     }
 
-    /// The page has gone.
+    /// Notes that the page has gone.
     pub fn page_goes(&self, page: u64) {
         let mut inner = self.inner();
         if inner.page == page {
@@ -144,24 +143,24 @@ impl Shared {
         }
     }
 
-    /// Whether a page is there and answers.
+    /// Whether a page is connected and answers.
     pub fn page_is_alive(&self) -> bool {
         self.inner().answered.is_some_and(|answered| answered.elapsed() < PAGE_LOST)
     }
 
-    /// Whether a page was there and is lost; once for each loss.
+    /// Whether a page was connected and is lost; true once for each loss.
     pub fn page_was_lost(&self) -> bool {
         let alive = self.page_is_alive();
         !alive && std::mem::take(&mut self.inner().watched)
     }
 
-    /// Whether the drive runs for nobody: there was a page, and there is none.
+    /// Whether the drive runs without a page: one was connected, and none is.
     pub fn is_abandoned(&self) -> bool {
         let inner = self.inner();
         inner.page > 0 && !inner.watched
     }
 
-    /// Puts a line of the page to the drive, with a number for the answer, unless too many wait.
+    /// Queues a line of the page for the drive, with a number for the answer, unless too many wait.
     pub fn ask(&self, id: u64, line: String) {
         let mut inner = self.inner();
         if inner.asks.len() < MOST_ASKS {
@@ -181,7 +180,7 @@ impl Shared {
         waited.unwrap_or_else(PoisonError::into_inner).0.asks.pop_front()
     }
 
-    /// Answers all lines that wait with an error.
+    /// Answers all waiting lines with an error.
     pub fn drop_asks(&self, why: &str) {
         let waiting = std::mem::take(&mut self.inner().asks);
         for ask in waiting {
@@ -192,7 +191,7 @@ impl Shared {
         }
     }
 
-    /// The way to the drive for what cannot wait; `None` while it is not connected.
+    /// Sets the connection to the drive for urgent lines; `None` while it is not connected.
     pub fn connect(&self, urgent: Option<Urgent>) {
         self.inner().urgent = urgent;
     }
@@ -201,15 +200,15 @@ impl Shared {
     pub fn stop(&self, why: &str) {
         self.drop_asks("not sent: the drive was stopped");
         self.tell(json!({ "stopped": why }));
-        // Whoever reads it may have gone.
+        // The reader of the output may have gone.
         let _ = writeln!(std::io::stdout(), "drive stopped: {why}");
         self.send("stop");
     }
 
-    /// Sends a line past all questions.
+    /// Sends a line ahead of all questions.
     pub fn send(&self, line: &str) {
         let urgent = self.inner().urgent.clone();
-        // A port that is gone is told by the thread that reads it.
+        // If the port is gone, the thread that reads it reports that.
         urgent.map(|urgent| urgent.send(line));
     }
 }

@@ -1,4 +1,4 @@
-//! The board without hardware, in this program and in real time: it needs neither emulator nor pseudo-terminals.
+//! The board without hardware, in this program and in real time: it needs neither an emulator nor pseudo-terminals.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use hil_sim::console::link::Link;
 
 use crate::shared::Shared;
 
-/// From one look at the clock to the next.
+/// Time from one reading of the clock to the next.
 const PAUSE: Duration = Duration::from_millis(5);
-/// A computer that slept does not make up for more.
+/// Most time that is simulated at once, after the computer slept for example.
 const MOST_MS: u128 = 200;
 
-/// The direction to the board.
+/// The transmit direction to the board.
 struct ToBoard(Sender<Vec<u8>>);
 
 impl Write for ToBoard {
@@ -28,10 +28,10 @@ impl Write for ToBoard {
     }
 }
 
-/// Switches a board on that has learned its motor, and connects to it. It ends with the connection.
+/// Powers a board up that has learned its motor, and connects to it. The board ends with the connection.
 ///
 /// # Errors
-/// In words: the board does not start.
+/// The reason why the board does not start.
 pub fn connect(shared: &Arc<Shared>, seed: u64) -> Result<Link, String> {
     let mut board = HostBoard::new(seed)?;
     board.learn()?;

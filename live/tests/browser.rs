@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use crate::chromium::{Browser, Page};
 
-/// Simulated time may pass at a tenth of the clock's: a start takes 2 s, a design as long.
+/// Simulated time may pass at a tenth of real time: a start takes 2 s, and a design takes as long.
 const PATIENCE: Duration = Duration::from_secs(90);
-/// A learning takes 50 s of simulated time.
+/// A self-commissioning takes 50 s of simulated time.
 const LEARNING: Duration = Duration::from_secs(500);
 
 /// `cargo live` with the virtual board.
@@ -26,7 +26,7 @@ impl Live {
     fn start(folder: &Path, load: &str) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_drive-live"));
         command.args(["--no-browser", "--", "--load", load, "--out"]).arg(folder);
-        // `cargo test` sets it: the build of the emulator would take it for a change.
+        // `cargo test` sets the variable: the build of the emulator would take it for a change.
         command.env_remove("CARGO_MANIFEST_DIR");
         if let Some(elf) = std::env::var_os("LIVE_ELF") {
             command.arg("--elf").arg(elf);
@@ -44,7 +44,7 @@ impl Live {
         live
     }
 
-    /// The rest of the next line that begins so, and when it came.
+    /// The rest of the next line that begins with this text, and the time when it came.
     fn line(&self, beginning: &str, patience: Duration) -> (Instant, String) {
         let until = Instant::now() + patience;
         loop {
@@ -77,7 +77,7 @@ fn saved(folder: &Path, name: &str) -> String {
     std::fs::read_to_string(file).expect(name)
 }
 
-/// Checks the head of a CSV file; its rows.
+/// Checks the head of a CSV file; returns its rows.
 fn rows(text: &str, what: &str, units: &str, names: &str) -> Vec<Vec<f64>> {
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some(&*format!("# induction-drive {what}, schema 1")));
@@ -96,7 +96,7 @@ fn step(page: &mut Page<'_>, name: &str, button: &str, expected: &str, patience:
         "[...{}.querySelectorAll('button')].find(b => b.textContent == '{button}')",
         item(name)
     );
-    // It waits for the state of the drive, which the page hears five times a second.
+    // The button waits for the state of the drive, which the page receives five times a second.
     page.until(&format!("!{button}.disabled"), PATIENCE);
     page.value(&format!("{button}.click()"));
     verdict(page, name, expected, patience);
@@ -117,13 +117,13 @@ fn verdict(page: &mut Page<'_>, name: &str, expected: &str, patience: Duration) 
     );
 }
 
-/// Streams these signals, so many samples a second.
+/// Streams these signals, with this number of samples per second.
 fn stream(page: &mut Page<'_>, names: &str, rate: u32) {
     page.value(&format!("document.querySelectorAll('#signals input').forEach(box => {{ box.checked = '{names}'.split(' ').includes(box.value); }}); $('rate').value = {rate}; restream()"));
     page.until(&format!("streamed.toSorted().join(' ') == '{names}'.split(' ').toSorted().join(' ') && times.length > 100"), PATIENCE);
 }
 
-/// Whether a control is disabled and its view says why.
+/// Whether a control is disabled and its view gives the reason.
 fn waits(page: &mut Page<'_>, id: &str, reason: &str) {
     let waits = page.value(&format!("$('{id}').disabled && $('{id}').title.startsWith('{reason}') && $('{id}').closest('section').querySelector('.why').textContent.includes('{reason}')"));
     assert_eq!(waits, true, "{id}: {reason}");
@@ -164,7 +164,7 @@ fn the_page_shows_and_drives_the_virtual_board() {
 
     runs_and_shows(&mut page, &folder);
     records(&mut page, &folder, &files);
-    // It stops by keyboard, from a field as well.
+    // The drive is stopped by keyboard, from a field as well.
     page.value("view('view-live'); $('reference').focus()");
     page.key("Escape", 27);
     state(&mut page, "off");
@@ -174,10 +174,10 @@ fn the_page_shows_and_drives_the_virtual_board() {
     sets_up(&mut page, &folder);
     begins_again(&mut page);
 
-    // Closed while the drive runs: it stops in time.
+    // If the page is closed while the drive runs, the drive stops in time.
     page.value("view('view-live'); $('start').click()");
     state(&mut page, "regulating torque");
-    // The connection that the set-up has closed was told as well.
+    // The end of the connection that the set-up has closed was reported as well.
     live.lines.try_iter().for_each(drop);
     let closed = Instant::now();
     page.close();
@@ -204,7 +204,7 @@ fn begins(page: &mut Page<'_>) {
     assert_eq!(page.value("plots.map(({ plot }) => plot.axes[0].label || '-').join()"), "-,-,-,s");
 }
 
-/// The newest values are in the legend; signals of what the drive does are there beside the measured ones.
+/// The newest values are in the legend; signals of the control are there beside the measured ones.
 fn shows_signals(page: &mut Page<'_>) {
     page.until("/^1\\.9|^2\\.0/.test(document.querySelectorAll('#curves .u-legend .u-value')[1].textContent)", PATIENCE);
     stream(page, "torque_nm i_a_a i_b_a heat_sink_c state limit i_d_a i_q_a", 200);
@@ -214,7 +214,7 @@ fn shows_signals(page: &mut Page<'_>) {
     let [torque, i_d, i_q] = ["torque_nm", "i_d_a", "i_q_a"].map(|name| last(page, name));
     let by_status = page.number("parseFloat($('torque').textContent)");
     assert!((torque - by_status).abs() < 0.05 * by_status, "{torque}, {by_status} Nm");
-    // With an amplitude-invariant transformation the phase currents are as large as those of the frame, but for the carrier.
+    // With an amplitude-invariant transformation the phase currents are as large as the dq currents, apart from the injection.
     let [a, b] = ["i_a_a", "i_b_a"].map(|name| last(page, name));
     let peak = (4.0 / 3.0 * (a * a + a * b + b * b)).sqrt();
     assert!((peak - i_d.hypot(i_q)).abs() < 0.5, "{peak} A, {i_d} A, {i_q} A");
@@ -223,7 +223,7 @@ fn shows_signals(page: &mut Page<'_>) {
     page.until("/state:?\\s*running/.test($('curves').innerText) && /limit:?\\s*none/.test($('curves').innerText)", PATIENCE);
 }
 
-/// No peak of a sample is lost where many samples share a pixel.
+/// No peak of a sample disappears if many samples share a pixel.
 fn draws_peaks(page: &mut Page<'_>) {
     stream(page, "i_d_a i_q_a", 2000);
     page.until("times.length > 8000", PATIENCE);
@@ -238,7 +238,7 @@ fn draws_peaks(page: &mut Page<'_>) {
     stream(page, "i_q_a i_q_ref_a i_d_a speed_rpm torque_nm phi_deg", 200);
 }
 
-/// The drive is started, the curves move, and a step of the torque shows in them and in the number.
+/// The drive is started, the curves move, and a step of the torque appears in the curves and in the number.
 fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
     page.value("$('start').click()");
     state(page, "regulating torque");
@@ -267,7 +267,7 @@ fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
     page.key("p", 80);
 }
 
-/// A jog turns a free shaft while its button is held, in speed mode; a stop by ramp ends in off. Every mode shows what it has.
+/// A jog turns a free shaft while its button is held, in speed mode; a stop by ramp ends in off. Every mode shows its controls.
 fn jogs(page: &mut Page<'_>, folder: &Path) {
     let choose = |page: &mut Page<'_>, mode: &str| {
         page.value(&format!("$('mode').value = '{mode}'; $('mode').onchange()"));
@@ -277,7 +277,7 @@ fn jogs(page: &mut Page<'_>, folder: &Path) {
     assert_eq!(choose(page, "position"), "position");
     pictures(page, folder, "homing");
     waits(page, "home", "the drive does not regulate the position");
-    // The mode is that of the drive, whoever has started it.
+    // The page shows the mode of the drive, regardless of which side has started it.
     page.value("tell('start speed')");
     state(page, "regulating speed");
     assert_eq!(choose(page, "speed"), "speed");
@@ -342,10 +342,10 @@ fn records(page: &mut Page<'_>, folder: &Path, files: &Path) {
 /// A setting is changed and put in force; files are saved, compared and loaded.
 fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
     page.value("view('view-settings')");
-    // The twelve to set first are open, the rest is folded, what belongs to the board comes last.
+    // The twelve settings to set first are open, the others are folded, and those of the board come last.
     assert_eq!(page.value("[...$('settings').children].filter(group => group.open).map(group => group.querySelectorAll('tbody tr').length).join()"), "12");
     let order = page.value("[$('settings').firstChild, $('settings').lastChild].map(group => group.querySelector('summary').textContent).join()");
-    assert!(order.as_str().unwrap().starts_with("Set these first: 12,Of the board: "), "{order}");
+    assert!(order.as_str().unwrap().starts_with("Set these first: 12,Board: "), "{order}");
     let all = page.value("$('settings').querySelectorAll('tbody tr').length == settings.length");
     assert_eq!(all, true);
     let shown = page.value("$('settings').querySelector('[aria-label=\"inverter.dead_time_s\"]').parentElement.textContent");
@@ -368,7 +368,7 @@ fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
     assert!(file.starts_with("# 0.") && file.contains("motor.r_s 5.5"), "{file}");
     pictures(page, folder, "settings");
 
-    // What differs is marked.
+    // Differences are marked.
     let with = |text: &str| {
         format!("{{ target: {{ files: [new File([{}], 'mine.txt')] }} }}", serde_json::json!(text))
     };
@@ -409,14 +409,14 @@ fn sets_up(page: &mut Page<'_>, folder: &Path) {
     page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged", PATIENCE);
     step(page, WIRING, WIRING, "^done: the wiring", PATIENCE);
     state(page, "off");
-    // A step that is stopped says so.
+    // If a step is stopped, the page says so.
     step(page, "Commission", "Commission", "sensors: sound", PATIENCE);
     page.key("Escape", 27);
     verdict(page, "Commission", "^not done: stopped", PATIENCE);
-    // The page hears of the stop before the outputs are off.
+    // The page receives the stop before the outputs are off.
     std::thread::sleep(Duration::from_secs(6));
     state(page, "off");
-    // So does one whose connection is lost, which stops the drive.
+    // The same holds if the connection is lost, which stops the drive.
     step(page, "Commission", "Commission", "sensors: sound", PATIENCE);
     page.value("socket.close()");
     verdict(page, "Commission", "^not done: stopped: the program that serves", PATIENCE);
@@ -425,7 +425,7 @@ fn sets_up(page: &mut Page<'_>, folder: &Path) {
     step(page, "Commission", "Commission", "^done: commissioning: ended; .Accept.", PATIENCE);
     let commission = item("Commission");
     assert_eq!(page.value(&format!("{commission}.querySelector('progress').value")), 7.0);
-    // Found and allowed stand in a table.
+    // Found and allowed values are in a table.
     let found = page.value(&format!("[...{commission}.querySelectorAll('tbody tr')].map(row => [...row.cells].map(cell => cell.textContent.trim()).join('|')).find(row => /[|]r_s[|]/.test(row))"));
     assert!(
         found.as_str().unwrap().starts_with("levels|r_s|5.")
@@ -446,7 +446,7 @@ fn sets_up(page: &mut Page<'_>, folder: &Path) {
     page.until("$('learned').textContent.split('\\n').length > 5", PATIENCE);
 }
 
-/// The figures of the loops follow a staged setting, and a step is recorded and judged.
+/// The figures of the loops follow a staged setting, and a step is recorded and evaluated.
 fn loops(page: &mut Page<'_>, folder: &Path) {
     page.value("view('view-loops')");
     let cell = |page: &mut Page<'_>, row: usize, column: usize| {
@@ -477,7 +477,7 @@ fn loops(page: &mut Page<'_>, folder: &Path) {
         .split(|c: char| !c.is_ascii_digit() && c != '.')
         .filter_map(|word| word.parse().ok())
         .collect();
-    // 10 to 90 % in so many ms, overshoot, where it ends.
+    // Rise time from 10 to 90 % in ms, overshoot, and final value.
     let [_, _, rise_ms, overshoot, end] = figures[..] else { panic!("{said}") };
     assert!((1.0..20.0).contains(&rise_ms) && overshoot < 20.0, "{said}");
     assert!((end - 100.0).abs() < 5.0, "{said}");
@@ -486,7 +486,7 @@ fn loops(page: &mut Page<'_>, folder: &Path) {
     state(page, "off");
 }
 
-/// A limit that acts is told in words, and is a signal.
+/// A limit that acts is told in words, and there is a signal for it.
 fn limits(page: &mut Page<'_>) {
     page.value("view('view-live'); tell('set limits.derate_c 0').then(() => tell('apply')).then(() => tell('start torque'))");
     state(page, "regulating torque");
@@ -503,7 +503,7 @@ fn limits(page: &mut Page<'_>) {
     stream(page, "i_q_a i_q_ref_a i_d_a speed_rpm torque_nm phi_deg", 200);
 }
 
-/// A drive that was reset streams again: when it says so, and when that line is lost.
+/// A drive that was reset streams again: when it says so, and also when that line is lost.
 fn begins_again(page: &mut Page<'_>) {
     page.value("globalThis.kept = announced");
     for deaf in [false, true] {
@@ -515,7 +515,7 @@ fn begins_again(page: &mut Page<'_>) {
     page.value("announced = kept");
 }
 
-/// A fault is shown in words with what to do; it is cleared. What does not fit is told.
+/// A fault is shown in words with its cure, and is cleared. A value that does not fit is reported.
 fn fails(page: &mut Page<'_>, folder: &Path) {
     page.value("tell('set limits.heat_sink_c 10').then(() => tell('apply')).then(() => tell('confirm board')).then(() => tell('start torque'))");
     page.until("/Fault 18.*heat sink/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);

@@ -1,5 +1,5 @@
-//! Pages of the simulator in a real browser: none overflows, and the text of every plot can be read. Pictures and prints of them
-//! are for a look.
+//! Pages of the simulator in a real browser: none overflows, and the text of every plot is readable. Pictures and prints of them can be
+//! looked at.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,5 @@
-//! Who may connect, what a bad or slow page can do, and what its loss does. The drive is a stand-in that takes every line.
+//! Tests which clients may connect, what a bad or slow page can do, and what its loss causes. The drive is a stand-in that accepts every
+//! line.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -20,7 +21,7 @@ const TOKEN: &str = "0123456789abcdef";
 type Page = WebSocket<MaybeTlsStream<TcpStream>>;
 type Lines = Arc<Mutex<Vec<(Instant, String)>>>;
 
-/// A server with a drive that notes the lines that it gets.
+/// A server with a drive that notes the lines that it receives.
 struct Served {
     address: SocketAddr,
     lines: Lines,
@@ -28,7 +29,7 @@ struct Served {
     shared: Arc<Shared>,
 }
 
-/// Answers as the console does, but for the tag.
+/// Answers as the console does, except for the tag.
 fn answer(line: &str) -> &'static str {
     match line {
         "describe stream" => {
@@ -161,7 +162,7 @@ fn only_the_own_page_with_its_token_is_served() {
     let page = served.get(&format!("/?token={TOKEN}"), &host);
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("uPlot") && page.contains("STOP"));
     assert!(page.contains("content-security-policy: default-src 'none'"));
-    // Nothing is fetched from elsewhere: it works offline.
+    // Nothing is loaded from elsewhere, so the page works offline.
     assert!(!page.contains("src=\"http") && !page.contains("href=\"http"));
     for path in ["/", "/?token=", "/?token=0123", "/ws", "/other"] {
         assert!(served.get(path, &host).starts_with("HTTP/1.1 403"), "{path}");
@@ -212,10 +213,10 @@ fn malformed_and_oversized_messages_reach_no_drive() {
     for line in ["", " ", "start\nstart", "start\rstart", "stärt", "baud 9600", &"a".repeat(121)] {
         assert!(ask(&mut page, 7, line)["error"].is_string(), "{line:?}");
     }
-    // A stream ends the drive with this program.
+    // If a stream ends, the drive ends with this program.
     assert_eq!(ask(&mut page, 9, "STREAM i_q_a 6000")["lines"], json!(["ok"]));
     assert_eq!(ask(&mut page, 8, "torque 1")["lines"], json!(["ok"]));
-    // One that is too long ends the connection, and with it the drive.
+    // A message that is too long ends the connection, and so stops the drive.
     let sent = page.send(Message::text("x".repeat(server::LONGEST + 1)));
     let ended = sent.is_err() || (0..100).any(|_| page.read().is_err());
     assert!(ended, "it is still connected");
@@ -260,7 +261,7 @@ fn a_slow_page_loses_frames_and_nothing_else() {
     let mut served = served();
     let mut page = served.own();
     until(&mut page, "hello");
-    // It takes nothing while two minutes of frames come: far more than the sockets hold.
+    // The page accepts nothing while two minutes of frames come: far more than the sockets hold.
     let mut wire = [0; LONGEST];
     for sequence in 0..60_000_u16 {
         let frame =
@@ -283,7 +284,7 @@ fn clients_that_send_slowly_or_too_much_hold_up_nobody() {
     let served = served();
     let mut page = served.own();
     until(&mut page, "hello");
-    // A hundred that never end their request, and one with a head of a megabyte.
+    // A hundred clients that never end their request, and one with a head of a megabyte.
     let _half: Vec<_> = (0..100)
         .map(|_| {
             let mut stream = TcpStream::connect(served.address).unwrap();
@@ -302,7 +303,7 @@ fn clients_that_send_slowly_or_too_much_hold_up_nobody() {
     assert!(served.got("stop").is_none(), "the drive was stopped");
 }
 
-/// Also one that has been answered before.
+/// The request may also follow one that has been answered.
 #[test]
 fn half_a_request_is_disconnected() {
     let served = served();
@@ -319,7 +320,7 @@ fn half_a_request_is_disconnected() {
     }
 }
 
-/// A page that asks faster than the drive answers is refused what is beyond the limit. A start that waits is not sent behind a stop.
+/// If a page asks faster than the drive answers, questions above the limit are refused. A start that waits is not sent after a stop.
 #[test]
 fn a_flood_of_questions_is_refused_and_a_stop_empties_the_queue() {
     let slow = |line: &str| {
@@ -364,7 +365,7 @@ fn firmware_that_does_not_fit_is_told_in_words() {
         let hello = until(&mut page, "hello")["hello"].clone();
         let misfit = hello["misfit"].as_str().unwrap();
         assert!(misfit.contains(says) && misfit.contains(cure), "{misfit}");
-        // All else works.
+        // All other requests work.
         assert_eq!(ask(&mut page, 1, "torque 1")["lines"], json!(["ok"]));
     }
 }
@@ -399,7 +400,7 @@ fn figures_of_the_loops_are_those_of_the_design() {
     assert!((number(2, 1) - 4.4).abs() < 0.1, "{loops}");
     assert!((number(3, 1) - 1.1).abs() < 0.05, "{loops}");
     assert!(number(0, 2) >= 44.9 && number(0, 3) <= 2.21, "{loops}");
-    // More margin is slower; a value may come as a number, as `describe` prints it.
+    // More phase margin makes the loop slower; a value may come as a number, as `describe` prints it.
     let margin = json!({ "name": "speed.phase_margin_deg", "value": 70 }).to_string();
     let calm = loops::of(&[set("angle_source", "encoder"), margin]);
     assert!((calm[2][2].as_f64().unwrap() - 70.0).abs() < 0.1, "{calm}");
@@ -408,7 +409,7 @@ fn figures_of_the_loops_are_those_of_the_design() {
     assert!(refused["error"].as_str().unwrap().contains("r_s in ohm"), "{refused}");
 }
 
-/// A page that is reloaded stops the drive each time, however soon it is back.
+/// If a page is reloaded, the drive is stopped each time, however soon the page is back.
 #[test]
 fn a_page_that_is_reloaded_stops_the_drive() {
     let served = served();
@@ -422,7 +423,7 @@ fn a_page_that_is_reloaded_stops_the_drive() {
         let stops = || served.lines.lock().unwrap().iter().filter(|(_, l)| l == "stop").count();
         let began = Instant::now();
         while stops() < reloads {
-            // Before the page is lost, which answers no more.
+            // The stop comes before the page, which no longer answers, counts as lost.
             let waited = began.elapsed();
             assert!(waited < Duration::from_millis(200), "{} stops of {reloads}", stops());
             std::thread::sleep(Duration::from_millis(5));

@@ -1,4 +1,4 @@
-//! The drive in a browser, from a server that knows nothing but files.
+//! The drive in a browser, from a server that serves only files.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -12,19 +12,19 @@ use crate::browser::{pictures, state};
 use crate::chromium::{Browser, Page};
 
 const PATIENCE: Duration = Duration::from_secs(30);
-/// First picture, ms behind the beginning of the load, on a computer that runs the drive so many times as fast as the clock; a slower
-/// one has longer in proportion.
+/// Latest first picture, ms after the beginning of the load, on a computer that runs the drive this many times as fast as real time; a
+/// slower computer has longer in proportion.
 const FIRST_PICTURE_MS: f64 = 700.0;
 const QUIET: f64 = 250.0;
-/// Least speed, of the clock's, and the simulated time that is measured, ms, in parts of which the fastest counts: the computer
-/// has other things to do.
+/// Least speed relative to real time, and the simulated time that is measured, ms. The fastest of its parts counts, because the computer
+/// also does other things.
 const FASTER: f64 = 60.0;
 const MEASURED_MS: u32 = 20_000;
 const PART_MS: u32 = 200;
-/// The outputs are on from here on, ms.
+/// Time after which the outputs are on, ms.
 const ON_MS: u32 = 5000;
 
-/// Serves the files of a folder; its address.
+/// Serves the files of a folder; returns its address.
 fn served(folder: PathBuf) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/", listener.local_addr().unwrap());
@@ -66,7 +66,7 @@ fn serve(folder: &Path, mut stream: TcpStream) {
     let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&bytes));
 }
 
-/// Presses the button of the guide or of the motor that does this.
+/// Presses the button of the guide or of the motor that sends these lines.
 fn play(page: &mut Page<'_>, lines: &str) {
     page.value(&format!("document.querySelector('[data-play^=\"{lines}\"]').click()"));
 }
@@ -85,7 +85,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     let address = served(web);
     let mut browser = Browser::start(&folder.join("profile-web"), &folder);
 
-    // The best of three, likewise.
+    // The best of three counts here as well.
     let mut first = f64::INFINITY;
     for _ in 0..3 {
         let mut page = browser.open(&address);
@@ -140,7 +140,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     play(&mut page, "!open b");
     state(&mut page, "in fault");
 
-    // As fast as it can, and the bits of the same steps here.
+    // As fast as the browser can, with the same bits as the same steps give here.
     page.value(&format!(
         "fetch('drive.wasm').then(file => file.arrayBuffer()).then(bytes => WebAssembly.instantiate(bytes, {{}})).then(({{ instance: {{ exports: own }} }}) => {{
             own.init(7); let least = 1e9;
@@ -160,7 +160,7 @@ fn a_drive_in_the_browser_holds_torque_reverses_and_reports_a_wrong_angle() {
     assert!(faster > FASTER, "{faster}");
 }
 
-/// The same board behind `cargo live --simulated`, in real time.
+/// The same board with `cargo live --simulated`, in real time.
 #[test]
 fn the_simulated_board_starts_holds_torque_and_reports_an_open_wire() {
     let shared = Shared::new();

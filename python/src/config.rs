@@ -9,13 +9,13 @@ use pyo3::types::PyDict;
 
 use crate::raised;
 
-/// A motor with inverter, sensors and load, and its drive, as the options of `cargo sim` describe them: `motor` is a name that
-/// `cargo sim motors` shows or a file, `file` a TOML file of keys, `set` a dict of keys, the last to count.
+/// A motor with inverter, sensors and load, and its drive, as the options of `cargo sim` describe them: `motor` is a name that `cargo sim
+/// motors` shows or a file, `file` a TOML file of keys, `set` a dict of keys, which has priority.
 #[pyclass(frozen, module = "induction_drive")]
 pub struct Config {
     /// The options.
     pub input: Input,
-    /// What they mean.
+    /// The values that follow from the options.
     pub values: hil_sim::Config,
 }
 

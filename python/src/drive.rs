@@ -10,10 +10,10 @@ use pyo3::prelude::*;
 use crate::config::Config;
 use crate::raised;
 
-/// A command of a value by its name.
+/// A command with a value, by its name.
 type Named = (&'static str, fn(f32) -> Command);
 
-/// Commands by their name at the console; a reference is that of the value.
+/// Commands by their name at the console; a set-point command uses the value.
 #[rustfmt::skip] // one a line
 const COMMANDS: &[Named] = &[
     ("torque", Command::Torque),
@@ -50,8 +50,8 @@ impl Drive {
         built(&config.values.drive).map(|built| Self(drive_core::Drive::new(built))).map_err(raised)
     }
 
-    /// One control period: from the currents of phases a and b, A, and the dc link, V, at its beginning to the duties of the three
-    /// legs, 0 to 1, of the next period; None: all switches are off at once. `encoder`: its count, four a line.
+    /// One control period: from the currents of phases a and b, A, and the dc link, V, at its beginning to the duties of the three legs,
+    /// 0 to 1, of the next period; None: all switches are off at once. `encoder`: its count, four per line.
     #[pyo3(signature = (current_a, current_b, dc_link_v, encoder=0))]
     fn step(
         &mut self,
@@ -61,7 +61,7 @@ impl Drive {
         encoder: u32,
     ) -> Option<[f32; 3]> {
         let phases = Abc { a: current_a, b: current_b, c: -current_a - current_b };
-        // The heat sink bears all of the current.
+        // The heat sink allows the full current.
         let (third, dc_link, heat_sink) = (phases.c, dc_link_v, 1.0);
         let (hardware, fault) = (Hardware::empty(), None);
         self.0

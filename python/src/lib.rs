@@ -1,7 +1,7 @@
 //! The module `induction_drive` of Python: the drive and its simulated motor on numpy arrays, and the experiments of `cargo sim`.
 //!
-//! Each class is one of the simulator or of the control, and gives its bits. What the user has to change is a `ValueError` with the
-//! words of `cargo sim`; a command that the drive refuses and a failure are a `RuntimeError`.
+//! Each class is one of the simulator or of the control, and gives the same bits. An error that the user can correct is a `ValueError`
+//! with the words of `cargo sim`; a command that the drive refuses and a failure are a `RuntimeError`.
 
 mod config;
 mod drive;
@@ -37,7 +37,7 @@ fn raised(error: Error) -> PyErr {
     }
 }
 
-/// Fails unless a number is in its range, which has no upper end where that is infinite.
+/// Fails unless a number is in its range; an infinite upper limit means none.
 fn check(name: &str, value: f64, (min, max): (f64, f64), unit: &str) -> PyResult<()> {
     if (min..=max).contains(&value) {
         return Ok(());
@@ -46,8 +46,8 @@ fn check(name: &str, value: f64, (min, max): (f64, f64), unit: &str) -> PyResult
     Err(PyValueError::new_err(text))
 }
 
-/// Runs an experiment, a group of them or the TOML file of a scenario, and returns the object that `cargo sim run NAME --json`
-/// prints. `input` is the file of an experiment that takes one. A run that was lost says so in `faults` and `metrics`.
+/// Runs an experiment, a group of them or the TOML file of a scenario, and returns the object that `cargo sim run NAME --json` prints.
+/// `input` is the file of an experiment that takes one. If the drive lost the lock in a run, `faults` and `metrics` say so.
 #[pyfunction]
 #[pyo3(signature = (experiment, config=None, *, seed=1, seconds=None, input=None))]
 fn run<'py>(
@@ -64,8 +64,8 @@ fn run<'py>(
     py.import("json")?.call_method1("loads", (json,))
 }
 
-/// Commissions the motor of a configuration by a drive that knows its nameplate, at rest: what it found, and what follows from that,
-/// by key. `Config(set=...)` takes it, for a drive that uses it.
+/// Commissions the motor of a configuration at rest, with a drive that knows its nameplate, and returns the results and the settings that
+/// follow from them, by key. `Config(set=...)` takes them, for a drive that uses them.
 #[pyfunction]
 #[pyo3(signature = (config, seed=1))]
 fn commission<'py>(py: Python<'py>, config: &Config, seed: u64) -> PyResult<Bound<'py, PyDict>> {
@@ -78,7 +78,7 @@ fn commission<'py>(py: Python<'py>, config: &Config, seed: u64) -> PyResult<Boun
         if let value::Value::Number(number) = is
             && (is != was || entry.name.starts_with("motor."))
         {
-            // The shortest decimal fraction that stands for it.
+            // The shortest decimal fraction that stands for the number.
             let number: f64 = number.to_string().parse()?;
             found.set_item(format!("drive.{}", entry.name), number)?;
         }

@@ -70,7 +70,8 @@ impl Plant {
     }
 
     /// Applies space vectors of the voltage, V, complex in the stator frame and amplitude-invariant, each for `step_s` seconds. Returns
-    /// arrays with the values at the end of each: `current` (A) and `flux` of the rotor (Wb) as space vectors, `torque_nm`,
+    /// arrays with the values at the end of each step: `current` (A) and `flux` of the rotor (Wb) as space vectors, `torque_nm`,
+    /// `speed_rpm`, and `angle_rad` of the shaft.
     /// `speed_rpm`, and `angle_rad` of the shaft.
     fn run<'py>(
         &mut self,

@@ -19,7 +19,7 @@ const LONGEST_S: f64 = 600.0;
 #[pyclass(module = "induction_drive")]
 pub struct Rig(pub rig::Rig);
 
-/// The quantity of a point without a reference.
+/// The quantities of a point without a reference.
 fn seen(point: &Point) -> Seen<'_> {
     Seen { point, reference: f64::NAN, actual: f64::NAN }
 }
@@ -39,14 +39,14 @@ impl Rig {
         py.detach(|| rig.start(mode)).map_err(raised)
     }
 
-    /// Couples another load, as `Plant.set_load`.
+    /// Couples another load, as `Plant.set_load` does.
     #[pyo3(signature = (mode, value=0.0))]
     fn set_load(&mut self, mode: &str, value: f64) -> PyResult<()> {
         self.0.set_load(plant::load(mode, value)?).map_err(raised)
     }
 
-    /// Runs for this time and returns arrays with a value for each control period, 1/6000 s: `time_s`, and the columns of a scenario
-    /// that need no reference. `fault` says afterwards whether the drive has stopped itself.
+    /// Runs for this time and returns arrays with a value for each control period, 1/6000 s: `time_s`, and the columns of a scenario that
+    /// need no reference. `fault` says afterwards whether the drive has tripped.
     fn run<'py>(&mut self, py: Python<'py>, seconds: f64) -> PyResult<Bound<'py, PyDict>> {
         check("seconds", seconds, (0.0, LONGEST_S), "s")?;
         let rig = &mut self.0;

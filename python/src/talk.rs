@@ -1,4 +1,4 @@
-//! What a drive is told and tells, alone and on its motor.
+//! Commands to a drive and its signals, for a drive alone and for one on its motor.
 
 use drive_core::Accepted;
 use hil_sim::rig::{RATE_HZ, fault_text};
@@ -15,7 +15,7 @@ macro_rules! conversation {
         #[pymethods]
         impl $class {
             /// Gives a command by its name at the console: `torque`, a current in A, `speed` in rpm, `position` in turns, `start torque`,
-            /// `stop quick`, `clear` and others. Returns the value that holds where it was limited, else None.
+            /// `stop quick`, `clear` and others. Returns the value in force if the value was limited, else None.
             #[pyo3(signature = (name, value=0.0))]
             fn command(&mut self, name: &str, value: f32) -> PyResult<Option<f32>> {
                 let refused = |why| PyRuntimeError::new_err(format!("the drive refuses {name}: {why}"));
@@ -23,7 +23,7 @@ macro_rules! conversation {
                 Ok(if let Accepted::Limited(to) = accepted { Some(to) } else { None })
             }
 
-            /// What it estimated and wanted in the last period with the outputs on; angle in electrical turns, frequencies in Hz.
+            /// Estimates and references of the last period with the outputs on; angle in electrical turns, frequencies in Hz.
             fn telemetry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
                 let (seen, hz, values) = (self.$($drive)+.telemetry(), RATE_HZ as f32, PyDict::new(py));
                 for (name, value) in [
@@ -46,13 +46,13 @@ macro_rules! conversation {
                 Ok(values)
             }
 
-            /// Its state in words.
+            /// State of the drive in words.
             #[getter]
             fn state(&self) -> String {
                 self.$($drive)+.state().to_string()
             }
 
-            /// The fault with which it has stopped itself, with its number, or None.
+            /// The fault by which the drive has tripped, with its number, or None.
             #[getter]
             fn fault(&self) -> Option<String> {
                 self.$($drive)+.state().fault().map(fault_text)

@@ -5,17 +5,17 @@ const FLASH_BYTES: u32 = 512 * 1024;
 const FLASH_ADDRESS: u32 = 0x0800_0000;
 /// Size of a page with two banks, and with one, bytes (RM0440, flash module organization).
 const PAGE_BYTES: (u32, u32) = (2048, 4096);
-/// Room for a set of settings, bytes: a page of the smaller kind.
+/// Space for one set of settings, bytes: a page of the smaller kind.
 pub const SETTINGS_SLOT_BYTES: u32 = PAGE_BYTES.0;
 /// Slots that the firmware writes: two sets of settings, and two pages of the history before them.
 pub const STORED_SLOTS: usize = 4;
-// In the second bank: the code, in the first, runs on while the second is written.
+// In the second bank: the code in the first bank runs on while the second bank is written.
 const _: () = assert!(settings_offset(2) >= FLASH_BYTES / 2);
 
 /// Offset of a slot from the beginning of the flash: the last pages of the larger kind, so that they stay in place when
 /// the option bit DBANK changes.
 const fn settings_offset(slot: usize) -> u32 {
-    // The sets of settings have kept their place.
+    // The two sets of settings have kept the places that earlier firmware gave them.
     let from_end = [2, 1, 4, 3][slot % STORED_SLOTS];
     FLASH_BYTES - from_end * PAGE_BYTES.1
 }
@@ -39,7 +39,7 @@ pub const fn settings_page(slot: usize, dual_bank: bool) -> (bool, u8) {
 mod tests {
     use super::*;
 
-    /// Erasing any other page would destroy the firmware.
+    /// An erasure of any other page would destroy the firmware.
     #[test]
     fn the_stored_pages_are_the_last_with_one_bank_and_with_two() {
         let pages = |dual| [0, 1, 2, 3].map(|slot| settings_page(slot, dual));

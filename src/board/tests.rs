@@ -6,10 +6,10 @@ fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
         let wanted = ns as f32 * 1e-9;
         let made = dead_time(wanted).1;
         assert!(made > wanted - 0.2e-9 && made < 1.04 * wanted + 12e-9, "{wanted}: {made}");
-        // What the timer makes, asked for again, is the same.
+        // A dead time that the timer generates, requested again, gives the same dead time.
         assert_eq!(dead_time(made), dead_time(wanted));
     }
-    // Whatever else is asked for, there is a field.
+    // Any other request has a field, too.
     for odd in [f32::NAN, f32::INFINITY, -1.0, 0.0] {
         let _ = dead_time(odd);
     }
@@ -38,7 +38,7 @@ fn the_protection_follows_the_settings_and_stays_in_the_range_of_the_converters(
     assert!((s.scales.dc_link.at(over_voltage) - 64.5).abs() < 0.05);
     (s.limits.trip_a, s.limits.dc_over_v) = (Some(s.sensor_range_a()), Some(s.dc_link_range_v()));
     let ends = protection(SELECTED, &s);
-    // The comparator ends where the board does: 436.9 V at 0.11 V a code, whatever the scale.
+    // The comparator's level ends at the board's limit: 436.9 V at 0.11 V a count, for any scale.
     assert_eq!((ends.window_a, ends.over_voltage), ((1, ADC_FULL_SCALE - 1), 3971));
 }
 
@@ -75,14 +75,14 @@ fn the_timer_makes_equal_pulses_in_a_control_period() {
         let timer = Timer::of(&settings.inverter);
         assert_eq!(timer.top(), top);
         assert_eq!(f32::from(top), settings.build().unwrap().front_end.top);
-        // An update after so many ends of the count, of which each pulse has two.
+        // The timer leaves out this many ends of the count before an update; each pulse has two ends.
         assert_eq!(timer.updates_left_out() + 1, 2 * carrier_khz.pulses());
         let hz = CLOCK_HZ as f32 / (2 * u32::from(top) * u32::from(carrier_khz.pulses())) as f32;
         assert!((hz / 6000.0 - 1.0).abs() < 1e-4, "{hz} Hz");
     }
 }
 
-/// 0 A gave 2024 with 3.0 V (Table 4): the same voltage is 1840 of 3.3 V.
+/// 0 A gave 2024 counts with 3.0 V (Table 4): the same voltage is 1840 counts with 3.3 V.
 #[test]
 fn the_calibration_follows_the_reference() {
     let line = SELECTED.currents.a.line.value;
@@ -107,8 +107,8 @@ fn the_drive_accepts_the_board() {
     assert!(settings().build().is_ok());
 }
 
-/// The oscillator of the watchdog at the ends of the data sheet's range is sound, beside a crystal and beside the internal
-/// oscillator with its error; beyond 29 and 35 kHz it is not.
+/// A watchdog oscillator at the ends of the datasheet's range passes, beside a crystal and beside the internal oscillator with its error.
+/// Beyond 29 and 35 kHz it fails.
 #[test]
 fn clocks_agree_over_the_range_of_the_oscillator() {
     let clocks = |hz: f64, error: f64| (8.0 * f64::from(CLOCK_HZ) * (1.0 + error) / hz) as u32;
@@ -122,7 +122,7 @@ fn clocks_agree_over_the_range_of_the_oscillator() {
     assert!(!clocks_agree(0, true));
 }
 
-/// The factory has measured the reference of the chip beside 3.0 V.
+/// The factory has measured the chip's own reference with 3.0 V.
 #[test]
 fn references_agree_within_three_per_cent() {
     let code = |volts: f32| (1655.0 * 3.0 / volts) as u16;

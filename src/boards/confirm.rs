@@ -4,7 +4,7 @@ use super::{Board, Currents, Source};
 use crate::hash;
 
 impl Board {
-    /// What is assumed, with the bench step for it.
+    /// The assumed items, each with the bench step that shows whether it holds.
     pub fn assumptions(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
         self.sources().into_iter().filter_map(|(item, source)| match source? {
             Source::Assumed(step) => Some((item, step)),
@@ -12,7 +12,7 @@ impl Board {
         })
     }
 
-    /// The items of the power stage with their sources; none for an item that the board does not have.
+    /// The items of the power stage with their sources; the source is `None` for an item that the board does not have.
     pub fn sources(&self) -> [(&'static str, Option<Source>); 15] {
         let Currents { a, b, shunts } = &self.currents;
         [
@@ -26,16 +26,16 @@ impl Board {
             ("scale of current c", shunts.map(|shunts| shunts.c.line.source)),
             ("settling of the shunts", shunts.map(|shunts| shunts.settle_s.source)),
             ("scale of the dc link", Some(self.dc_link.line.source)),
-            ("highest dc link in operation", Some(self.dc_link_limits.operation.source)),
-            ("switches stand", Some(self.dc_link_limits.switches.source)),
-            ("capacitors stand", Some(self.dc_link_limits.capacitors.source)),
+            ("maximum operating voltage", Some(self.dc_link_limits.operation.source)),
+            ("switches withstand", Some(self.dc_link_limits.switches.source)),
+            ("capacitors withstand", Some(self.dc_link_limits.capacitors.source)),
             ("over-current shut-down", self.over_current.map(|shut_down| shut_down.source)),
             ("thermistor", Some(self.ntc.source)),
         ]
     }
 
-    /// The number that a confirmation saves: of the board's name, its values, and the words that are `in_force` beside them,
-    /// so that it does not hold for others. Never 0.
+    /// The number that a confirmation saves. It covers the board's name, its values, and the words of the settings that are `in_force`
+    /// beside them, so that it does not hold for other values. Never 0.
     pub fn confirmation(&self, in_force: impl Iterator<Item = u32>) -> u32 {
         let Currents { a, b, shunts } = &self.currents;
         let line = |sensor: &super::Analog| [sensor.line.value.gain, sensor.line.value.offset];

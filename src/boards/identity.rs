@@ -24,7 +24,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// That of a board.
+    /// The identity of a board.
     pub const fn of(board: &Board) -> Self {
         let (bytes, mut name, mut i) = (board.name.as_bytes(), [0; NAME], 0);
         assert!(bytes.len() < NAME, "the board's name is too long");

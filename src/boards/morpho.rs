@@ -1,4 +1,4 @@
-//! ST's morpho connector for motor control, where all boards here have their signals, and the power boards of ST at it:
+//! ST's morpho connector for motor control, to which all boards here connect their signals, and ST's power boards on it. These have
 //! drivers L639x, which switch a low side on at a low level, and three shunts below the low sides.
 
 use drive_core::Line;
@@ -25,7 +25,7 @@ pub const SHUNT_STEP: &str =
 /// Bench step of a thermistor.
 pub const NTC_STEP: &str = "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink";
 
-/// A thermistor with this resistor in series. Another topology shows another temperature, or one that falls.
+/// A thermistor with this resistor in series. If the topology differs, the temperature is wrong or falls when it should rise.
 pub const fn ntc(divider_ohm: f32) -> Stated<Ntc> {
     assumed(Ntc { divider_ohm, ..Ntc::DEFAULT }, NTC_STEP)
 }
@@ -42,7 +42,7 @@ pub const fn fault(bench_step: &'static str) -> FaultInput {
     }
 }
 
-/// The dc link, with this many volts a code.
+/// The dc link, with this many volts per ADC count.
 pub const fn dc_link(gain: Stated<f32>) -> Analog {
     let line = Line { gain: gain.value, offset: 0.0 };
     Analog { pin: pa(1), line: Stated { value: line, source: gain.source } }
@@ -56,8 +56,7 @@ pub const CURRENT_DELAY_S: Stated<f32> =
 /// Advice on resistors.
 pub const PULLS: &str = "10 kOhm to 3.3 V at each low-side input, 10 kOhm to ground at each high-side input: those of the drivers are weak";
 
-/// Shunts below the low sides, with amplifiers that give `zero_v` without current and `v_per_a` more for each ampere into
-/// the motor, V.
+/// Shunts below the low sides. Their amplifiers give `zero_v` without current and `v_per_a` more for each ampere into the motor, V.
 pub const fn shunts(v_per_a: Stated<f32>, zero_v: f32) -> Currents {
     let value = Line::of_sensor(v_per_a.value, zero_v, REFERENCE_V, CODES);
     let line = Stated { value, source: v_per_a.source };

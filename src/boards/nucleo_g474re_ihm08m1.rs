@@ -1,5 +1,5 @@
-//! NUCLEO-G474RE with X-NUCLEO-IHM08M1: up to 48 V while it brakes, so 42 V nominal; three shunts below the low sides. The board to start with: no
-//! voltage on it is dangerous to touch.
+//! NUCLEO-G474RE with X-NUCLEO-IHM08M1: up to 48 V while braking, so 42 V nominal; three shunts below the low sides. It is the board to
+//! start with: no voltage on it is dangerous to touch.
 //!
 //! Not tried with a motor yet. Set-up of the jumpers: JP1 and JP2 closed, J5 and J6 at three shunts, JP3 closed, J9 open
 //! above 12 V, C3, C5 and C7 removed, JP5 of the Nucleo at E5V.
@@ -10,10 +10,10 @@ use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
 use super::{Board, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read};
 
-/// The port of NuttX to this board, which has turned motors: polarity, gain, sign and divider.
+/// The NuttX port to this board, which has run motors: polarity, gain, sign and divider.
 const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
 
-#[rustfmt::skip] // All that the board leaves free beside PB4, PB6 and PB8: REFERENCE and the motor's sensor; ENABLE, START, STOP, RESET.
+#[rustfmt::skip] // All pins that the board leaves free beside PB4, PB6 and PB8: REFERENCE and the motor's sensor; ENABLE, START, STOP, RESET.
 const TERMINALS: TerminalPins = [
     Some(pb(12)), None, Some(pb(13)),
     Some(pb(5)), Some(pb(7)), Some(pb(9)), None, Some(pc(7)), None, None,
@@ -42,7 +42,7 @@ pub const BOARD: Board = Board {
     dc_link: morpho::dc_link(read(19.15 * REFERENCE_V / CODES as f32, NUTTX)),
     heat_sink: morpho::HEAT_SINK,
     ntc: morpho::ntc(4700.0),
-    // Braking lifts the link by 14 %, to the highest in operation.
+    // Braking raises the link by 14 %, to the maximum operating voltage.
     dc_link_v: 42.0,
     flux: Flux::High,
     dc_link_limits: DcLinkLimits {
@@ -50,7 +50,7 @@ pub const BOARD: Board = Board {
         switches: read(60.0, "STL220N6F7 data sheet, drain to source"),
         capacitors: assumed(63.0, "the voltage that is printed on the capacitors at the supply"),
     },
-    // The sources do not agree on what sets its threshold: a divider, or a voltage at PB4.
+    // The sources disagree on what sets the comparator's threshold: a divider, or a voltage at PB4.
     over_current: Some(assumed(
         "comparator on the shunts, about 30 A, at the fault input",
         "CURRENT REF (CN10-27) must have a voltage; below it the comparator does not trip",

@@ -1,5 +1,5 @@
-//! Pins of the STM32G474RE, and what the peripherals used here reach (datasheet, alternate functions and pin description;
-//! the same as in the tables of `stm32g4xx-hal` 0.1.0).
+//! Pins of the STM32G474RE, and the peripheral signals that each pin can carry (datasheet, alternate functions and pin description; the
+//! same as in the tables of `stm32g4xx-hal` 0.1.0).
 
 /// A port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,12 +62,12 @@ pub const COMP1_INPUT: Pin = pa(1);
 /// Channels of ADC1 and ADC2 that reach the same pin: `(pin, channel)`. All are among channels 1 to 9.
 const ADC12: [(Pin, u8); 6] =
     [(pa(0), 1), (pa(1), 2), (pc(0), 6), (pc(1), 7), (pc(2), 8), (pc(3), 9)];
-/// Channels of ADC1 alone.
+/// Channels of ADC1 only.
 const ADC1: [(Pin, u8); 2] = [(pa(2), 3), (pa(3), 4)];
-/// Channels of ADC2 alone.
+/// Channels of ADC2 only.
 const ADC2: [(Pin, u8); 3] = [(pa(6), 3), (pa(7), 4), (pa(5), 13)];
 
-/// Channels of ADC3 (0) and ADC4 (1): `(pin, (converter, channel))`.
+/// Channels of ADC3 (0) and ADC4 (1): `(pin, (ADC, channel))`.
 const ADC34: [(Pin, (u8, u8)); 4] =
     [(pb(13), (0, 5)), (pb(12), (1, 3)), (pb(14), (1, 4)), (pb(15), (1, 5))];
 
@@ -88,7 +88,7 @@ impl Pin {
         self.port as u8 == other.port as u8 && self.number == other.number
     }
 
-    /// Whether it is one of these, of which some may be none.
+    /// Whether the pin is one of these, some of which may be `None`.
     pub const fn is_one_of(self, pins: &[Option<Self>]) -> bool {
         match pins {
             [] => false,
@@ -97,7 +97,7 @@ impl Pin {
         }
     }
 
-    /// Whether it is one of these.
+    /// Whether the pin is one of these.
     pub const fn is_among(self, pins: &[Self]) -> bool {
         match pins {
             [] => false,
@@ -118,7 +118,7 @@ impl Pin {
         }
     }
 
-    /// Its channel of ADC1.
+    /// Channel of the pin at ADC1.
     pub const fn adc1(self) -> Option<u8> {
         match look_up(&ADC12, self) {
             Some(channel) => Some(channel),
@@ -126,12 +126,12 @@ impl Pin {
         }
     }
 
-    /// Its converter, ADC3 (0) or ADC4 (1), and its channel there.
+    /// ADC of the pin, ADC3 (0) or ADC4 (1), and its channel there.
     pub const fn adc34(self) -> Option<(u8, u8)> {
         look_up(&ADC34, self)
     }
 
-    /// Its channel of ADC2.
+    /// Channel of the pin at ADC2.
     pub const fn adc2(self) -> Option<u8> {
         match look_up(&ADC12, self) {
             Some(channel) => Some(channel),

@@ -9,7 +9,7 @@ use super::{
     Analog, Board, Currents, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read,
 };
 
-#[rustfmt::skip] // References at a converter each, and the motor's sensor; contacts; outputs.
+#[rustfmt::skip] // Two references and the motor's sensor, each at an ADC; contacts; outputs.
 const TERMINALS: TerminalPins = [
     Some(pb(12)), Some(pb(13)), Some(pb(14)),
     Some(pb(5)), Some(pb(7)), Some(pb(9)), Some(pb(10)), Some(pb(11)), Some(pc(4)), Some(pc(5)),
@@ -35,11 +35,11 @@ pub const BOARD: Board = Board {
         ),
     },
     fault: morpho::fault("ground the fault input: `status` must show the break"),
-    // Both switches of a leg are off for this long at every change.
+    // Both switches of a leg are off for this time at every change.
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
-    // The need of slow power modules.
+    // Slow power modules need up to this dead time.
     dead_time_max_s: 6e-6,
-    // Assumed: the dissertation names no switches; the heat sink shows whether they stand the losses.
+    // Assumed: the dissertation names no switches; the heat sink shows whether they withstand the losses.
     carrier_max_khz: Carrier::Khz18,
     currents: Currents {
         a: Analog {
@@ -62,9 +62,9 @@ pub const BOARD: Board = Board {
     ntc: morpho::ntc(4700.0),
     dc_link_v: 311.0,
     flux: Flux::Low,
-    // With another divider all three are as many times more as the divider.
+    // With another divider all three voltages scale with it.
     dc_link_limits: DcLinkLimits {
-        operation: assumed(392.0, "the voltage that all parts at the dc link stand for any time"),
+        operation: assumed(392.0, "the voltage that all dc-link parts withstand continuously"),
         switches: assumed(600.0, "data sheet of the switches: highest voltage when off"),
         capacitors: assumed(450.0, "the voltage that is printed on the capacitors"),
     },
@@ -74,7 +74,7 @@ pub const BOARD: Board = Board {
     )),
     analog_only: &[],
     bus: Some(morpho::BUS),
-    // PB4 and PB6 have the pull-downs of USB-C after a reset, PB8 chooses what starts.
+    // PB4 and PB6 have the pull-downs of USB-C after a reset, PB8 selects the program that starts.
     strip: Strip::of(TERMINALS),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

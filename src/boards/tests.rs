@@ -42,9 +42,9 @@ fn section(board: &Board) -> String {
     )
     .chain([
         ("scale of the dc link", format!("{:.3} V a code", board.dc_link.line.value.gain)),
-        ("highest dc link in operation", volts(board.dc_link_limits.operation.value)),
-        ("switches stand", volts(board.dc_link_limits.switches.value)),
-        ("capacitors stand", volts(board.dc_link_limits.capacitors.value)),
+        ("maximum operating voltage", volts(board.dc_link_limits.operation.value)),
+        ("switches withstand", volts(board.dc_link_limits.switches.value)),
+        ("capacitors withstand", volts(board.dc_link_limits.capacitors.value)),
     ])
     .chain(
         board.over_current.map(|shut_down| ("over-current shut-down", shut_down.value.to_owned())),
@@ -70,12 +70,12 @@ fn section(board: &Board) -> String {
         let source = sources.iter().find(|(name, _)| *name == item).and_then(|(_, source)| *source);
         let source = match source {
             Some(Source::Read(document)) => format!("read: {document}"),
-            // Its bench step is what `board` says.
+            // The `board` command prints its bench step.
             Some(Source::Assumed(_)) => "**assumed**".to_owned(),
             None => panic!("{item}"),
         };
         match rows.last_mut() {
-            // Sensors that are alike share a row.
+            // Identical sensors share a row.
             Some((items, before))
                 if SCALES.contains(&item) && before[..] == [value.clone(), source.clone()] =>
             {
@@ -90,7 +90,7 @@ fn section(board: &Board) -> String {
     text
 }
 
-/// Both zero vectors on every board: sensors in the lines can, shunts below the low sides refuse it by name.
+/// Both zero vectors on every board: sensors in the lines allow them, and shunts below the low sides refuse them by name.
 #[test]
 fn shunts_refuse_both_zero_vectors() {
     for board in ALL {
@@ -103,7 +103,7 @@ fn shunts_refuse_both_zero_vectors() {
     }
 }
 
-/// What each board takes: sensors in the lines up to what its switches do, shunts 6 kHz alone.
+/// Switching frequencies that each board takes: with sensors in the lines up to the limit of its switches, with shunts 6 kHz only.
 #[test]
 fn a_carrier_that_a_board_does_not_take_is_refused_by_name() {
     for board in ALL {
@@ -131,8 +131,8 @@ fn the_manual_lists_the_boards() {
     generated::check("boards.md", "boards", &ALL.map(section).join("\n"));
 }
 
-/// Nominal dc link, end of generating torque, highest in operation, trip of the software, of the comparator, with the margins
-/// for the errors, and what switches and capacitors stand.
+/// Voltages in ascending order, with the margins for the errors: nominal dc link, braking limit, maximum operating voltage, trip of the
+/// software, trip of the comparator, limits of switches and capacitors.
 #[test]
 fn the_voltages_of_every_board_are_in_order() {
     for board in ALL {
@@ -140,7 +140,7 @@ fn the_voltages_of_every_board_are_in_order() {
         settings.check().unwrap();
         let limits = &board.dc_link_limits;
         let mut highest = [settings.dc_over_v(); 2];
-        // By rule, and the highest that may be typed.
+        // First the value by rule, then the highest that may be typed.
         for typed in [false, true] {
             if typed {
                 let entry = drive_settings::find("limits.dc_over_v").unwrap();
@@ -154,14 +154,14 @@ fn the_voltages_of_every_board_are_in_order() {
             println!("{}: {nominal} {end} {trip} {comparator}", board.name);
             let operation = 1.0005 * limits.operation.value;
             assert!(nominal < end && end <= operation && limits.operation.value < trip);
-            // A code less.
+            // The tolerance is one count.
             assert!(comparator > (1.0 + COMPARATOR_ERROR - 0.002) * trip, "{}", board.name);
             let at_most = comparator * (1.0 + SENSING_ERROR);
             assert!(at_most <= OF_SWITCHES * limits.switches.value, "{}", board.name);
             assert!(at_most <= limits.capacitors.value, "{}", board.name);
         }
         assert!(highest[1] >= highest[0]);
-        // A scale that is typed moves neither: they are codes.
+        // A typed scale changes neither trip: they are in ADC counts.
         let before = protection(board, &settings).over_voltage;
         settings.scales.dc_link.gain *= 0.5;
         settings.limits.dc_over_v = None;
@@ -172,26 +172,26 @@ fn the_voltages_of_every_board_are_in_order() {
     }
 }
 
-/// Whether a board is refused when compiling, and with which words.
+/// Whether the compile-time check refuses a board, and its message.
 fn refused(board: Board) -> String {
     let panic = std::panic::catch_unwind(|| check(&board)).expect_err("it is taken");
     panic.downcast_ref::<&str>().copied().unwrap_or_default().to_owned()
 }
 
-/// One board after the other with a number or a pin that must not be.
+/// One board after the other, each with an invalid number or pin.
 #[test]
 fn a_board_that_cannot_be_protected_does_not_compile() {
     for board in ALL {
         check(board);
         let mut other = *board;
         other.dc_link_v = board.dc_link_limits.operation.value;
-        assert!(refused(other).contains("nominal dc link leaves no room"));
+        assert!(refused(other).contains("nominal dc link is too close"));
         let mut other = *board;
         other.dc_link_limits.switches.value = 1.1 * board.dc_link_limits.operation.value;
-        assert!(refused(other).contains("below what switches and capacitors stand"));
+        assert!(refused(other).contains("limits of switches and capacitors"));
         let mut other = *board;
         other.dc_link_limits.capacitors.value = 1.02 * board.dc_link_limits.operation.value;
-        assert!(refused(other).contains("below what switches and capacitors stand"));
+        assert!(refused(other).contains("limits of switches and capacitors"));
         let mut other = *board;
         other.fault.pull_ohm.value = 10e3;
         assert!(refused(other).contains("the chip pulls against it"));
@@ -208,8 +208,8 @@ fn a_board_that_cannot_be_protected_does_not_compile() {
             check(&other);
         }
     }
-    // As this board was: its link up to the absolute maximum of its transistors.
+    // As this board was once: its link up to the absolute maximum of its transistors.
     let mut old = *ALL[1];
     (old.dc_link_v, old.dc_link_limits.operation.value) = (48.0, 58.5);
-    assert!(refused(old).contains("below what switches and capacitors stand"));
+    assert!(refused(old).contains("limits of switches and capacitors"));
 }

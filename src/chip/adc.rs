@@ -1,9 +1,9 @@
-//! The converters: ADC1 and ADC2 sample the currents a and b at the same instant, then current c if the board measures it,
-//! then dc link and heat sink, started by TIM1 once per period. The end of ADC2's sequence raises the control interrupt; ADC1
-//! goes on with the chip's own reference.
+//! The ADCs. ADC1 and ADC2 sample the currents a and b at the same instant, then current c if the board measures it, then dc link and
+//! heat sink. TIM1 starts them once per period. The end of ADC2's sequence raises the control interrupt; ADC1 goes on with the chip's own
+//! reference.
 //!
-//! Sensors in the lines can be sampled in the upper zero vector as well, where all high sides are on: a regular conversion of
-//! each converter, half a period before the sequence. The code of a current is the sum of both then.
+//! Sensors in the lines can be sampled in the upper zero vector as well, where all high sides are on: each ADC does a regular conversion
+//! half a period before the sequence. The counts of a current are then the sum of both conversions.
 
 use cortex_m::asm;
 use drive_core::Sample;
@@ -16,14 +16,14 @@ use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::{Currents, SELECTED};
 
-/// Events of the converters.
+/// Events of the ADCs.
 #[derive(Clone, Copy)]
 pub struct AdcEvents {
     /// A current was outside its window since the last call.
     pub over_current: bool,
     /// The sequence of ADC2 has ended. An interrupt without it comes from an analog watchdog.
     pub ended: bool,
-    /// All conversions that the codes need have taken place.
+    /// All conversions that the counts need have taken place.
     pub complete: bool,
 }
 
@@ -36,19 +36,19 @@ const AWD1: u32 = 1 << 7;
 /// The channel of the chip's own reference at ADC1.
 const OWN_REFERENCE: u8 = 18;
 
-/// Both converters.
+/// Both ADCs.
 pub struct Adc {
     one: pac::ADC1,
     two: pac::ADC2,
-    /// Flags without which a conversion is missing: with [`EOC`] the currents are converted in the upper zero vector, too.
+    /// Flags without which a conversion is missing; with [`EOC`] the currents are converted in the upper zero vector, too.
     needed: u32,
 }
 
 impl Adc {
-    /// Sets both converters up, with the windows of their analog watchdogs; they wait for the trigger.
+    /// Sets both ADCs up, with the windows of their analog watchdogs; they wait for the trigger.
     ///
     /// # Errors
-    /// A converter did not finish a step in time.
+    /// An ADC did not finish a step in time.
     pub fn new(
         one: pac::ADC1,
         two: pac::ADC2,
@@ -67,9 +67,9 @@ impl Adc {
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4().vrefen().enabled());
         if !common.ccr().read().ckmode().is_sync_div4() {
-            return Err("the converters have no clock");
+            return Err("the ADCs have no clock");
         }
-        // `boards` has checked that each pin reaches its converter. Channel 0 is not one of them.
+        // `boards` has checked that each pin reaches its ADC. Channel 0 is not one of them.
         let channels = |first: Option<u8>, slow: Option<u8>, last| {
             [first, c.and_then(|c| c.pin.adc1()), slow, last].map(|channel| channel.unwrap_or(0))
         };
@@ -87,7 +87,7 @@ impl Adc {
         Ok(Self { one, two, needed: JEOC })
     }
 
-    /// Whether the currents are converted in the upper zero vector, too, from the next one on.
+    /// Sets whether the currents are converted in the upper zero vector, too, from the next one on.
     #[inline(always)] // the control interrupt calls it, and nothing in the CCM may call into the flash
     pub fn convert_both(&mut self, both: bool) {
         if both == (self.needed & EOC != 0) {
@@ -113,10 +113,10 @@ impl Adc {
         AdcEvents { over_current, ended: two & JEOS != 0, complete }
     }
 
-    /// The codes of the period: currents a, b and c (0 if the board does not measure it), dc link, heat sink; clears the interrupt
-    /// request. With both zero vectors those of a and b are sums.
+    /// Reads the ADC counts of the period: currents a, b and c (0 if the board does not measure it), dc link, heat sink. Clears the
+    /// interrupt request. With both zero vectors the counts of a and b are sums.
     pub fn read(&mut self) -> Sample {
-        // Before the data are read: a sequence that ends from here on raises a new request.
+        // Cleared before the data are read: a sequence that ends after this line raises a new request.
         self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
         let data = |rank| {
             let (one, two) = (self.one.jdr(rank).read().jdata(), self.two.jdr(rank).read().jdata());
@@ -124,7 +124,7 @@ impl Adc {
         };
         let (mut current_a, mut current_b) = data(0);
         if self.needed & EOC != 0 {
-            // Each read clears the EOC of its converter.
+            // Each read clears the EOC of its ADC.
             current_a = current_a.wrapping_add(self.one.dr().read().rdata().bits());
             current_b = current_b.wrapping_add(self.two.dr().read().rdata().bits());
         }
@@ -134,38 +134,37 @@ impl Adc {
         Sample { current_a, current_b, current_c, dc_link, heat_sink, ..Sample::default() }
     }
 
-    /// The period is over: its own reference has been converted, and the next sequence of ADC1 can be told from it.
+    /// Ends the period: the chip's own reference has been converted, and the next sequence of ADC1 can be told from this one.
     pub fn close(&mut self) {
         self.one.isr().write(|w| w.jeoc().clear());
     }
 }
 
-/// Powers a converter, calibrates and enables it.
+/// Powers an ADC, calibrates and enables it.
 ///
 /// # Errors
-/// It did not finish a step in time.
+/// The ADC did not finish a step in time.
 pub fn power_up(adc: &RegisterBlock) -> Result<(), StartError> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
 
     adc.cr().modify(|_, w| w.adcaldif().single_ended().adcal().start_calibration());
-    wait_for(|| !adc.cr().read().adcal().bit()).ok_or("a converter does not calibrate")?;
-    // At least four converter clocks between the calibration and the next step.
+    wait_for(|| !adc.cr().read().adcal().bit()).ok_or("an ADC does not calibrate")?;
+    // At least four ADC clocks between the calibration and the next step.
     asm::delay(8 * board::ADC_CLOCK_DIVIDER);
 
     adc.isr().write(|w| w.adrdy().clear());
-    // Again until it is ready: the logic of the calibration may still clear the bit (`stm32g4xx_hal_adc.c`).
+    // Set again until the ADC is ready: the logic of the calibration may still clear the bit (`stm32g4xx_hal_adc.c`).
     wait_for(|| {
         adc.cr().modify(|_, w| w.aden().enabled());
         adc.isr().read().adrdy().bit()
     })
-    .ok_or("a converter does not start")
+    .ok_or("an ADC does not start")
 }
 
-/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels (0: none) are those of its own
-/// current, of current c, of its slow signal, and of the chip's own reference. Both converters convert current c, so that up to
-/// the slow signal both sequences take the same time.
+/// Sets an ADC up: power, calibration, sequence, in the order of RM0440. The channels (0: none) are its own current, current c, its slow
+/// signal, and the chip's own reference. Both ADCs convert current c, so that both sequences take the same time up to the slow signal.
 fn prepare(
     adc: &RegisterBlock,
     channels: [u8; 4],
@@ -182,15 +181,15 @@ fn prepare(
     // SAFETY: five bits, an existing channel; a sequence of one.
     adc.sqr1().write(|w| unsafe { w.sq1().bits(current) });
     adc.cr().modify(|_, w| w.adstart().start_conversion());
-    wait_for(|| adc.isr().read().eoc().bit()).ok_or("a converter does not start")?;
-    // Its EOC stays, for the first period.
+    wait_for(|| adc.isr().read().eoc().bit()).ok_or("an ADC does not start")?;
+    // Its EOC flag stays set, for the first period.
     adc.isr().write(|w| w.eosmp().clear().eos().clear());
 
-    // The analog watchdog interrupts at the first code outside the window.
+    // The analog watchdog interrupts at the first count outside the window.
     // SAFETY: twelve bits each, from codes of twelve bits.
     adc.tr1().write(|w| unsafe { w.lt1().bits(low).ht1().bits(high) });
-    // It checks the current alone. No queue of sequences: the one below never changes. The regular conversion is that of the
-    // current again, where trigger output 2 of TIM1 rises; the last one counts.
+    // The watchdog checks the current only. No queue of sequences: the sequence below never changes. The regular conversion is one of the
+    // current again, at the rising edge of trigger output 2 of TIM1; with several edges in a period the last conversion counts.
     // SAFETY: five bits, an existing channel.
     adc.cfgr().modify(|_, w| unsafe {
         w.awd1ch().bits(current).awd1sgl().set_bit().awd1en().set_bit().jawd1en().set_bit();
@@ -207,12 +206,12 @@ fn prepare(
     Ok(())
 }
 
-/// The code of the chip's own reference, and the one that it had in the factory. For the main loop.
+/// ADC counts of the chip's own reference, now and in the factory. For the main loop.
 pub fn own_reference() -> (u16, u16) {
-    // Behind the dc link.
+    // Its rank is after the dc link.
     let rank = if SELECTED.currents.shunts.is_some() { 3 } else { 2 };
     let factory = board::REFERENCE_CALIBRATION as *const u16;
-    // SAFETY: the converter always exists, and only a result is read; read-only memory of the chip, aligned.
+    // SAFETY: the ADC always exists, and only a result is read; read-only memory of the chip, aligned.
     unsafe { ((*pac::ADC1::ptr()).jdr(rank).read().jdata().bits(), factory.read_volatile()) }
 }
 

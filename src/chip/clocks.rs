@@ -36,8 +36,8 @@ const fn pll_hz(oscillator_hz: u32, divider: PllMDiv) -> u32 {
 const _: () = assert!(pll_hz(board::HSE_HZ, CRYSTAL_DIVIDER) == board::CLOCK_HZ);
 const _: () = assert!(pll_hz(board::HSI_HZ, INTERNAL_DIVIDER) == board::CLOCK_HZ);
 
-/// Switches on the clock of a peripheral, and waits until the peripheral can be accessed: two bus cycles (ST reads the
-/// enable register back after every enable, `stm32g4xx_ll_bus.h`). An error if the bit does not stay.
+/// Switches on the clock of a peripheral, and waits two bus cycles until the peripheral can be accessed (ST reads the enable register
+/// back after every enable, `stm32g4xx_ll_bus.h`). The result is an error if the bit does not stay set.
 macro_rules! clock_on {
     ($register:expr, $bit:ident, $name:literal) => {{
         $register.modify(|_, w| w.$bit().set_bit());
@@ -55,9 +55,9 @@ pub fn start(
     flash: &pac::FLASH,
 ) -> (Rcc, Source, Result<(), StartError>) {
     let rcc = rcc.constrain();
-    // Off after reset, and the HAL leaves it off: without it no write below has an effect.
+    // PWR is off after reset, and the HAL leaves it off: without its clock no write below has an effect.
     let powered = clock_on!(rcc.apb1enr1(), pwren, "PWR");
-    // The range without boost: from there the HAL takes the steps to 170 MHz. A reset may have kept the boost.
+    // The range without boost, from which the HAL takes the steps to 170 MHz. A reset may have kept the boost.
     pwr.cr5().modify(|_, w| w.r1mode().set_bit());
     let (source, mux, divider) = if crystal_starts(&rcc) {
         (Source::Crystal, PllSrc::HSE(board::HSE_HZ.Hz()), CRYSTAL_DIVIDER)
@@ -84,7 +84,7 @@ pub fn start(
     // The HAL leaves the prefetch off; the caches are on after reset.
     flash.acr().modify(|_, w| w.prften().set_bit());
     if source == Source::Crystal {
-        // A crystal that stops raises the NMI, and TIM1's break with it.
+        // If the crystal stops, it raises the NMI, and TIM1's break with it.
         rcc.cr().modify(|_, w| w.csson().on());
     }
     (rcc, source, powered.and_then(|()| read_back(flash)))
@@ -96,7 +96,7 @@ fn read_back(flash: &pac::FLASH) -> Result<(), StartError> {
     let pwr = unsafe { &*pac::PWR::ptr() };
     // R1MODE clear means boosted; VOSF is set while the voltage is still changing.
     if pwr.cr5().read().r1mode().bit() || pwr.sr2().read().vosf().bit() {
-        return Err("the core voltage is not boosted, which 170 MHz need");
+        return Err("the core voltage is not boosted, but 170 MHz need it");
     }
     let monitor = pwr.cr2().read();
     if !monitor.pvde().bit() || monitor.pvdls().bits() != board::SUPPLY_LEVEL {
@@ -120,9 +120,9 @@ fn pll_locks(rcc: &Rcc, crystal: bool) -> bool {
     locks && becomes(|| !rcc.cr().read().pllrdy().is_ready(), PLL_START_MS)
 }
 
-/// Waits until something is so, for some ms at most.
+/// Waits until `so` is true, for this many milliseconds at most.
 fn becomes(so: impl Fn() -> bool, ms: u32) -> bool {
-    // A tenth of a millisecond: the core still runs from the internal oscillator.
+    // Each step takes a tenth of a millisecond: the core still runs from the internal oscillator.
     (0..10 * ms).any(|_| {
         so() || {
             asm::delay(board::HSI_HZ / 10_000);

@@ -1,8 +1,9 @@
 //! Outputs for the dc link: brake chopper and precharge relay.
 //!
-//! TIM8 makes the chopper's pulses, one in each control period (with 12 and 18 kHz one less in 2.4 s: its period is fixed); the relay is a plain output. High switches either on. A
-//! reset releases both pins, so external resistors pull them down ([`board::CHOPPER`], [`board::RELAY`]). The break of
-//! TIM8 takes the chopper off without software where the core locks up, the supply or the flash fails.
+//! TIM8 generates the chopper's pulses, one per control period (with 12 and 18 kHz one less in 2.4 s, because its period is fixed); the
+//! relay is a plain output. A high level switches either on. A reset releases both pins, so external resistors pull them down
+//! ([`board::CHOPPER`], [`board::RELAY`]). The break of TIM8 switches the chopper off without software if the core locks up, or the
+//! supply or the flash fails.
 
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
@@ -21,7 +22,7 @@ pub struct DcLink {
 }
 
 impl DcLink {
-    /// Both off, then connected with their pins.
+    /// Switches both off, then connects them with their pins.
     ///
     /// # Errors
     /// The timer has no clock.
@@ -34,7 +35,7 @@ impl DcLink {
         timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().enabled());
         timer.ccr1().write(|w| w.ccr().set(0));
         timer.ccer().write(|w| w.cce(0).set_bit());
-        // No pin breaks it, only faults inside the chip, which `Pwm::new` connects for all timers.
+        // No pin triggers its break, only faults inside the chip, which `Pwm::new` connects for all timers.
         timer.af1().write(|w| w.bkine().clear_bit());
         timer.bdtr().write(|w| {
             w.ossi().idle_level().bke().enabled().bkp().active_high().aoe().manual().moe().enabled()
@@ -66,8 +67,8 @@ impl DcLink {
 
 /// Switches both off, from any context: for handlers that do not return.
 pub fn outputs_off() {
-    // SAFETY: TIM8 always exists. This may interrupt its owner anywhere; it only clears MOE. An owner that still runs sets
-    // it again only with the drive off, at the duty zero.
+    // SAFETY: TIM8 always exists. This function may interrupt the timer's owner anywhere; it only clears MOE. An owner that still runs
+    // sets MOE again only with the drive off, at the duty zero.
     let timer = unsafe { &*pac::TIM8::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
     pins::set(board::RELAY, Level::Low);

@@ -23,8 +23,8 @@ impl Encoder {
     /// Both pins belong to JTAG after reset; the two-wire debug port does not need them.
     pub fn new(timer: pac::TIM2, rcc: &mut Rcc) -> Result<Self, StartError> {
         clock_on!(rcc.apb1enr1(), tim2en, "TIM2")?;
-        // No resistors of the chip: with them on the pins do not stand the 5 V of a push-pull encoder (AN4899), and for an
-        // open collector 40 kOhm are too slow. That one needs 1 to 4.7 kOhm to 3.3 V outside.
+        // No resistors of the chip: with them, the pins do not withstand the 5 V of a push-pull encoder (AN4899), and 40 kOhm are too
+        // slow for an open collector. An open collector needs an external resistor of 1 to 4.7 kOhm to 3.3 V.
         for track in [pa(15), pb(3)] {
             pins::alternate(track, board::ENCODER_AF, None);
         }

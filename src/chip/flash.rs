@@ -1,12 +1,12 @@
-//! The flash pages of settings and history: reading past torn double words, erasing, programming.
+//! The flash pages of settings and history: reading that tolerates torn double words, erasing, programming.
 //!
 //! Erasing and programming follow RM0440 (FLASH main memory erase and programming sequences). With two
 //! banks the code, in the first, continues while the second is written; with one, the core waits for
 //! an erasure (22 ms), so the outputs must be off.
 //!
-//! Own code instead of `stm32g4xx_hal::flash` (0.1.0), which does not suit the second bank nor torn data: it never sets
-//! the bank (BKER), waits without a limit, checks one error flag of an erasure, accepts a double word of which one half
-//! reads back, leaves the data cache as it is, and reads without regard to errors that the flash cannot correct.
+//! Own code replaces `stm32g4xx_hal::flash` (0.1.0), which suits neither the second bank nor torn data: it never sets the bank (BKER),
+//! waits without a limit, checks one error flag of an erasure, accepts a double word of which one half reads back, leaves the data cache
+//! as it is, and reads without regard to errors that the flash cannot correct.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -38,8 +38,8 @@ const STATUS_END: u32 = 1;
 /// Clears an uncorrectable error of the flash if it belongs to a read of the settings; `false` if it does not. For the
 /// non-maskable interrupt.
 ///
-/// An error in the code that reads the settings would be taken for one of the settings. The code is fetched again
-/// later, and the error is raised again.
+/// An error in the code that reads the settings would be taken for an error of the settings. But the code is fetched again later, and
+/// then the error is raised again.
 pub fn forgive_torn() -> bool {
     // SAFETY: FLASH exists for as long as the chip does; only its error flags are touched.
     let registers = unsafe { &*pac::FLASH::ptr() };
@@ -70,7 +70,7 @@ impl Pages {
         }
         // SAFETY: flags only; written as 1 they are cleared.
         self.registers.sr().write(|w| unsafe { w.bits(STATUS_FLAGS) });
-        // Off during the work: the control interrupt reads the flash meanwhile, and the cache would return wrong data
+        // The data cache is off during the work: the control interrupt reads the flash meanwhile, and the cache would return wrong data
         // (`stm32g4xx_hal_flash.c` switches it off for the same reason).
         self.registers.acr().modify(|_, w| w.dcen().clear_bit());
         let status = work(self);

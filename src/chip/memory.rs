@@ -27,9 +27,9 @@ pub fn control_code() -> (MemoryRange, u32) {
 /// The word at an address that is a multiple of 4, in the flash, in RAM, or of a register whose read has no effect.
 pub fn word(address: u32) -> u32 {
     let word;
-    // SAFETY: all callers pass addresses of statics or of configuration registers, and reading these changes nothing. In assembler, because the
-    // word may be padding or the interrupt's own, which no read in Rust may touch. A word is read whole, before or
-    // after a write of the interrupt.
+    // SAFETY: all callers pass addresses of statics or of configuration registers, and reading these changes nothing. The read is in
+    // assembler because the word may be padding or belong to the interrupt, and a read in Rust may touch neither. A word is read whole,
+    // before or after a write of the interrupt.
     unsafe {
         core::arch::asm!(
             "ldr {word}, [{address}]",
@@ -41,7 +41,7 @@ pub fn word(address: u32) -> u32 {
     word
 }
 
-/// The build id: the linker's hash of the image, which identifies the running build. It lies behind the note's header
+/// The build id: the linker's hash of the image, which identifies the running build. It follows the note's header
 /// (12 bytes) and its name, `GNU`.
 pub fn build_id() -> [u8; 8] {
     const BEHIND: usize = 16;
@@ -58,9 +58,10 @@ const GUARD_BYTES: usize = 32;
 /// Makes the last bytes of the stack inaccessible: an overflow ends in the fault handler, which begins a fresh stack.
 pub fn guard_stack(mpu: &mut MPU) {
     let end = &raw const _stack_end as u32;
-    // Region 0: 2^(SIZE + 1) bytes, no access, no execution. Elsewhere the usual map holds, and none in the fault handlers.
+    // Region 0: 2^(SIZE + 1) bytes, no access, no execution. Elsewhere the default memory map applies, and in the fault handlers no
+    // region does.
     const SIZE: u32 = GUARD_BYTES.trailing_zeros() - 1;
-    // SAFETY: the region lies below all that is used of the stack, and is no other memory.
+    // SAFETY: the region lies below the used part of the stack, and is no other memory.
     unsafe {
         mpu.rbar.write(end | 1 << 4);
         mpu.rasr.write(1 << 28 | SIZE << 1 | 1);

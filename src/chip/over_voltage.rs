@@ -1,8 +1,7 @@
 //! Over-voltage protection without software: comparator 1 compares the pin of the dc link with a level from DAC3,
 //! channel 1, inside the chip, and pulls the break of TIM1 (`pwm.rs`).
 //!
-//! The dc link is the only measured signal with a comparator of its own: the pins of both currents reach comparator 3
-//! alone.
+//! The dc link is the only measured signal with a comparator of its own: the pins of both currents reach comparator 3 only.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,12 +17,12 @@ use induction_drive::boards::{Level, SELECTED};
 
 /// The comparator has tripped by a voltage at its pin.
 static PROVED: AtomicBool = AtomicBool::new(false);
-/// The reason why no motor is switched on before it has.
+/// Reason why no motor is switched on before the comparator has tripped.
 pub const UNPROVED: StartError = "self-test: the over-voltage comparator does not trip at the level zero; with a sensor that drives its pin: dc link above a tenth of the range first";
 
-/// Starts the comparator, proves that it pulls the break of the timer and does not at the converter code `level`, and locks it
-/// there until the next reset. The outputs are off. It has to trip at the level zero as well; where a sensor drives the pin to
-/// ground against the chip's resistor, [`prove`] shows that with a dc link.
+/// Starts the comparator and locks it at `level`, in ADC counts, until the next reset. Proves before that it pulls the break of the
+/// timer, and that it does not at `level`. The outputs are off. The comparator has to trip at the level zero as well; if a sensor drives
+/// the pin to ground against the chip's resistor, [`prove`] shows that later with a dc link.
 ///
 /// # Errors
 /// The first step of the proof that fails.
@@ -69,7 +68,7 @@ pub fn watch(
     let filtered = || {
         asm::delay(board::BREAK_FILTER_NS * board::CYCLES_PER_US / 1000 + board::CYCLES_PER_US);
     };
-    // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it, and a capacitor there.
+    // Without a dc link its pin is at ground, and so is the level zero: the chip's resistor lifts the pin and charges a capacitor there.
     pins::pulled_input(SELECTED.dc_link.pin, Level::High);
     // An earlier break, of the fault input for example, does not count.
     pwm.take_break();
@@ -83,7 +82,7 @@ pub fn watch(
     pins::analog(SELECTED.dc_link.pin);
     set(level);
     if !trips {
-        // The other polarity shows the way to the break.
+        // The opposite polarity shows that the signal reaches the break.
         pwm.take_break();
         csr.modify(|_, w| w.pol().set_bit());
         filtered();
@@ -107,13 +106,13 @@ pub fn watch(
     }
 }
 
-/// Whether the comparator has tripped; if not, it has to at half of the dc link, of this code, and not at its own level behind it.
-/// For a drive that is off.
+/// Whether the comparator has tripped. If it has not, this tests it: it has to trip at half of the dc link (ADC counts) and not at its
+/// own level afterwards. For a drive that is off.
 pub fn prove(dc_link: u16) -> bool {
     if dc_link < board::COMPARABLE || PROVED.load(Ordering::Relaxed) {
         return PROVED.load(Ordering::Relaxed);
     }
-    // SAFETY: both always exist. The level is this function's alone since `watch`; it only reads the comparator.
+    // SAFETY: both always exist. After `watch` only this function writes the level; it only reads the comparator.
     let (dac, comparators) = unsafe { (&*pac::DAC3::ptr(), &*pac::COMP::ptr()) };
     let level = dac.dhr12r1().read().daccdhr().bits();
     let trips_at = |code: u16| {

@@ -1,4 +1,4 @@
-//! Pins by their data: a board names them, so their types are not known to the compiler.
+//! Pins as data: a board names its pins, so their types are not known to the compiler.
 
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::gpioc::RegisterBlock;

@@ -1,9 +1,8 @@
 //! The power stage: TIM1 generates the six gate signals, with dead time and break input.
 //!
-//! The counter runs up to its top and down to 0 once per pulse. A high side is on while the counter is below the compare
-//! value of its leg, so all low sides are on around the top. There, once per control period of one to three pulses, the
-//! currents are sampled, and there the timer takes over the compare values written during the control period before:
-//! sample `k` acts in period `k + 1`.
+//! The counter runs up to its top and down to 0 once per pulse. A high side is on while the counter is below the compare value of its
+//! leg, so all low sides are on around the top. At the top, once per control period of one to three pulses, the currents are sampled, and
+//! the timer takes over the compare values written during the control period before: sample `k` acts in period `k + 1`.
 
 use cortex_m::asm;
 use drive_core::Compare;
@@ -23,8 +22,8 @@ const EVENTS: u32 = 1 | 1 << 7 | 1 << 13;
 pub struct TimerEvents {
     /// It has taken over compare values since the last call.
     pub updated: bool,
-    /// The power stage, the comparator or a fault inside the chip has pulled the break since the last
-    /// call, or still pulls it; or the outputs are off although they should be on, whatever switched them off.
+    /// The power stage, the comparator or a fault inside the chip has pulled the break since the last call, or still pulls it; or the
+    /// outputs are off although they should be on, whatever switched them off.
     pub pulled: bool,
 }
 
@@ -32,8 +31,8 @@ pub struct TimerEvents {
 pub struct Pwm {
     timer: pac::TIM1,
     on: bool,
-    /// Whether a start was taken since the drive was off: a second fact beside the state of the drive, as a word that no few flipped
-    /// bits turn into the other.
+    /// [`ARMED`] if a start was taken since the drive was off. It is a second condition beside the state of the drive, in a word that a
+    /// few flipped bits do not turn into the other value.
     armed: u32,
 }
 
@@ -46,7 +45,7 @@ impl Pwm {
     /// [`connect_gates`].
     ///
     /// # Errors
-    /// It has no clock; dead time, polarity, break or lock do not read back as they were written; the address of its break
+    /// The timer has no clock; dead time, polarity, break or lock do not read back as they were written; the address of its break
     /// register is not [`board::TIM1_BDTR`], which the fault handler writes.
     pub fn new(
         timer: pac::TIM1,
@@ -71,8 +70,8 @@ impl Pwm {
         timer
             .ccmr1_output()
             .write(|w| w.oc1m().pwm_mode1().oc1pe().enabled().oc2m().pwm_mode1().oc2pe().enabled());
-        // Channels 4 and 6 have no pins. The signal of 4 is high above its compare value (PWM mode 2), that of 6 below its own
-        // (PWM mode 1): they rise before the top and before 0, and start the conversions there.
+        // Channels 4 and 6 have no pins. The signal of channel 4 is high above its compare value (PWM mode 2), the signal of channel 6
+        // below its own (PWM mode 1). They rise before the top and before 0, and start the conversions there.
         timer
             .ccmr2_output()
             .write(|w| w.oc3m().pwm_mode1().oc3pe().enabled().oc4m().pwm_mode2().oc4pe().enabled());
@@ -89,8 +88,8 @@ impl Pwm {
             for leg in 0..3 {
                 w.ois(leg).bit(high_low_active).oisn(leg).bit(low_low_active);
             }
-            // SAFETY: four bits and three. The signal of channel 6 is the trigger output 2, that of channel 4 or the update the
-            // output 1.
+            // SAFETY: four bits and three. Trigger output 2 is the signal of channel 6; trigger output 1 is channel 4 or the update
+            // event.
             unsafe { w.mms2().bits(9).mms().bits(settings.trigger_output()) }
         });
         // Both outputs of the legs.
@@ -102,19 +101,18 @@ impl Pwm {
             w
         });
 
-        // To the break as well, until the next reset: lock-up of the core, supply voltage, and errors of the flash that
-        // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.) The stored pages,
-        // which a power failure may have torn, have been read before.
+        // Further break sources, until the next reset: lock-up of the core, supply voltage, and errors of the flash that cannot be
+        // corrected. (Not the parity of the RAM, which the factory's option bytes leave off.) The stored pages, which a power failure may
+        // have torn, have been read before.
         clock_on!(rcc.apb2enr(), syscfgen, "SYSCFG")?;
         system.cfgr2().modify(|_, w| w.cll().set_bit().pvdl().set_bit().eccl().set_bit());
 
-        // The break inputs: the fault output of the power stage; the comparator of the dc link, high trips. One OR gate
-        // combines them, so each must be low behind its own polarity in normal operation, and the break itself is active
-        // high (BKP below).
+        // The break inputs: the fault output of the power stage, and the comparator of the dc link, which trips high. One OR gate
+        // combines them, so each must be low after its own polarity in normal operation, and the break itself is active high (BKP below).
         let trips_at_low = SELECTED.fault.trips_at.value == Level::Low;
         timer.af1().write(|w| w.bkine().set_bit().bkinp().bit(trips_at_low).bkcmp1e().set_bit());
-        // In one write, which the lock belongs to: it counts from the first write after a reset on
-        // (`stm32g4xx_ll_tim.h`). It keeps dead time, polarity, break, idle level and output mode until the next reset.
+        // One write for all, including the lock, which counts from the first write after a reset (`stm32g4xx_ll_tim.h`). It keeps dead
+        // time, polarity, break, idle level and output mode until the next reset.
         timer.bdtr().write(|w| {
             w.dtg().set(settings.dead_time_code);
             // Off means driven to the idle level: not floating.
@@ -135,15 +133,15 @@ impl Pwm {
             return Err("dead time, polarity, break or lock of TIM1 do not read back");
         }
 
-        // Load all of it. The repetition counter is loaded with 0 first, so that the first update comes when the counter first
-        // reaches the top; from there on once in a control period, always at the top.
+        // Loads all preloaded registers. The repetition counter is loaded with 0 first, so that the first update comes when the counter
+        // first reaches the top. After that an update comes once per control period, always at the top.
         timer.rcr().write(|w| w.rep().set(0));
         // See board::DEAD_TIME_CLOCKS.
         timer.cr1().write(|w| w.arpe().enabled().cms().center_aligned1().ckd().div2());
         timer.egr().write(|w| w.ug().update());
         timer.rcr().write(|w| w.rep().set(settings.updates_left_out()));
 
-        // Pulled to the level that trips, so that a broken wire does.
+        // Pulled to the level that trips, so that a broken wire trips as well.
         let fault = SELECTED.fault;
         pins::alternate(fault.pin, fault.pin.function(&pin::TIM1_BKIN), Some(fault.trips_at.value));
 
@@ -160,7 +158,7 @@ impl Pwm {
     /// Starts the counter and checks that the compare values are taken over at the top.
     ///
     /// # Errors
-    /// It does not run, or takes them over elsewhere.
+    /// The counter does not run, or takes the compare values over elsewhere.
     pub fn start(&mut self) -> Result<(), StartError> {
         self.timer.sr().write(|w| w.uif().clear().bif().clear());
         self.timer.cr1().modify(|_, w| w.cen().enabled());
@@ -186,10 +184,10 @@ impl Pwm {
         self.armed = DISARMED;
     }
 
-    /// Applies the output of the drive: compare values for the next period, outputs on or off now. Returns whether it was right: a drive
-    /// that wants its outputs on although no start was taken has a flipped bit in its state, and the outputs stay off.
+    /// Applies the output of the drive: compare values for the next period, outputs on or off now. Returns `false`, and the outputs stay
+    /// off, if the drive wants its outputs on although no start was taken: then its state has a flipped bit.
     ///
-    /// Until the first compare values are taken over, the initial zeros hold: low sides on.
+    /// Until the first compare values are taken over, the initial zeros apply: low sides on.
     pub fn apply(&mut self, compare: Compare) -> bool {
         if !compare.enabled {
             self.trip();
@@ -197,7 +195,7 @@ impl Pwm {
         self.timer.ccr1().write(|w| w.ccr().set(u32::from(compare.a)));
         self.timer.ccr2().write(|w| w.ccr().set(u32::from(compare.b)));
         self.timer.ccr3().write(|w| w.ccr().set(u32::from(compare.c)));
-        // Once, when the drive switches on: written in every period, it would undo a break since the sample.
+        // Written once, when the drive switches on: if it were written in every period, it would undo a break since the sample.
         if compare.enabled && !self.on {
             if self.armed != ARMED {
                 return false;
@@ -218,16 +216,16 @@ impl Pwm {
     pub fn take_events(&mut self) -> TimerEvents {
         let status = self.timer.sr().read();
         let (updated, broken) = (status.uif().bit(), status.bif().bit() || status.sbif().bit());
-        // Only what was read: a break since then stays for the next call. (Written as 1 a flag stays.) While its input is
-        // low the break is set again.
+        // Clears only the flags that were read: a break since then stays for the next call. (Writing 1 leaves a flag as it is.) While the
+        // break input is low the flag is set again.
         // SAFETY: flags of the register itself.
         self.timer.sr().write(|w| unsafe { w.bits(!(status.bits() & EVENTS)) });
         let lost = self.on && !self.timer.bdtr().read().moe().bit();
         TimerEvents { updated, pulled: broken || lost }
     }
 
-    /// Ticks since the counter was at [`board::PWM_TOP`], or would have been if its top were there, while it counts down; half a
-    /// control period or more while it counts up.
+    /// Ticks since the counter, counting down, was at [`board::PWM_TOP`], or would have been if its top were there. Half a control period
+    /// or more while it counts up.
     pub fn since_top(&self) -> u32 {
         let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {
@@ -243,10 +241,10 @@ impl Pwm {
     }
 }
 
-/// Connects the pins of the gates with the timer, which drives them off. Only on the board that the image is for: on another one, the level
-/// that is off here may switch on.
+/// Connects the pins of the gates with the timer, which drives them off. Only on the board that the image is for: on another board, the
+/// level that is off here may switch a gate on.
 pub fn connect_gates() {
-    // The resistors hold them off as well, should the timer ever release them.
+    // The resistors hold the gates off as well, should the timer ever release the pins.
     let off = |on_at: Level| if on_at == Level::Low { Level::High } else { Level::Low };
     let (high, low) = (SELECTED.high.on_at.value, SELECTED.low.on_at.value);
     let gates = SELECTED.high.pins.into_iter().zip(SELECTED.low.pins);
@@ -258,8 +256,8 @@ pub fn connect_gates() {
 
 /// Switches all six switches, chopper and relay off, from any context: for handlers that do not return.
 pub fn outputs_off() {
-    // SAFETY: TIM1 always exists. This may interrupt the owner of the timer anywhere; it only clears MOE, and nothing
-    // else runs after it.
+    // SAFETY: TIM1 always exists. This function may interrupt the timer's owner anywhere; it only clears MOE, and nothing else runs after
+    // it.
     let timer = unsafe { &*pac::TIM1::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
     dc_link::outputs_off();

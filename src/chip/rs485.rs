@@ -1,8 +1,8 @@
 //! The RS-485 port of the field bus: USART3 and a pin that switches the driver on, an interrupt per byte.
 //!
-//! Only the interrupt accesses the registers, at the priority of the console's. A frame ends when the receiver has heard
-//! nothing for the silence of the line (its time-out counter); then it goes to the main loop whole. While the
-//! driver is on nothing is received.
+//! Only the interrupt accesses the registers, at the same priority as the console's. A frame ends when the receiver has heard nothing for
+//! the silent interval of the line (its time-out counter); then the whole frame goes to the main loop. While the driver is on nothing is
+//! received.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -34,11 +34,11 @@ struct PortInterrupt {
     driver: Pin,
     received: Sender<'static, Frame>,
     to_send: Receiver<'static, Frame>,
-    /// The frame that comes in, or goes out.
+    /// The frame that is being received or sent.
     frame: Frame,
-    /// Whether the frame that comes in is damaged.
+    /// Whether the frame that is being received is damaged.
     damaged: bool,
-    /// The next byte of the frame that goes out; `None` while nothing is sent.
+    /// The next byte of the frame that is being sent; `None` while nothing is sent.
     next: Option<usize>,
     /// The line in force, as in [`LINE`].
     line: u32,
@@ -53,7 +53,7 @@ unsafe impl Sync for Owned {}
 
 static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 
-/// The line that is wanted: address, rate and format, see [`line`].
+/// The requested line parameters: address, rate and format, see [`line`].
 static LINE: AtomicU32 = AtomicU32::new(NO_LINE);
 /// The port is off.
 const NO_LINE: u32 = u32::MAX;
@@ -176,8 +176,8 @@ impl PortInterrupt {
         }
     }
 
-    /// A frame has come in: to the main loop, or answered here while that designs controllers for seconds, or has not taken the frame
-    /// before.
+    /// Ends a received frame: it goes to the main loop. While the main loop designs controllers for seconds, or has not taken the frame
+    /// before, the frame is answered here.
     fn end_frame(&mut self) {
         let whole = !self.damaged && !self.frame.is_empty();
         let busy = BUSY.load(Ordering::Relaxed);
@@ -185,7 +185,7 @@ impl PortInterrupt {
             let [_, own, ..] = self.line.to_be_bytes();
             let (answer, stop) = slave::busy(&self.frame, own, bus::is_stop);
             if let Some((at, word)) = stop {
-                // Of two the one that stays is a stop as well.
+                // If two stops come, the one that is kept is a stop as well.
                 STOP.fetch_max(u32::from(at) << 16 | u32::from(word), Ordering::Relaxed);
             }
             if let Some(answer) = answer {
@@ -221,7 +221,7 @@ impl PortInterrupt {
         }
     }
 
-    /// Gives the next byte to the transmitter; switches the driver off behind the last stop bit.
+    /// Gives the next byte to the transmitter; switches the driver off after the last stop bit.
     fn send(&mut self) {
         let Some(next) = self.next else { return };
         let port = &self.port;
@@ -255,7 +255,7 @@ impl PortInterrupt {
             let w = w.rtoen().enabled();
             if format == Format::TwoStops { w.stop().stop2() } else { w.stop().stop1() }
         });
-        // The interrupt also at damaged bytes.
+        // The interrupt is raised by damaged bytes, too.
         port.cr3().write(|w| w.eie().enabled());
         let parity = format == Format::Even;
         // Nine bits with parity.

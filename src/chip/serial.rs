@@ -1,7 +1,7 @@
 //! The serial port of the console: LPUART1, 8N1, with its FIFOs of eight bytes.
 //!
-//! Only the interrupt accesses the registers. Its priority is below that of the control interrupt, during which the FIFOs
-//! go on: at 2 Mbaud eight bytes take 40 us.
+//! Only the interrupt accesses the registers. Its priority is below the control interrupt's, during which the FIFOs go on: at 2 Mbaud
+//! eight bytes take 40 us.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -54,7 +54,7 @@ static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 
 /// Bytes were damaged on the wire, or came faster than they were read.
 static DAMAGED: AtomicBool = AtomicBool::new(false);
-/// The BRR register wanted, and in force.
+/// The requested BRR register, and the one in force.
 static DIVIDER: AtomicU32 = AtomicU32::new(0);
 static IN_FORCE: AtomicU32 = AtomicU32::new(0);
 
@@ -71,7 +71,7 @@ impl Port {
         // Pulled up: an open input stays idle.
         pins::alternate(pa(3), board::SERIAL_AF, Some(Level::High));
 
-        // The interrupt also at damaged bytes.
+        // The interrupt is raised by damaged bytes, too.
         port.cr3().write(|w| w.eie().enabled());
         let divider = board::serial_divider(clock_hz, board::SERIAL_BAUD);
         DIVIDER.store(divider, Ordering::Relaxed);
@@ -131,7 +131,7 @@ impl PortInterrupt {
     /// Sets the rate and switches the port on: 8 bits, no parity, one stop bit, as after reset; FIFOs, and an interrupt when
     /// a byte is received.
     fn enable(&self) {
-        // BRR and the FIFOs can be changed only while it is off (RM0440, LPUART_CR1).
+        // BRR and the FIFOs can be changed only while the port is off (RM0440, LPUART_CR1).
         self.port.cr1().reset();
         // SAFETY: the register takes 20 bits; `board` keeps the value inside.
         self.port.brr().write(|w| unsafe { w.bits(self.divider) });
@@ -148,7 +148,7 @@ impl PortInterrupt {
             port.icr().write(|w| w.orecf().clear().fecf().clear().ncf().clear().pecf().clear());
             DAMAGED.store(true, Ordering::Relaxed);
         }
-        // At most as many as the FIFO holds: the main loop goes on.
+        // At most as many bytes as the FIFO holds, so that the main loop goes on.
         for _ in 0..FIFO {
             if !port.isr().read().rxne().bit() {
                 break;
@@ -170,7 +170,7 @@ impl PortInterrupt {
         let more = self.to_send.ready();
         port.cr1().modify(|_, w| w.txfeie().bit(more));
         let wanted = DIVIDER.load(Ordering::Relaxed);
-        // At the end of the last byte; the main loop asks again until then.
+        // Changed at the end of the last byte; the main loop asks again until then.
         if wanted != self.divider && !more && port.isr().read().tc().bit() {
             self.divider = wanted;
             self.enable();

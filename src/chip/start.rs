@@ -1,14 +1,14 @@
 //! The start block: the first code after a reset, in the first page of the flash, with nothing set up yet. In assembler, because
 //! no Rust may run before statics are initialised, and because nothing outside of the page may be relied on.
 //!
-//! * What ST's loader jumps to begins with a reset: the loader leaves pins and clocks as it has used them.
-//! * A reset that [`into_loader`] has asked for ends in ST's loader (AN2606: from the state after a reset, with the
+//! * A jump of ST's loader begins with a reset: the loader leaves pins and clocks as it has used them.
+//! * A reset that [`into_loader`] has requested ends in ST's loader (AN2606: from the state after a reset, with the
 //!   system memory at address 0).
-//! * Otherwise the CRC unit sums up the image. A wrong sum, or a word that the flash cannot correct, is what an update leaves that
-//!   was cut short: nothing of the image runs. All pins stay as after a reset but for those of the console, where the answer to
-//!   each line is that the image is damaged; `update gates-off` still works.
-//! * A whole image goes on: the control code is copied from the flash to CCM, where it is fetched without wait states. It is
-//!   done first, because the functions that copy and clear memory are among it.
+//! * Otherwise the CRC unit sums up the image. A wrong sum, or a word that the flash cannot correct, means that an update was cut short:
+//!   nothing of the image runs. All pins stay as after a reset but for those of the console, where the answer to each line is that the
+//!   image is damaged; `update gates-off` still works.
+//! * If the image is whole, the control code is copied from the flash to CCM, where it is fetched without wait states. This is done
+//!   first, because the functions that copy and clear memory are part of it.
 
 use core::arch::global_asm;
 
@@ -29,7 +29,7 @@ unsafe extern "C" {
 
 /// The check sum of the image: CRC-32 as of zip, over its pieces (`memory.x`).
 pub fn check() -> u32 {
-    // SAFETY: a word of the flash, which `cargo firmware` puts in behind the compiler.
+    // SAFETY: a word of the flash, which `cargo firmware` puts in after the compiler.
     unsafe { (&raw const __check).read_volatile() }
 }
 
@@ -43,7 +43,7 @@ global_asm!(
     ".type __pre_init, %function; .type into_loader, %function; .type NonMaskableInt, %function",
     ".Lblock: .thumb_func",
     "__pre_init: push {{r4, lr}}",
-    // A port has its clock (AHB2ENR): no reset, but the loader's jump.
+    // If a port already has its clock (AHB2ENR), no reset led here, but the loader's jump.
     "ldr r0, ={rcc}; ldr r1, [r0, #0x4c]; cmp r1, #0; bne .Lreset",
     "ldr r0, ={backup}; ldr r1, [r0]; ldr r2, ={word}; cmp r1, r2; beq .Lenter",
     // Each piece through the CRC unit (AHB1ENR, CRC_CR: bits reversed, from all ones).
@@ -60,7 +60,7 @@ global_asm!(
     ".Lcopy: ldm r2!, {{r3}}; stm r0!, {{r3}}; cmp r0, r1; bne .Lcopy",
     // The writes end before the code is fetched.
     "dsb; isb; pop {{r4, pc}}",
-    // Once; with the system memory at address 0 (SYSCFG_MEMRMP).
+    // Clears the request, so that it acts once; then jumps with the system memory at address 0 (SYSCFG_MEMRMP).
     ".Lenter: movs r0, #0; bl .Lkeep",
     "ldr r0, ={rcc}; movs r1, #1; str r1, [r0, #0x60]; ldr r2, [r0, #0x60]",
     "ldr r0, ={syscfg}; str r1, [r0]; dsb",
@@ -71,7 +71,8 @@ global_asm!(
     "ldr r1, [r0, #0xc]; orr r1, #0x40; str r1, [r0, #0xc]; ldr r1, [r0]; bic r1, #0x50; str r1, [r0]",
     "ldr r4, ={serial}; ldr r1, ={divider}; str r1, [r4, #0xc]; movs r1, #0xd; str r1, [r4]",
     ".Ltell: ldr r0, =.Lerror; bl .Lsend",
-    // r0 is where the phrase goes on, or nowhere. Each word begins it anew, for a tag may come before it.
+    // r0 points to the next expected character of the phrase, or nowhere. Each word restarts the phrase, because a tag may come before
+    // it.
     ".Lword: ldr r0, =.Lphrase",
     ".Lhear: ldr r1, [r4, #0x1c]; lsls r1, #26; bpl .Lhear",
     "movs r1, #8; str r1, [r4, #0x20]; ldr r1, [r4, #0x24]",
@@ -88,11 +89,11 @@ global_asm!(
     ".Lkeep: ldr r1, ={rcc}; ldr r2, [r1, #0x58]; orr r2, #0x10000000; str r2, [r1, #0x58]; ldr r2, [r1, #0x58]",
     "ldr r1, ={pwr}; ldr r2, [r1]; orr r2, #0x100; str r2, [r1]",
     "ldr r1, ={backup}; str r0, [r1]; ldr r0, [r1]; dsb; bx lr",
-    // Sends the text at r0, to its last bit.
+    // Sends the text at r0, up to its last bit.
     ".Lsend: ldrb r1, [r0], #1; cbz r1, .Lsent",
     ".Lfull: ldr r2, [r4, #0x1c]; lsls r2, #24; bpl .Lfull; str r1, [r4, #0x28]; b .Lsend",
     ".Lsent: ldr r2, [r4, #0x1c]; lsls r2, #25; bpl .Lsent; bx lr",
-    // An error of the flash while the image is summed up goes on as a damaged image; others to the handler.
+    // An error of the flash while the image is summed up is handled as a damaged image; other errors go to the handler.
     ".thumb_func",
     "NonMaskableInt: ldr r0, [sp, #24]; ldr r1, =.Lblock; subs r0, r1; cmp r0, #.Lend - .Lblock; bhs .Lother",
     "ldr r0, ={eccr}; ldr r1, [r0]; str r1, [r0]; ldr r1, =.Ldamaged; str r1, [sp, #24]; bx lr",

@@ -91,8 +91,8 @@ fn panic(info: &PanicInfo) -> ! {
     SCB::sys_reset()
 }
 
-/// Handler of processor faults. The cause may be a stack overflow: clears MOE before anything else, and begins a fresh
-/// stack, both without a memory access to the old one.
+/// Handler of processor faults. The cause may be a stack overflow, so it clears MOE before anything else and begins a fresh stack, both
+/// without an access to the old stack.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")] // SAFETY: the name in the vector table of cortex-m-rt.
 #[unsafe(link_section = ".HardFault.user")] // SAFETY: the section of cortex-m-rt for it.
@@ -131,11 +131,11 @@ extern "C" fn after_hard_fault(program_counter: u32, link: u32) -> ! {
     end(Reason::HardFault, [program_counter, link, scb.cfsr.read(), scb.bfar.read()])
 }
 
-/// Handler of a stopped crystal, and of an error in the flash that cannot be corrected. If the crystal does not start
-/// again after the reset, the firmware runs from the internal oscillator.
+/// Handler of a stopped crystal, and of an error in the flash that cannot be corrected. If the crystal does not start again after the
+/// reset, the firmware runs from the internal oscillator.
 ///
-/// A double word of the settings that a power failure has torn does not stop the firmware. The vector leads to the start block,
-/// which comes here once it has gone on to `main`.
+/// A double word of the settings that a power failure has torn does not stop the firmware. The vector leads to the start block, which
+/// calls this handler once it has gone on to `main`.
 #[unsafe(no_mangle)] // SAFETY: the name that `start.rs` calls, defined nowhere else.
 extern "C" fn non_maskable() {
     if flash::forgive_torn() {

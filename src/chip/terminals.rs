@@ -1,8 +1,8 @@
 //! The pins of the terminal strip, and the slow analog inputs at ADC3 and ADC4.
 //!
-//! The main loop converts one of these inputs each millisecond: no interrupt, and nothing of ADC1 and ADC2. A conversion that comes
-//! long after the one before may be wrong (ES0430, 2.7.7 and 2.7.8), so each is done twice, and the second counts. All registers of
-//! a conversion are written before it: a flipped bit lasts for one of them.
+//! The main loop converts one of these inputs each millisecond, without an interrupt and without ADC1 and ADC2. A conversion long after
+//! the previous one may be wrong (ES0430, 2.7.7 and 2.7.8), so each is done twice, and the second result counts. All registers of a
+//! conversion are written before it, so a flipped bit affects one conversion at most.
 
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
@@ -33,7 +33,7 @@ pub struct Port {
 }
 
 impl Port {
-    /// Sets pins and converters up. Without its converter an input has no code.
+    /// Sets pins and ADCs up. An input whose ADC does not start has no ADC counts.
     pub fn new(
         three: pac::ADC3,
         four: pac::ADC4,
@@ -46,7 +46,7 @@ impl Port {
         INPUTS.iter().flatten().for_each(|pin| pins::analog(*pin));
         let port = Self { three, four, codes: [None; ANALOG], at: 0 };
         if let Err(why) = port.start(common, rcc) {
-            defmt::error!("reference and motor sensor have no converter: {=str}", why);
+            defmt::error!("reference and motor sensor have no ADC: {=str}", why);
         }
         port
     }
@@ -61,7 +61,7 @@ impl Port {
         adc::power_up(&self.four)
     }
 
-    /// Takes the code of the input that was being converted, and begins with the next.
+    /// Takes the result of the input that was being converted, and begins with the next input.
     fn convert(&mut self) {
         if let Some((adc, _)) = self.converter(self.at) {
             let ended = adc.isr().read().eos().bit();
@@ -77,7 +77,7 @@ impl Port {
         adc.cr().modify(|_, w| w.adstart().start_conversion());
     }
 
-    /// Converter and channel of an input, if the board has it.
+    /// ADC and channel of an input, if the board has the input.
     fn converter(&self, input: usize) -> Option<(&RegisterBlock, u8)> {
         let (converter, channel) = INPUTS[input]?.adc34()?;
         Some((if converter == 0 { &*self.three } else { &*self.four }, channel))

@@ -1,7 +1,7 @@
 //! The time base: TIM5 counts core clocks, 32 bits, wrapping every 25 s.
 //!
-//! Not the cycle counter of the core, which stands still while the core sleeps unless a debug probe keeps its clock on, and
-//! not stopped by a halt of the core: after a halt the control interrupt sees the gap.
+//! It is not the cycle counter of the core, which stops while the core sleeps unless a debug probe keeps its clock on. TIM5 does not stop
+//! when the core is halted: after a halt the control interrupt sees the gap.
 
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
@@ -13,15 +13,15 @@ use induction_drive::board;
 /// Starts the counter.
 ///
 /// # Errors
-/// It has no clock.
+/// The timer has no clock.
 pub fn start(timer: pac::TIM5, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Result<(), StartError> {
     clock_on!(rcc.apb1enr1(), tim5en, "TIM5")?;
-    // A debugger may have set it, and only a power cycle clears it.
+    // A debugger may have set the bit, and only a power cycle clears it.
     debug.apb1l_fz().modify(|_, w| w.dbg_tim5_stop().clear_bit());
     timer.psc().write(|w| w.psc().set(0));
     timer.arr().write(|w| w.arr().set(u32::MAX));
     timer.egr().write(|w| w.ug().update());
-    // Captured: every eighth edge of the watchdog's oscillator, behind input 1 (RM0440, TIM5_TISEL).
+    // The capture takes every eighth edge of the watchdog's oscillator, at input 1 (RM0440, TIM5_TISEL).
     rcc.csr().modify(|_, w| w.lsion().on());
     // SAFETY: four bits, an existing input.
     timer.tisel().write(|w| unsafe { w.ti1sel().bits(1) });
@@ -33,13 +33,12 @@ pub fn start(timer: pac::TIM5, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Result<(),
 
 /// Core clocks since the start, wrapping; 0 before it.
 pub fn now() -> u32 {
-    // SAFETY: TIM5 always exists, and reading its counter changes nothing. Its clock is on from `start` on; before, the
-    // read gives 0.
+    // SAFETY: TIM5 always exists, and reading its counter changes nothing. Its clock is on after `start`; before, the read gives 0.
     unsafe { &*pac::TIM5::ptr() }.cnt().read().bits()
 }
 
-/// Core clocks from one capture of the watchdog's oscillator to the next; `None` if they do not come, or one was missed. Waits
-/// for [`board::LSI_TIMEOUT_US`] at most.
+/// Core clocks from one capture of the watchdog's oscillator to the next; `None` if no capture comes, or one was missed. Waits for
+/// [`board::LSI_TIMEOUT_US`] at most.
 pub fn lsi_clocks() -> Option<u32> {
     // SAFETY: TIM5 always exists; nothing else uses its status and its capture.
     let timer = unsafe { &*pac::TIM5::ptr() };

@@ -26,9 +26,9 @@ impl Watchdog {
         watchdog
     }
 
-    /// Lets the watchdogs and the time base run on while a debugger halts the core: a halt ends in a reset, so the power
-    /// stage stays off after it. In each pass of the main loop, because OpenOCD and ST's server stop the watchdogs when
-    /// they attach (`stm32g4x.cfg`: DBGMCU_APB1_FZR1), and the bits survive a reset.
+    /// Lets the watchdogs and the time base run on while a debugger halts the core: a halt ends in a reset, so the power stage stays off
+    /// after it. Called in each pass of the main loop, because OpenOCD and ST's server stop the watchdogs when they attach
+    /// (`stm32g4x.cfg`: DBGMCU_APB1_FZR1), and the bits survive a reset.
     pub fn run_in_halts(&mut self) {
         self.debug.apb1l_fz().modify(|_, w| {
             w.dbg_iwdg_stop().clear_bit().dbg_wwdg_stop().clear_bit().dbg_tim5_stop().clear_bit()
@@ -40,8 +40,8 @@ impl Watchdog {
         self.key(RELOAD);
     }
 
-    /// Does long `work` with the time of the watchdog extended to ten seconds: for work with the outputs off that ends
-    /// before they can be switched on.
+    /// Does long `work` with the watchdog's time extended to ten seconds: for work with the outputs off that ends before they can be
+    /// switched on.
     pub fn extended<R>(&mut self, work: impl FnOnce() -> R) -> R {
         self.set(board::WATCHDOG_LONG_PRESCALER, board::WATCHDOG_LONG_RELOAD);
         let result = work();
@@ -54,7 +54,7 @@ impl Watchdog {
         self.timer.kr().write(|w| unsafe { w.bits(key) });
     }
 
-    /// Waits until the registers have taken an earlier change: six of its clocks behind the prescaler of that time. The wait
+    /// Waits until the registers have taken an earlier change: six of the watchdog's clocks after the prescaler then in force. The wait
     /// is limited in case its clock does not run.
     fn wait(&mut self) {
         for _ in 0..board::WATCHDOG_SET_US {

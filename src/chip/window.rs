@@ -1,4 +1,4 @@
-//! The window watchdog: resets the chip when the control interrupt stays away for three periods, or comes far too early. The
+//! The window watchdog: resets the chip when the control interrupt does not come for three periods, or comes far too early. The
 //! independent watchdog, which the main loop feeds, takes 5 ms for that.
 
 use stm32g4xx_hal::pac::WWDG;
@@ -14,12 +14,12 @@ const CLOCK: u32 = 4096;
 const PERIOD: u32 = 2 * board::PWM_TOP as u32;
 /// The last value before a reset.
 const LAST: u32 = 0x40;
-/// Counts from feeding to the reset; the first may be cut short.
+/// Counts from one feeding to the reset; the first count may be cut short.
 const COUNTS: u32 = 3 * PERIOD / CLOCK;
-/// Counts from feeding within which feeding again is too early.
+/// Counts after a feeding within which the next feeding is too early.
 const CLOSED: u32 = (PERIOD - LONGEST_INTERRUPT_CYCLES) / CLOCK;
 const RELOAD: u8 = (LAST + COUNTS - 1) as u8;
-// It fits seven bits; a period late by the longest interrupt is no reason for a reset.
+// The counts fit seven bits, and a period that is late by the longest interrupt causes no reset.
 const _: () = assert!(
     RELOAD < 0x80 && (COUNTS - 1) * CLOCK > PERIOD + LONGEST_INTERRUPT_CYCLES && CLOSED > 0
 );
@@ -28,7 +28,7 @@ const _: () = assert!(
 pub struct Window(WWDG);
 
 impl Window {
-    /// The first [`feed`](Self::feed) starts it, with the window open.
+    /// The watchdog, with the window open; the first [`feed`](Self::feed) starts it.
     ///
     /// # Errors
     /// It has no clock.
@@ -37,9 +37,10 @@ impl Window {
         Ok(Self(timer))
     }
 
-    /// Closes the window of one that is fed. (Before the first feeding, its counter may be anywhere, and that feeding early.)
+    /// Closes the window of a watchdog that is being fed. (Before the first feeding, its counter may have any value, and that feeding
+    /// would be too early.)
     pub fn close() {
-        // SAFETY: the register is this function's alone.
+        // SAFETY: only this function uses the register.
         let timer = unsafe { &*WWDG::ptr() };
         // Undivided beyond CLOCK, no interrupt.
         timer.cfr().write(|w| w.w().set(RELOAD - CLOSED as u8));

@@ -12,7 +12,7 @@ const PASS: u64 = 7;
 /// Longest commissioning, control periods.
 const LONGEST: u64 = 240_000;
 
-/// A bench with a free shaft, whose drive believes in another motor.
+/// A bench with a free shaft, whose drive has the settings of another motor.
 fn bench(seed: u64) -> (Rig, Settings) {
     let mut config = Config::default();
     config.load.mode = LoadMode::Free;
@@ -22,7 +22,7 @@ fn bench(seed: u64) -> (Rig, Settings) {
     (Rig::new(&plant_settings(&config), &settings, seed).unwrap(), settings)
 }
 
-/// Plays the part of the firmware until the session ends; what it told. Of the periods given by `lost` none arrives.
+/// Plays the part of the firmware until the session ends, and returns its events. Periods for which `lost` is true do not arrive.
 fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bool) -> Vec<News> {
     let mut told = Vec::new();
     for n in 0..LONGEST {
@@ -79,7 +79,7 @@ fn the_motor_is_found_from_its_nameplate() {
     ] {
         assert!((f64::from(found) / truth - 1.0).abs() < 0.015, "{found} {truth}");
     }
-    // Other settings, another motor perhaps.
+    // New settings, as for another motor.
     session.configured(&settings);
     assert_eq!(session.found(&settings), None);
 }
@@ -89,11 +89,11 @@ fn samples_that_are_lost_while_they_count_refuse_the_step() {
     let (mut rig, settings) = bench(4);
     let mut session = Session::new(&settings);
     session.begin(Step::Nameplate, Step::Leakage);
-    // One period, a second into the levels.
+    // One period is lost, a second into the dc resistance test.
     let told = play(&mut rig, &mut session, |n, _| n == 12_000);
     assert_eq!(refusal(&told), (Step::Levels, Refusal::SamplesLost));
     assert_eq!((session.found(&settings), rig.drive.state()), (None, State::Off));
-    // Begun again, it is not refused for them.
+    // If the step is begun again, the lost period does not count.
     session.begin(Step::Nameplate, Step::Levels);
     let told = play(&mut rig, &mut session, |_, _| false);
     assert_eq!(told.last(), Some(&News::Ended { sound: true, step: Step::Levels }), "{told:?}");
@@ -108,7 +108,7 @@ fn a_command_that_is_not_taken_ends_it() {
     // Somebody starts the drive in between.
     drive.command(&Command::Start(Mode::Learning)).unwrap();
     let report = loop {
-        // As far as the session knows, it is still off.
+        // The session has not learned of the start, so it takes the drive to be off.
         let stale = TestReport::default();
         if let Some(command) = session.poll(&stale, |_| panic!("too early")) {
             let why = drive.command(&command).unwrap_err();
@@ -168,7 +168,7 @@ fn the_inertia_is_found_with_a_free_shaft() {
     assert_eq!(rig.drive.state(), State::Off);
 }
 
-/// The plants from the pseudo-random voltage are those of the motor, and come into the settings with the rest.
+/// The plants identified from the pseudo-random voltage are the motor's, and go into the settings with the other results.
 #[test]
 fn the_plants_of_the_current_loop_are_identified_on_request() {
     for (seed, scale) in [(1, 1.0), (2, 0.6), (3, 1.7)] {
@@ -190,7 +190,8 @@ fn the_plants_of_the_current_loop_are_identified_on_request() {
         let found = session.found(&settings).unwrap();
         assert_eq!(found.current_plant.source, PlantSource::Identified);
         assert_eq!(found.motor, parameters.motor);
-        // The motor's own plant. The saliencies of the flux and of the current hardly show at half the test current.
+        // The plant computed from the motor's parameters. The saliencies of the flux and of the current hardly show at half the test
+        // current.
         let truth = Circuit::of_plant(&config);
         let pole = (-(truth.r_s + truth.r_r) / (6000.0 * truth.leakage)).exp();
         let gain = (1.0 - pole) / (truth.r_s + truth.r_r);

@@ -1,4 +1,4 @@
-//! The text of the news, in lines that come unasked.
+//! The text of the events, in lines that come unrequested.
 
 use core::fmt;
 
@@ -13,14 +13,14 @@ use crate::commissioning;
 use crate::desk::Desk;
 use crate::desk::news::News;
 
-/// Asymmetry that no gain mismatch explains from which on a second rotor position is advised.
+/// Asymmetry that no gain mismatch explains, above which a second rotor position is advised.
 const UNEXPLAINED: f32 = 0.002;
 
-/// Told beside a fault of a drive with a brake.
-const HANGS: &str = "; the brake closes now, and alone holds the load";
+/// Remark beside a fault of a drive with a brake.
+const HANGS: &str = "; the brake closes now and holds the load alone";
 
 impl Console {
-    /// Writes the next news, if there are any, on lines of their own.
+    /// Writes the next events, if there are any, on lines of their own.
     pub(super) fn announce(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
         let typed = desk.settings().in_force().command.echo && self.reader.begun();
         if typed {
@@ -42,14 +42,14 @@ impl Console {
         }
     }
 
-    /// Writes a line about the commissioning, and keeps the news for the next.
+    /// Writes a line about the commissioning, and keeps the event for the next line.
     fn tell_commissioning(&mut self, news: commissioning::News, line: usize) {
         let (text, next) = told(&news, line);
         self.out.news(format_args!("commissioning: {text}"));
         self.commissioned = next.map(|line| (news, line));
     }
 
-    /// Writes news.
+    /// Writes an event.
     pub(super) fn tell(&mut self, news: News, desk: &Desk) {
         let out = &mut self.out;
         match news {
@@ -90,7 +90,7 @@ impl Console {
     }
 }
 
-/// The announcement of a learning's result.
+/// The announcement of a self-commissioning's result.
 fn outcome(result: &Learned) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         if result.verdict.is_accepted() {
@@ -98,7 +98,7 @@ fn outcome(result: &Learned) -> impl fmt::Display {
             let tracks = result.slope.is_some();
             if tracks && result.positions == 1 && result.gain_mismatch.misfit > UNEXPLAINED {
                 f.write_str(
-                    "one rotor position: `learn again` at another tells slots from the stator; ",
+                    "one rotor position: `learn again` at another separates slot effects from the stator; ",
                 )?;
             }
             f.write_str("`save` keeps it")
@@ -108,7 +108,7 @@ fn outcome(result: &Learned) -> impl fmt::Display {
     })
 }
 
-/// Line number `line` of what is told of a commissioning's news, and the number of the next line.
+/// Line number `line` about an event of the commissioning, and the number of the next line.
 fn told(news: &commissioning::News, line: usize) -> (impl fmt::Display, Option<usize>) {
     let value = match news {
         commissioning::News::Report(report) => report.values.get(line).copied().flatten(),
@@ -121,7 +121,7 @@ fn told(news: &commissioning::News, line: usize) -> (impl fmt::Display, Option<u
         (commissioning::News::Report(report), None) => write!(f, "{report}"),
         (commissioning::News::Ended { sound: true, step }, _) => {
             f.write_str("ended; `accept` puts it in force and saves it")?;
-            // Another motor has to be learned.
+            // With another motor the saliency has to be learned again.
             f.write_str(match step {
                 Step::Inertia => "",
                 _ => "; then lock the shaft and `learn`",

@@ -15,7 +15,7 @@ use crate::link::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::bus::Commander;
 use crate::settings::staging::UNCONFIRMED;
 
-/// Significant digits of a limited reference.
+/// Significant digits of a limited set-point.
 const DIGITS: usize = 4;
 
 impl Console {
@@ -80,7 +80,7 @@ impl Console {
         }
     }
 
-    /// Answers with the desk's answer.
+    /// Writes the answer of the command arbiter.
     pub(super) fn reply(&mut self, answer: &Answer) {
         match answer {
             Ok(Reply::Designing) => self.out.news(format_args!("designing...")),
@@ -91,7 +91,7 @@ impl Console {
 
     fn restored(&mut self, check: u32, desk: &mut Desk, drive: &impl Firmware) {
         let both = desk.settings().latest().drive.scales.both_zero_vectors;
-        // The words stay for another try.
+        // The received words are kept for another try.
         if let Err(why) = may_stage(drive) {
             return self.error(&why);
         }
@@ -128,7 +128,7 @@ impl Console {
                 );
             }
             *level = (*level - offset) / gain;
-            // A larger current has a smaller code.
+            // With a negative gain a larger current has a smaller count.
             *above ^= gain < 0.0;
         }
         if !drive.begin_trace(&plan) {
@@ -144,7 +144,7 @@ impl Console {
     }
 }
 
-/// The text behind the `ok` of a reply.
+/// The text after the `ok` of a reply.
 fn remark(reply: Reply) -> impl fmt::Display {
     fmt::from_fn(move |f| match reply {
         Reply::Done | Reply::Designing => Ok(()),
@@ -162,7 +162,7 @@ fn remark(reply: Reply) -> impl fmt::Display {
         }
         Reply::Unconfirmed => write!(f, ": staged; {UNCONFIRMED}"),
         Reply::RestoredDropped => {
-            f.write_str(": staged; what was restored belongs to other settings and is dropped")
+            f.write_str(": staged; the restored values belong to other settings and are dropped")
         }
         Reply::NothingStaged => f.write_str(": nothing staged"),
         Reply::Dropped(count) => write!(f, ": {count} staged values dropped"),

@@ -31,8 +31,7 @@ const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
 /// Largest divider of a trace.
 const LARGEST_DIVIDER: u16 = 1000;
 
-/// The commands. The number of each for life is its place, from 1 on: a new one comes last, and `-` takes the place of a
-/// retired one.
+/// The commands. The permanent number of each is its place, from 1: a new command comes last, and `-` takes the place of a retired one.
 pub const COMMANDS: &str = "help status start commission accept learn stop relock torque speed jog position home angle get \
     describe set apply revert save defaults backup learned faults history clear trace stream baud \
     log echo reboot board confirm version h ? update";
@@ -67,10 +66,10 @@ impl<'a> Words<'a> {
     }
 }
 
-/// The tag of a line, and the request behind it: `@17 status` is the request `status` with the tag `17`.
+/// The tag of a line, and the request after it: `@17 status` is the request `status` with the tag `17`.
 ///
 /// # Errors
-/// A tag of no characters or of more than [`LONGEST_TAG`](super::line::LONGEST_TAG).
+/// The tag has no characters or more than [`LONGEST_TAG`](super::line::LONGEST_TAG).
 pub fn tagged(line: &str) -> Result<(Option<Tag>, &str), TagError> {
     let Some(tagged) = line.strip_prefix('@') else { return Ok((None, line)) };
     let (tag, request) = tagged.split_once(' ').unwrap_or((tagged, ""));
@@ -153,7 +152,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
     words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))
 }
 
-/// The order that begins with this word; `None` if it begins none.
+/// The request to the command arbiter that begins with this word; `None` if no such request does.
 fn order<'a>(word: &str, words: &mut Words<'a>) -> Result<Option<Order>, ParseError<'a>> {
     Ok(Some(match word {
         "start" => match words.optional() {
@@ -235,7 +234,7 @@ fn setting(word: &str) -> Result<Key, ParseError<'_>> {
     keys::find(word).ok_or_else(|| ParseError::Key { word, near: near() })
 }
 
-/// The same beginning of a name in the table.
+/// The same beginning of a name, from the table.
 fn prefix(word: &str) -> Result<&'static str, ParseError<'_>> {
     let beginning = keys::all().find_map(|key| {
         let name = key.name();
@@ -265,7 +264,7 @@ fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
     let last = Fault::ALL.last().map_or(0, |fault| fault.code());
     let code = whole("the fault", word, 1, last.into())?;
     let found = Fault::ALL.iter().find(|fault| u16::from(fault.code()) == code);
-    // A number that is not in use any more.
+    // The number is not in use any more.
     let all = "the numbers that `docs/faults.md` lists";
     found.copied().ok_or(ParseError::OneOf { what: "the fault", word, all })
 }

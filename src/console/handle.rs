@@ -1,4 +1,4 @@
-//! The two sides of the console: the rest of the firmware beside the desk's drive, and the serial port.
+//! The two interfaces of the console: to the rest of the firmware beside the command arbiter's drive, and to the serial port.
 
 use core::fmt::{self, Write};
 
@@ -21,9 +21,9 @@ pub trait Firmware: DriveHandle {
     fn cancel_trace(&mut self);
     /// Whether a trace is being recorded.
     fn tracing(&self) -> bool;
-    /// Record number `i` of the last trace, and its number from the record of the trigger.
+    /// Record number `i` of the last trace, and its position relative to the trigger's record.
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
-    /// Asks for a record of each control period whose number is a multiple of `divider`, or of one of the next two; 0 ends it.
+    /// Requests a record of each control period whose number is a multiple of `divider`, or of one of the next two; 0 ends it.
     fn stream(&mut self, divider: u16);
     /// The next record for the stream.
     fn sampled(&mut self) -> Option<Record>;
@@ -51,6 +51,6 @@ pub trait Port {
     fn take_damage(&mut self) -> bool;
     /// Sends all bytes; `false`, and nothing sent, if they do not fit now.
     fn write(&mut self, bytes: &[u8]) -> bool;
-    /// Changes the bits per second as soon as all bytes are sent; `false` if that is still to come: call it again.
+    /// Changes the bits per second as soon as all bytes are sent; `false` if the change is still to come: call it again.
     fn change_rate(&mut self, baud: u32) -> bool;
 }

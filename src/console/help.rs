@@ -10,7 +10,7 @@ pub const HELP: [&str; 41] = [
     "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",
     "stop [ramp|quick|now]     torque to zero, then off; ramp, quick: speed to zero first, by speed.ramp_rpm_per_s or speed.quick_rpm_per_s; now: off at once",
     "relock                    no torque, magnetise again, verify the lock, go on",
-    "torque A                  current on the quadrature axis, A peak",
+    "torque A                  q-axis current, A peak",
     "speed RPM                 speed, mechanical rpm",
     "jog RPM                   turn at this speed while it is repeated every 0.5 s, then to rest by the ramp",
     "position TURNS            position, mechanical turns from where it started",

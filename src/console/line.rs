@@ -9,15 +9,15 @@ use thiserror::Error;
 pub const LONGEST_TAG: usize = 8;
 /// Longest request, characters.
 const LONGEST_REQUEST: usize = 120;
-/// Longest line that is taken, characters without its end: a request behind `@TAG `.
+/// Longest line that is accepted, characters without its end: a request after `@TAG `.
 pub const LONGEST: usize = "@ ".len() + LONGEST_TAG + LONGEST_REQUEST;
-/// Room for text that goes out, bytes: the longest line, that of `status`, or one of `describe` and what was typed so far.
+/// Space for text that goes out, bytes: the longest line, which is that of `status`, or one of `describe` and the typed text so far.
 pub const OUTPUT: usize = 504;
 
 /// Tag of a request.
 pub type Tag = String<LONGEST_TAG>;
 
-/// Beginning of each line that comes unasked, and of no other.
+/// Beginning of each unrequested line, and of no other.
 pub const UNASKED: &str = "* ";
 
 const CTRL_C: u8 = 0x03;
@@ -54,14 +54,14 @@ enum Sequence {
     Inside,
 }
 
-/// Collects bytes to lines.
+/// Collects bytes into lines.
 #[derive(Default)]
 pub struct LineReader {
     text: String<LONGEST>,
     /// First error in the line so far; the line is discarded at its end.
     error: Option<LineError>,
     sequence: Sequence,
-    /// Whether the last byte was a carriage return: a line feed behind it belongs to the same end.
+    /// Whether the last byte was a carriage return: a line feed after it belongs to the same end.
     returned: bool,
 }
 
@@ -139,7 +139,7 @@ impl LineReader {
     }
 }
 
-/// Text that goes out. What does not fit is cut off, between characters.
+/// Text that goes out. Text that does not fit is cut off, between characters.
 #[derive(Default)]
 pub struct OutputLine {
     text: String<OUTPUT>,
@@ -153,7 +153,7 @@ impl OutputLine {
         self.tag = tag;
     }
 
-    /// Adds the last line of an answer, behind the request's tag.
+    /// Adds the last line of an answer, after the request's tag.
     pub fn answer(&mut self, text: fmt::Arguments<'_>) {
         match self.tag.take() {
             Some(tag) => self.line(format_args!("@{tag} {text}")),
@@ -161,12 +161,12 @@ impl OutputLine {
         }
     }
 
-    /// Adds a line that comes unasked.
+    /// Adds an unrequested line.
     pub fn news(&mut self, text: fmt::Arguments<'_>) {
         self.line(format_args!("{UNASKED}{text}"));
     }
 
-    /// Adds a line: of an answer, one that others follow.
+    /// Adds a line of an answer that other lines follow.
     pub fn line(&mut self, text: fmt::Arguments<'_>) {
         const END: &str = "\r\n";
         // Writing to it never fails.

@@ -1,4 +1,4 @@
-//! Replies of many lines: one line at a time, and `ok` behind the last.
+//! Replies of many lines: one line at a time, and `ok` after the last.
 
 use core::fmt;
 
@@ -30,9 +30,9 @@ pub(super) struct List {
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum ListKind {
     Help,
-    /// The settings that begin so.
+    /// The settings whose names begin with this text.
     Settings(&'static str),
-    /// The same as JSON.
+    /// The same settings as JSON.
     Describe(&'static str),
     Backup,
     Board,
@@ -46,7 +46,7 @@ pub(super) enum ListKind {
 
 /// Significant digits of a trace.
 const TRACE_DIGITS: usize = 6;
-/// A setting that a backup leaves out: a restored drive checks its wiring.
+/// A setting that a backup leaves out, so that a restored drive checks its wiring.
 const NOT_IN_BACKUP: &str = "wiring_checked";
 
 impl Console {
@@ -54,7 +54,7 @@ impl Console {
         self.list = Some(List { kind, next: 0 });
     }
 
-    /// Writes the next line of the list, or `ok` behind the last; nothing if the list has to wait.
+    /// Writes the next line of the list, or `ok` after the last; nothing if the list has to wait.
     pub(super) fn next_of_list(&mut self, desk: &Desk, drive: &impl Firmware) {
         let Some(List { kind, next }) = self.list else { return };
         let line = usize::from(next);
@@ -90,7 +90,7 @@ impl Console {
         }
     }
 
-    /// The header, then a line a record.
+    /// Writes the header, then one line per record.
     fn trace_line(&mut self, next: u16, settings: &Settings, drive: &impl Firmware) -> Option<u16> {
         let Plan { choice, divider, .. } = self.traced.as_ref()?;
         let Some(i) = next.checked_sub(1) else {
@@ -111,8 +111,8 @@ impl Console {
         Some(next + 1)
     }
 
-    /// Writes the next line of a backup, from this place on: the board; `defaults`; the words, since ranges depend on them, and then
-    /// the numbers that differ from the image; what was learned; `apply`.
+    /// Writes the next line of a backup, from this place on. The order is: the board; `defaults`; the settings with words, since ranges
+    /// depend on them; the numbers that differ from the image; the learned values; `apply`.
     fn backup(&mut self, place: usize, settings: &FirmwareSettings) -> Option<u16> {
         const FIRST: usize = 2;
         const NUMBERS: usize = FIRST + keys::COUNT;
@@ -153,7 +153,7 @@ impl Console {
     }
 }
 
-/// The first setting from a number on whose name begins so, and the number behind it.
+/// The first setting from a number on whose name begins with the prefix, and the number after it.
 fn setting_from(number: usize, prefix: &str) -> Option<(Key, u16)> {
     let mut rest = (1..).zip(keys::all()).skip(number);
     rest.find(|(_, key)| key.name().starts_with(prefix)).map(|(after, key)| (key, after))

@@ -2,10 +2,10 @@
 
 use core::fmt;
 
-/// Most digits behind the point: enough for nanoamperes.
+/// Most digits after the point: enough for nanoamperes.
 const MOST_DECIMALS: usize = 9;
 
-/// A number, and how many of its digits are shown; without exponent, and at most nine digits behind the point.
+/// A number, and how many of its digits are shown; without exponent, and with at most nine digits after the point.
 pub struct Significant(pub f32, pub usize);
 
 impl fmt::Display for Significant {

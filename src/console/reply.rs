@@ -1,4 +1,4 @@
-//! Replies: settings, the text of a fault, and the result of a learning.
+//! Replies: settings, the text of a fault, and the result of a self-commissioning.
 
 use core::fmt;
 
@@ -12,8 +12,8 @@ use crate::settings::keys::{self, Key};
 use crate::settings::staging::Staging;
 use crate::store::history::{CHANGED, History};
 
-/// A setting with its unit and the allowed values. They are computed before anything is printed, because printing
-/// needs much stack and so does the range.
+/// A setting with its unit and the allowed values. They are computed before anything is printed, because both the printing and the range
+/// need much stack.
 pub struct Setting {
     key: Key,
     value: Value,
@@ -124,8 +124,8 @@ const BOOT_PIN: [&str; 2] = [
      `stm32l4x option_write 0 0x20 0x08000000 0x0c000000; stm32l4x option_load 0`, ends that",
 ];
 
-/// Line number `i` of the text of the board: its name, its assumptions with the bench step for each, the boot pin, and
-/// whether all that is confirmed.
+/// Line number `i` of the text of the board: its name, its assumptions with the bench step for each, the boot pin, and whether all of it
+/// is confirmed.
 pub fn board(settings: &FirmwareSettings, i: usize) -> Option<impl fmt::Display> {
     let (board, boot_pin) = (settings.board, usize::from(settings.boot_pin_counts));
     let confirmed = settings.board_is_confirmed();
@@ -143,7 +143,7 @@ pub fn board(settings: &FirmwareSettings, i: usize) -> Option<impl fmt::Display>
     }))
 }
 
-/// Line number `i` of the text of a fault, behind its first: the causes, the likely ones first, and the cure.
+/// Line number `i` of the text of a fault, after its first line: the causes, the likely ones first, and the cure.
 pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
     let causes = fault.causes();
     (i <= causes.len()).then_some(fmt::from_fn(move |f| match causes.get(i) {
@@ -155,7 +155,7 @@ pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
 /// Line number `i` of the history: the totals, then the faults, the latest first.
 pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
     let fault = i.checked_sub(1).map(|i| history.faults().nth(i));
-    // None behind the last fault.
+    // There is no line after the last fault.
     (fault != Some(None)).then_some(fmt::from_fn(move |f| {
         let hours = |s: u32| s as f32 / 3600.0;
         let Some(fault) = fault.flatten() else {
@@ -170,7 +170,7 @@ pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
         if code == CHANGED {
             let key = u16::try_from(fault.running_s).ok().and_then(keys::find_id);
             let name = key.map_or("a setting", Key::name);
-            return write!(f, "at {at:.1} h: {name} was changed, which protects");
+            return write!(f, "at {at:.1} h: the protective setting {name} was changed");
         }
         write!(f, "at {at:.1} h, with current {:.1} h: fault {code}", hours(fault.running_s))?;
         let known = Fault::ALL.iter().find(|known| known.code() == code);
@@ -178,8 +178,8 @@ pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
     }))
 }
 
-/// Line number `i` of the result of a learning; `None` behind the last line. The fitted values come first, then a table
-/// of the reference and the carrier current over the torque current.
+/// Line number `i` of the result of a self-commissioning; `None` after the last line. The fitted values come first, then a table of
+/// saliency offset, saliency sensitivity and injection current over the q-axis current.
 pub fn learned(result: &Learned, believable: bool, i: u16) -> Option<impl fmt::Display> {
     let lines = 2 + result.reference.points().len().min(result.points + 1);
     let line = usize::from(i);
@@ -212,7 +212,7 @@ fn fitted(f: &mut fmt::Formatter<'_>, name: &str, fitted: &Fitted) -> fmt::Resul
 fn point(f: &mut fmt::Formatter<'_>, result: &Learned, index: usize) -> fmt::Result {
     let reference = result.reference.points()[index];
     write!(f, "{:.2},{reference:.5}", result.reference.grid().current(index))?;
-    // Not learned: empty, the setting holds.
+    // If a table was not learned, the field is empty and the setting applies.
     let tables =
         [result.slope.map(|table| *table.points()), result.carrier.map(|table| *table.points())];
     for table in tables {

@@ -1,7 +1,7 @@
 //! Learned values as lines of text, which `backup` prints and a paste restores.
 //!
-//! `learned INDEX WORD ...` gives up to eight of the words of [`crate::store::learned`], from an index on, in
-//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them.
+//! `learned INDEX WORD ...` gives up to eight of the words of [`crate::store::learned`], from an index on, in hexadecimal; `learned check
+//! WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them.
 
 use core::fmt;
 
@@ -15,34 +15,34 @@ use crate::store::learned::{self, WORDS};
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// Words that have come in so far.
+/// Words received so far.
 pub struct Restore {
     words: [u32; WORDS],
-    /// A bit for each.
+    /// A bit for each word.
     present: u64,
 }
 
 /// Reason why learned values were not restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum RestoreError {
-    /// Words behind the last.
+    /// More words than a result has.
     #[error("learned: more than {WORDS} words")]
     Behind,
     /// The word with this index has not come.
     #[error("learned: word {0} is missing")]
     Missing(usize),
-    /// The checksum of the words is another.
+    /// The checksum of the words differs.
     #[error("learned: the checksum of these words is {0:08x}")]
     Checksum(u32),
-    /// Learned with another choice of the zero vectors, this word.
-    #[error("learned: with scales.both_zero_vectors = {0}; set it so before, or learn again")]
+    /// The values were learned with another choice of the zero vectors: this word.
+    #[error("learned: with scales.both_zero_vectors = {0}; set it to this first, or learn again")]
     ZeroVectors(&'static str),
-    /// Learned by a firmware with other rules.
+    /// The values were learned by a firmware with other rules.
     #[error(
         "learned: by an earlier firmware, which measured the motor in another way; `commission`, then `learn`"
     )]
     Rules,
-    /// No result that a learning accepts.
+    /// The values are no result that a self-commissioning accepts.
     #[error("learned: no result that a learning accepts")]
     Unbelievable,
 }
@@ -63,7 +63,7 @@ impl Restore {
     /// Takes words, from an index on.
     ///
     /// # Errors
-    /// There are no so many; nothing is taken.
+    /// A result has fewer words; nothing is taken.
     pub fn take(&mut self, index: usize, words: &[u32]) -> Result<(), RestoreError> {
         let places = self.words.get_mut(index..index + words.len()).ok_or(RestoreError::Behind)?;
         places.copy_from_slice(words);
@@ -71,10 +71,10 @@ impl Restore {
         Ok(())
     }
 
-    /// The result of the words that came in, for currents of `both` zero vectors or of one; the next begins anew.
+    /// The result of the words received so far, for currents of `both` zero vectors or of one. The next words begin a new result.
     ///
     /// # Errors
-    /// Words are missing or damaged, make no result, or one of other rules or zero vectors.
+    /// Words are missing or damaged, form no result, or belong to other rules or zero vectors.
     pub fn finish(&mut self, check: u32, both: bool) -> Result<Learned, RestoreError> {
         let Self { words, present } = core::mem::take(self);
         if learned::is_of_other_rules(&words, present) {
@@ -94,7 +94,7 @@ impl Restore {
     }
 }
 
-/// Line number `i` of a result; `None` behind the last.
+/// Line number `i` of a result; `None` after the last.
 pub fn line(result: &Learned, both: bool, i: usize) -> Option<impl fmt::Display> {
     let words = learned::to_words(result, both);
     let first = i * WORDS_IN_LINE;

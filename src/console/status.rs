@@ -52,8 +52,8 @@ impl Console {
     }
 }
 
-/// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with
-/// psi = L_m i_d; power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the carrier.
+/// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with psi = L_m i_d;
+/// power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the injected voltage.
 ///
 /// # Errors
 /// Those of the formatter.
@@ -100,7 +100,7 @@ fn line(
     if s.state == State::Off || s.state.regulates() {
         torque_range(f, s, settings)?;
     }
-    // Dc link and heat sink from the sample: the drive's own values stand still while it is off.
+    // Dc link and heat sink come from the sample: the drive's own values are not updated while it is off.
     let dc_link = scales.dc_link.at(s.sample.dc_link);
     let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
     write!(f, "dc link {dc_link:.1} V, ")?;
@@ -111,7 +111,8 @@ fn line(
     write!(f, "stack {used} of {size}")
 }
 
-/// A bit for each of the settings that protect and are looser than by rule and default. Not in a formatter: the defaults take much stack.
+/// Protective settings that are looser than by rule and default, one bit each. Not computed in a formatter, because the defaults take
+/// much stack.
 #[inline(never)]
 fn looser(settings: &FirmwareSettings) -> u64 {
     let usual = FirmwareSettings::of(settings.board);
@@ -120,8 +121,8 @@ fn looser(settings: &FirmwareSettings) -> u64 {
     guarded().enumerate().fold(0, |bits, (n, key)| bits | u64::from(is_looser(key)) << n)
 }
 
-/// Writes the torque that the drive can give now, least and largest, with the direct current that is left there; of a shaft at
-/// rest while it is off.
+/// Writes the torque that the drive can give now, least and largest, with the d-axis current that remains at each. While the drive is
+/// off, the values are those at standstill.
 fn torque_range(f: &mut fmt::Formatter<'_>, s: &Status, settings: &Settings) -> fmt::Result {
     let (i_d, largest) = (settings.i_d(), settings.current_limit_a());
     let limit = VoltageLimit::new(&settings.motor, i_d, largest);
@@ -141,15 +142,15 @@ fn torque_range(f: &mut fmt::Formatter<'_>, s: &Status, settings: &Settings) -> 
 
 /// Temperature of the settings' resistances, °C.
 const COLD_C: f32 = 25.0;
-/// Temperatures below 0 °C at which the resistance of copper, and of the aluminium of a cage, would be none.
+/// Temperatures below 0 °C at which the extrapolated resistance of copper, and of a cage's aluminium, is zero.
 const COPPER_C: f32 = 235.0;
 const ALUMINIUM_C: f32 = 225.0;
-/// Difference between sensor and stator that is told, K: 15 % of the resistance.
+/// Difference between sensor and stator above which the status line reports it, K: 15 % of the resistance.
 const DOUBTFUL_K: f32 = 40.0;
 
-/// Writes the temperatures of stator and rotor that their tracked resistances mean, if those of the settings are of 25 °C:
-/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one. Behind them that of the `sensor`, °C, if there is
-/// one, and whether both differ.
+/// Writes the temperatures of stator and rotor that their tracked resistances mean, if the resistances in the settings are those at 25
+/// °C: `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one. After them comes the temperature of the `sensor`, °C,
+/// if there is one, and whether both differ.
 ///
 /// # Errors
 /// Those of the formatter.
@@ -173,7 +174,7 @@ fn temperatures(
     if let (Some(stator), Some(Ok(motor))) = (stator, sensor)
         && (stator - motor).abs() > DOUBTFUL_K
     {
-        write!(f, ", which the stator's resistance does not confirm")?;
+        write!(f, ", which the stator resistance does not confirm")?;
     }
     tau_r.map_or(Ok(()), |tau_r| {
         let more = settings.motor.tau_r() / tau_r - 1.0;

@@ -23,13 +23,13 @@ const _: () = assert!(trace::MOST == MOST_SIGNALS);
 pub(super) struct Wire {
     stream: Option<Stream>,
     frame: [u8; LONGEST],
-    /// Bytes of a frame that waits for room.
+    /// Bytes of a frame that waits for space.
     waiting: usize,
     sent: u32,
     dropped: u32,
     /// Control period of the last frame, in dividers, and its sequence number; `None` before the first.
     last: Option<(u32, u16)>,
-    /// Bits per second in force, and those wanted.
+    /// Bits per second in force, and those requested.
     baud: u32,
     pub wanted: u32,
 }
@@ -43,12 +43,12 @@ impl Default for Wire {
 }
 
 impl Wire {
-    /// Without a line for so long the drive stops, s; 0: never.
+    /// Time without a line after which the drive stops, s; 0: never.
     pub fn alive_s(&self) -> f32 {
         self.stream.as_ref().map_or(0.0, |stream| stream.alive_s)
     }
 
-    /// Makes the frame of a record, and counts those before it that were dropped.
+    /// Makes the frame of a record, and counts the frames before it that were dropped.
     fn make(&mut self, record: &Record, settings: &Settings, shaft: &Shaft) {
         let Some(stream) = &self.stream else { return };
         let all = trace::shown(&record.telemetry, &record.sampled, shaft.freq());
@@ -56,7 +56,7 @@ impl Wire {
         stream.choice.record(&mut values, &all);
         let values = values.iter().zip(stream.choice.signals());
         let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
-        // It has waited for less than a divider.
+        // The record has waited for less than a divider.
         let (period, now) = (record.period, record.period / u32::from(stream.divider).max(1));
         let (last, before) = self.last.unwrap_or((now.wrapping_sub(1), u16::MAX));
         let due = now.wrapping_sub(last);
@@ -94,7 +94,7 @@ impl Console {
         self.out.answer(format_args!("ok: every {divider} periods"));
     }
 
-    /// Tells the state of the stream.
+    /// Reports the state of the stream.
     pub(super) fn stream_state(&mut self) {
         let Wire { sent, dropped, .. } = self.wire;
         let on = if self.wire.stream.is_some() { "on" } else { "off" };
@@ -107,7 +107,7 @@ impl Console {
         self.wire.stream = None;
     }
 
-    /// Sends the frames for which there is room; whether none waits any more.
+    /// Sends the frames for which there is space; returns whether none waits any more.
     pub(super) fn send_frames(
         &mut self,
         port: &mut impl Port,
@@ -116,7 +116,7 @@ impl Console {
     ) -> bool {
         let settings = &desk.settings().in_force().drive;
         let wire = &mut self.wire;
-        // As many as the ring holds at most: the main loop goes on.
+        // At most as many frames as the ring holds, so that the main loop goes on.
         for _ in 0..=board::RECORDED_PERIODS {
             if wire.waiting == 0 {
                 let Some(record) = drive.sampled() else { return true };
@@ -131,7 +131,7 @@ impl Console {
         false
     }
 
-    /// Ends the stream when no line came for the time that it allows; the drive is stopped, if the console commands.
+    /// Ends the stream when no line came for the time that it allows. If the console commands the drive, the drive is stopped.
     pub(super) fn watch_link(&mut self, desk: &mut Desk, drive: &mut impl Firmware, now_ms: u32) {
         let alive_s = self.wire.alive_s();
         let silence_ms = now_ms.wrapping_sub(*self.line_ms.get_or_insert(now_ms));
@@ -143,7 +143,7 @@ impl Console {
         }
     }
 
-    /// Changes the rate that was asked for, when the answer is sent; falls back without a valid line.
+    /// Changes the rate as requested, when the answer is sent; falls back without a valid line.
     pub(super) fn watch_rate(
         &mut self,
         port: &mut impl Port,

@@ -1,14 +1,13 @@
 //! Suggestions for misspelt words.
 //!
-//! Own code instead of `strsim`, which needs an allocator.
+//! Own code replaces `strsim`, which needs an allocator.
 
 /// Longest word that is compared.
 const LONGEST: usize = 32;
 /// Most changes of a letter between a word and its suggestion.
 const MOST_CHANGES: usize = 2;
 
-/// The candidate that is spelt most like `word`, if one differs in no more than half of its letters and two of
-/// them at most.
+/// The candidate whose spelling is nearest to `word`, if it differs in at most half of the letters and at most two.
 pub fn nearest(word: &str, candidates: impl Iterator<Item = &'static str>) -> Option<&'static str> {
     let most = MOST_CHANGES.min(word.len() / 2);
     let near =
@@ -67,7 +66,7 @@ mod tests {
         }
     }
 
-    /// Against the usual definition, letter by letter.
+    /// Compared with the usual definition, letter by letter.
     #[test]
     fn changes_are_counted_as_defined() {
         fn defined(a: &[u8], b: &[u8]) -> usize {

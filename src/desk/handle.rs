@@ -1,4 +1,4 @@
-//! The drive as the desk sees it.
+//! Access of the command arbiter to the drive.
 
 use drive_core::learned::Learned;
 use drive_core::{Accepted, Coefficients, Command, Refused};
@@ -20,12 +20,12 @@ pub enum CommandError {
     /// The control interrupt does not run.
     #[error("the control does not run")]
     NoAnswer,
-    /// It was not started, for this reason.
+    /// The control was not started, for this reason.
     #[error("the control does not run: {0}")]
     NotStarted(&'static str),
 }
 
-/// Access of the desk to the drive.
+/// Access of the command arbiter to the drive.
 pub trait DriveHandle {
     /// Gives the drive a command and waits for its answer, a few control periods at most.
     ///
@@ -45,19 +45,19 @@ pub trait DriveHandle {
     fn build(&mut self, settings: &mut FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// Notes that the drive has taken these settings.
     fn configured(&mut self, settings: &FirmwareSettings);
-    /// Connects the pins of the gates: the board is the one that the image is for.
+    /// Connects the pins of the gates, because the board is the one that the image is for.
     fn connect(&mut self);
-    /// Notes that this setting, which protects, has another value now. Only while the outputs are off.
+    /// Notes that this protective setting has another value now. Only while the outputs are off.
     fn changed(&mut self, key: Key);
     /// The commissioning.
     fn session(&mut self) -> &mut Session;
-    /// Saves the settings. Takes up to two erasures: only while the outputs are off.
+    /// Saves the settings. Takes up to two page erasures: only while the outputs are off.
     ///
     /// # Errors
     /// The flash failed.
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError>;
     /// Resets the chip, into ST's loader or the firmware. Only while the outputs are off.
     fn reboot(&mut self, loader: bool);
-    /// Calls `show` with the result of a learning that ended since the last call, accepted or not.
+    /// Calls `show` with the result of a self-commissioning that ended since the last call, accepted or not.
     fn learned(&mut self, show: &mut dyn FnMut(&Learned));
 }

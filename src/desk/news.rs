@@ -1,4 +1,4 @@
-//! News: what the desk tells unasked.
+//! Events, which the command arbiter reports without a request.
 
 use drive_core::homing::Failure;
 use drive_core::{Fault, Stage, State};
@@ -9,10 +9,10 @@ use crate::commissioning;
 use crate::link::Status;
 use crate::settings::bus::Commander;
 
-/// Longest silence while the drive learns, ms.
+/// Longest time between two progress reports of the self-commissioning, ms.
 const PROGRESS_MS: u32 = 5000;
 
-/// News.
+/// An event.
 // Exists once at a time.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,24 +23,24 @@ pub enum News {
     Running(State),
     /// The outputs are off, for this reason.
     Off(&'static str),
-    /// It learns.
+    /// The saliency self-commissioning runs.
     Learning {
-        /// The point that is being measured, from 1 on.
+        /// The point that is being measured, from 1.
         point: usize,
         /// Number of points.
         points: usize,
         /// Expected time until the end, s.
         left_s: f32,
     },
-    /// A learning has ended, with the result that [`Desk::learned`](super::Desk::learned) gives.
+    /// A self-commissioning has ended, with the result that [`Desk::learned`](super::Desk::learned) gives.
     Learned,
     /// The commissioning goes on, or has ended.
     Commissioning(commissioning::News),
     /// A homing has ended.
     Homed(Result<(), Failure>),
-    /// Silence of the one that commands, of this time, s, has stopped the drive; or the reason why not.
+    /// The drive was stopped because the commander was silent for this time, s; or the reason why it was not stopped.
     Stopped(Result<f32, CommandError>),
-    /// Bus or strip was refused something: [`Desk::refusal`](super::Desk::refusal).
+    /// A request of bus or strip was refused: [`Desk::refusal`](super::Desk::refusal).
     Refused(Commander),
 }
 
@@ -49,16 +49,16 @@ pub enum News {
 pub struct Announcer {
     /// The last state that was seen.
     state: Option<State>,
-    /// The last one but for those of a stop.
+    /// The last state that was not part of a stop.
     active: State,
-    /// Who has stopped the drive, with silence as the console. For that one off is no news, unless it takes a while.
+    /// The source of the stop; silence counts as the console. The source is not told that the drive is off, unless that takes a while.
     pub stopped: Option<Commander>,
     progress: Option<(usize, usize)>,
     told_ms: u32,
 }
 
 impl Announcer {
-    /// The news of a report, if there are any, of a drive with these settings. `now_ms` wraps.
+    /// The event of a report, if there is any, of a drive with these settings. `now_ms` wraps.
     pub fn next(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
         let state = status.state;
         let before = self.state.replace(state);
@@ -76,16 +76,16 @@ impl Announcer {
                 let by = self.stopped.take();
                 match (before?, was) {
                     (State::Fault(_), _) => None,
-                    // The commissioning says so itself.
+                    // The commissioning reports this itself.
                     (State::Exciting | State::CheckingWiring, State::Exciting) => None,
                     (State::Learning | State::Stopping, State::Learning) if by.is_none() => {
                         Some(News::Off("the learning has ended"))
                     }
-                    // Also where no report came on the way.
+                    // Reported also if no report came in between.
                     (state, _) if matches!(state.stage(), Stage::Running | Stage::Stopping) => {
                         Some(News::Off("stopped"))
                     }
-                    // At once, and answered.
+                    // The stop acts at once and has been answered.
                     _ if by == Some(Commander::Console) => None,
                     _ if by.is_some() => Some(News::Off("stopped")),
                     _ => Some(News::Off("the start has ended")),

@@ -1,4 +1,4 @@
-//! Orders to the desk, its replies, and the reasons for which it refuses.
+//! Requests to the command arbiter, its replies, and the reasons for which it refuses.
 
 use drive_commission::Step;
 use drive_core::homing::{OutOfRange, Plan};
@@ -14,25 +14,25 @@ use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;
 use crate::terminals::Lost;
 
-/// An order.
+/// A request.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
-    /// Put the staged settings in force, then start in a mode; to learn it is [`Learn`](Self::Learn).
+    /// Put the staged settings in force, then start in a mode; for the self-commissioning use [`Learn`](Self::Learn).
     Start(Mode),
-    /// Learn on the motor: anew, or again at another rotor position on top of what is learned.
+    /// Learn the motor's saliency: from scratch, or again at another rotor position on top of what is learned.
     Learn {
-        /// On top of it.
+        /// On top of what is learned.
         again: bool,
     },
-    /// Put the staged settings in force, then commission: these steps, the first and the last.
+    /// Put the staged settings in force, then commission, from the first of these steps to the last.
     Commission(Step, Step),
-    /// Put in force what the commissioning has found, and save.
+    /// Put the results of the commissioning in force, and save.
     Accept,
     /// Stop in this way.
     Stop(Stop),
     /// Magnetise again and check that the flux is tracked.
     Relock,
-    /// Set the current on the quadrature axis, A.
+    /// Set the q-axis current, A.
     Torque(f32),
     /// Set the speed, mechanical rpm.
     Speed(f32),
@@ -54,24 +54,24 @@ pub enum Order {
     Save,
     /// Send typed characters back, or not.
     Echo(bool),
-    /// Reset the controller; whether unsaved settings may be lost.
+    /// Reset the controller; true if unsaved settings may be lost.
     Reboot(bool),
-    /// Reset it into ST's loader: the gate drivers have no supply.
+    /// Reset the controller into ST's loader: the gate drivers have no supply.
     Update,
-    /// Check that what follows belongs to this board.
+    /// Check that the lines that follow belong to this board.
     BoardIs(&'static Board),
     /// Note that the bench steps of the board were done, and save.
     Confirm,
 }
 
 impl Order {
-    /// Whether it ends with the motor energised.
+    /// Whether the request ends with the motor energised.
     pub fn starts(&self) -> bool {
         matches!(self, Self::Start(_) | Self::Learn { .. } | Self::Commission(..))
     }
 
-    /// Whether only the one that commands may give it. Anybody may stop the drive; the console may also clear a fault, and do all that needs
-    /// the drive off.
+    /// Whether only the commander may make the request. Anybody may stop the drive; the console may also clear a fault, and make all
+    /// requests that need the drive off.
     pub fn is_for_the_commander(&self, from: Commander) -> bool {
         if from != Commander::Console {
             return !matches!(self, Self::Stop(_));
@@ -91,14 +91,14 @@ impl Order {
     }
 }
 
-/// An order was carried out.
+/// A request was carried out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply {
-    /// As it was given.
+    /// As requested.
     Done,
-    /// With this reference instead of the one that was given, and its unit.
+    /// With this set-point instead of the requested one, and its unit.
     Limited(f32, &'static str),
-    /// It waits until the answer is on its way: controllers are designed for seconds. The answer follows.
+    /// The request waits until the answer has been sent, because controllers are designed for seconds. The final answer follows.
     Designing,
     /// The drive starts with a check of the wiring.
     WiringFirst,
@@ -106,9 +106,9 @@ pub enum Reply {
     ShaftTurns,
     /// Values are staged.
     Staged,
-    /// What was staged is as in force.
+    /// The staged values equal those in force.
     AsInForce,
-    /// Staged; this one takes effect at the next reset, if saved.
+    /// Staged; this setting takes effect at the next reset, if saved.
     StagedForReset(Key),
     /// Staged; the board has to be confirmed again.
     Unconfirmed,
@@ -116,7 +116,7 @@ pub enum Reply {
     RestoredDropped,
     /// Nothing was staged.
     NothingStaged,
-    /// So many staged values are dropped.
+    /// This number of staged values is dropped.
     Dropped(usize),
     /// In force, with these remarks.
     Applied(Applied),
@@ -124,11 +124,11 @@ pub enum Reply {
     BootPin,
     /// The chip is about to be reset.
     Rebooting,
-    /// It is about to be reset into ST's loader.
+    /// The chip is about to be reset into ST's loader.
     Loader,
 }
 
-/// Reason why an order was not carried out.
+/// Reason why a request was not carried out.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Refusal {
     /// The drive refuses it, or does not answer.
@@ -137,7 +137,7 @@ pub enum Refusal {
     /// The drive is not off.
     #[error("the drive must be off: `stop` first")]
     MustBeOff,
-    /// The other side commands.
+    /// Another side commands.
     #[error("{}", AUTHORITY[*.0 as usize])]
     Authority(Commander),
     /// The controllers cannot be designed for the staged settings.
@@ -178,10 +178,10 @@ pub enum Refusal {
     /// The commissioning has found nothing new.
     #[error("nothing new was found: `commission` first")]
     NothingFound,
-    /// There is nothing to learn on top of.
+    /// There are no learned values to add to.
     #[error("nothing is learned with these settings: `learn` first")]
     NothingLearned,
-    /// A number of a homing.
+    /// A number of a homing is out of range.
     #[error(transparent)]
     Homing(#[from] OutOfRange),
     /// Changes would be lost.
@@ -192,10 +192,10 @@ pub enum Refusal {
         "the dc link has {0:.0} V, and ST's loader drives a gate: {LOADER_DC_LINK_V} V at most"
     )]
     Charged(f32),
-    /// The bus sets a setting of the hardware.
+    /// The bus tries to set a setting of the hardware.
     #[error("{} belongs to the hardware: set it at the console", .0.name())]
     Hardware(Key),
-    /// The bus repeats its run command after a stop from elsewhere.
+    /// The bus repeats its run command after a stop from another source.
     #[error("the drive has stopped for another reason: write a stop first")]
     Ended,
     /// The terminal strip does not let the drive run.
@@ -204,7 +204,7 @@ pub enum Refusal {
     /// A stop came before the controllers for a start were designed.
     #[error("a stop came before the start")]
     Stopped,
-    /// Seconds for which a fault of the power stage is not cleared.
+    /// A fault of the power stage is not cleared for this number of seconds.
     #[error(
         "three faults of the power stage within 10 s: find the short circuit or the wrong wire; `clear` works in {0} s"
     )]
@@ -214,21 +214,21 @@ pub enum Refusal {
     Reference(Lost),
 }
 
-/// Highest dc link beside ST's loader, V.
+/// Highest dc link voltage with ST's loader, V.
 pub const LOADER_DC_LINK_V: f32 = 20.0;
 
-/// Refusal by the side that commands, in the order of [`Commander`].
+/// Texts of a refusal, by the side that commands, in the order of [`Commander`].
 const AUTHORITY: [&str; 3] = [
     "the console commands: `set bus.commands bus` lets the bus",
     "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over",
     "the terminal strip commands: `stop` works here, `set bus.commands console` takes over",
 ];
 
-/// Terminals by the stop that an open wire makes.
+/// Terminals by the stop that an open wire causes.
 const HOLDS: [&str; 2] = ["ENABLE", "STOP"];
 
 impl Refusal {
-    /// Its number in the register of the bus, and the meaning there. A number keeps its meaning.
+    /// Number of the refusal in the register of the bus, and its meaning there. A number keeps its meaning.
     pub fn code(&self) -> u16 {
         match self {
             Self::Authority(_) => 1,

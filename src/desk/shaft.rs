@@ -1,30 +1,30 @@
-//! The speed of the shaft as the desk knows it. While the drive is off nobody measures it without an encoder: the last measured speed stays,
-//! marked as assumed, until the shaft must have come to rest.
+//! The speed of the shaft as the command arbiter knows it. While a drive without an encoder is off, nothing measures the speed. The last
+//! measured speed is kept, marked as assumed, until the shaft must have come to rest.
 
 use drive_core::{AngleSource, State};
 
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
 
-/// Speed at and below which a shaft that was braked counts as at rest, mechanical rpm.
+/// Speed at and below which a braked shaft counts as at rest, mechanical rpm.
 const REST_RPM: f32 = 30.0;
 
-/// See the head of the module.
+/// The speed of the shaft, see the head of the module.
 pub struct Shaft {
     /// Electrical speed, turns per control period.
     freq: f32,
-    /// Whether it is not measured: the last one, or, after a reset, none.
+    /// Whether the speed is not measured: it is the last measured one, or, after a reset, none.
     assumed: bool,
     /// Whether the drive brakes, or stops after it has braked.
     braked: bool,
     measured_ms: u32,
-    /// Periods and count of the encoder of the last report.
+    /// Periods and encoder count of the last report.
     counted: (u32, u32),
 }
 
 impl Default for Shaft {
     fn default() -> Self {
-        // After a reset the shaft may turn.
+        // After a reset the shaft may be rotating.
         Self { freq: 0.0, assumed: true, braked: false, measured_ms: 0, counted: (0, 0) }
     }
 }
@@ -52,24 +52,24 @@ impl Shaft {
             }
             State::Off | State::Fault(_) => {
                 let passed = now_ms.wrapping_sub(self.measured_ms) as f32 * 1e-3;
-                // It is asked in each pass: what is known once is not assumed again.
+                // Evaluated in each pass: a speed that is known once is not assumed again.
                 self.assumed &= passed < settings.command.coasts_s;
                 if !self.assumed {
                     self.freq = 0.0;
                 }
                 return;
             }
-            // The shaft is looked for, or nothing measures it.
+            // The speed is being searched for, or nothing measures it.
             State::Calibrating | State::Precharge | State::CheckingWiring => return,
             State::FlyingStart | State::Exciting | State::Learning => return,
         }
         (self.freq, self.measured_ms) = (status.telemetry.rotor_freq, now_ms);
-        // Should the drive go off now.
+        // The speed counts as assumed, should the drive go off now.
         self.assumed = true;
         self.counted = (status.periods, status.sample.encoder);
     }
 
-    /// The speed by the encoder since the report before, if there is a new one.
+    /// The speed by the encoder since the previous report, if there is a new one.
     fn counted(&mut self, status: &Status, settings: &FirmwareSettings) -> Option<f32> {
         let (periods, count) =
             core::mem::replace(&mut self.counted, (status.periods, status.sample.encoder));
@@ -91,7 +91,7 @@ impl Shaft {
         self.freq
     }
 
-    /// Whether a drive that is off does not know whether the shaft turns.
+    /// Whether the drive is off and does not know whether the shaft rotates.
     pub fn is_assumed(&self) -> bool {
         self.assumed
     }

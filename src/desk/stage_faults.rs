@@ -1,5 +1,4 @@
-//! Faults of the power stage, which a master must not clear as often as it likes: each start into a short circuit is a load for the
-//! switches.
+//! Faults of the power stage. A master must not clear them without limit, because each start into a short circuit stresses the switches.
 
 use crate::link::Status;
 
@@ -9,17 +8,17 @@ const WINDOW_MS: u32 = 10_000;
 /// The times of the last faults of the power stage.
 #[derive(Default)]
 pub struct StageFaults {
-    /// Whether the fault that is latched has been counted.
+    /// Whether the latched fault has been counted.
     counted: bool,
-    /// Periods of the report that was the last one when the fault was cleared: it shows that fault still.
+    /// Periods of the last report before the fault was cleared: that report still shows the fault.
     stale: Option<u32>,
-    /// Ages of the last three, ms, the newest first; those that are older than the window are forgotten.
+    /// Ages of the last three faults, ms, the newest first; ages above the window are dropped.
     ages: [Option<u32>; 3],
     seen_ms: u32,
 }
 
 impl StageFaults {
-    /// Counts the fault that is latched, once; whether any is. Called in each pass of the main loop; `now_ms` wraps.
+    /// Counts the latched fault once; returns whether one is latched. Called in each pass of the main loop; `now_ms` wraps.
     pub fn watch(&mut self, status: &Status, now_ms: u32) -> bool {
         let passed = now_ms.wrapping_sub(core::mem::replace(&mut self.seen_ms, now_ms));
         for age in &mut self.ages {
@@ -38,10 +37,10 @@ impl StageFaults {
         fault.is_some()
     }
 
-    /// Passes if the fault may be cleared now, behind [`watch`](Self::watch).
+    /// Passes if the fault may be cleared now; call [`watch`](Self::watch) first.
     ///
     /// # Errors
-    /// The seconds until then.
+    /// The seconds until the fault may be cleared.
     pub fn may_clear(&self) -> Result<(), u32> {
         match self.ages {
             [Some(newest), _, Some(_)] => Err((WINDOW_MS - newest).div_ceil(1000)),
@@ -49,7 +48,7 @@ impl StageFaults {
         }
     }
 
-    /// The fault was cleared; this is the last report, from before.
+    /// The fault was cleared; this is the last report before that.
     pub fn cleared(&mut self, status: &Status) {
         (self.counted, self.stale) = (false, Some(status.periods));
     }

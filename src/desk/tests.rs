@@ -1,4 +1,4 @@
-//! Orders by state and source: one table.
+//! Requests by state and source: one table.
 
 use drive_commission::Step;
 use drive_core::homing::Plan;
@@ -32,7 +32,7 @@ const SITUATIONS: [Situation; 6] = [
     Situation::Staged,
 ];
 
-/// A desk and a drive in a situation; `commander` commands.
+/// A command arbiter and a drive in a situation; `commander` commands.
 fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
     let mut settings = FirmwareSettings::of_the_board();
     settings.command.wiring_checked = true;
@@ -60,8 +60,9 @@ fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
     (desk, drive)
 }
 
-/// Each order, and by situation (`Off`, `Starting`, `Fault`, `NoControl`, `NotConfirmed`, `Staged`): `+` taken, `d` refused by the
-/// drive, `o` must be off, `c` no control, `n` not confirmed, `s` values are staged, `-` nothing found or learned, `u` unsaved.
+/// Each request, with its result by situation (`Off`, `Starting`, `Fault`, `NoControl`, `NotConfirmed`, `Staged`): `+` accepted, `d`
+/// refused by the drive, `o` must be off, `c` no control, `n` not confirmed, `s` values are staged, `-` nothing found or learned, `u`
+/// unsaved.
 fn orders() -> Vec<(Order, &'static str)> {
     let plan = Plan { rpm: 60.0, i_q: 0.5, turns: 2.0 };
     vec![
@@ -116,7 +117,7 @@ fn each_order_in_each_situation() {
                 let (mut desk, mut drive) = desk(*situation, Commander::Console);
                 let before = drive.commands.len();
                 let answer = desk.order(Commander::Console, order.clone(), &mut drive);
-                // A refusal of the desk itself never reaches the drive.
+                // A request that the arbiter itself refuses never reaches the drive.
                 let refused = matches!(&answer, Err(why) if !matches!(why, Refusal::Command(_)));
                 assert!(!refused || drive.commands.len() == before, "{order:?}, {situation:?}");
                 letter(&answer)
@@ -129,7 +130,7 @@ fn each_order_in_each_situation() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Who does not command is refused all that is for the commander, in each situation, and nothing happens.
+/// A side that does not command is refused all requests of the commander, in each situation, and nothing happens.
 #[test]
 fn the_other_side_may_stop_and_nothing_else_that_moves() {
     for situation in SITUATIONS {
@@ -143,7 +144,7 @@ fn the_other_side_may_stop_and_nothing_else_that_moves() {
                 assert_eq!(answer == authority, order.is_for_the_commander(from), "{order:?}");
                 if answer == authority {
                     assert!(drive.commands.is_empty() && !desk.is_busy(), "{order:?}");
-                    // The register has the reason, and it is announced once.
+                    // The register holds the reason, and it is announced once.
                     if from == Commander::Bus {
                         assert_eq!(desk.refusal().map(Refusal::code), Some(1));
                         let told = |desk: &mut Desk, drive: &mut FakeDrive| {
@@ -165,7 +166,7 @@ fn the_other_side_may_stop_and_nothing_else_that_moves() {
     assert!(!Order::Stop(Stop::Coast).is_for_the_commander(Commander::Bus));
 }
 
-/// The announcement of a drive that one report shows in a state and the next one off; a column for each source of the stop: none,
+/// The announcement of a drive that one report shows in a state and the next one off; one column for each source of the stop: none,
 /// console, bus, strip.
 #[test]
 fn a_stop_between_two_reports_is_told_as_one() {
@@ -200,7 +201,7 @@ fn a_stop_between_two_reports_is_told_as_one() {
             let news = told(&mut desk, State::Off);
             let text = (!expected.is_empty()).then_some(News::Off(expected));
             assert_eq!(news, text, "{state:?}, {by:?}");
-            // A stop of a drive that is off is none of the next run.
+            // A stop of a drive that is off is not taken for a stop of the next run.
             assert!(drive.is_off() || by.is_none());
             desk.order(Commander::Console, Order::Stop(Stop::Coast), &mut drive).unwrap();
             told(&mut desk, State::Magnetising);

@@ -1,12 +1,13 @@
 //! A place for one message between the control interrupt and the main loop.
 //!
-//! Own code, because the control interrupt writes its report into the message in place: a queue of `heapless` (0.8 and
-//! 0.9.3) takes items by value, one copy more in every report, and so does `heapless::mpmc`.
+//! Own code replaces a queue of `heapless`, because the control interrupt writes its report into the message in place. The queues of
+//! `heapless` (0.8 and 0.9.3, also `heapless::mpmc`) take items by value, which costs one more copy for every report.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Whether there is a message, as words of 16 different bits: a flipped one neither sends a message again nor blocks the sender.
+/// Value while there is a message. It differs from the other value in 16 bits, so a flipped bit neither sends a message again nor blocks
+/// the sender.
 const FULL: u32 = 0x96c3_5a3c;
 const EMPTY: u32 = 0;
 
@@ -38,7 +39,7 @@ impl<T> Mailbox<T> {
         Self { full: AtomicU32::new(EMPTY), message: UnsafeCell::new(unread) }
     }
 
-    /// Its two ends.
+    /// The two ends of the mailbox.
     pub fn split(&mut self) -> (Sender<'_, T>, Receiver<'_, T>) {
         (Sender(self), Receiver(self))
     }
@@ -50,7 +51,7 @@ impl<T> Sender<'_, T> {
         self.send_with(|place| *place = message)
     }
 
-    /// The same with a message that `write` writes in place, over an earlier one.
+    /// Sends a message that `write` writes in place, over an earlier one; `false` as for [`send`](Self::send).
     pub fn send_with(&mut self, write: impl FnOnce(&mut T)) -> bool {
         if self.0.full.load(Ordering::Acquire) == FULL {
             return false;

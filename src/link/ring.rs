@@ -1,8 +1,8 @@
 //! The ring: signals of control periods, from the control interrupt to its readers in the main loop.
 //!
-//! The interrupt writes a record in a period for which somebody asks, and nothing in others. It never waits: the newest record
-//! replaces the oldest. Each reader sees every record, at its own pace, from the oldest one that is left on; one that
-//! was overtaken misses the records between, which the numbers of the periods show.
+//! The interrupt writes a record in each period that a reader has requested, and none in others. It never waits: the newest record
+//! replaces the oldest. Each reader sees every record, at its own pace, from the oldest one that is left. A reader that was overtaken
+//! misses records, and the numbers of the periods show the gap.
 //!
 //! Own code: the queues of `heapless` and `bbqueue` keep the oldest items, and give each item to one reader.
 
@@ -22,16 +22,16 @@ pub struct Record {
     pub telemetry: Telemetry,
     /// The rest of the signals.
     pub sampled: Sampled,
-    /// Whether it is for tracking and commissioning, which every period is while they observe.
+    /// Whether the record is for tracking and commissioning; while they observe, every period is.
     pub observed: bool,
-    /// Whether it is for the stream.
+    /// Whether the record is for the stream.
     pub streamed: bool,
 }
 
 impl Record {
     /// Sets the signals.
     pub fn set(&mut self, telemetry: &Telemetry) {
-        /// In two parts: the compiler copies up to 64 bytes without a call, in a third of the cycles.
+        /// Copied in two parts: the compiler copies up to 64 bytes without a call, in a third of the cycles.
         type Parts = ([u32; 11], [u32; 10]);
         const _: () = assert!(size_of::<Parts>() == size_of::<Telemetry>());
         const _: () = assert!(align_of::<Parts>() == align_of::<Telemetry>());
@@ -47,7 +47,7 @@ impl Record {
     }
 }
 
-/// Memory for `N` records, a power of two; one less is read.
+/// Memory for `N` records, a power of two; readers see at most one less.
 pub struct Ring<const N: usize> {
     slots: [Slot; N],
     /// Records so far, wrapping.
@@ -60,7 +60,7 @@ struct Slot {
     record: UnsafeCell<Record>,
 }
 
-// SAFETY: only who has set `held`, which was not set before, touches the record.
+// SAFETY: only the side that has set `held`, which was clear before, touches the record.
 unsafe impl Sync for Slot {}
 
 /// The control interrupt's end.
@@ -88,10 +88,10 @@ impl Slot {
 }
 
 impl<const N: usize> Ring<N> {
-    // SAFETY: zeros are a record, which has numbers and a `bool`.
+    // SAFETY: a record consists of numbers and `bool`s, so zeros are a valid record.
     const EMPTY: Record = unsafe { core::mem::zeroed() };
 
-    /// No records. A constant: none is made on the stack.
+    /// A ring without records. It is a constant, so that none is built on the stack.
     pub const fn new() -> Self {
         const { assert!(N.is_power_of_two(), "the number of a record wraps") };
         let slots =
@@ -100,38 +100,38 @@ impl<const N: usize> Ring<N> {
         Self { slots, written: AtomicU32::new(0) }
     }
 
-    /// Its two ends. A reader can be cloned.
+    /// The two ends of the ring. A reader can be cloned.
     pub fn split(&mut self) -> (Writer<'_, N>, Reader<'_, N>) {
         (Writer(self), Reader { ring: self, next: 0 })
     }
 }
 
 impl<const N: usize> Writer<'_, N> {
-    /// Adds a record, which `write` writes in place over the oldest one. It is missing if that one is being read just now.
+    /// Adds a record, which `write` writes in place over the oldest one. The record is left out if the oldest one is being read.
     pub fn write(&mut self, write: impl FnOnce(&mut Record)) {
         let number = self.0.written.load(Ordering::Relaxed);
         let Some(slot) = self.0.slots.get(number as usize % N) else { return };
         let _ = slot.hold(|record| {
             write(record);
-            // While the record is held: who holds it next knows that it is another one.
+            // Stored while the record is held, so that the next holder knows that it is another record.
             self.0.written.store(number.wrapping_add(1), Ordering::Release);
         });
     }
 }
 
 impl<const N: usize> Reader<'_, N> {
-    /// Passes the next record that is left to `with`; `None` if there is none yet, or if it is being overwritten just now.
+    /// Passes the next remaining record to `with`; `None` if there is none yet, or if it is being overwritten.
     pub fn take_with<R>(&mut self, with: impl FnOnce(&Record) -> R) -> Option<R> {
         let left =
             |next: u32| self.ring.written.load(Ordering::Acquire).wrapping_sub(next) as usize;
         match left(self.next) {
             0 => return None,
-            // Not the oldest: the writer needs its place next, and would lose a period.
+            // The oldest record is skipped: the writer needs its place next, and would lose a period.
             more if more >= N => self.next = self.next.wrapping_add((more - N + 1) as u32),
             _ => {}
         }
         let slot = self.ring.slots.get(self.next as usize % N)?;
-        // Overtaken before it was held?
+        // The writer may have overtaken the reader before the record was held.
         let result = slot.hold(|record| (left(self.next) < N).then(|| with(record)))??;
         self.next = self.next.wrapping_add(1);
         Some(result)
@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(read(&mut reader), [4], "periods 2 and 3 are missing");
     }
 
-    /// However far behind it is, a reader takes no period from the others.
+    /// A reader takes no period from the others, however far behind it is.
     #[test]
     fn a_late_reader_is_not_in_the_way_of_the_writer() {
         let mut ring = Ring::<4>::new();
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(read(&mut prompt), [20]);
     }
 
-    /// Two readers, of which one hardly keeps up: no record is torn, each comes once and in order.
+    /// Two readers, one of which hardly keeps up: no record is torn, and each comes once and in order.
     #[test]
     fn records_arrive_whole_and_in_order_across_threads() {
         const LAST: u32 = 300_000;
@@ -244,7 +244,7 @@ mod tests {
             let fast = reader.clone();
             let readers =
                 [scope.spawn(move || follow(fast, 0)), scope.spawn(move || follow(reader, 500))];
-            // Until the last record has arrived: one that is being read is left out.
+            // Repeated until the last record has arrived, because a record that is being read is left out.
             let mut period = 0;
             while readers.iter().any(|reader| !reader.is_finished()) {
                 period += 1;

@@ -1,9 +1,8 @@
 //! The trace: signals of the drive, period by period, recorded in RAM.
 //!
-//! The main loop requests it, the control interrupt writes it, the main loop reads it; `stage` says who owns the
-//! memory. The records form a ring, so that a trace with a trigger holds what came before it. It is not the
-//! [ring](super::ring) of the other readers: it is a hundred times as long, holds the chosen signals alone, and stands still
-//! once its trigger has come.
+//! The main loop requests it, the control interrupt writes it, the main loop reads it; `stage` says who owns the memory. The records form
+//! a ring, so that a trace with a trigger holds the periods before the trigger. It is not the [ring](super::ring) of the other readers:
+//! it is a hundred times as long, holds only the chosen signals, and stops after its trigger.
 
 mod signals;
 #[cfg(test)]
@@ -18,25 +17,25 @@ pub use signals::{
     MOST, Record, SIGNALS, Sampled, Signal, SignalChoice, Values, find, shown, values,
 };
 
-/// What starts the part of a trace that is kept.
+/// Event that starts the kept part of a trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// The request.
+    /// The request itself.
     Now,
-    /// A fault: all records are from before it, but the last.
+    /// A fault: all records but the last are from before the fault.
     Fault,
-    /// A signal that is above or below a level: a quarter of the records are from before that.
+    /// A signal crosses a level: a quarter of the records are from before the crossing.
     Level {
         /// Index into [`SIGNALS`].
         signal: u8,
-        /// The level, in the unit of the signal in a plan of the console, and as recorded in the recorder.
+        /// The level, in the unit of the signal for a plan of the console, and as recorded for the recorder.
         level: f32,
-        /// Whether the signal has to be above it.
+        /// Whether the signal has to be above the level.
         above: bool,
     },
 }
 
-/// A trace that is asked for.
+/// A requested trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Number of records.
@@ -45,15 +44,15 @@ pub struct Plan {
     pub divider: u16,
     /// Recorded signals.
     pub choice: SignalChoice,
-    /// Its start.
+    /// The trigger that starts it.
     pub trigger: Trigger,
 }
 
-/// Before the first request: the memory is the main loop's.
+/// No request yet: the memory belongs to the main loop.
 const IDLE: u8 = 0;
-/// Being written: the memory is the interrupt's.
+/// The trace is being written: the memory belongs to the interrupt.
 const RECORDING: u8 = 1;
-/// Written: the memory is the main loop's.
+/// The trace is complete: the memory belongs to the main loop.
 const DONE: u8 = 2;
 
 struct Inner<const N: usize> {
@@ -65,7 +64,7 @@ struct Inner<const N: usize> {
     written: usize,
     /// Records still to be written; `None` before the trigger.
     left: Option<usize>,
-    /// Records behind the one of the trigger.
+    /// Number of records after the trigger's record.
     behind: usize,
     /// Periods until the next record.
     wait: u16,
@@ -100,7 +99,7 @@ impl<const N: usize> Trace<N> {
         Self { taken: AtomicBool::new(false), stage: AtomicU8::new(IDLE), inner }
     }
 
-    /// Its two ends; only the first time.
+    /// The two ends of the trace; only at the first call.
     pub fn take(&self) -> Option<(Recorder<'_, N>, Reader<'_, N>)> {
         let first = !self.taken.swap(true, Ordering::AcqRel);
         first.then_some((Recorder(self), Reader(self)))
@@ -113,7 +112,7 @@ impl<const N: usize> Inner<N> {
         usize::from(self.plan.records).min(N)
     }
 
-    /// Number of records behind that of the trigger, if it has come with the record just written.
+    /// Number of records still to be written after the trigger's, if the record just written triggers.
     fn triggered(&self, values: &Values, fault: bool) -> Option<usize> {
         let size = self.size();
         match self.plan.trigger {
@@ -130,7 +129,7 @@ impl<const N: usize> Inner<N> {
 }
 
 impl<const N: usize> Recorder<'_, N> {
-    /// Records the present control period, if one is due, and tells whether it was.
+    /// Records the present control period, if it is due, and returns whether it was.
     pub fn step(&mut self, sampled: &Sampled, t: &Telemetry) -> bool {
         self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(sampled, t)
     }
@@ -138,7 +137,7 @@ impl<const N: usize> Recorder<'_, N> {
     fn record(&mut self, sampled: &Sampled, t: &Telemetry) -> bool {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
-        // A fault is recorded at once: what follows it stands still.
+        // A fault is recorded at once, because the signals no longer change after it.
         let fault = sampled.state >= signals::FAULT;
         if inner.wait > 0 && !(fault && inner.plan.trigger == Trigger::Fault) {
             inner.wait -= 1;
@@ -182,11 +181,11 @@ impl<const N: usize> Reader<'_, N> {
 
     /// Ends a recording without a result.
     pub fn cancel(&mut self) {
-        // The interrupt cannot be in the midst of a record: it is never interrupted by the main loop.
+        // The interrupt cannot be in the middle of a record: the main loop never interrupts it.
         self.0.stage.store(IDLE, Ordering::Release);
     }
 
-    /// Record number `i` of a finished recording, from the oldest on, and its number from that of the trigger.
+    /// Record number `i` of a finished recording, from the oldest, and its position relative to the trigger's record.
     pub fn get(&self, i: u16) -> Option<(i16, Record)> {
         if self.0.stage.load(Ordering::Acquire) != DONE {
             return None;

@@ -1,7 +1,7 @@
-//! The field bus as a front end of the desk: registers to orders, refusals to exceptions.
+//! The field bus as an interface of the command arbiter: registers to requests, refusals to exceptions.
 //!
-//! A run command holds until a stop; when the drive stopped for another reason (console, time-out, fault), a master that repeats its run
-//! command does not start it again before it has written a stop.
+//! A run command holds until a stop. If the drive has stopped for another reason (console, time-out, fault), a master that repeats its
+//! run command starts it again only after it has written a stop.
 
 use drive_core::{Mode, Stop};
 use modbus_core::Exception;
@@ -19,7 +19,7 @@ use crate::settings::bus::{Alive, Commander};
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST, SetError};
 
-/// Fields of the command word: what to do, and the direction. Other bits are refused.
+/// Fields of the command word: the action and the direction. Other bits are refused.
 const ACTION: u16 = 0b11;
 const STOP: u16 = 1;
 const FORWARD: u16 = 1 << 4;
@@ -31,7 +31,7 @@ const BASE_BLOCK: u16 = 1 << 2;
 /// Whether a write is a stop, which acts also while the drive is busy.
 pub fn is_stop((at, word): Written) -> bool {
     match at {
-        // A release is one where the bus commands.
+        // A release is a stop if the bus commands.
         COMMAND => word & ACTION == STOP || word == 0,
         RESET => word & BASE_BLOCK != 0,
         CONTROL => cia402::stop(word).is_some(),
@@ -45,15 +45,15 @@ enum Run {
     /// None, or a stop.
     #[default]
     Stop,
-    /// A start was taken; the controllers are being designed.
+    /// A start was accepted; the controllers are being designed.
     Starting,
     /// The drive runs for the bus.
     Running,
-    /// The drive has stopped for another reason.
+    /// The drive has stopped, not by a stop of the bus.
     Ended,
 }
 
-/// See the head of the module.
+/// The field bus, see the head of the module.
 #[derive(Default)]
 pub struct Bus {
     run: Run,
@@ -62,9 +62,9 @@ pub struct Bus {
     frequency: u16,
     /// The speed that the drive was given last since its start, rpm.
     given: Option<f32>,
-    /// Number of the desk's last design that was noticed.
+    /// Number of the arbiter's last design that was noticed.
     designs: u32,
-    /// Whether the control word of CiA 402 that was written last asks for the reset of a fault: the change to it does.
+    /// Whether the last control word of CiA 402 has the fault-reset bit: only the change to it resets a fault.
     resets: bool,
     faults: FaultLog,
     seconds: u32,
@@ -94,11 +94,11 @@ impl Bus {
             self.follow_run(desk, drive);
         }
         let frame = port.receive();
-        // An answer to a request from before a design, which the master has given up, would be taken for that to another.
+        // The master has given up a request from before a design. An answer would be taken for the answer to another request.
         let late = desk.has_designed(&mut self.designs);
         let mut access = Access { bus: self, desk, drive, commanded: false };
         match frame {
-            // A stop acts all the same.
+            // A stop in such a request is carried out all the same.
             Some(frame) if late => {
                 let (_, stop) = slave::busy(&frame, settings.own(), is_stop);
                 stop.iter().for_each(|stop| access.carry_out(*stop));
@@ -106,15 +106,15 @@ impl Bus {
             Some(frame) => {
                 let own = settings.own();
                 let valid = slave::answer(&frame, own, &mut access, |answer| port.send(answer));
-                // By default a master counts as alive by what it commands: neither a panel that only reads nor a gateway that writes to
-                // all stands in for it.
+                // By default only commands count as a sign of life of the master: neither a panel that only reads nor a gateway that
+                // broadcasts replaces it.
                 if valid && (access.commanded || settings.alive == Alive::Any) {
                     access.desk.note_activity(Commander::Bus, now_ms);
                 }
             }
             None => {}
         }
-        // Behind the frame, which came before it.
+        // The stop is carried out after the frame, which came before it.
         if let Some(stop) = port.take_stop() {
             access.carry_out(stop);
         }
@@ -134,7 +134,7 @@ impl Bus {
         }
     }
 
-    /// Gives the speed, if it is another than before.
+    /// Gives the drive the speed, if it has changed.
     fn send_reference(
         &mut self,
         desk: &mut Desk,
@@ -156,7 +156,7 @@ impl Bus {
     }
 }
 
-/// A refusal is a failure of the device, except of a value.
+/// A refusal is a failure of the device, unless it is about a value.
 impl From<Refusal> for Exception {
     fn from(why: Refusal) -> Self {
         match why {
@@ -172,7 +172,7 @@ struct Access<'a, D> {
     bus: &'a mut Bus,
     desk: &'a mut Desk,
     drive: &'a mut D,
-    /// Whether command, frequency or control word were written, and taken.
+    /// Whether command, frequency or control word were written and accepted.
     commanded: bool,
 }
 
@@ -181,9 +181,9 @@ impl<D: DriveHandle> Access<'_, D> {
         Ok(self.desk.order(Commander::Bus, order, self.drive).map(drop)?)
     }
 
-    /// Carries out a stop that has been acknowledged already, or whose master waits no more.
+    /// Carries out a stop that has been acknowledged already, or whose master no longer waits.
     fn carry_out(&mut self, (at, word): Written) {
-        // The desk shows a refusal at the console.
+        // The arbiter shows a refusal at the console.
         let _ = self.write_word(at, word);
     }
 
@@ -192,7 +192,7 @@ impl<D: DriveHandle> Access<'_, D> {
         Err(why.into())
     }
 
-    /// Writes a register that is no setting.
+    /// Writes a register that is not a setting.
     fn write_word(&mut self, at: u16, word: u16) -> Result<(), Exception> {
         match at {
             COMMAND => self.command(word),
@@ -257,7 +257,7 @@ impl<D: DriveHandle> Access<'_, D> {
         }
     }
 
-    /// A control word of CiA 402. A run keeps the direction.
+    /// Carries out a control word of CiA 402. A run keeps the direction.
     fn control(&mut self, word: u16) -> Result<(), Exception> {
         let resets = word & cia402::FAULT_RESET != 0;
         let before = core::mem::replace(&mut self.bus.resets, resets);
@@ -292,7 +292,7 @@ impl<D: DriveHandle> Access<'_, D> {
         }
     }
 
-    /// Stages settings, whole ones.
+    /// Stages settings, each written completely.
     fn stage(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
         self.may_command()?;
         let first = at - SETTINGS;
@@ -308,7 +308,7 @@ impl<D: DriveHandle> Access<'_, D> {
             if key.hardware() {
                 return self.refuse(Refusal::Hardware(key));
             }
-            // There is room.
+            // The list has enough space.
             let _ = values.push((key, from_float(key, self.desk.settings().latest(), float)?));
         }
         self.desk.set(Commander::Bus, &values, self.drive).map(drop).or_else(|why| self.refuse(why))
@@ -351,7 +351,7 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
         let word = words.get(0).unwrap_or(0);
         match (at, words.get(1)) {
             (SETTINGS..STAGED, _) => self.stage(at, words),
-            // The frequency first: a run command begins with it.
+            // The frequency is written first, because a run command begins with it.
             (COMMAND, Some(frequency)) if words.count() == 2 => {
                 if word & ACTION == RUN {
                     self.frequency(frequency)?;

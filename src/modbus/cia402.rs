@@ -30,8 +30,7 @@ pub enum Power {
 }
 
 impl Power {
-    /// All, in the order of the state machine, each with its name in the standard and bits 0 to 3, 5 and 6 of the status
-    /// word.
+    /// All states, in the order of the state machine, each with its name in the standard and bits 0 to 3, 5 and 6 of the status word.
     pub const ALL: [(Self, &str, u16); 7] = [
         (Self::NotReadyToSwitchOn, "not ready to switch on", 0x00),
         (Self::SwitchOnDisabled, "switch on disabled", 0x40),
@@ -66,21 +65,21 @@ impl Power {
     }
 }
 
-/// Bits of the control word that order, and what they order.
+/// Command bits of the control word.
 const SWITCH_ON: u16 = 1 << 0;
 const ENABLE_VOLTAGE: u16 = 1 << 1;
-/// Stops quickly where it is 0.
+/// A quick stop if the bit is 0.
 const QUICK_STOP: u16 = 1 << 2;
 const ENABLE_OPERATION: u16 = 1 << 3;
 /// Bit of the control word: clear the latched fault.
 pub const FAULT_RESET: u16 = 1 << 7;
 
-/// The control word that orders the drive to run.
+/// The control word that commands a run.
 pub const RUN: u16 = SWITCH_ON | ENABLE_VOLTAGE | QUICK_STOP | ENABLE_OPERATION;
 /// The control word of a drive that is stopped: shutdown.
 pub const SHUTDOWN: u16 = ENABLE_VOLTAGE | QUICK_STOP;
 
-/// The stop that a control word orders; `None` for a run. Disable voltage switches off at once, a quick stop brakes by its own ramp,
+/// The stop that a control word commands; `None` for a run. Disable voltage switches off at once, a quick stop brakes by its own ramp,
 /// and shutdown, switch on and disable operation brake by the ramp of the speed.
 pub const fn stop(control_word: u16) -> Option<Stop> {
     if control_word & ENABLE_VOLTAGE == 0 {
@@ -96,7 +95,7 @@ pub const fn stop(control_word: u16) -> Option<Stop> {
 
 /// Bit of the status word: the dc link is above its lower limit.
 pub const VOLTAGE_ENABLED: u16 = 1 << 4;
-/// Bit of the status word, the manufacturer's: the drive is off, and the speed is the last measured one.
+/// Bit of the status word, manufacturer-specific: the drive is off, and the speed is the last measured one.
 pub const SPEED_ASSUMED: u16 = 1 << 14;
 /// Bit of the status word: the bus commands.
 pub const REMOTE: u16 = 1 << 9;

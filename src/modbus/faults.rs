@@ -3,7 +3,7 @@
 use drive_core::State;
 use heapless::Deque;
 
-/// Faults that are kept.
+/// Number of faults that are kept.
 pub const KEPT: usize = 8;
 
 /// The last faults.
@@ -15,7 +15,7 @@ pub struct FaultLog {
 }
 
 impl FaultLog {
-    /// Notes a fault when the state becomes one, `seconds` after the start.
+    /// Notes a fault when the state changes to one, `seconds` after the start.
     pub fn watch(&mut self, state: State, seconds: u32) {
         let was = core::mem::replace(&mut self.faulty, state.fault().is_some());
         if let Some(fault) = state.fault()
@@ -24,7 +24,7 @@ impl FaultLog {
             if self.entries.is_full() {
                 self.entries.pop_back();
             }
-            // There is room.
+            // The list has enough space.
             let _ = self.entries.push_front((fault.code(), seconds));
         }
     }

@@ -1,4 +1,4 @@
-//! Settings as floats of 32 bits: their ranges depend on other settings, so that no scale would fit them all.
+//! Settings as floats of 32 bits: their ranges depend on other settings, so no fixed scale would fit them all.
 
 use drive_settings::value::Value;
 use modbus_core::Exception;
@@ -6,7 +6,7 @@ use modbus_core::Exception;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
 
-/// A setting as the float in its registers: `auto` is not a number, a word its place, from 0 on.
+/// A setting as the float in its registers: `auto` is NaN, a word is its place in the list, from 0.
 pub fn to_float(key: Key, settings: &FirmwareSettings) -> f32 {
     match key.get(settings) {
         Value::Number(value) => value,
@@ -18,12 +18,12 @@ pub fn to_float(key: Key, settings: &FirmwareSettings) -> f32 {
     }
 }
 
-/// The value of a setting that a float in its registers stands for.
+/// The value of a setting for a float in its registers.
 ///
 /// # Errors
 /// [`Exception::IllegalDataValue`]. The range is checked when the value is staged.
 pub fn from_float(key: Key, settings: &FirmwareSettings, float: f32) -> Result<Value, Exception> {
-    // The casts saturate, and a fraction is seen in the way back.
+    // The casts saturate, and the way back reveals a fraction.
     let whole = float as u32;
     let is_whole = whole as f32 == float;
     match key.get(settings) {

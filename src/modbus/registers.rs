@@ -1,4 +1,4 @@
-//! The registers that the master reads: a table from which the manual's is made.
+//! The registers that the master reads: a table, from which the table in the manual is made.
 //!
 //! A value of 32 bits takes two registers, the upper half first; a setting is a float, see [`float`](super::float).
 
@@ -20,28 +20,28 @@ use crate::settings::keys;
 
 /// The command; see the manual.
 pub const COMMAND: u16 = 0x2000;
-/// Its bit for a run.
+/// Bit of the command for a run.
 pub const RUN: u16 = 2;
-/// The frequency that is asked for, 0.01 Hz.
+/// The frequency reference, 0.01 Hz.
 pub const FREQUENCY: u16 = 0x2001;
 /// Bit 1 clears the latched fault.
 pub const RESET: u16 = 0x2002;
 /// The control word of CiA 402.
 pub const CONTROL: u16 = 0x6040;
-/// The signals of a trace: two registers each, by its number for life.
+/// The signals of a trace: two registers each, by permanent number.
 pub const SIGNALS: u16 = 0x3000;
 const SIGNALS_END: u16 = 0x3200;
-/// The settings, up to [`STAGED`]: two registers each, by its number for life.
+/// The settings, up to [`STAGED`]: two registers each, by permanent number.
 pub const SETTINGS: u16 = 0x4000;
-/// Order about the staged settings: 1 puts them in force, 2 also saves, 3 drops them.
+/// Request about the staged settings: 1 puts them in force, 2 also saves, 3 drops them.
 pub const STAGED: u16 = 0x4fff;
 /// The faults since the start, the newest first: code, and seconds since the start.
 pub const FAULTS: u16 = 0x5100;
-/// Registers of a fault.
+/// Number of registers per fault.
 const PER_FAULT: u16 = 3;
 const FAULTS_END: u16 = FAULTS + PER_FAULT * faults::KEPT as u16;
 
-/// Pages: what lies in one and has no meaning reads as 0, so that a block may have holes.
+/// Pages: an address in a page that has no meaning reads as 0, so that a block read may span gaps.
 const PAGES: [(u16, u16); 6] = [
     (0x0000, 0x01ff),
     (0x2000, 0x21ff),
@@ -62,17 +62,17 @@ const SPEED_ASSUMED: u16 = 1 << 15;
 /// Speed counts as reached within this share of the largest.
 const REACHED: f32 = 0.01;
 
-/// What the registers show.
+/// State that the registers show.
 pub struct View<'a> {
     /// Last report of the control; `None` if it does not run.
     pub status: Option<Status>,
-    /// The desk, with the settings.
+    /// The command arbiter, with the settings.
     pub desk: &'a Desk,
     /// The settings in force.
     pub settings: &'a FirmwareSettings,
     /// The command in force, as it would be written.
     pub command: u16,
-    /// The frequency asked for, 0.01 Hz.
+    /// The frequency reference, 0.01 Hz.
     pub frequency: u16,
     /// The faults.
     pub faults: &'a FaultLog,
@@ -82,9 +82,9 @@ pub struct View<'a> {
 
 use Shown::{Double, Number, Word};
 
-/// The way to a value.
+/// Function that gives a value.
 pub enum Shown {
-    /// A number in parts of its unit: 10 for 0.1.
+    /// A number in fractions of its unit: 10 for 0.1.
     Number(u16, fn(&View<'_>) -> f32),
     /// A word.
     Word(fn(&View<'_>) -> u16),
@@ -98,7 +98,7 @@ pub struct Row {
     pub at: u16,
     /// Unit; empty if there is none.
     pub unit: &'static str,
-    /// Its value.
+    /// Function that gives its value.
     pub shown: Shown,
     /// Meaning, one sentence without its full stop.
     pub help: &'static str,
@@ -111,7 +111,7 @@ macro_rules! rows {
     };
 }
 
-/// The registers but for settings and faults, by number.
+/// The registers except settings and faults, by number.
 pub static ROWS: [Row; 30] = rows! {
     0x0100: Number(100, |v| v.largest_hz()), "Hz", "largest frequency that is asked for, as 0x211B";
     COMMAND: Word(|v| v.command), "", "command: 1 stop, 18 run forward, 34 run reverse, 0 release";
@@ -172,7 +172,7 @@ impl View<'_> {
         Ok(ROWS.iter().find_map(|row| row.word(at, self)).unwrap_or(0))
     }
 
-    /// The latest value of the signal with this number; 0 for none, and before the control runs.
+    /// The latest value of the signal with this number; 0 for an unknown number, and before the control runs.
     fn signal(&self, id: u16) -> f32 {
         let Some(s) = &self.status else { return 0.0 };
         let sampled = Sampled::new(&s.sample, s.state, s.limiting);
@@ -181,7 +181,7 @@ impl View<'_> {
         found.map_or(0.0, |(signal, value)| signal.shown(value, &self.settings.drive))
     }
 
-    /// The report of a drive that is not off.
+    /// The report, if the drive is not off.
     fn active(&self) -> Option<&Status> {
         self.status.as_ref().filter(|status| !status.state.is_off())
     }
@@ -208,7 +208,7 @@ impl View<'_> {
         }
     }
 
-    /// Of a drive that is off that of the shaft: masters take it for the speed, and wait for rest by it.
+    /// Output frequency. While the drive is off, it is that of the shaft: masters take it for the speed, and wait for standstill by it.
     fn output_hz(&self) -> f32 {
         let freq = match self.active() {
             Some(status) => status.telemetry.flux_freq,
@@ -217,7 +217,7 @@ impl View<'_> {
         (freq / PERIOD_S).abs()
     }
 
-    /// Of the shaft, signed; the last measured one while nobody measures it.
+    /// Speed of the shaft, signed, rpm; the last measured one while nothing measures it.
     fn rpm(&self) -> f32 {
         let freq = match self.active() {
             Some(status) => status.telemetry.rotor_freq,
@@ -226,7 +226,7 @@ impl View<'_> {
         freq / PERIOD_S / self.hz_per_rpm()
     }
 
-    /// Whether the drive is off and does not know whether the shaft turns.
+    /// Whether the drive is off and does not know whether the shaft rotates.
     fn speed_is_assumed(&self) -> bool {
         self.active().is_none() && self.desk.shaft().is_assumed()
     }
@@ -245,7 +245,7 @@ impl View<'_> {
         })
     }
 
-    /// By 3/2 P L_m/L_r psi i_q (Eq. 2.7), as at the console.
+    /// Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7), as at the console.
     fn torque(&self) -> f32 {
         let (motor, plate) = (&self.settings.drive.motor, &self.settings.drive.nameplate);
         let rated = plate.torque_nm();
@@ -308,7 +308,7 @@ impl View<'_> {
 }
 
 impl Row {
-    /// The word at this number, if it belongs to the row.
+    /// The word at this register number, if it belongs to the row.
     fn word(&self, at: u16, view: &View<'_>) -> Option<u16> {
         let place = at.checked_sub(self.at).filter(|place| *place < self.words())?;
         Some(match self.shown {
@@ -318,18 +318,18 @@ impl Row {
         })
     }
 
-    /// Whether it can be written.
+    /// Whether the row can be written.
     pub fn is_written(&self) -> bool {
         matches!(self.at, COMMAND | FREQUENCY | RESET | STAGED | CONTROL)
     }
 
-    /// Number of its registers.
+    /// Number of registers of the row.
     pub fn words(&self) -> u16 {
         if matches!(self.shown, Shown::Double(_)) { 2 } else { 1 }
     }
 }
 
-/// A number in parts of its unit, rounded; a negative one as two's complement.
+/// A number in fractions of its unit, rounded; a negative one as two's complement.
 fn counts(value: f32, parts: u16) -> u16 {
     let counts = libm::roundf(value * f32::from(parts));
     // The casts saturate.

@@ -1,9 +1,9 @@
 //! The slave: a request frame in, the answer frame out. No hardware and no state.
 //!
-//! Functions 03 (read), 06 and 16 (write one or several), 08 with subfunction 0 (echo). `modbus-core` checks, takes apart
-//! and builds frames. Three things are done here: the function 08, which the crate does not decode; the exact lengths, since
-//! it passes over what is too much; and the frame's bounds. Its `decode_request` looks for a frame anywhere in the bytes,
-//! where an RTU frame is all between two silences, and panics on a frame that it cannot decode (0.2.0).
+//! Functions 03 (read), 06 and 16 (write one or several), 08 with subfunction 0 (echo). `modbus-core` checks, parses and builds frames.
+//! Three things are done here: the function 08, which the crate does not decode; the exact lengths, since it accepts surplus bytes; and
+//! the frame's bounds. Its `decode_request` looks for a frame anywhere in the bytes, although an RTU frame is all bytes between two
+//! silent intervals, and panics on a frame that it cannot decode (0.2.0).
 
 use modbus_core::rtu::{self, Header, ResponseAdu, server};
 use modbus_core::{
@@ -12,7 +12,7 @@ use modbus_core::{
 
 use super::{Frame, LONGEST};
 
-/// Address of a request to all.
+/// Address of a broadcast.
 const BROADCAST: u8 = 0;
 /// Most registers of a read (Modbus application protocol V1.1b3, 6.3) and of a write (6.12).
 const MOST_READ: u16 = 125;
@@ -20,7 +20,7 @@ const MOST_WRITTEN: usize = 123;
 /// Bytes of a frame beside the function and its data: address and checksum.
 const AROUND: usize = 3;
 const DIAGNOSTICS: u8 = 8;
-/// Highest code of a function; above it stand exceptions.
+/// Highest code of a function; exceptions are above it.
 const LAST_FUNCTION: u8 = 0x7f;
 
 /// The words of a write.
@@ -28,7 +28,7 @@ const LAST_FUNCTION: u8 = 0x7f;
 pub struct Words<'a>(&'a [u8]);
 
 impl Words<'_> {
-    /// Number of words, from 1 on.
+    /// Number of words, at least 1.
     pub fn count(self) -> usize {
         self.0.len() / 2
     }
@@ -59,19 +59,19 @@ pub trait Registers {
     fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception>;
 }
 
-/// What a request asks for.
+/// A decoded request.
 #[derive(Clone, Copy)]
 enum Asked<'a> {
-    /// The registers from this to that.
+    /// Read the registers from the first to the last.
     Read(u16, u16),
-    /// The function and the words from this register on.
+    /// Write the words from this register on, by this function.
     Write(FunctionCode, u16, Words<'a>),
-    /// The same data.
+    /// Return the same data.
     Echo(FunctionCode, &'a [u8]),
 }
 
-/// Carries out a frame that came in, if it is whole and for the address `own` or for all, and sends the answer, if there is
-/// one. Returns whether it was a request to this address alone, and was carried out.
+/// Carries out a received frame, if it is whole and for the address `own` or for all, and sends the answer, if there is one. Returns
+/// whether the frame was a request to this address alone, and was carried out.
 pub fn answer(
     frame: &[u8],
     own: u8,
@@ -80,7 +80,7 @@ pub fn answer(
 ) -> bool {
     let Some((slave, pdu)) = whole(frame) else { return false };
     let function = pdu[0];
-    // A read of all has no answer.
+    // A broadcast read has no answer.
     let for_us = slave == own || (slave == BROADCAST && matches!(function, 6 | 16));
     if !for_us || function > LAST_FUNCTION {
         return false;
@@ -98,11 +98,11 @@ pub fn answer(
     false
 }
 
-/// What a slave that is busy makes of a frame: its answer, and a stop that is to be carried out.
+/// The reaction of a busy slave to a frame: its answer, and a stop that is to be carried out.
 pub type Busy = (Option<Frame>, Option<Written>);
 
-/// The same for the address `own`, if the frame is whole: a write that is a stop, to this slave or to all, is acknowledged; other requests
-/// to this slave alone are answered with exception 6. Without a panic, for an interrupt.
+/// The reaction of a busy slave with the address `own` to a whole frame. A write that is a stop, to this slave or to all, is
+/// acknowledged; other requests to this slave alone are answered with exception 6. It never panics, because an interrupt calls it.
 pub fn busy(frame: &[u8], own: u8, is_stop: impl FnOnce(Written) -> bool) -> Busy {
     let Some((body, sum)) = frame.split_last_chunk::<2>() else { return (None, None) };
     if *sum != rtu::crc16(body).to_be_bytes() {
@@ -172,13 +172,13 @@ fn asked(pdu: &[u8]) -> Result<Asked<'_>, Exception> {
         Ok(Request::Custom(function, [0, 0, ..])) if function.value() == DIAGNOSTICS => {
             Ok(Asked::Echo(function, &pdu[1..]))
         }
-        // Too short for its function.
+        // The request is too short for its function.
         Err(_) if matches!(pdu[0], 3 | 6 | 16) => Err(Exception::IllegalDataValue),
         _ => Err(Exception::IllegalFunction),
     }
 }
 
-/// Sends the answer; whether it is no exception. Not inlined: its buffers must not lie below what a write calls.
+/// Sends the answer; returns whether it is not an exception. Not inlined, so that its buffers take no stack from a write.
 #[inline(never)]
 fn reply(
     slave: u8,
@@ -200,7 +200,7 @@ fn reply(
         Asked::Write(FunctionCode::WriteSingleRegister, at, words) => {
             Ok(Response::WriteSingleRegister(at, words.get(0).unwrap_or(0)))
         }
-        // At most 123.
+        // At most 123 words.
         Asked::Write(_, at, words) => {
             Ok(Response::WriteMultipleRegisters(at, words.count() as u16))
         }
@@ -212,7 +212,7 @@ fn reply(
         exception,
     }));
     let mut out = Frame::new();
-    // As long as the longest frame, which every answer fits in.
+    // As long as the longest frame, so every answer fits.
     let _ = out.resize_default(LONGEST);
     let length = server::encode_response(ResponseAdu { hdr: Header { slave }, pdu }, &mut out);
     out.truncate(length.unwrap_or(0));

@@ -54,7 +54,7 @@ fn memory() -> Memory {
     Memory((0..0x100).map(|n| 3 * n).collect())
 }
 
-/// The checksum by the table-free algorithm of the specification (V1.02, appendix B), written anew.
+/// The checksum by the table-free algorithm of the specification (V1.02, appendix B), written independently.
 fn crc(bytes: &[u8]) -> [u8; 2] {
     let mut crc = 0xffff_u16;
     for bit in bytes.iter().flat_map(|byte| (0..8).map(move |n| byte >> n & 1)) {
@@ -78,8 +78,8 @@ fn ask(frame: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
     Some(bytes.to_vec())
 }
 
-/// Exception 6 to a whole request for this slave alone; nothing to a damaged one, to others, to all, and to an exception. A stop is
-/// acknowledged, and told.
+/// A busy slave answers a whole request for it alone with exception 6, and a damaged frame, a request to others or to all, and an
+/// exception not at all. It acknowledges and reports a stop.
 #[test]
 fn a_busy_slave_answers_whole_requests_for_it_alone() {
     let busy = |frame: &[u8]| {
@@ -126,18 +126,18 @@ fn a_busy_slave_answers_whole_requests_for_it_alone() {
 
 #[test]
 fn frames_of_the_specification() {
-    // Application protocol V1.1b3, 6.3, 6.6, 6.8, 6.12, with other addresses.
+    // Examples of the application protocol V1.1b3, 6.3, 6.6, 6.8, 6.12, with other addresses.
     for (request, answer) in [
         (&[17, 3, 0x20, 0x01, 0, 2][..], &[17, 3, 4, 0, 3, 0, 6][..]),
         (&[17, 6, 0x20, 0x02, 0xab, 0xcd], &[17, 6, 0x20, 0x02, 0xab, 0xcd]),
         (&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2], &[17, 16, 0x20, 0x01, 0, 2]),
         (&[17, 8, 0, 0, 0xa5, 0x37], &[17, 8, 0, 0, 0xa5, 0x37]),
-        // Illegal function: coils, another subfunction, a function of the user.
+        // Illegal function: coils, another subfunction, a user-defined function.
         (&[17, 1, 0x20, 0, 0, 1], &[17, 0x81, 1]),
         (&[17, 5, 0x20, 0, 1, 2], &[17, 0x85, 1]),
         (&[17, 8, 0, 1, 0, 0], &[17, 0x88, 1]),
         (&[17, 0x41], &[17, 0xc1, 1]),
-        // Illegal address: outside, and a block that leaves the registers or the 16 bits.
+        // Illegal address: outside, and a block that exceeds the registers or the 16 bits.
         (&[17, 3, 0, 0, 0, 1], &[17, 0x83, 2]),
         (&[17, 3, 0x20, 0xff, 0, 2], &[17, 0x83, 2]),
         (&[17, 3, 0xff, 0xff, 0, 2], &[17, 0x83, 2]),
@@ -151,7 +151,7 @@ fn frames_of_the_specification() {
         (&[17, 16, 0x20, 0, 0, 1, 3, 0, 1, 2], &[17, 0x90, 3]),
         (&[17, 16, 0x20, 0, 0, 0, 0], &[17, 0x90, 3]),
         (&[17, 16, 0x20, 0, 0, 2, 4, 0, 1], &[17, 0x90, 3]),
-        // The slave cannot.
+        // The slave cannot carry it out.
         (&[17, 6, 0x20, 0xff, 0, 0], &[17, 0x86, 4]),
     ] {
         let answered = ask(&framed(request), &mut memory());
@@ -168,7 +168,7 @@ fn the_longest_read_fits_and_frames_for_others_have_no_effect() {
     assert_eq!((longest.len(), longest[2]), (253, 250));
     let mut written = memory();
     let write = [17, 6, 0x20, 2, 0xab, 0xcd];
-    // Of another slave, damaged, with a response's function, too short.
+    // Ignored: for another slave, damaged, with a response's function, too short.
     let damaged = framed(&write).iter().enumerate().map(|(n, b)| b ^ u8::from(n == 4)).collect();
     for frame in [
         framed(&[&[18], &write[1..]].concat()),
@@ -180,7 +180,7 @@ fn the_longest_read_fits_and_frames_for_others_have_no_effect() {
         assert_eq!(ask(&frame, &mut written), None);
         assert_eq!(written, memory());
     }
-    // To all: written without an answer; not read.
+    // A broadcast is written without an answer, and is not read.
     assert_eq!(ask(&framed(&[&[0], &write[1..]].concat()), &mut written), None);
     assert_eq!(written.0[2], 0xabcd);
     assert!(!slave::answer(&framed(&[0, 3, 0x20, 0, 0, 1]), 17, &mut written, |_| {}));
@@ -198,8 +198,8 @@ impl Random {
     }
 }
 
-/// 100 000 frames: random bytes, valid requests, and valid ones with changed bits. What is answered is what an independent
-/// reading of the frame says; what is not valid changes nothing.
+/// 100 000 frames: random bytes, valid requests, and valid requests with changed bits. The answers are those of an independent reading of
+/// the frame, and an invalid frame changes nothing.
 #[test]
 fn random_and_mutated_frames() {
     let mut rng = Random(7);
@@ -246,8 +246,8 @@ fn random_and_mutated_frames() {
     assert!(answered > 10_000 && refused > 1000, "{answered} answered, {refused} refused");
 }
 
-/// The rate within 0.1 %: of the 2 % that a receiver of ten bits bears. The silence is 3.5 characters, or 1.75 ms above 19 200
-/// bit/s, rounded up to a bit.
+/// The rate is within 0.1 %; a receiver of ten bits tolerates 2 %. The silent interval is 3.5 characters, or 1.75 ms above 19 200 bit/s,
+/// rounded up to a bit.
 #[test]
 fn rates_and_silences() {
     for place in 0..Baud::WORDS.len() {

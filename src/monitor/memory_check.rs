@@ -1,9 +1,9 @@
 //! Check of the control's memory for flipped bits, a slice in each pass of the main loop.
 //!
-//! The code of the control interrupt is compared with the flash it was copied from, which corrects itself. The data
-//! that it only reads, mainly the coefficients of the drive, have no second copy: their hash must stay the same as
-//! long as the drive counts no change of its coefficients. The first whole pass after a change is the reference of the
-//! later ones, so a flip in the milliseconds between is taken for a part of the change.
+//! The code of the control interrupt is compared with its source in the flash, which corrects errors. The data that the interrupt only
+//! reads, mainly the coefficients of the drive, have no second copy: their hash must stay the same as long as the drive counts no change
+//! of its coefficients. The first whole pass after a change is the reference of the later ones, so a flip in the milliseconds between is
+//! taken for a part of the change.
 //!
 //! Data that the interrupt writes in every period cannot be checked in this way; the drive's own checks cover them.
 
@@ -12,7 +12,7 @@ use crate::hash;
 
 /// Words of code compared in a pass of the main loop.
 const CODE_SLICE: u32 = 64;
-/// Words of constants hashed in one.
+/// Words of constants hashed in a pass.
 const CONSTANTS_SLICE: u32 = 16;
 
 /// A range of memory.
@@ -29,9 +29,9 @@ pub struct MemoryRange {
 pub struct CheckedMemory<const N: usize> {
     /// The executed code.
     pub code: MemoryRange,
-    /// Address it was copied from.
+    /// Address that the code was copied from.
     pub source: u32,
-    /// Data that change only when `changes` counts.
+    /// Data that change only when the count at `changes` does.
     pub constants: [MemoryRange; N],
     /// Address of the count of changes.
     pub changes: u32,
@@ -41,9 +41,9 @@ pub struct CheckedMemory<const N: usize> {
 #[derive(Clone, Debug)]
 pub struct MemoryCheck<const N: usize> {
     memory: CheckedMemory<N>,
-    /// Next word of the code.
+    /// Next word of the code to compare.
     code: u32,
-    /// Next range of the constants, and word in it.
+    /// Next range of the constants, and next word in it.
     range: usize,
     word: u32,
     hash: u32,
@@ -63,7 +63,7 @@ impl<const N: usize> MemoryCheck<N> {
     /// Checks the next slices.
     ///
     /// # Errors
-    /// A flipped bit, of the code or of the constants, as the record of a run that it ends.
+    /// A flipped bit in the code or in the constants, as the record of the run that it ends.
     pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Record> {
         self.compare_code(&read)?;
         self.hash_constants(&read)
@@ -131,13 +131,13 @@ mod tests {
         MemoryRange { address: 9600, words: 17 },
     ];
     const CHANGES: u32 = 9996;
-    /// Passes in which everything is looked at: 1000 words of code, 318 of constants.
+    /// Number of passes that cover everything: 1000 words of code, 318 of constants.
     const WHOLE: u32 = 20;
 
     struct Memory(RefCell<Vec<u32>>);
 
     impl Memory {
-        /// Any contents, the code a copy.
+        /// A memory with arbitrary contents; the code is a copy.
         fn new() -> Self {
             let mut words: Vec<u32> =
                 (0..2500_u32).map(|n| n.wrapping_mul(2_654_435_769)).collect();
@@ -198,7 +198,7 @@ mod tests {
             memory.flip(8000 + 4 * word, 3);
             memory.flip(CHANGES, 0);
             prop_assert_eq!(run(&mut check, &memory, 4 * WHOLE), Ok(()));
-            // What was taken over then is watched as well.
+            // The data that the check took over then are watched as well.
             memory.flip(8000 + 4 * word, 4);
             prop_assert!(run(&mut check, &memory, 2 * WHOLE).is_err());
         }

@@ -4,8 +4,7 @@ use core::fmt;
 
 use crate::hash;
 
-/// Reasons to stop. The numbers follow those of the drive's faults; 70 to 73 and 76 are those of rejected settings (see
-/// `store/codec.rs`).
+/// Reasons to stop. The numbers continue those of the drive's faults; 70 to 73 and 76 belong to rejected settings (see `store/codec.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Reason {
@@ -27,8 +26,8 @@ pub enum Reason {
     Coefficients = 75,
     /// A configuration register has changed; details: address, its checked bits, those after the start.
     Register = 77,
-    /// A bit of the drive's state has flipped: its phase is none, or it wants its outputs on although no start was taken; details: the
-    /// word of the phase.
+    /// A bit of the drive's state has flipped: its phase word is invalid, or it wants its outputs on although no start was taken;
+    /// details: the word of the phase.
     State = 78,
 }
 
@@ -60,7 +59,7 @@ pub struct Record {
 /// Words of a record in memory.
 pub const WORDS: usize = 7;
 
-/// Tells a record from the contents of RAM after power-on.
+/// Distinguishes a record from the contents of RAM after power-on.
 const MAGIC: u32 = 0x7265_6331;
 
 impl Record {

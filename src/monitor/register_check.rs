@@ -1,14 +1,14 @@
 //! Check of the chip's configuration for flipped bits, a slice in each pass of the main loop.
 //!
-//! The lock of TIM1 keeps dead time, polarity and break from a program, not from a disturbance, and the divider of the dead
-//! time's clock (CKD) is not under it. The values after the start, which reads its settings back, are the reference.
+//! The lock of TIM1 protects dead time, polarity and break from a program, not from a disturbance, and it does not cover the divider of
+//! the dead time's clock (CKD). The values after the start, which reads its settings back, are the reference.
 
 use super::record::{Reason, Record};
 
 /// Registers read in a pass of the main loop.
 const SLICE: usize = 8;
 
-/// A register and its bits that stay from the start to the next reset.
+/// A register and its bits that do not change from the start to the next reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
     /// Address.
@@ -23,7 +23,7 @@ const DIR: u32 = 1 << 4;
 const MOE: u32 = 1 << 15;
 /// Output of a comparator.
 const OUTPUT: u32 = 1 << 30;
-/// Of a converter: enabled, started, its regulator on, not in deep power-down.
+/// ADC: enabled, started, its regulator on, not in deep power-down.
 const ADC_RUNS: u32 = 1 | 1 << 3 | 1 << 28 | 1 << 29;
 /// The oscillators, the clock security system, and the PLL.
 const CLOCKS: u32 = 1 << 8 | 3 << 16 | 1 << 19 | 3 << 24;
@@ -59,7 +59,7 @@ const CONFIGURED: [(u32, &[u16]); 21] = [
     (0x4800_0800, &[0, 4, 0xc, 0x20, 0x24]),
     // The window watchdog: CFR
     (0x4000_2c00, &[4]),
-    // Of the core: VTOR, CPACR, MPU_CTRL
+    // Core: VTOR, CPACR, MPU_CTRL
     (0xe000_ed00, &[8, 0x88, 0x94]),
     // NVIC: enabled interrupts 0 to 95; priorities of ADC1_2, USART3, LPUART
     (0xe000_e000, &[0x100, 0x104, 0x108, 0x410, 0x424, 0x458]),
@@ -72,7 +72,7 @@ const CONFIGURED: [(u32, &[u16]); 21] = [
     (0x4000_7000, &[0, 4, 0x80]),
 ];
 
-/// The bits that stay, of registers that hold others as well.
+/// The bits that do not change, for registers that hold others as well.
 const PARTS: [(u32, u32); 13] = [
     (0x4001_2c00, !DIR),
     (0x4001_2c44, !MOE),
@@ -130,7 +130,7 @@ impl RegisterCheck {
         new
     }
 
-    /// Takes the contents now.
+    /// Takes the present contents as the reference.
     pub fn renew(&mut self, read: impl Fn(u32) -> u32) {
         for (Register { address, mask }, expected) in control().zip(self.expected.iter_mut()) {
             *expected = read(address) & mask;
@@ -140,7 +140,7 @@ impl RegisterCheck {
     /// Checks the next slice.
     ///
     /// # Errors
-    /// A register that has changed, as the record of a run that it ends.
+    /// A register that has changed, as the record of the run that it ends.
     pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Record> {
         let both = addresses().zip(self.expected.iter());
         for (address, &expected) in both.skip(self.next).take(SLICE) {

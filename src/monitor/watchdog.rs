@@ -2,18 +2,18 @@
 
 use crate::board;
 
-/// Core cycles over which the rate of the control interrupt is judged, at least: 12 control periods, 2 ms.
+/// Least number of core cycles over which the rate of the control interrupt is judged: 12 control periods, 2 ms.
 pub const WINDOW_CYCLES: u32 = 12 * PERIOD_CYCLES;
 const PERIOD_CYCLES: u32 = 2 * board::PWM_TOP as u32;
-// The tolerance of a tenth covers one interrupt more or less, which depends on the instant of the count.
+// The tolerance of a tenth covers one interrupt more or less, depending on the instant of the count.
 const _: () = assert!(WINDOW_CYCLES / 10 > PERIOD_CYCLES);
-// A rate that is wrong is noticed in half the time of the watchdog.
+// A wrong rate is detected within half the time of the watchdog.
 const _: () = assert!(WINDOW_CYCLES / board::CYCLES_PER_US * 2 < board::WATCHDOG_US);
 
 /// Result of the rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Not now: the control interrupt is late.
+    /// Do not feed now: the control interrupt is late.
     Wait,
     /// Feed the watchdog.
     Feed,
@@ -21,13 +21,13 @@ pub enum Verdict {
     Refuse {
         /// Control periods in the window.
         periods: u32,
-        /// Core cycles in it.
+        /// Core cycles in the window.
         cycles: u32,
     },
 }
 
-/// The rule, evaluated in each pass of the main loop and around what takes long in it. It allows feeding while the control interrupt
-/// comes, to one period, and no deadline was missed. Over each window its rate must be right within a tenth.
+/// The rule, evaluated in each pass of the main loop and around long operations in it. It allows feeding if the control interrupt comes,
+/// to within one period, and no deadline was missed. Over each window the rate must be right within a tenth.
 #[derive(Clone, Copy, Debug)]
 pub struct FeedRule {
     cycles: u32,
@@ -41,7 +41,7 @@ impl FeedRule {
         Self { cycles, periods, refused: false }
     }
 
-    /// Begins anew at these counts; a refusal stays.
+    /// Restarts the window at these counts; a refusal stays.
     pub const fn restart(&mut self, cycles: u32, periods: u32) {
         (self.cycles, self.periods) = (cycles, periods);
     }
@@ -80,7 +80,7 @@ mod tests {
         }
     }
 
-    /// Within a window an interrupt that is late stops the feeding, and at its end for good.
+    /// A late interrupt stops the feeding within a window, and for good at its end.
     #[test]
     fn it_waits_for_an_interrupt_that_is_late() {
         let mut rule = FeedRule::new(0, 0);

@@ -1,4 +1,4 @@
-//! The settings of the field bus, and what the USART makes of rate and format.
+//! The settings of the field bus, and the USART's values for rate and format.
 
 use drive_settings::value::Words;
 use drive_settings::words;
@@ -25,12 +25,12 @@ words! {
         None = "8n1",
         /// Even parity, one stop bit.
         Even = "8e1",
-        /// No parity, two stop bits: as long as with parity, as the specification asks for.
+        /// No parity, two stop bits: as long as a byte with parity, as the specification requires.
         TwoStops = "8n2",
     }
 }
 
-/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
+/// Silence of a commanding bus after which the drive stops, s, unless `command.timeout_s` sets another time.
 pub const BUS_SILENT_S: f32 = 1.0;
 
 /// Silence that ends a frame above 19 200 bit/s, us (Modbus over serial line V1.02, 2.5.1.1). Below, 3.5 characters.
@@ -44,7 +44,7 @@ impl Baud {
 
     /// Ticks of [`CLOCK_HZ`] per bit, rounded: the BRR register (RM0440, USART baud rate generation; 16 to 65535).
     pub fn divider(self) -> u16 {
-        // All rates give values in the range; see the tests. That none is zero the compiler does not find out.
+        // All rates give values in the range, see the tests. The compiler cannot tell that none is zero.
         let rate = self.bits_per_s().max(1);
         ((CLOCK_HZ + rate / 2) / rate) as u16
     }
@@ -67,7 +67,7 @@ impl Format {
 }
 
 words! {
-    /// Who starts the drive and gives it references. Anybody may stop it.
+    /// The source of starts and set-points. Anybody may stop the drive.
     #[derive(Default)]
     pub enum Commander {
         /// The console.
@@ -81,13 +81,13 @@ words! {
 }
 
 words! {
-    /// The requests by which the master that commands counts as alive: valid ones to the address of the drive alone.
+    /// The requests that count as signs of life of the commanding master: valid ones to the address of the drive alone.
     #[derive(Default)]
     pub enum Alive {
-        /// Those that write command, frequency or control word.
+        /// Requests that write command, frequency or control word.
         #[default]
         Writes = "writes",
-        /// All, for masters that write once and then only read.
+        /// All requests, for masters that write once and then only read.
         Any = "any",
     }
 }
@@ -101,16 +101,16 @@ pub struct Settings {
     pub baud: Baud,
     /// Format of a byte.
     pub format: Format,
-    /// Who commands.
+    /// The source of starts and set-points.
     pub commander: Commander,
-    /// Signs of life of the master.
+    /// Requests that count as signs of life of the master.
     pub alive: Alive,
 }
 
 impl Settings {
     /// The address in a frame.
     pub fn own(&self) -> u8 {
-        // 1 to 247.
+        // Always 1 to 247.
         self.address as u8
     }
 }

@@ -13,7 +13,7 @@ use super::own::{OWN, TIMEOUT};
 use crate::boards::Board;
 use crate::hash;
 
-/// Bits of `auto` in the flash: not a number, as no value of a setting is.
+/// Bits of `auto` in the flash: NaN, which no value of a setting is.
 const AUTO_BITS: u32 = 0x7fc0_0000;
 
 /// Number of settings.
@@ -38,17 +38,17 @@ pub fn find(name: &str) -> Option<Key> {
     all().find(|key| key.name() == name)
 }
 
-/// The setting with this [number for life](Key::id).
+/// The setting with this [permanent number](Key::id).
 pub fn find_id(id: u16) -> Option<Key> {
     of_id(all(), id)
 }
 
-/// The same among these: neither order nor names matter.
+/// The setting with this number among these: neither order nor names matter.
 pub fn of_id(mut keys: impl Iterator<Item = Key>, id: u16) -> Option<Key> {
     keys.find(|key| key.id() == id)
 }
 
-/// The same expression for either kind of entry, with the settings that it belongs to.
+/// Evaluates the same expression for either kind of entry, with the settings that it belongs to.
 macro_rules! with {
     ($key:expr, |$entry:ident| $result:expr) => {
         match $key {
@@ -97,40 +97,40 @@ impl Key {
         with!(self, |entry| entry.change)
     }
 
-    /// Whether learned values hold for this value only.
+    /// Whether learned values are valid for this value only.
     pub fn learned(self) -> bool {
         with!(self, |entry| entry.learned)
     }
 
-    /// Whether the power stage is at stake: only at the console, and to be confirmed.
+    /// Whether the setting affects the safety of the power stage: it can be set only at the console, and must be confirmed.
     pub fn hardware(self) -> bool {
         with!(self, |entry| entry.hardware)
     }
 
-    /// Whether it protects: from elsewhere than the console it can only be tightened.
+    /// Whether the setting is protective: other sources than the console can only tighten it.
     pub fn guards(self) -> bool {
         with!(self, |entry| entry.guard != Guard::None)
     }
 
-    /// The number in effect; of a word its place. A time-out of 0 is that of the bus.
+    /// The number in effect; for a word its place in the list. A time-out of 0 is the bus's own time-out.
     pub fn level(self, settings: &FirmwareSettings) -> f32 {
         let level = with!(self, settings, |entry, s| entry.level(s));
         if self.name() == TIMEOUT && level == 0.0 { BUS_SILENT_S } else { level }
     }
 
-    /// Whether these settings protect as well as those in which it has this level.
+    /// Whether these settings protect at least as well as settings in which this setting has the level `bound`.
     pub fn holds(self, settings: &FirmwareSettings, bound: f32) -> bool {
         let level = self.level(settings);
         with!(self, |entry| entry.guard.holds(level, bound))
     }
 
-    /// Whether it protects less with these settings than with others.
+    /// Whether the setting protects less in these settings than in others.
     pub fn is_looser(self, settings: &FirmwareSettings, than: &FirmwareSettings) -> bool {
         let says_what_is_there = with!(self, |entry| entry.guard == Guard::Keep);
         !says_what_is_there && !self.holds(settings, self.level(than))
     }
 
-    /// The words that may be set; none for a number.
+    /// The words that may be set; empty for a number.
     pub fn words(self) -> &'static [&'static str] {
         with!(self, |entry| entry.words())
     }
@@ -150,11 +150,11 @@ impl Key {
         with!(self, settings, |entry, s| entry.number(s))
     }
 
-    /// The range beside the present settings; `None` for a word.
+    /// The range with the present settings; `None` for a word.
     pub fn range(self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let range = with!(self, settings, |entry, s| entry.range(s));
         let Board { dead_time_s, dead_time_max_s, .. } = settings.board;
-        // The switches need that of the board, and the timer makes none above the other.
+        // The lower limit of the board protects its switches, and the timer generates no dead time above the upper limit.
         if self.name() == DEAD_TIME { Some((dead_time_s.value, *dead_time_max_s)) } else { range }
     }
 
@@ -165,11 +165,11 @@ impl Key {
     pub fn check(self, settings: &FirmwareSettings) -> Result<(), SettingsError> {
         let range = self.range(settings);
         with!(self, settings, |entry, s| entry.check_in(range, s))?;
-        // Its words depend on the board and on each other.
+        // The words of the strip depend on the board and on each other.
         if matches!(self, Self::Own(_)) { settings.strip.check(settings.board) } else { Ok(()) }
     }
 
-    /// The value that a text stands for. Its range is checked by [`check`](Self::check).
+    /// The value that a text stands for. [`check`](Self::check) checks its range.
     ///
     /// # Errors
     /// The text is not a value of this setting.
@@ -182,7 +182,7 @@ impl Key {
         with!(self, settings, |entry, s| entry.set(s, value))
     }
 
-    /// Its number for life: in the flash, and of its registers on the bus.
+    /// Permanent number of the setting: in the flash, and for its registers on the bus.
     pub fn id(self) -> u16 {
         with!(self, |entry| entry.id)
     }
@@ -197,8 +197,8 @@ impl Key {
         }
     }
 
-    /// Sets a value from [`to_bits`](Self::to_bits); `None` if the bits are not a value of this setting. Its range
-    /// is checked by [`check`](Self::check).
+    /// Sets a value from [`to_bits`](Self::to_bits); `None` if the bits are not a value of this setting. [`check`](Self::check) checks
+    /// its range.
     pub fn set_bits(self, settings: &mut FirmwareSettings, bits: u32) -> Option<()> {
         let value = match self.get(settings) {
             Value::Number(_) | Value::Auto if bits == AUTO_BITS => Value::Auto,

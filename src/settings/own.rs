@@ -9,16 +9,16 @@ use super::bus::{Alive, Baud, Commander, Format};
 use super::strip::{Enable, Reference, Start};
 use crate::boards;
 
-/// The setting of the silence that stops the drive.
+/// Name of the setting for the silence that stops the drive.
 pub const TIMEOUT: &str = "command.timeout_s";
 
-/// The setting that names the board.
+/// Name of the setting that identifies the board.
 pub const BOARD: &str = "board";
 
-/// In the order in which they are shown.
+/// The settings, in the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
 pub static OWN: [Entry<Settings>; 24] = [
-    entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
+    entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "time without a valid line after which the drive stops; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
     entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest").from_to(0.0, 3600.0).guarded(Guard::Raise),
     entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set").guarded(Guard::Keep),
     entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
@@ -39,7 +39,7 @@ pub static OWN: [Entry<Settings>; 24] = [
     entry!(119: whole(), "strip.reference_rpm", [strip] reference_rpm: u16, "speed at 20 mA or 10 V").from_to(0.0, 24_000.0),
     entry!(120: word(), "strip.outputs", [strip] outputs: bool, "whether the outputs RUN and FAULT are used"),
     entry!(121: word(), "strip.brake", [strip] brake: bool, "whether the output BRAKE opens a brake while the drive has torque, which each start proves first").guarded(Guard::Keep),
-    entry!(133: number("s"), "strip.brake_s", [strip] brake_s: f32, "time that the brake needs to close; for so long the torque is kept at a stop").from_to(0.01, 5.0).guarded(Guard::Keep),
+    entry!(133: number("s"), "strip.brake_s", [strip] brake_s: f32, "time that the brake needs to close; a stop keeps the torque for this time").from_to(0.01, 5.0).guarded(Guard::Keep),
     Entry::new(108, BOARD, "", Access::Word(
         |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
         |s, place| s.board = boards::ALL[place % boards::ALL.len()],

@@ -17,7 +17,7 @@ use crate::board;
 /// Most settings that are set at once.
 pub const MOST: usize = 8;
 
-/// Room for the settings that protect.
+/// Space for the protective settings.
 const GUARDED: usize = 48;
 
 /// Settings with their new values.
@@ -27,18 +27,18 @@ pub type Assignments = Vec<(Key, Value), MOST>;
 pub struct Staging {
     in_force: FirmwareSettings,
     staged: Option<Staged>,
-    /// Whether the present or last learning is on top of what was learned before.
+    /// Whether the present or last self-commissioning adds to the values learned before.
     again: bool,
-    /// Whether the drive learned since it was given the settings in force, so that it may have other learned values.
+    /// Whether the drive has learned since it was given the settings in force, so that it may have other learned values.
     outdated: bool,
-    /// Levels of the settings that protect, as the console staged them last: nobody else loosens them beyond.
+    /// Levels of the protective settings, as the console staged them last: no other source can loosen them further.
     bounds: Vec<f32, GUARDED>,
 }
 
 struct Staged {
     settings: FirmwareSettings,
-    /// Whether `settings.learned` is staged, too. Otherwise the learned values in force stay as long as they hold for
-    /// the staged settings.
+    /// Whether `settings.learned` is staged, too. Otherwise the learned values in force stay as long as they are valid for the staged
+    /// settings.
     learned: bool,
 }
 
@@ -51,20 +51,20 @@ pub enum SetError {
     /// A value out of range.
     #[error("{0}")]
     Range(SettingsError),
-    /// The first setting would loosen the second one, which protects.
-    #[error("{} would loosen {}, which protects: set it at the console", .0.name(), .1.name())]
+    /// The first setting would loosen the second one, which is protective.
+    #[error("{} would loosen {}, a protective setting: set it at the console", .0.name(), .1.name())]
     Loosens(Key, Key),
 }
 
 /// A hardware setting has changed.
 pub const UNCONFIRMED: &str = "the board has to be confirmed again before a start";
 
-/// What the user has to know of settings that are in force now.
+/// Remarks for the user on settings that have been put in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Applied {
-    /// What was learned is gone: it held for another value of the setting of this name.
+    /// The learned values were dropped, because they were learned with another value of this setting.
     pub forgotten: Option<&'static str>,
-    /// Dead time or carrier of the timer hold from the next reset on.
+    /// Dead time or switching frequency of the timer change at the next reset.
     pub timer: bool,
     /// The analog watchdogs and the comparator follow at the next reset.
     pub protection: bool,
@@ -75,7 +75,7 @@ pub struct Applied {
 impl fmt::Display for Applied {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let notes = [
-            (self.timer, "dead time and carrier hold from the next reset on, if saved"),
+            (self.timer, "dead time and switching frequency change at the next reset, if saved"),
             (
                 self.protection,
                 "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
@@ -88,19 +88,19 @@ impl fmt::Display for Applied {
             separator = "; ";
         }
         if let Some(name) = self.forgotten {
-            write!(f, "{separator}what was learned with another {name} is forgotten: learn again")?;
+            write!(f, "{separator}values learned with another {name} are dropped: learn again")?;
         }
         Ok(())
     }
 }
 
-/// The settings that protect.
+/// The protective settings.
 pub fn guarded() -> impl Iterator<Item = Key> {
     keys::all().filter(|key| key.guards())
 }
 
 impl Staging {
-    /// These settings in force, none staged.
+    /// Staging with these settings in force and none staged.
     pub fn new(in_force: FirmwareSettings) -> Self {
         let mut new =
             Self { in_force, staged: None, again: false, outdated: false, bounds: Vec::new() };
@@ -108,7 +108,7 @@ impl Staging {
         new
     }
 
-    /// Takes the protection of the latest settings as the loosest that others than the console may set.
+    /// Takes the protection of the latest settings as the loosest that other sources than the console may set.
     fn bound(&mut self) {
         let latest = self.staged.as_ref().map_or(&self.in_force, |staged| &staged.settings);
         self.bounds = guarded().map(|key| key.level(latest)).collect();
@@ -139,9 +139,9 @@ impl Staging {
         key.get(self.latest()) != key.get(&self.in_force)
     }
 
-    /// Stages values: all of them or none. Each must be in its range beside the other staged values; the settings as a
-    /// whole are checked when they are put in force. From elsewhere than the console they must not loosen a setting that protects, not
-    /// even by its rule. Returns whether restored learned values are dropped, which hold for the settings that they were restored with.
+    /// Stages values: all of them or none. Each must be in its range with the other staged values; the settings as a whole are checked
+    /// when they are put in force. Other sources than the console must not loosen a protective setting, not even by its rule. Returns
+    /// whether restored learned values are dropped, because they are valid only for the settings that they were restored with.
     ///
     /// # Errors
     /// The first value that is refused.
@@ -152,7 +152,7 @@ impl Staging {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         let mut before = Assignments::new();
         for (key, value) in values {
-            // There is room: it has the same size.
+            // The list has enough space: it has the same size.
             let _ = before.push((*key, key.get(&staged.settings)));
             key.set(&mut staged.settings, *value);
         }
@@ -170,7 +170,7 @@ impl Staging {
         });
         let mut dropped = false;
         if checked.is_err() {
-            // Backwards: a setting may be named twice.
+            // In reverse order, because a setting may be named twice.
             for (key, value) in before.iter().rev() {
                 key.set(&mut staged.settings, *value);
             }
@@ -184,11 +184,11 @@ impl Staging {
         checked.map(|()| dropped)
     }
 
-    /// Stages the settings of the image, with nothing learned.
+    /// Stages the settings of the image, without learned values.
     pub fn set_defaults(&mut self) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         let mut settings = FirmwareSettings::of(self.in_force.board);
-        // Properties of the hardware, not of the settings.
+        // These are properties of the hardware, not of the settings.
         settings.command.confirmed = self.in_force.command.confirmed;
         settings.boot_pin_counts = self.in_force.boot_pin_counts;
         *staged = Staged { settings, learned: true };
@@ -196,12 +196,12 @@ impl Staging {
         self.bound();
     }
 
-    /// Stages settings of the drive that the commissioning has found. They are checked when they are put in force.
+    /// Stages the drive settings that the commissioning has found. They are checked when they are put in force.
     pub fn stage(&mut self, found: Settings) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         let confirmed = staged.settings.board_is_confirmed();
         staged.settings.drive = found;
-        // Its correction of the gains of two sensors against each other, a per cent, was measured.
+        // The commissioning has measured its correction of the gains of two sensors against each other, about a per cent.
         if confirmed {
             staged.settings.confirm_board();
         }
@@ -210,7 +210,7 @@ impl Staging {
         self.bound();
     }
 
-    /// Stages the result of a learning with the staged settings.
+    /// Stages the result of a self-commissioning with the staged settings.
     pub fn restore(&mut self, learned: Learned) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         (staged.settings.learned, staged.learned) = (Some(learned), true);
@@ -223,7 +223,7 @@ impl Staging {
         self.bound();
     }
 
-    /// Whether the controllers have to be designed anew, for the staged settings or since the drive has learned.
+    /// Whether the controllers have to be designed again, for the staged settings or because the drive has learned.
     pub fn needs_design(&self) -> bool {
         let differs = self.staged.as_ref().is_some_and(|Staged { settings, .. }| {
             settings.drive != self.in_force.drive || settings.learned != self.in_force.learned
@@ -231,8 +231,8 @@ impl Staging {
         differs || self.outdated
     }
 
-    /// The settings to be put in force: the staged ones with the learned values that hold for them, or those in force once the
-    /// drive has learned; `None` if nothing is to be done.
+    /// The settings to be put in force: the staged ones with the learned values that are valid for them, or those in force once the drive
+    /// has learned; `None` if there is nothing to do.
     pub fn prepare(&mut self) -> Option<&mut FirmwareSettings> {
         let Some(Staged { settings, learned }) = &mut self.staged else {
             return self.outdated.then_some(&mut self.in_force);
@@ -251,7 +251,7 @@ impl Staging {
         let (old, new) = (&self.in_force.drive, &settings.drive);
         let applied = Applied {
             forgotten: self.in_force.learned.filter(|_| settings.learned.is_none()).map(|_| {
-                // The defaults may differ in others only.
+                // The defaults may differ in other settings only.
                 new.learned_with_another(old).unwrap_or("set of settings")
             }),
             timer: board::Timer::of(&old.inverter) != board::Timer::of(&new.inverter),
@@ -264,11 +264,11 @@ impl Staging {
         applied
     }
 
-    /// Begins a learning: `again` at another rotor position, on top of what is learned, or anew. If something is learned that
-    /// must not act meanwhile, `configure` is to give the drive the settings without it.
+    /// Begins a self-commissioning: `again` at another rotor position, adding to the learned values, or from scratch. If learned values
+    /// must not act meanwhile, `configure` is to give the drive the settings without them.
     ///
     /// # Errors
-    /// That of `configure`.
+    /// The error of `configure`.
     pub fn begin_learning<E>(
         &mut self,
         again: bool,
@@ -286,13 +286,13 @@ impl Staging {
         configured
     }
 
-    /// Takes the result of the learning that was begun last, if it was accepted.
+    /// Takes the result of the last self-commissioning, if it was accepted.
     pub fn learned(&mut self, result: &Learned) {
         let again = self.again;
         self.note(|settings| settings.learn(result, again));
     }
 
-    /// Changes the settings in force and the staged ones alike: for what the firmware itself finds out.
+    /// Changes the settings in force and the staged ones alike: for values that the firmware itself determines.
     pub fn note(&mut self, change: impl Fn(&mut FirmwareSettings)) {
         change(&mut self.in_force);
         if let Some(staged) = &mut self.staged {

@@ -1,4 +1,4 @@
-//! The settings of the terminal strip: which functions its wires have. All are off by default.
+//! The settings of the terminal strip: functions of its wires. All are off by default.
 
 use drive_core::Stop;
 use drive_settings::value::Words;
@@ -8,10 +8,10 @@ use crate::boards::{Board, EXTRA_LOW_V};
 use crate::terminals::{TERMINALS, Wires};
 
 words! {
-    /// Whether ENABLE must be closed, and how opening it stops the drive, whoever commands.
+    /// Whether ENABLE must be closed, and how opening it stops the drive, for every commander.
     #[derive(Default)]
     pub enum Enable {
-        /// It need not be.
+        /// ENABLE need not be closed.
         #[default]
         No = "no",
         /// Opening it takes the torque to zero, then switches off.
@@ -22,10 +22,10 @@ words! {
 }
 
 words! {
-    /// How START starts.
+    /// Function of START.
     #[derive(Default)]
     pub enum Start {
-        /// It does not.
+        /// START does nothing.
         #[default]
         Off = "off",
         /// A switch: closing starts, opening stops.
@@ -39,7 +39,7 @@ words! {
     /// The signal of the analog reference.
     #[derive(Default)]
     pub enum Reference {
-        /// None.
+        /// No analog reference.
         #[default]
         Off = "off",
         /// A current loop.
@@ -52,15 +52,15 @@ words! {
 /// Settings of the terminal strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Whether ENABLE must be closed, whoever commands.
+    /// Whether ENABLE must be closed, for every commander.
     pub enable: Enable,
-    /// How START and STOP work.
+    /// Function of START and STOP.
     pub start: Start,
-    /// Whether REVERSE counts.
+    /// Whether REVERSE is used.
     pub reverse: bool,
-    /// Whether RESET counts.
+    /// Whether RESET is used.
     pub reset: bool,
-    /// Whether PRESET1 and PRESET2 count.
+    /// Whether PRESET1 and PRESET2 are used.
     pub presets: bool,
     /// The analog reference.
     pub reference: Reference,
@@ -70,11 +70,11 @@ pub struct Settings {
     pub brake: bool,
     /// Time that the brake needs to close, s.
     pub brake_s: f32,
-    /// Preset speeds, rpm.
+    /// First preset speed, rpm.
     pub preset_1_rpm: u16,
-    /// The second.
+    /// Second preset speed, rpm.
     pub preset_2_rpm: u16,
-    /// The third.
+    /// Third preset speed, rpm.
     pub preset_3_rpm: u16,
     /// Speed at the full reference, rpm.
     pub reference_rpm: u16,
@@ -91,7 +91,7 @@ impl Default for Settings {
             reference: Reference::Off,
             outputs: false,
             brake: false,
-            // Most spring-applied brakes close within it.
+            // Most spring-applied brakes close within this time.
             brake_s: 0.2,
             preset_1_rpm: 0,
             preset_2_rpm: 0,
@@ -101,14 +101,14 @@ impl Default for Settings {
     }
 }
 
-/// A switch that is closed when the power comes is told from one that is being closed only by an ENABLE that comes with it.
-const NEEDS_ENABLE: &str = "needs strip.enable yes, so that a switch that is closed as the power comes does not start the drive";
+/// If a switch is closed at power-up, only an ENABLE that is open then distinguishes it from a switch that is being closed.
+const NEEDS_ENABLE: &str = "needs strip.enable yes, so that a switch that is already closed at power-up does not start the drive";
 const NO_PIN: &str = "this board has no pin for it";
 const NO_LIVE_ZERO: &str =
     "it has no live zero: above 60 V the board needs a second input that agrees; 4-20ma has one";
 
 impl Settings {
-    /// The stop that keeps the drive from running with these wires closed; `None` lets it run.
+    /// The stop that keeps the drive from running with these wires closed; `None` if the drive may run.
     pub fn interlock(&self, closed: Wires) -> Option<Stop> {
         match self.enable {
             Enable::Yes if !closed.has(Wires::ENABLE) => return Some(Stop::Coast),
@@ -118,10 +118,10 @@ impl Settings {
         (self.start == Start::Buttons && !closed.has(Wires::STOP)).then_some(Stop::Ramp)
     }
 
-    /// Checks that the board has the pins of the functions in use, and that they are safe there.
+    /// Checks that the board has the pins of the functions in use, and that the functions are safe there.
     ///
     /// # Errors
-    /// The first function that is not.
+    /// The first function that fails the check.
     pub fn check(&self, board: &Board) -> Result<(), SettingsError> {
         let pins = TERMINALS.iter().zip(board.strip.pins);
         let has = |name| pins.clone().any(|(terminal, pin)| *terminal == name && pin.is_some());
@@ -143,14 +143,14 @@ impl Settings {
     }
 }
 
-/// Refuses a function that is on, by its setting, unless `met`.
+/// Refuses a function that its setting switches on, unless `met`.
 fn needs<T: Words>(
     name: &'static str,
     value: T,
     met: bool,
     why: &'static str,
 ) -> Result<(), SettingsError> {
-    // All are off in the first place.
+    // The first word of each function is off.
     if met || value.place() == 0 {
         Ok(())
     } else {

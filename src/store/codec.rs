@@ -6,10 +6,10 @@
 //! | 1 | sequence number | checksum, 32 bits | |
 //! | 2 and on | id of the key | its value, 32 bits | |
 //!
-//! The id of a key is its number for life, in version 1 the hash of its name, so keys can be added, removed and renamed: a key
-//! that the record does not hold keeps its default, an entry that no key claims is skipped. The result of a learning, if there
-//! is one, follows the keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The
-//! checksum is the CRC-32 of Ethernet over everything but itself.
+//! The id of a key is its permanent number, in version 1 the hash of its name, so keys can be added, removed and renamed: a key that the
+//! record does not hold keeps its default, and an entry that belongs to no key is skipped. The result of a self-commissioning, if there
+//! is one, follows the keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The checksum is
+//! the CRC-32 of Ethernet over everything but itself.
 
 use core::fmt;
 
@@ -46,14 +46,14 @@ pub enum Rejected {
     Newer(u16),
     /// The value of this setting is unknown to the firmware.
     Value(&'static str),
-    /// They were saved by the firmware of this board, which is another.
+    /// The firmware of another board, this one, saved them.
     Board(&'static str),
     /// The design rules refuse the settings.
     Refused,
 }
 
 impl Rejected {
-    /// Its number.
+    /// Number of the reason.
     pub const fn code(self) -> u8 {
         match self {
             Self::Broken => 70,
@@ -80,7 +80,7 @@ impl fmt::Display for Rejected {
     }
 }
 
-/// The record of `settings`; the double words behind its [`length`] are erased.
+/// The record of `settings`; the double words after its [`length`] are erased.
 pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
     for (key, word) in keys::all().zip(words.iter_mut().skip(FIRST)) {
@@ -140,7 +140,7 @@ pub fn whole_record(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<u32> {
 /// The settings of a whole record.
 ///
 /// # Errors
-/// The reason why they are rejected.
+/// The reason why the settings are rejected.
 pub fn settings(
     read: &mut dyn FnMut(usize) -> Option<u64>,
     defaults: &FirmwareSettings,
@@ -151,7 +151,7 @@ pub fn settings(
     }
     let mut settings = *defaults;
     let (mut words, mut present) = ([0; learned::WORDS], 0_u64);
-    // Records without a board are older than the second one.
+    // Records without a board are older than the second board.
     settings.board = boards::ALL[0];
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
@@ -174,7 +174,7 @@ pub fn settings(
     if settings.board != defaults.board {
         return Err(Rejected::Board(settings.board.name));
     }
-    // A result of other rules is left out: the drive has to learn again.
+    // A result learned with other rules is left out: the drive has to learn again.
     if present > 0 && !learned::is_of_other_rules(&words, present) {
         let same = learned::in_both(&words) == settings.drive.scales.both_zero_vectors;
         let is_sound = same && present == learned::ALL;

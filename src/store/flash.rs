@@ -1,4 +1,4 @@
-//! The flash behind settings and history, and its errors.
+//! The flash for settings and history, and its errors.
 
 use thiserror::Error;
 
@@ -51,8 +51,8 @@ pub const fn halves(word: u64) -> (u32, u32) {
     (word as u32, (word >> 32) as u32)
 }
 
-/// Of two slots that are written in turn, the one that counts and its sequence number, by the numbers of those that are whole:
-/// adjacent ones, which wrap.
+/// The valid one of two slots that are written in turn, and its sequence number. The argument has the sequence numbers of the whole
+/// slots; they are adjacent, and wrap.
 pub fn newer(sequences: [Option<u32>; 2]) -> Option<(usize, u32)> {
     match sequences {
         [Some(a), Some(b)] if (b.wrapping_sub(a) as i32) < 0 => Some((0, a)),

@@ -6,33 +6,33 @@
 //! | time | 0x80 | time powered, minutes | time with current, s |
 //! | starts | 0x81 | 0 | starts |
 //! | fault | its number, 1 to 125 | time powered, minutes | time with current, s |
-//! | change of a setting that protects | 126 | time powered, minutes | its number for life |
+//! | change of a protective setting | 126 | time powered, minutes | its permanent number |
 //!
 //! A page is filled from its beginning. When it is full, the other is erased, gets a time, the starts and the last faults,
 //! and its header, by which it counts. A power failure tears the double word that is being written, which is passed over,
 //! or leaves the page without its header, so that the full one still counts.
 //!
-//! Wear: a fault takes one double word, a time with the starts two. They are written once in [`OFF_S`] at most with the
-//! outputs off and once in [`ON_S`] with them on, and the same fault again once in [`SAME_FAULT_S`]. A page with room for
-//! [`ROOM`] lasts 9.8 hours of starting and stopping without end, and two pages of 10 000 erasures (datasheet) 22 years;
-//! with a fault every minute besides, 6 years.
+//! Wear: a fault takes one double word, a time with the starts two. Time and starts are written once in [`OFF_S`] at most with the
+//! outputs off and once in [`ON_S`] with them on, and the same fault again once in [`SAME_FAULT_S`]. A page with space for [`ROOM`]
+//! entries lasts 9.8 hours of continuous starting and stopping, and two pages of 10 000 erasures (datasheet) last 22 years; with a fault
+//! every minute besides, 6 years.
 
 use heapless::Deque;
 
 use super::flash::{ERASED, Flash, FlashError, HISTORY, SLOT_WORDS, halves, newer, pair};
 
-/// Faults that are remembered.
+/// Number of faults that are kept.
 pub const FAULTS: usize = 16;
 /// Shortest time between two times written with the outputs off, s.
 pub const OFF_S: u32 = 300;
-/// The same with the outputs on, and of a drive that does nothing.
+/// Shortest time between two times written with the outputs on, and for a drive that does nothing, s.
 pub const ON_S: u32 = 900;
-/// The same with the outputs on, and the second half of the page: what is left of it lasts 19 days, for it is not erased
-/// with the outputs on.
+/// Shortest time between two times written with the outputs on in the second half of the page, s. The rest of the page lasts 19 days at
+/// this rate, because the page is not erased with the outputs on.
 pub const LONG_S: u32 = 16 * ON_S;
 /// Shortest time between two equal faults that are both written, s.
 pub const SAME_FAULT_S: u32 = 60;
-/// Double words for what happens while a page counts.
+/// Double words for entries while a page is in use.
 pub const ROOM: usize = SLOT_WORDS - 1 - 2 - FAULTS;
 
 /// "idhl": marks a page.
@@ -40,38 +40,38 @@ const MAGIC: u32 = 0x6c68_6469;
 const TIME: u8 = 0x80;
 const STARTS: u8 = 0x81;
 const LAST_FAULT: u8 = 0x7f;
-/// In place of the number of a fault: a setting that protects was changed.
+/// Value in place of the number of a fault: a protective setting was changed.
 pub const CHANGED: u8 = 0x7e;
 
-/// A fault of the past, or a change of a setting that protects.
+/// A fault of the past, or a change of a protective setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PastFault {
-    /// Its number, or [`CHANGED`].
+    /// Number of the fault, or [`CHANGED`].
     pub code: u8,
     /// Time powered until then, minutes.
     pub powered_min: u32,
-    /// Time with current until then, s; the number of the setting that was changed.
+    /// Time with current until then, s; or the number of the changed setting.
     pub running_s: u32,
 }
 
-/// The history, and where its log goes on.
+/// The history, and the place where its log continues.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// Time powered, ms beyond the minutes of the log, and minutes.
+    /// Time powered beyond the last whole second, ms.
     ms: u32,
     /// Time powered, s.
     pub powered_s: u32,
-    /// Time with current, s, and ms beyond.
+    /// Time with current, s; `running_ms` is the rest, ms.
     pub running_s: u32,
     running_ms: u32,
-    /// Starts.
+    /// Number of starts.
     pub starts: u32,
     faults: Deque<PastFault, FAULTS>,
     page: usize,
     sequence: u32,
-    /// The next double word; none before the first page was begun.
+    /// The next double word; 0 before the first page was begun.
     next: usize,
-    /// What the log has of the starts and of the time with current; `powered_s` of the last record.
+    /// Starts and time with current in the log, and `powered_s` of the last record.
     written: (u32, u32, u32),
 }
 
@@ -110,11 +110,11 @@ impl History {
             TIME => (self.powered_s, self.running_s) = (60 * middle, high),
             1..=LAST_FAULT => {
                 let fault = PastFault { code: kind, powered_min: middle, running_s: high };
-                // A second attempt after an error that was none.
+                // An equal entry is a second attempt after an apparent write error.
                 if self.faults.back() != Some(&fault) {
                     self.remember(fault);
                 }
-                // Faults that a page begins with are older than its time.
+                // The faults at the beginning of a page are older than its time.
                 self.powered_s = self.powered_s.max(60 * middle);
                 if kind != CHANGED {
                     self.running_s = self.running_s.max(high);
@@ -128,7 +128,7 @@ impl History {
         if self.faults.is_full() {
             self.faults.pop_front();
         }
-        // There is room.
+        // The list has enough space.
         let _ = self.faults.push_back(fault);
     }
 
@@ -157,12 +157,12 @@ impl History {
     /// Notes a fault and writes it, with the outputs off.
     ///
     /// # Errors
-    /// The flash failed. The fault is remembered until the next reset.
+    /// The flash failed. The fault is kept until the next reset.
     pub fn fault(&mut self, flash: &mut impl Flash, code: u8) -> Result<(), FlashError> {
         self.note(flash, code, self.running_s)
     }
 
-    /// Notes that the setting with this number, which protects, was changed, and writes it.
+    /// Notes that the protective setting with this number was changed, and writes it.
     ///
     /// # Errors
     /// As [`fault`](Self::fault).
@@ -207,7 +207,7 @@ impl History {
     /// Writes times and starts.
     ///
     /// # Errors
-    /// The flash failed; the next attempt is as far away as after a success.
+    /// The flash failed; the next attempt comes as late as after a success.
     pub fn write(&mut self, flash: &mut impl Flash) -> Result<(), FlashError> {
         let before =
             core::mem::replace(&mut self.written, (self.starts, self.running_s, self.powered_s));
@@ -240,7 +240,7 @@ impl History {
         Ok(())
     }
 
-    /// Programs the next double word; the one behind it if that fails, for a power failure may have left it neither
+    /// Programs the next double word. If that fails, programs the one after it, because a power failure may have left the first neither
     /// erased nor readable as written.
     fn append(&mut self, flash: &mut impl Flash, word: u64) -> Result<(), FlashError> {
         let mut result = Err(FlashError::Verify(self.next));

@@ -1,23 +1,23 @@
-//! The result of a learning as values in the flash. Either all of them are present or none.
+//! The result of a saliency self-commissioning as values in the flash. Either all of them are present or none.
 //!
 //! | index | value |
 //! |---|---|
-//! | 0 to 14 | reference at the currents of its table, except at zero |
-//! | 15 to 29 | carrier current at the same, 0 where it was not learned |
-//! | 30 | spread of the even part of the reference |
+//! | 0 to 14 | saliency offset at the currents of its table, except at zero |
+//! | 15 to 29 | injection current at these currents, 0 where it was not learned |
+//! | 30 | spread of the even part of the saliency offset |
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope, both zero vectors, asymmetry at the start, two bits that earlier firmware set; rotor positions in the third byte; today's rules in the lowest bit of the fourth |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, injection current, saliency sensitivity, both zero vectors, asymmetry at the start, two bits that earlier firmware set; rotor positions in the third byte; present rules in the lowest bit of the fourth |
 //! | 37 | distance of the points, A |
-//! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
-//! | 54 | largest torque current, A |
+//! | 38 to 53 | saliency sensitivity at the currents of its table, 0 where it was not learned |
+//! | 54 | largest q-axis current, A |
 //! | 55 to 57 | asymmetry: constant, sine, cosine |
-//! | 58 to 60 | the same at the start, 0 where it was not seen |
+//! | 58 to 60 | asymmetry at the start: constant, sine, cosine, 0 where it was not measured |
 //!
-//! All but number 36 are in single precision. Earlier firmware learned with other rules of the torque, with another compensation of the
-//! dead time, or in a frame turned by a rotor time constant that its commissioning had measured at another current than that of the
-//! drive. Its results do not fit this drive: they are left out, and the motor has to be commissioned and learned again.
+//! All values except number 36 are in single precision. Earlier firmware learned with other rules of the torque, with another
+//! compensation of the dead time, or in a frame rotated by a rotor time constant that its commissioning had measured at another current
+//! than the drive's. Its results do not fit this drive: they are left out, and the motor has to be commissioned and learned again.
 
 use core::mem::offset_of;
 
@@ -50,11 +50,11 @@ struct Stored {
 pub const WORDS: usize = size_of::<Stored>() / 4;
 /// A bit for each value.
 pub const ALL: u64 = (1 << WORDS) - 1;
-/// The name that their ids derive from, and that a rejection states.
+/// The name from which their ids derive, and which a rejection states.
 pub const NAME: &str = "learned";
 
 const FLAGS: usize = offset_of!(Stored, flags) / 4;
-/// Place of the rotor positions in their word.
+/// Position of the count of rotor positions in its word.
 const POSITIONS: u32 = 16;
 const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
@@ -62,8 +62,8 @@ const HAS_CARRIER: u32 = 1 << 10;
 const HAS_SLOPE: u32 = 1 << 11;
 const IN_BOTH: u32 = 1 << 12;
 const HAS_START: u32 = 1 << 13;
-/// The firmware that set bit 14 compensated the dead time by the sign of the mean current of a period, the one that set bit 15 as well
-/// measured the rotor time constant beside the current of the drive.
+/// Set by the present rules. Firmware that set bit 14 compensated the dead time by the sign of the mean current of a period; firmware
+/// that also set bit 15 measured the rotor time constant at another current than the drive's.
 const TODAYS_RULES: u32 = 1 << 24;
 
 /// The id of a value: the hash of the name plus its index.
@@ -87,7 +87,7 @@ pub fn is_of_other_rules(words: &[u32; WORDS], present: u64) -> bool {
     present & 1 << FLAGS != 0 && words[FLAGS] & TODAYS_RULES == 0
 }
 
-/// The values of a result, and of whether it was learned with the currents of both zero vectors.
+/// The values of a result, and whether it was learned with the currents of both zero vectors.
 pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     let flag = |set: bool, bit: u32| if set { bit } else { 0 };
     let fitted = |Fitted { value, misfit, .. }| [value, misfit];
@@ -118,7 +118,7 @@ pub fn to_words(learned: &Learned, both: bool) -> [u32; WORDS] {
     })
 }
 
-/// The result with these values, if it is one that a learning accepts.
+/// The result with these values, if it is one that a self-commissioning accepts.
 pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
     let stored: Stored = must_cast(*words);
     let has = |flag: u32| stored.flags & flag != 0;
@@ -151,7 +151,7 @@ pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
     learned.is_believable().then_some(learned)
 }
 
-/// The points of a table with this value at zero and the others behind.
+/// The points of a table with this value at zero, followed by the others.
 fn from_zero(at_zero: f32, others: &[f32; POINTS - 1]) -> [f32; POINTS] {
     let mut points = [at_zero; POINTS];
     points[1..].copy_from_slice(others);

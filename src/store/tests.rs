@@ -26,7 +26,7 @@ fn with_r_s(r_s: f32) -> FirmwareSettings {
     settings
 }
 
-/// Something that a learning can have found, of 16 numbers from -1 to 1; without a slope, of a current difference.
+/// A possible result of a self-commissioning, from 16 numbers from -1 to 1; without a saliency sensitivity, from a current difference.
 fn learned(random: [f32; POINTS]) -> Learned {
     let sign = if random[7] < 0.0 { -1.0 } else { 1.0 };
     let slope = random.map(|x| sign * (0.3 + 0.26 * x));
@@ -92,7 +92,7 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
     }
     let turns = [[true, false], [false, true]];
     assert_eq!(erased, [turns, turns, turns].concat());
-    // The same without a reset between.
+    // The same without a reset in between.
     let (mut saved, _) = Saved::load(&mut fake, &board());
     for n in 7..10 {
         saved.save(&with_r_s(n as f32)).unwrap();
@@ -100,14 +100,14 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(9.0)));
 }
 
-/// The record that the firmware wrote before there was anything learned: the same, without it.
+/// The record of firmware without learned values equals the present one, without these values.
 #[test]
 fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by_older_firmware() {
     let old = codec::record(&with_r_s(7.0), 0);
     assert_eq!(codec::length(&old), 2 + keys::COUNT);
-    // Magic, version 2 and one entry a key: what is in the flash of boards.
+    // Magic, version 2 and one entry per key, as in the flash of boards.
     assert_eq!(old[0], (keys::COUNT as u64) << 48 | 0x0002_7672_6469);
-    // By their numbers: a new name loses nothing.
+    // Entries have numbers, so a new name loses nothing.
     assert!(keys::all().zip(&old[2..]).all(|(key, word)| u32::from(key.id()) == *word as u32));
     assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
     let mut fake = Fake::new();
@@ -116,7 +116,7 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
 
     let new = codec::record(&with_learned(), 0);
     assert_eq!(codec::length(&new), codec::WORDS);
-    // No key has a number that what was learned has: those who do not know it leave it alone.
+    // No key has the number of a learned value, so firmware that does not know the learned values leaves them alone.
     for word in &new[2 + keys::COUNT..] {
         assert!(learned_words::index(*word as u32).is_some());
         assert!(keys::all().all(|key| u32::from(key.id()) != *word as u32));
@@ -132,7 +132,7 @@ fn what_was_learned_is_saved_and_loaded_with_its_settings_and_gone_with_the_defa
     assert_eq!(load(&mut fake), Loaded::Settings(board()));
 }
 
-/// Half of it, or what no learning can have found: refused by name, whatever the settings.
+/// Half of a result, or one that no self-commissioning can give, is refused by name, with any settings.
 #[test]
 fn what_cannot_have_been_learned_is_refused() {
     let first = 2 + keys::COUNT;
@@ -205,7 +205,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     save(&mut fake, &with_r_s(1.0)).unwrap();
     let mut record = codec::record(&with_r_s(2.0), 1);
     record[0] += 1 << 32;
-    // As a later firmware computes it.
+    // The checksum is computed as by a later firmware.
     fake.hold(1, resealed(record));
     let kept = fake.words[1];
     assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Newer(3)));
@@ -234,7 +234,7 @@ fn a_value_that_nobody_knows_is_named() {
     assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("angle_source")));
 }
 
-/// The record with its checksum made right again.
+/// The record with a corrected checksum.
 fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
     let mut bytes = record[0].to_le_bytes().to_vec();
     bytes.extend((record[1] as u32).to_le_bytes());
@@ -254,7 +254,7 @@ fn numbers_of_settings_follow_those_of_the_records() {
     assert!(all.iter().all(|why| why.to_string().starts_with("7")));
 }
 
-/// With what was learned, too: never the settings of one set and what was learned with another.
+/// The test covers the learned values, too: never the settings of one set with the learned values of another.
 #[test]
 fn whenever_the_power_fails_what_was_learned_is_with_its_settings() {
     let mut before = with_learned();
@@ -352,8 +352,8 @@ proptest! {
     }
 }
 
-/// Each word of a stored result replaced by values that no learning gives: what is taken all the same is bounded, the injection current
-/// above all, and no number in it is infinite.
+/// Each word of a stored result is replaced by values that no self-commissioning gives. Values that are accepted all the same are
+/// bounded, above all the injection current, and none is infinite.
 #[test]
 fn a_restored_result_is_bounded_whatever_a_word_says() {
     let whole = learned_words::to_words(&crate::console::tests::found(), false);

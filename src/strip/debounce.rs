@@ -1,14 +1,14 @@
-//! From contacts that bounce to wires that are closed or open.
+//! Turns bouncing contacts into wires that are closed or open.
 
 use crate::terminals::{CONTACTS, Wires};
 
-/// Looks, a millisecond each, in a row for which an input must be closed to count as closed.
+/// Consecutive readings, one per millisecond, for which an input must be closed to count as closed.
 pub const CLOSES: u8 = 20;
-/// Looks in a row for which a closed one must be open to count as open: a broken wire and a button stop at once.
+/// Consecutive readings for which a closed input must be open to count as open: a broken wire and a button stop at once.
 pub const OPENS: u8 = 2;
 
-/// A count for each input, up at a closed look, down ten times as fast at an open one: an input that chatters comes out open, which
-/// never starts and never lets run.
+/// A count for each input, up at a closed reading, down ten times as fast at an open one. An input that chatters counts as open, so it
+/// neither starts the drive nor lets it run.
 #[derive(Debug, Default)]
 pub struct Debounce {
     counts: [u8; CONTACTS],
@@ -16,7 +16,7 @@ pub struct Debounce {
 }
 
 impl Debounce {
-    /// The wires after another look at the contacts. All are open at first.
+    /// The wires after another reading of the contacts. All are open at first.
     pub fn look(&mut self, contacts: Wires) -> Wires {
         for (n, count) in self.counts.iter_mut().enumerate() {
             let bit = 1 << n;

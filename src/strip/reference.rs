@@ -1,4 +1,4 @@
-//! The analog reference: a share of the full speed, or why it is none.
+//! The analog reference: a share of the full speed, or the reason why it is lost.
 
 use crate::board::ADC_FULL_SCALE;
 use crate::boards::Strip;
@@ -6,26 +6,26 @@ use crate::boards::converter::{CODES, REFERENCE_V};
 use crate::settings::strip::Reference;
 use crate::terminals::{ANALOG, Lost};
 
-/// Looks in a row after which a reference counts as lost, a millisecond each; meanwhile the last speed holds.
+/// Consecutive readings after which a reference counts as lost, one per millisecond; meanwhile the last speed is kept.
 pub const LOOKS: u8 = 20;
-/// Range of a loop that is sound, mA (as NAMUR NE 43: 3.6 and 21 mA report a failure), and of the signal.
+/// Range of a healthy current loop, mA (as NAMUR NE 43: 3.6 and 21 mA report a failure), and of its signal.
 const SOUND_MA: (f32, f32) = (3.6, 21.0);
 const SIGNAL_MA: (f32, f32) = (4.0, 20.0);
 /// Largest difference of two redundant inputs, share of 10 V.
 const AGREES: f32 = 0.03;
-/// Codes at the end of the range, where the converter does not see more.
+/// ADC counts at the end of the range, where the ADC saturates.
 const RANGE_END: u16 = ADC_FULL_SCALE - 5;
 
-/// The share of the full speed, 0 to 1, that the codes of the first and the second input mean.
+/// The share of the full speed, 0 to 1, from the ADC counts of the first and the second input.
 ///
 /// # Errors
-/// They mean none.
+/// The reason why the reference is lost.
 pub fn share(
     kind: Reference,
     strip: &Strip,
     [first, second, _]: [Option<u16>; ANALOG],
 ) -> Result<f32, Lost> {
-    // 1 at 10 V and at 20 mA.
+    // The share is 1 at 10 V and at 20 mA.
     let of = |code: u16| f32::from(code) * (REFERENCE_V / f32::from(CODES)) / strip.full_v;
     let code = first.ok_or(Lost::Silent)?;
     let share = of(code);
@@ -37,7 +37,7 @@ pub fn share(
             _ => Ok(((ma - SIGNAL_MA.0) / (SIGNAL_MA.1 - SIGNAL_MA.0)).clamp(0.0, 1.0)),
         };
     }
-    // The slower of two.
+    // The lower of two references counts.
     let other = match strip.pins[1] {
         Some(_) => second.ok_or(Lost::Silent)?,
         None => code,

@@ -1,27 +1,27 @@
-//! Starts and stops by START, for a strip that commands.
+//! Starts and stops by START, if the strip commands.
 
 use crate::settings::strip::Start;
 
-/// Looks, a millisecond each, for which the contact at START must have been open without a break, with the drive allowed to run, before
-/// its closing counts: neither a switch that is closed as the power comes nor one that bounces starts the drive.
+/// Number of readings, one per millisecond, for which the contact at START must have been open without a break, with the drive allowed to
+/// run, before its closing counts. So neither a switch that is closed at power-up nor one that bounces starts the drive.
 pub const ARMED: u8 = 100;
 
-/// What the sequence sees beside START.
+/// Inputs of the sequence beside START.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     /// The strip commands.
     pub commands: bool,
     /// ENABLE or STOP keeps the drive from running.
     pub held: bool,
-    /// Controllers are being designed: a start that was taken has not begun.
+    /// Controllers are being designed: an accepted start has not begun.
     pub busy: bool,
-    /// The drive is off, with a fault or without.
+    /// The drive is off, with or without a fault.
     pub off: bool,
-    /// It is off or stopping.
+    /// The drive is off or stopping.
     pub ended: bool,
 }
 
-/// What is to be done.
+/// Action of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
     /// Nothing.
@@ -37,14 +37,15 @@ pub enum Act {
 /// Follows START. A run that has ended for any reason needs a new edge.
 #[derive(Debug, Default)]
 pub struct Sequence {
-    /// Looks in a row at which the contact was open with the drive allowed to run, up to [`ARMED`], where it stays until START is closed.
+    /// Consecutive readings at which the contact was open with the drive allowed to run, up to [`ARMED`]. There it stays until START is
+    /// closed.
     open: u8,
     /// Whether the drive runs for the strip.
     runs: bool,
 }
 
 impl Sequence {
-    /// Another look: `contact` is that at START, `closed` what the debounce makes of it.
+    /// Takes another reading: `contact` is the contact at START, `closed` its debounced state.
     pub fn step(&mut self, start: Start, contact: bool, closed: bool, seen: Seen) -> Act {
         let Seen { commands, held, busy, off, ended } = seen;
         let may = commands && !held && start != Start::Off;

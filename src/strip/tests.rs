@@ -1,4 +1,4 @@
-//! The wires against exhaustive tables and random contacts.
+//! The wires compared with exhaustive tables and random contacts.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ fn code(full_v: f32, volts_of_ten: f32) -> u16 {
     (volts_of_ten * 0.1 * full_v / 3.3 * 4096.0).round() as u16
 }
 
-/// START over some looks, and whether the drive may run: the acts.
+/// START over some readings, and whether the drive may run; returns the acts.
 fn acts(sequence: &mut Sequence, start: Start, looks: &[(bool, Seen)]) -> Vec<Act> {
     looks.iter().map(|(closed, seen)| sequence.step(start, *closed, *closed, *seen)).collect()
 }
@@ -26,7 +26,7 @@ fn acts(sequence: &mut Sequence, start: Start, looks: &[(bool, Seen)]) -> Vec<Ac
 const OFF: Seen = Seen { commands: true, held: false, busy: false, off: true, ended: true };
 const RUNNING: Seen = Seen { off: false, ended: false, ..OFF };
 
-/// All states of the sequence, reached from the beginning: what was seen, and the looks before.
+/// All states of the sequence, reached from the beginning: a name, and the readings before.
 fn histories() -> Vec<(&'static str, Vec<(bool, Seen)>)> {
     let open = |n: u8| vec![(false, OFF); n.into()];
     let armed = open(ARMED);
@@ -44,7 +44,7 @@ fn histories() -> Vec<(&'static str, Vec<(bool, Seen)>)> {
     ]
 }
 
-/// Each state, setting, wire and situation: when it starts, stops, and gives speeds. A start needs an edge.
+/// Each state with each setting, wire and situation: when it starts, stops, and gives speeds. A start needs an edge.
 #[test]
 fn every_state_with_every_input() {
     let mut seen_acts = BTreeSet::new();
@@ -76,7 +76,7 @@ fn every_state_with_every_input() {
                 };
                 assert_eq!(act, expected, "{case}");
                 seen_acts.insert(format!("{act:?}"));
-                // Whatever it was: a run that has ended begins again by a new edge alone.
+                // For any cause: after the end of a run only a new edge starts the next.
                 if ended && !busy {
                     let open = ["nearly armed", "armed", "runs with START open"].contains(&name);
                     let edge = open && !closed && commands && !held && start != Start::Off;
@@ -91,7 +91,7 @@ fn every_state_with_every_input() {
     assert_eq!(seen_acts.len(), 4);
 }
 
-/// A switch that bounces while the drive runs stops it, and does not start it anew as it comes to rest closed.
+/// A switch that bounces while the drive runs stops the drive, and does not start it again when it settles closed.
 #[test]
 fn a_switch_that_bounces_for_long_is_no_edge() {
     for open in 1..ARMED {
@@ -126,8 +126,8 @@ fn the_table_of_what_holds_the_drive() {
 }
 
 proptest! {
-    /// An input is closed only behind 20 closed looks in a row or nearly so, and open two looks behind a break; one that chatters
-    /// with a look open in ten never closes.
+    /// An input is closed only after about 20 consecutive closed readings, and open two readings after a break. An input that chatters
+    /// with one open reading in ten never closes.
     #[test]
     fn chatter_is_open(contacts in prop::collection::vec(0_u8..128, 1..400), every in 2_usize..11) {
         let mut debounce = Debounce::default();
@@ -227,7 +227,7 @@ fn what_a_board_cannot_do_is_refused_by_name() {
     let switch = Settings { start: Start::Switch, ..Settings::default() };
     assert!(refused(switch, reference).starts_with("strip.start = switch: needs strip.enable"));
     assert_eq!(refused(Settings { enable: Enable::Yes, ..switch }, reference), "");
-    // 48 V, one input; more volts, one input.
+    // 48 V with one input; then more volts with one input.
     let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
     assert_eq!(refused(voltage, ihm08m1), "");
     let mut high = *reference;

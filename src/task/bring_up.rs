@@ -38,7 +38,7 @@ use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
 pub struct Board<'a> {
-    /// Desk, console and field bus, with the saved settings, or the defaults.
+    /// Command arbiter, console and field bus, with the saved settings, or the defaults.
     pub front: &'static mut Front,
     /// The serial port of the console.
     pub port: Port,
@@ -51,7 +51,7 @@ pub struct Board<'a> {
 }
 
 const TWICE: StartError = "started twice";
-/// Another bank than the one with the code is written while the control runs.
+/// While the control runs from one bank, the other is written.
 const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to 1";
 
 /// Sets everything up and starts the control interrupt. If the drive cannot be started, the outputs stay off, the log
@@ -59,7 +59,7 @@ const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to
 ///
 /// # Errors
 /// On a second call.
-#[inline(never)] // as the functions that it calls: their stacks come in each other's place
+#[inline(never)] // like the functions that it calls, so that their stacks share memory
 pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, StartError> {
     let mut core = cortex_m::Peripherals::take().ok_or(TWICE)?;
     let chip = pac::Peripherals::take().ok_or(TWICE)?;
@@ -83,7 +83,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         defmt::warn!("the crystal does not start: on the internal oscillator, 1 % accurate");
     }
     let timed = time::start(chip.TIM5, &mut rcc, &chip.DBGMCU);
-    // The cycle counter measures the control interrupt, while which the core does not sleep.
+    // The cycle counter measures the control interrupt, during which the core does not sleep.
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
@@ -91,11 +91,12 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     start.settings.boot_pin_counts = board::boot_pin_counts(options);
     let timer = board::Timer::of(&start.settings.drive.inverter);
 
-    // The clocks of the ports; `pins` does the rest.
+    // Enables the clocks of the ports; `pins` does the rest.
     chip.GPIOA.split(&mut rcc);
     chip.GPIOB.split(&mut rcc);
     chip.GPIOC.split(&mut rcc);
-    // First, because the drivers are switched off from here on: on the board that the image is for, as somebody has confirmed.
+    // The power stage comes first, because the drivers are switched off from here on. Its pins are connected only if the user has
+    // confirmed that the image is for this board.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, &timer);
     let connected = pwm.is_ok() && start.settings.board_is_confirmed();
     if connected {
@@ -109,7 +110,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let wires = terminals::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
-    // Before the control runs: these are made with the interrupts masked.
+    // Made before the control runs, because these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = make(commissioning, || Session::new(&start.settings.drive));
@@ -125,7 +126,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
         if let Some(why) = &start.rejected {
             defmt::error!("{}", defmt::Display2Format(why));
         }
-        // After the design, which may have replaced refused settings by the defaults.
+        // Computed after the design, which may have replaced refused settings by the defaults.
         let protection = board::protection(SELECTED, &start.settings.drive);
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
@@ -156,14 +157,14 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     Ok(Board { front, port, line, wires, supervisor })
 }
 
-/// Makes a value in its place, with a stack that comes in the place of those of other functions.
+/// Makes a value in its place, with a stack that shares memory with those of other functions.
 #[inline(never)]
 fn make<T>(place: &'static mut MaybeUninit<T>, value: impl FnOnce() -> T) -> &'static mut T {
     place.write(value())
 }
 
-/// The stored pages at start. All of them are read before an error of the flash becomes a break, for a power failure may
-/// have torn any.
+/// The stored pages at start. All of them are read before an error of the flash triggers the break, because a power failure may have torn
+/// any of them.
 struct Start {
     saved: Saved<Pages>,
     history: History,
@@ -183,7 +184,7 @@ fn load(pages: Pages) -> Start {
         Loaded::Rejected(why) => (defaults, Some(why)),
         Loaded::Nothing => (defaults, None),
     };
-    // Settings of the power stage first; the others take longer to check.
+    // The settings of the power stage are checked first; the others take longer.
     if settings.check().is_err() {
         (settings, rejected) = (defaults, Some(Rejected::Refused));
     }
@@ -191,8 +192,7 @@ fn load(pages: Pages) -> Start {
 }
 
 impl Start {
-    /// Computes the coefficients, which takes seconds, for the timer. If the design rules refuse
-    /// the saved settings, the defaults hold.
+    /// Computes the coefficients, which takes seconds, for the timer. If the design rules refuse the saved settings, the defaults apply.
     #[inline(never)]
     fn build(&mut self, timer: &board::Timer) -> Result<Coefficients, SettingsError> {
         let built = self.settings.build_for(timer);
@@ -203,7 +203,7 @@ impl Start {
         self.settings.build_for(timer)
     }
 
-    /// Takes the defaults.
+    /// Replaces the settings by the defaults.
     #[inline(never)]
     fn refuse(&mut self) {
         self.settings = FirmwareSettings::of_the_board();
@@ -214,7 +214,7 @@ impl Start {
 /// Cause of the reset, record of the last run, and number of consecutive unintended resets.
 fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     let flags = rcc.csr().read();
-    // The most specific cause first: every reset pulls the reset pin as well.
+    // The most specific cause comes first, because every reset pulls the reset pin as well.
     let causes = [
         (flags.wwdgrstf().is_reset(), "window watchdog"),
         (flags.iwdgrstf().is_reset(), "watchdog"),
@@ -225,7 +225,7 @@ fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     ];
     let cause = causes.iter().find(|cause| cause.0).map_or("reset pin", |cause| cause.1);
     let record = stop::take_record();
-    // A fault of the drive does not reset the chip: after it, a reset by software comes from the debug probe.
+    // A fault of the drive does not reset the chip: a software reset after it comes from the debug probe.
     let stopped = record.is_some_and(|record| record.reason != Reason::Drive);
     let watchdog = flags.wwdgrstf().is_reset() || flags.iwdgrstf().is_reset();
     let unintended = watchdog || (flags.sftrstf().is_reset() && stopped);
@@ -233,8 +233,8 @@ fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     (cause, record, stop::count_reset(unintended))
 }
 
-/// Waits until the control interrupt satisfies the rule of the watchdog, which is started then; `false` if it does not in
-/// time. A watchdog over an interrupt that does not would reset the chip again and again.
+/// Waits until the control interrupt satisfies the rule of the watchdog, which is started then; `false` if it does not in time. If the
+/// watchdog were started over an interrupt that does not satisfy it, it would reset the chip again and again.
 fn comes_at_its_rate() -> bool {
     let now = || (time::now(), control::PERIODS.load(Ordering::Relaxed));
     let (began, periods) = now();
@@ -253,7 +253,7 @@ fn comes_at_its_rate() -> bool {
 }
 
 /// Creates the drive and hands it to the control interrupt.
-// Not inlined: it makes the drive on its stack, 6 KiB, which `main` would keep for ever.
+// Not inlined: it builds the drive on its stack, 6 KiB, which `main` would otherwise keep forever.
 #[inline(never)]
 fn start_control(
     coefficients: Result<Coefficients, SettingsError>,
@@ -274,7 +274,7 @@ fn start_control(
     let answers =
         singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Accepted::AsGiven))).ok_or(TWICE)?;
     let learned = singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(TWICE)?;
-    // Named, so that `cargo xtask size` can tell it from the rest.
+    // The memory has a name, so that `cargo xtask size` can tell it from the rest.
     static TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new();
     let (send_status, status) = status.split();
     let (commands, receive_commands) = commands.split();

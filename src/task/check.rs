@@ -18,9 +18,9 @@ pub struct Check {
 }
 
 impl Check {
-    /// The check of a control that runs; on the first call only.
+    /// The check of a running control; only the first call returns it.
     pub fn new() -> Option<Self> {
-        // Filled outside of the macro, which masks the interrupts: the control runs already.
+        // Filled outside the macro, which masks the interrupts, because the control runs already.
         let expected = singleton!(: MaybeUninit<[u32; COUNT]> = MaybeUninit::uninit())?;
         let expected = expected.write([0; COUNT]);
         let (code, source) = memory::control_code();
@@ -32,13 +32,13 @@ impl Check {
         })
     }
 
-    /// Takes the registers as they are now: pins have been connected.
+    /// Takes the present registers as the reference, after pins have been connected.
     pub fn renew(&mut self) {
         self.registers.renew(memory::word);
     }
 
-    /// Checks a slice. A flipped bit ends the run: start-up copies the code, computes the coefficients and sets the
-    /// registers up afresh.
+    /// Checks a slice. A flipped bit ends the run: the next start copies the code, computes the coefficients and sets the registers up
+    /// again.
     pub fn slice(&mut self) {
         let broken = control::BROKEN.load(Ordering::Relaxed);
         if broken != 0 {

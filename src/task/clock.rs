@@ -3,16 +3,16 @@
 use crate::chip::time;
 use induction_drive::board;
 
-/// Milliseconds from the time base, which wraps every 25 s: to be updated more often.
+/// Milliseconds from the time base, which wraps every 25 s; it must be updated more often.
 pub struct Clock {
     last: u32,
     cycles: u32,
-    /// Since the start, wrapping.
+    /// Time since the start, wrapping.
     pub ms: u32,
 }
 
 impl Clock {
-    /// One that begins now.
+    /// A clock that begins now.
     pub fn new() -> Self {
         Self { last: time::now(), cycles: 0, ms: 0 }
     }

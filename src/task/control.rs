@@ -1,7 +1,8 @@
 //! The control interrupt: samples in, [`Drive::period`], compare values out, 6000 times a second.
 //!
-//! It starts when both converters have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the sampling of the currents at
-//! a top of TIM1, and must have written the compare values before the next update, one control period later. It never logs, formats, waits, or takes a lock.
+//! It starts when both ADCs have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the sampling of the currents at a top of TIM1,
+//! and must have written the compare values before the next update, one control period later. It never logs, formats, waits, or takes a
+//! lock.
 
 mod addresses;
 
@@ -30,7 +31,7 @@ use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
 
 /// The drive and its surroundings, owned by the interrupt.
-#[repr(C)] // the references to the memory shared with the main loop follow each other
+#[repr(C)] // keeps the references to the memory shared with the main loop together
 pub struct Control {
     /// The drive.
     pub drive: Drive,
@@ -38,7 +39,7 @@ pub struct Control {
     pub pwm: Pwm,
     /// Chopper and precharge relay.
     pub dc_link: DcLink,
-    /// The converters.
+    /// The ADCs.
     pub adc: Adc,
     /// The encoder.
     pub encoder: Encoder,
@@ -50,7 +51,7 @@ pub struct Control {
     pub commands: Receiver<'static, Command>,
     /// Answers of the drive.
     pub answers: Sender<'static, Answer>,
-    /// Results of a learning.
+    /// Results of a self-commissioning.
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
@@ -58,20 +59,20 @@ pub struct Control {
     pub signals: Writer<'static, { board::RECORDED_PERIODS }>,
 }
 
-// It is copied at a start and by tools.
+// The drive is copied at a start and by tools.
 const _: () = assert!(size_of::<Drive>() <= 4096);
 
 /// Control periods since the start, wrapping.
 pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 /// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
-/// Whether the commissioning is to see what the drive does while it regulates.
+/// Whether the commissioning observes the drive while it regulates.
 pub static RECORD_FOR_MAIN: AtomicBool = AtomicBool::new(false);
 /// Control periods from one record of the stream to the next; 0: none.
 pub static STREAM_DIVIDER: AtomicU32 = AtomicU32::new(0);
-/// From the main loop: [`WINDOW_ON`], and what it has found wrong, as bits of [`Hardware`].
+/// Bits from the main loop: [`WINDOW_ON`], and the errors that it has found, as bits of [`Hardware`].
 pub static FAULTS_FROM_MAIN: AtomicU8 = AtomicU8::new(0);
-/// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
+/// The window watchdog is fed; the first feeding starts it, once the interrupt has come at its rate.
 pub const WINDOW_ON: u8 = 1 << 7;
 const _: () = assert!(Hardware::all().bits() & WINDOW_ON == 0);
 /// Word of the phase of a drive whose state has a flipped bit; 0: none. The outputs are off, and the main loop ends the run.
@@ -110,8 +111,8 @@ impl Control {
     }
 }
 
-/// The data that the interrupt reads and writes only when its drive counts a change, and the address of that count. The
-/// data are the coefficients and the references to the memory shared with the main loop.
+/// The data that the interrupt writes only when its drive counts a change, and the address of that count. The data are the coefficients
+/// and the references to the memory shared with the main loop.
 pub fn constants() -> ([MemoryRange; 2], u32) {
     let control = RUNNING.0.get() as usize + offset_of!(Running, control);
     let range = |at: usize, bytes: usize| MemoryRange {
@@ -127,19 +128,19 @@ pub fn constants() -> ([MemoryRange; 2], u32) {
     (constants, (control + drive + Drive::CHANGES) as u32)
 }
 
-/// The word of the drive's phase as it lies in memory: one of [`Drive::PHASES`], unless a bit has flipped.
+/// The word of the drive's phase in memory: one of [`Drive::PHASES`], unless a bit has flipped.
 fn phase(drive: &Drive) -> u32 {
     let drive = &raw const *drive;
-    // SAFETY: a word within the drive. It is read as what it is, a number, and not as the tag of an enum.
+    // SAFETY: a word within the drive. It is read as a plain number, not as the tag of an enum.
     unsafe { drive.cast::<u32>().byte_add(Drive::PHASE).read_volatile() }
 }
 
 /// The interrupt's own memory.
 struct Owned(UnsafeCell<MaybeUninit<Running>>);
 
-// SAFETY: never accessed by two contexts at a time: `Control::run` writes it before it unmasks the interrupt, and after
-// that only the interrupt accesses it, which cannot interrupt itself. (The check of the memory reads words of it,
-// without a reference; see `memory::word`.)
+// SAFETY: never accessed by two contexts at a time: `Control::run` writes it before it unmasks the interrupt, and after that only the
+// interrupt accesses it, which cannot interrupt itself. (The check of the memory reads words of it, without a reference; see
+// `memory::word`.)
 unsafe impl Sync for Owned {}
 
 // SAFETY: a section of memory.x for data without initialisation, which `MaybeUninit` allows for.
@@ -150,7 +151,7 @@ struct Running {
     control: Control,
     front_end: FrontEndState,
     periods: u32,
-    /// Of periods without a command, and with one.
+    /// Most cycles of periods without a command, and with one.
     worst_cycles: [u32; 2],
     worst_latency: u32,
     /// Deadline miss of the last period.
@@ -165,9 +166,9 @@ struct Running {
     began: u32,
     /// State in the last report.
     reported: Option<State>,
-    /// Parts of a report that are due.
+    /// Parts of a report that are still to be sent.
     report_left: u8,
-    /// Periods for which one has waited.
+    /// Number of periods for which a part has waited.
     report_late: u8,
     stream_due: bool,
 }
@@ -199,8 +200,8 @@ impl Running {
             ..
         } = &mut self.control;
 
-        // Over-current first: the outputs go off before anything is computed. The analog watchdogs interrupt
-        // when the current is converted, before the sequence has ended.
+        // Over-current comes first: the outputs go off before anything is computed. The analog watchdogs interrupt when the current is
+        // converted, before the sequence has ended.
         let converters = adc.take_events();
         if converters.over_current {
             pwm.trip();
@@ -210,14 +211,15 @@ impl Running {
             return;
         }
 
-        // At the beginning, where it comes in equal steps; an interrupt that does not end is not fed again.
+        // The watchdog is fed at the beginning, where the interrupt comes at equal intervals; an interrupt that hangs does not feed it
+        // again.
         let told = FAULTS_FROM_MAIN.load(Ordering::Relaxed);
         if told & WINDOW_ON != 0 {
             window.feed();
         }
 
-        // The timer counts down from the top, where the sampling ended and an update came, and was at the top one
-        // period before. Otherwise a period was skipped or came late.
+        // The timer counts down from the top, where the sampling ended and an update came, and was at the top one period before.
+        // Otherwise a period was skipped or came late.
         let timer = pwm.take_events();
         let since_top = pwm.since_top();
         let now = time::now();
@@ -238,7 +240,7 @@ impl Running {
         if !converters.complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
-        // Before anything is decided by it: of a drive whose phase has a flipped bit nothing can be told.
+        // Checked before any decision depends on it: if a bit of the phase has flipped, the state of the drive is unknown.
         let phase = phase(drive);
         if phase != self.phase {
             pwm.trip();
@@ -280,20 +282,20 @@ impl Running {
 
         dc_link.set(output.chopper, output.relay);
 
-        // Between two steps: a command acts from the next step on.
-        // There is room for the answer: the main loop takes the last one before it sends a command.
+        // Commands are taken between two steps: a command acts from the next step on. There is space for the answer, because the main
+        // loop takes the last one before it sends a command.
         let has_time = drive.has_time();
         let commanded = commands
             .take_if(
                 |command| has_time || matches!(command, Command::Stop(Stop::Now)),
                 |command| {
-                    // A start that is refused leaves the drive off, which disarms again.
+                    // If a start is refused, the drive stays off, which disarms again.
                     if matches!(command, Command::Start(_) | Command::Test(_)) {
                         pwm.arm();
                     }
                     answers.send_with(|answer| *answer = drive.command(command));
                     adc.convert_both(drive.front_end().both_zero_vectors);
-                    // What was taken is never carried out again.
+                    // A command that was taken is never carried out again.
                     *command = Command::Stop(Stop::Now);
                 },
             )
@@ -312,14 +314,14 @@ impl Running {
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // A report is sent in two periods: its signals, then the rest. Neither in the period of a command or, for two periods
-        // at most, of a record of trace or stream: each of these takes long enough.
+        // A report is sent in two periods: its signals, then the rest. A part is not sent in the period of a command. It also waits, for
+        // two periods at most, for a record of trace or stream, because each of these takes long enough.
         let due =
             self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
         if due && self.report_left == 0 {
             self.report_left = 2;
         }
-        // A sample of the stream waits as well, as long as it differs from the next one.
+        // A sample of the stream waits as well, while it is still distinguishable from the next one.
         let every = STREAM_DIVIDER.load(Ordering::Relaxed);
         let since = self.periods.checked_rem(every);
         self.stream_due |= since == Some(0);
@@ -351,13 +353,13 @@ impl Running {
         }
     }
 
-    /// Reports to the main loop. If it is slow or hangs, this report is lost, but not its events.
+    /// Reports to the main loop. If the main loop is slow or hangs, this report is lost, but not its events.
     fn report(&mut self, state: State, sample: Sample, cycles: u32) {
         let Control { drive, status, learned, .. } = &mut self.control;
         if self.reported == Some(State::Learning)
             && let Some(result) = drive.learned()
         {
-            // There is room: the main loop takes it at once, and the next comes a minute later.
+            // There is space: the main loop takes it at once, and the next result comes a minute later.
             learned.send(Some(*result));
         }
         let sent = status.send_with(|report| {
@@ -372,7 +374,7 @@ impl Running {
             report.limiting = drive.limiting();
             report.torque_limits = drive.torque_limits();
             report.stator_resistance = drive.stator_resistance();
-            // The commissioning's part: while the drive regulates nothing of it changes.
+            // The part for the commissioning does not change while the drive regulates.
             if !(state.regulates() && self.reported == Some(state)) {
                 report.test_report = drive.test_report();
             }

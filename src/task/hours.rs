@@ -8,25 +8,25 @@ use crate::task::guard::{Guard, extended};
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
 
-/// The history, and what is counted next.
+/// The history, and the values for its next count.
 pub struct Hours {
     /// Operating hours, starts and faults.
     pub history: History,
-    /// Time up to which it is counted, ms.
+    /// Time up to which the hours are counted, ms.
     counted_ms: u32,
     /// Whether the drive was off in the last report.
     was_off: bool,
-    /// Whether the control goes on while the history is written; it is not written otherwise.
+    /// Whether the control goes on while the history is written; otherwise the history is not written.
     dual_bank: bool,
 }
 
 impl Hours {
-    /// Goes on with the history of the flash.
+    /// Continues the history in the flash.
     pub const fn new(history: History, dual_bank: bool) -> Self {
         Self { history, counted_ms: 0, was_off: true, dual_bank }
     }
 
-    /// Counts up to this time, ms, and writes where that is due.
+    /// Counts up to this time, ms, and writes when that is due.
     pub fn count(&mut self, now_ms: u32, off: bool, guard: &mut Guard, pages: &mut Pages) {
         self.history.pass(now_ms.wrapping_sub(self.counted_ms), !off);
         self.counted_ms = now_ms;
@@ -47,7 +47,7 @@ impl Hours {
         }
     }
 
-    /// Notes that the setting with this number, which protects, was changed.
+    /// Notes that the protective setting with this number was changed.
     pub fn changed(&mut self, setting: u16, guard: &mut Guard, pages: &mut Pages) {
         self.write(guard, pages, |history, pages| history.changed(pages, setting));
     }

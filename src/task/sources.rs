@@ -1,5 +1,5 @@
-//! Second opinions on what the drive rests on: core clock against the watchdog's oscillator, the reference of the converters
-//! against the chip's own. A crystal or a supply that is off falsifies currents, voltages, times and their limits alike.
+//! Cross-checks of clock and reference voltage: the core clock against the watchdog's oscillator, the ADC reference voltage against the
+//! chip's own reference. If the crystal or the supply is off, currents, voltages, times and their limits are all wrong.
 
 use core::sync::atomic::Ordering;
 
@@ -10,13 +10,13 @@ use crate::chip::{StartError, adc, time};
 use crate::task::control::{FAULTS_FROM_MAIN, WINDOW_ON};
 use induction_drive::board;
 
-/// Time between two measurements, ms, and to one that repeats a suspicion.
+/// Time between two measurements, ms, and to one that repeats a suspicious result.
 const PAUSE_MS: [u32; 2] = [1000, 1];
 
 /// The measurements.
 pub struct Sources {
     internal: bool,
-    /// What the last one found.
+    /// The errors that the last measurement found.
     suspected: Hardware,
     measured_ms: u32,
     pause_ms: u32,
@@ -26,7 +26,7 @@ impl Sources {
     /// Measures for the first time, with the control running.
     ///
     /// # Errors
-    /// What is wrong twice.
+    /// The error that two measurements have found.
     pub fn new(source: Source) -> Result<Self, StartError> {
         let (internal, suspected) = (source == Source::Internal, Hardware::empty());
         let mut new = Self { internal, suspected, measured_ms: 0, pause_ms: PAUSE_MS[0] };
@@ -41,7 +41,7 @@ impl Sources {
         }
     }
 
-    /// Measures once a second, for less than a millisecond, and tells the control what is wrong.
+    /// Measures once a second, for less than a millisecond, and tells the control the errors found.
     pub fn watch(&mut self, now_ms: u32) {
         if now_ms.wrapping_sub(self.measured_ms) >= self.pause_ms {
             self.measured_ms = now_ms;
@@ -49,7 +49,7 @@ impl Sources {
         }
     }
 
-    /// What is wrong now and was at the last time.
+    /// The errors that are present now and were at the previous measurement.
     fn measure(&mut self) -> Hardware {
         let clocks = time::lsi_clocks().is_some_and(|n| board::clocks_agree(n, self.internal));
         let (code, then) = adc::own_reference();

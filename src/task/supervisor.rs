@@ -51,7 +51,7 @@ pub struct ControlLink {
     pub commands: Sender<'static, Command>,
     /// Answers of the drive.
     pub answers: Receiver<'static, Answer>,
-    /// Results of a learning.
+    /// Results of a self-commissioning.
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
@@ -61,7 +61,7 @@ pub struct ControlLink {
     pub observed: Signals,
     /// Signals for the report.
     pub reported: Signals,
-    /// The second opinions on clock and reference.
+    /// The cross-checks of clock and reference voltage.
     pub sources: Sources,
 }
 
@@ -73,9 +73,9 @@ pub struct Supervisor {
     level: Level,
     clock: Clock,
     guard: Guard,
-    /// `None` if the control does not run.
+    /// Check of memory and registers; `None` if the control does not run.
     check: Option<Check>,
-    /// Whether it has run long enough to forget earlier resets.
+    /// Whether the firmware has run long enough to clear the count of earlier resets.
     well: bool,
     chip: Chip,
     /// Tracking of the rotor time constant, if the settings enable it.
@@ -101,7 +101,7 @@ pub struct Chip {
     pub saved: Saved<Pages>,
     /// Reason why the saved settings were rejected, if they were.
     pub rejected: Option<Rejected>,
-    /// What the timer of the power stage was set to.
+    /// Values with which the timer of the power stage was set up.
     pub timer: board::Timer,
     /// Reason why the control was not started, if it was not.
     pub not_started: Option<&'static str>,
@@ -152,7 +152,7 @@ impl Supervisor {
             self.log(Status { telemetry: newest.telemetry, ..status });
         }
         self.commission();
-        // It designs for seconds: the console needs the time behind it.
+        // The commissioning designs for seconds, and the console needs the time after that.
         self.clock.update();
         let now = self.clock.ms;
         self.hours.count(now, self.is_off(), &mut self.guard, self.chip.saved.flash());
@@ -160,8 +160,8 @@ impl Supervisor {
         self.clock.ms
     }
 
-    /// Checks a slice of the control's memory and of its registers, and feeds the watchdog if the rule allows it; called at
-    /// the end of each pass of the main loop, and behind what takes long in it.
+    /// Checks a slice of the control's memory and of its registers, and feeds the watchdog if the rule allows it. Called at the end of
+    /// each pass of the main loop, and after long operations in it.
     pub fn feed_watchdog(&mut self) {
         self.check.iter_mut().for_each(Check::slice);
         let Some((watchdog, rule)) = &mut self.guard else { return };
@@ -171,7 +171,7 @@ impl Supervisor {
         match rule.judge(time::now(), periods, missed) {
             Verdict::Wait => {}
             Verdict::Feed => watchdog.feed(),
-            // The watchdog resets the chip in a moment. The main loop itself works, and the console answers until then.
+            // The watchdog is about to reset the chip. The main loop itself works, and the console answers until then.
             Verdict::Refuse { periods, cycles } => {
                 pwm::outputs_off();
                 stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
@@ -187,7 +187,7 @@ impl Supervisor {
     #[inline(never)] // a command takes much stack
     fn track(&mut self) {
         while let Some(link) = &mut self.link {
-            // Where it lies: a copy of each would be most of the time.
+            // Handled in place: copying each period would take most of the time.
             let tau_r = link.observed.take_with(|period| {
                 if !period.observed {
                     return None;
@@ -200,7 +200,7 @@ impl Supervisor {
             });
             let Some(tau_r) = tau_r else { return };
             let Some(tau_r) = tau_r else { continue };
-            // Refused when the drive has just stopped.
+            // The drive refuses the command if it has just stopped.
             let answer = self.command(Command::RotorTimeConstant(tau_r));
             if let (Ok(accepted), Some(tracking)) = (answer, self.tracking.as_mut()) {
                 tracking.taken(tau_r, accepted);
@@ -208,12 +208,12 @@ impl Supervisor {
         }
     }
 
-    /// Goes on with the commissioning.
+    /// Continues the commissioning.
     #[inline(never)] // a command takes much stack
     fn commission(&mut self) {
         let Some(Status { test_report, .. }) = self.status else { return };
         control::RECORD_FOR_MAIN.store(self.commissioning.is_running(), Ordering::Relaxed);
-        // A search takes most of the time of the watchdog, and so may the console before it, with the periods that came meanwhile. The
+        // A search takes most of the time of the watchdog, and so may the console before it, with the periods received meanwhile. The
         // drive answers a command within a period.
         self.feed_watchdog();
         let command = self.commissioning.poll(&test_report, |commissioning| {
@@ -230,7 +230,7 @@ impl Supervisor {
         }
     }
 
-    /// Logs changes of state, faults and events; once a second, at the level `debug`, what the drive does.
+    /// Logs changes of state, faults and events; once a second, at the level `debug`, the drive's operating point.
     fn log(&mut self, mut s: Status) {
         s.worst_latency = s.worst_latency.saturating_sub(self.chip.timer.below_the_top());
         let before = self.status.replace(s);
@@ -243,7 +243,7 @@ impl Supervisor {
             } else if self.level >= Level::Info {
                 defmt::info!("state: {}", Display2Format(&s.state));
             }
-            // Last: it writes to the flash for milliseconds.
+            // Called last, because it writes to the flash for milliseconds.
             self.hours.entered(s.state, &mut self.guard, self.chip.saved.flash());
         }
         // An event that lasts is logged once.
@@ -251,7 +251,7 @@ impl Supervisor {
         if self.level >= Level::Warn {
             for (event, text) in [
                 (Hardware::BREAK, "the power stage pulls the break input, or is not there"),
-                (Hardware::ANALOG_WATCHDOG, "over-current at a converter"),
+                (Hardware::ANALOG_WATCHDOG, "over-current at an ADC"),
                 (Hardware::DEADLINE_MISS, "a control period took too long"),
                 (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
                 (Hardware::CHOPPER_OFF, "the chip has switched the brake chopper off"),

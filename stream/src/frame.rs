@@ -15,10 +15,10 @@ const AROUND: usize = 1 + 2;
 /// Bytes of the longest frame on the wire.
 pub const LONGEST: usize = wire_bytes(MOST_SIGNALS);
 
-/// Without a table, which would take half a kilobyte of the firmware.
+/// Computed without a table, which would take half a kilobyte of the firmware.
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_3740);
 
-/// Bytes on the wire of a frame with so many signals.
+/// Bytes on the wire of a frame with this number of signals.
 pub const fn wire_bytes(signals: usize) -> usize {
     HEAD + 4 * signals + CHECK + AROUND
 }
@@ -26,7 +26,7 @@ pub const fn wire_bytes(signals: usize) -> usize {
 /// Values of signals at one instant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// One more for each sample that was due; wraps.
+    /// Sequence number: one more for each sample that was due; wraps.
     pub sequence: u16,
     /// Control periods since the start of the firmware; wraps.
     pub period: u32,
@@ -37,18 +37,18 @@ pub struct Frame {
 /// Reason why bytes are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Damage {
-    /// Not as COBS writes it.
+    /// The bytes are not a COBS block.
     #[error("not a COBS block")]
     Cobs,
-    /// Not the length of a frame.
-    #[error("{0} bytes: no frame is so long")]
+    /// The length is not that of a frame.
+    #[error("{0} bytes: no frame has this length")]
     Length(usize),
     /// The checksum differs.
     #[error("checksum {found:04x} where the contents have {computed:04x}")]
     Check {
         /// As received.
         found: u16,
-        /// Of the contents received.
+        /// Computed over the contents received.
         computed: u16,
     },
 }
@@ -73,7 +73,7 @@ impl Frame {
             length += CHECK;
         }
         *to = [0; LONGEST];
-        // There is room: the contents are shorter than a block of COBS.
+        // There is space: the contents are shorter than a block of COBS.
         let source = contents.get(..length).unwrap_or_default();
         let block = to.get_mut(1..).map_or(0, |to| cobs::try_encode(source, to).unwrap_or(0));
         (block + 2).min(LONGEST)

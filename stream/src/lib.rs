@@ -9,10 +9,10 @@
 //! | 4 each | `f32` | one to [`MOST_SIGNALS`] values, in the units that the names of the signals end with |
 //! | 2 | `u16` | CRC-16/IBM-3740 over all bytes before it |
 //!
-//! The text of the console never contains `0x00`. A receiver tells the two apart by [`Splitter`]: outside a frame all
-//! bytes but `0x00` are text; a `0x00` begins a frame, which the next `0x00` ends. Where the bytes between two `0x00` are no
-//! whole frame, they are discarded as damaged, and the second `0x00` begins the next frame: a receiver that begins to
-//! listen in the midst of a frame, or one that has lost a `0x00`, is in step again within two frames.
+//! The text of the console never contains `0x00`. A receiver separates text and frames by [`Splitter`]: outside a frame all bytes but
+//! `0x00` are text; a `0x00` begins a frame, which the next `0x00` ends. If the bytes between two `0x00` are not a whole frame, they are
+//! discarded as damaged, and the second `0x00` begins the next frame. So a receiver that begins to listen in the middle of a frame, or
+//! has lost a `0x00`, is in step again within two frames.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

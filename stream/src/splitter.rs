@@ -1,10 +1,10 @@
-//! Text and frames of one wire, told apart.
+//! Separation of text and frames on one wire.
 
 use heapless::Vec;
 
 use crate::frame::{Frame, LONGEST};
 
-/// What a byte has completed.
+/// The piece that a byte completes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Piece {
     /// Nothing yet.
@@ -17,7 +17,7 @@ pub enum Piece {
     Damaged,
 }
 
-/// Tells text and frames apart; see the head of the crate.
+/// Separates text and frames; see the head of the crate.
 #[derive(Clone, Debug, Default)]
 pub struct Splitter {
     /// The bytes of a frame so far; `None` in text.
@@ -52,7 +52,7 @@ impl Splitter {
             },
             (Some(block), byte) => match block.push(byte) {
                 Ok(()) => Piece::Nothing,
-                // Too long for a frame: text behind a 0x00 that ended a frame.
+                // Too long for a frame: text after a 0x00 that ended a frame.
                 Err(_) => {
                     self.block = None;
                     Piece::Damaged

@@ -1,4 +1,4 @@
-//! Frames survive the wire, and the receiver finds back to them.
+//! Frames survive the wire, and the receiver recovers after damage.
 
 use drive_stream::{Damage, Frame, LONGEST, Piece, Splitter, wire_bytes};
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ fn written(frame: &Frame) -> Vec<u8> {
     wire[..length].to_vec()
 }
 
-/// Compared by their bytes: a value may be no number.
+/// Compared by their bytes, because a value may be NaN.
 fn same(a: &Frame, b: &Frame) -> bool {
     written(a) == written(b)
 }
@@ -27,7 +27,7 @@ fn lines() -> impl Strategy<Value = Vec<u8>> {
     "[ -~]{0,60}\r\n".prop_map(String::into_bytes)
 }
 
-/// Frames and text, as they come in.
+/// Frames and text, as they are received.
 fn split(bytes: &[u8]) -> (Vec<Frame>, Vec<u8>, usize) {
     let (mut splitter, mut frames, mut text, mut damaged) =
         (Splitter::new(), Vec::new(), Vec::new(), 0);
@@ -86,7 +86,7 @@ proptest! {
         prop_assert!(found.iter().zip(&sent).all(|(a, b)| same(a, b)));
     }
 
-    /// Two frames are the most that one lost or damaged byte can cost: its own, and the next where the end was lost.
+    /// A lost or damaged byte costs two frames at most: its own, and the next one if the end was lost.
     #[test]
     fn a_damaged_byte_costs_two_frames_at_most(
         sent in prop::collection::vec(frames(), 4..12),

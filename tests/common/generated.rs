@@ -1,13 +1,13 @@
 //! Generated blocks of the pages in `docs/`, for the tests of all crates.
 //!
-//! A block stands between `<!-- generated: NAME (COMMAND) -->` and `<!-- end -->`. A test that renders it fails where the page has
-//! something else; with the environment variable `WRITE_DOCS` the same test writes it.
+//! A block stands between `<!-- generated: NAME (COMMAND) -->` and `<!-- end -->`. A test that renders it fails if the page has another
+//! text; with the environment variable `WRITE_DOCS` the same test writes it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::{env, fs};
 
-/// One block after another: two tests may write the same page.
+/// Serialises the writes: two tests may write the same page.
 static WRITES: Mutex<()> = Mutex::new(());
 
 /// The folder of the repository.
@@ -17,7 +17,7 @@ pub fn root() -> PathBuf {
     root.expect("a folder with the book").to_owned()
 }
 
-/// Compares the block of a page with what it has to be, or writes it.
+/// Compares the block of a page with its required text, or writes it.
 pub fn check(page: &str, name: &str, block: &str) {
     let _one = WRITES.lock();
     let path = root().join("docs").join(page);

@@ -12,7 +12,7 @@ pub fn config(changes: &[&str]) -> Config {
     Config::load(None, None, changes).unwrap()
 }
 
-/// No noise, a converter of 16 bits, no analog filter, an ideal inverter.
+/// No noise, an ADC of 16 bits, no analog filter, an ideal inverter.
 pub const IDEAL: [&str; 6] = [
     "measurement.noise_a=0",
     "measurement.lsb_a=0.00014",
@@ -30,22 +30,22 @@ pub fn all(parts: &[&[&'static str]]) -> Vec<&'static str> {
     parts.concat()
 }
 
-/// What an experiment finds with these changes.
+/// Result of an experiment with these changes.
 pub fn run(experiment: &str, changes: &[&str], seed: u64) -> Outcome {
     experiments::run(experiment, &config(changes), seed).unwrap()
 }
 
-/// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
+/// A drive that regulates torque with the reference `i_q`, A, after `settle` s.
 pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     regulating_with(&plant_settings(config), &config.drive, seed, i_q, settle)
 }
 
-/// The same by the encoder, with the shaft locked and the injection beside it.
+/// A drive that regulates torque by the encoder, with the shaft locked and the injection running beside it.
 pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     Rig::oriented(config, seed, i_q.into(), settle).unwrap()
 }
 
-/// The same from settings.
+/// A drive that regulates torque, from settings.
 pub fn regulating_with(
     plant: &PlantSettings,
     drive: &Settings,

@@ -1,18 +1,18 @@
-//! Recorded samples and orders of the board: the same compare values as ever.
+//! Recorded samples and requests of the board give unchanged compare values.
 //!
-//! A recorded sample does not answer to another voltage, so a control that differs in its last digit departs from the record, and
-//! after a quarter of a second fault 11 ends it: then the runs are recorded again. They were when
+//! A recorded sample does not respond to another voltage, so a control that differs in its last digit departs from the recording, and
+//! after a quarter of a second fault 11 ends the run. Then the runs are recorded again. They were when
 //!
-//! * the tracking came to divide by the slope of a table instead of a constant: with the injection, from the first torque on, the
-//!   angle differs in its last digit; before that, and with the encoder, the hashes of commit 1abee12 held;
-//! * the references of the current loop got a direct share, which changes the voltage at every step of theirs;
-//! * a start without an encoder looks for a turning shaft with half of the current at once;
-//! * duties took the place of timer counts in the modulator: a count differs here and there by one;
-//! * tasks of the carrier period moved to other samples, so that no sample has much more to do than another;
-//! * a filter took the place of the tracking loop, and a command is taken behind one sample of ten;
+//! * the tracking began to divide by the saliency sensitivity of a table instead of a constant: with the injection, from the first torque
+//!   on, the angle differs in its last digit; before that, and with the encoder, the hashes of commit 1abee12 remained;
+//! * the references of the current loop got a feed-forward share, which changes the voltage at each of their steps;
+//! * a start without an encoder searches for a rotating shaft with half of the current at once;
+//! * duties replaced timer counts in the modulator: a count differs occasionally by one;
+//! * tasks of the injection period moved to other samples, so that no sample has much more to do than another;
+//! * a filter replaced the tracking loop, and a command is taken after one sample of ten;
 //! * the voltage limit moved to another sample, the resistance returns to the measured one, and an angle error changes the flux;
 //! * the compensation of the dead time takes the mean of the signs of a current that crosses zero within a period;
-//! * the resistance stays near the measured one, and the slow error is forgotten with the rotor time constant.
+//! * the resistance stays near the measured one, and the slow error decays with the rotor time constant.
 
 use std::fs;
 
@@ -30,7 +30,7 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     let orders = fs::read_to_string(format!("{path}.orders")).unwrap();
     let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
     let mut settings = FirmwareSettings::of_the_board();
-    // The board that was recorded had not learned.
+    // The recorded board had not learned.
     settings.drive.injection.synchronous.allow_unlearned = true;
     let mut drive = Drive::new(settings.build().unwrap());
     let mut front_end = FrontEndState::default();
@@ -59,7 +59,7 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     (compares.chunks(BLOCK).map(hash).collect(), compares.len())
 }
 
-/// Gives an order that the board's drive took.
+/// Gives a request that the board's drive accepted.
 fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
     let request = if line == "check wiring" { None } else { Some(grammar::parse(line).unwrap()) };
     let taken = match request {

@@ -1,4 +1,4 @@
-//! Samples as differences from one to the next, column by column, deflated.
+//! Samples as differences between consecutive samples, column by column, deflated.
 
 use std::io::{Read as _, Write as _};
 

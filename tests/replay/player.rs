@@ -1,4 +1,4 @@
-//! A drive that is given recorded samples and orders, and hashes of its outputs and beliefs.
+//! A drive that is given recorded samples and requests, and hashes of its outputs and estimates.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use induction_drive::desk::order::Order;
 
 use super::scenes::Scene;
 
-/// Periods to a hash, so that a difference is located.
+/// Periods per hash, so that a difference is located.
 pub const BLOCK: usize = 6000;
 /// Periods between two polls of the commissioning.
 const POLL: usize = 6;
@@ -41,7 +41,7 @@ impl Fnv {
     }
 }
 
-/// Hashes of a block: of the outputs, and of that which the drive believes.
+/// Hashes of a block: of the outputs, and of the drive's estimates.
 #[derive(Clone, Copy, Default)]
 pub struct Hashes {
     outputs: Fnv,
@@ -80,7 +80,7 @@ impl Hashes {
     }
 }
 
-/// Orders and commissioning around a drive, which the bench of a recording and its replay share.
+/// Requests and commissioning around a drive; the bench of a recording and its replay share them.
 pub struct Player {
     settings: Settings,
     commissioning: Option<Commissioning>,
@@ -102,7 +102,7 @@ impl Player {
         }
     }
 
-    /// Gives the drive an order as it is typed at the console, or one of the commands that cannot be typed.
+    /// Gives the drive a request as it is typed at the console, or one of the commands that cannot be typed.
     pub fn order(&mut self, drive: &mut Drive, line: &str) {
         let mut words = line.split(' ');
         let word = words.next().unwrap();
@@ -171,7 +171,7 @@ impl Player {
     }
 }
 
-/// Gives a drive with the settings of the scene these samples and orders; the drive, and the hashes of each block.
+/// Gives a drive with the settings of the scene these samples and requests; returns the drive, and the hashes of each block.
 pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Hashes>) {
     let (mut drive, mut front_end) = (scene.drive(), FrontEndState::default());
     let mut player = Player::new(&scene.config().drive);

@@ -1,4 +1,4 @@
-//! The scenes that are recorded: the simulated bench, and the orders and events of each.
+//! The recorded scenes: the simulated bench, and the requests and events of each scene.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -34,7 +34,7 @@ pub struct Bench {
 }
 
 impl Scene {
-    /// The configuration: for the whole range of the speed, without a learning before the start.
+    /// The configuration: for the whole speed range, without a self-commissioning before the start.
     pub fn config(&self) -> Config {
         let keys = [self.keys, &["injection.allow_unlearned=yes"]].concat();
         for_the_range(&Config::load(None, None, &keys).unwrap()).unwrap()
@@ -80,7 +80,7 @@ impl Bench {
         (0..(seconds * RATE_HZ) as u32).for_each(|_| self.step(|_| {}));
     }
 
-    /// Runs until the drive, or the bench, is so; at most for these seconds.
+    /// Runs until the condition on the drive, or the bench, is true; at most for this number of seconds.
     fn until(&mut self, seconds: f64, is_so: impl Fn(&Drive, &Player) -> bool) {
         for _ in 0..(seconds * RATE_HZ) as u32 {
             if is_so(&self.rig.drive, &self.player) {
@@ -101,7 +101,7 @@ impl Bench {
         self.until_state(wanted);
     }
 
-    /// One disturbed sample, or several, after which the drive is in fault.
+    /// Disturbs one sample, or several, after which the drive is in fault.
     fn fails(&mut self, disturb: impl Fn(&mut Sample)) {
         for _ in 0..6000 {
             self.step(&disturb);
@@ -155,7 +155,7 @@ pub const SCENES: &[Scene] = &[
                 bench.start("start torque", State::Torque);
                 bench.order(torque);
                 bench.run(0.4);
-                // The next start finds the flux that is left.
+                // The next start finds the remaining flux.
                 bench.order("stop");
                 bench.until_state(State::Off);
                 bench.run(0.1);
@@ -178,7 +178,7 @@ pub const SCENES: &[Scene] = &[
             bench.run(0.2);
             bench.order("stop");
             bench.until_state(State::Off);
-            // In the search, then while the flux builds up, each time with flux left.
+            // Stops during the search, then while the flux builds up, each time with remaining flux.
             for seconds in [0.015, 0.4] {
                 bench.run(0.02);
                 bench.start("start torque", State::FlyingStart);
@@ -191,7 +191,7 @@ pub const SCENES: &[Scene] = &[
             bench.run(0.3);
             bench.order("stop");
             bench.until_state(State::Off);
-            // At rest, while it magnetises and while it verifies.
+            // Stops at rest, while the drive magnetises and while it verifies the lock.
             bench.turn_at(0.0);
             bench.run(1.0);
             for state in [State::Magnetising, State::Verifying] {
@@ -282,7 +282,7 @@ pub const SCENES: &[Scene] = &[
             bench.run(3.0);
             bench.order("stop");
             bench.until_state(State::Off);
-            // Within the magnetising before it.
+            // A stop during the magnetising before the self-commissioning.
             bench.order("learn");
             bench.run(1.0);
             bench.order("stop");
@@ -310,7 +310,7 @@ pub const SCENES: &[Scene] = &[
             bench.fails(|sample| sample.current_b = 2010);
             bench.order("clear");
             start(bench);
-            // An angle that is lost: the dynamometer tears the shaft away, faster than the angle is tracked.
+            // The lock is lost: the dynamometer accelerates the shaft faster than the angle is tracked.
             bench.turn_at(-3000.0);
             bench.fails(|_| {});
         },

@@ -1,4 +1,4 @@
-//! What changes around the drive while it runs: load, motor, wires and sensors.
+//! Changes around the drive while it runs: load, motor, wires and sensors.
 
 use std::f64::consts::TAU;
 
@@ -7,20 +7,20 @@ use motor_plant::{
     Channel, CurrentFault, Load, MachineSettings, Plant, PlantError, SaliencySettings,
 };
 
-/// Changes the plant as these words say.
+/// Changes the plant as requested by these words.
 ///
 /// | words | effect |
 /// |---|---|
 /// | `load locked`, `load free NM`, `load speed RPM` | blocks the shaft, brakes it with a torque, turns it |
-/// | `turn DEG` | turns the motor's flux by an electrical angle, at once: the angle of the drive is wrong by as much |
+/// | `turn DEG` | rotates the motor's flux by an electrical angle at once, so that the drive's angle is off by this angle |
 /// | `open a`, `b`, `c`, `none` | opens the wire of a phase, or closes all |
-/// | `saliency SHARE` | share of the saliency of the motor, cold, that is left; 0 is the textbook machine |
+/// | `saliency SHARE` | remaining share of the saliency of the cold motor; 0 is the textbook machine |
 /// | `warm PERCENT` | resistances of stator and rotor above those at the start |
 /// | `sensor a FAULT`, `b FAULT` | a current sensor: `none`, `open` (reads no current), `high`, `low` (at an end of the range) |
 /// | `dc VOLT` | voltage of the dc link |
 ///
 /// # Errors
-/// In words: what is wrong, and what is allowed.
+/// The error, and the allowed words.
 pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
     let words: Vec<&str> = words.split_whitespace().collect();
     let refused = |why: PlantError| why.to_string();
@@ -74,7 +74,7 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
 /// The contacts of the terminal strip with these names.
 ///
 /// # Errors
-/// The name that is none, and those that are.
+/// The unknown name, and the names that exist.
 pub fn contacts(names: &str) -> Result<Wires, String> {
     let all = &TERMINALS[ANALOG..ANALOG + CONTACTS];
     let known: Vec<(&str, u8)> = all.iter().enumerate().map(|(n, name)| (*name, 1 << n)).collect();

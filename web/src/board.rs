@@ -1,6 +1,6 @@
-//! A board without hardware: the firmware's front, its drive and a simulated motor, behind the bytes of a serial port.
+//! A board without hardware: the firmware's interfaces, its drive and a simulated motor, connected by the bytes of a serial port.
 //!
-//! Lines that begin with `!` are for the motor and what is around it; all others go to the console.
+//! Lines that begin with `!` are for the motor and its surroundings; all others go to the console.
 
 use std::collections::VecDeque;
 
@@ -22,23 +22,23 @@ use motor_plant::{
 use crate::around;
 use crate::machine::Machine;
 
-/// Control periods from one pass of the main loop to the next, and passes of a millisecond.
+/// Control periods from one pass of the main loop to the next. The next constant is the number of passes per millisecond.
 const PERIODS: u32 = 3;
 const PASSES: u32 = board::PWM_HZ / 1000 / PERIODS;
-/// Longest learning, and the time in which the flux has decayed behind it.
+/// Longest self-commissioning. The next constant is the time in which the flux has decayed after it.
 const LONGEST_LEARNING_MS: u32 = 200_000;
 const REST_MS: u32 = 2000;
 /// Temperature of the heat sink, degrees Celsius.
 const HEAT_SINK_C: f32 = 25.0;
 
-/// See the head of the module.
+/// The board, see the head of the module.
 pub struct HostBoard {
     front: Front,
     /// Drive and motor.
     pub machine: Machine,
     wires: Wires,
     contacts: Contacts,
-    /// A line that is coming in.
+    /// The line that is being received.
     line: Vec<u8>,
     now_ms: u32,
 }
@@ -80,7 +80,7 @@ impl Port for Wires {
     }
 }
 
-/// There is no field bus.
+/// A board without a field bus.
 enum NoBus {}
 
 impl modbus::Port for NoBus {
@@ -95,8 +95,7 @@ impl modbus::Port for NoBus {
     }
 }
 
-/// The plant that `cargo sim` simulates by default, with the converters and the timer of the reference board, as the virtual board
-/// has it.
+/// The plant that `cargo sim` simulates by default, with the ADCs and the timer of the reference board, as on the virtual board.
 pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {
     let (scales, own) = (&settings.drive.scales, MeasurementSettings::DEFAULT);
     let dead_time_s = board::dead_time(settings.drive.inverter.dead_time_s).1;
@@ -125,10 +124,10 @@ pub fn settings() -> FirmwareSettings {
 }
 
 impl HostBoard {
-    /// A board that has just been switched on; the shaft is locked. Equal seeds give equal boards, to the bit.
+    /// A board that has just been powered up; the shaft is locked. Equal seeds give equal boards, to the bit.
     ///
     /// # Errors
-    /// In words: the plant or the drive refuses its settings.
+    /// The reason why the plant or the drive refuses its settings.
     pub fn new(seed: u64) -> Result<Self, String> {
         let settings = settings();
         let plant = Plant::new(&plant_settings(&settings), seed).map_err(|why| why.to_string())?;
@@ -143,10 +142,10 @@ impl HostBoard {
         Ok(board)
     }
 
-    /// Lets the drive learn its motor, as fast as it can, and save that. The shaft must be locked.
+    /// Lets the drive learn its motor, as fast as possible, and save the result. The shaft must be locked.
     ///
     /// # Errors
-    /// In words: what the board has said.
+    /// The error message of the board.
     pub fn learn(&mut self) -> Result<(), String> {
         self.write(b"learn\n");
         for _ in 0..LONGEST_LEARNING_MS {
@@ -193,7 +192,7 @@ impl HostBoard {
         std::mem::take(&mut self.wires.output)
     }
 
-    /// A millisecond passes.
+    /// Simulates a millisecond.
     pub fn millisecond(&mut self) {
         for _ in 0..PASSES {
             (0..PERIODS).for_each(|_| self.machine.period());
@@ -204,7 +203,7 @@ impl HostBoard {
         if self.machine.resets {
             let (mut plant, saved) = (self.machine.plant.clone(), self.machine.saved);
             plant.set_pulses(saved.drive.inverter.carrier_khz.pulses());
-            // The settings were in force when they were saved.
+            // The saved settings were in force, so a board can be built with them.
             if let Ok(board) = Self::on(plant, &saved) {
                 *self = Self { contacts: self.contacts, ..board };
             }

@@ -25,37 +25,37 @@ use induction_drive::settings::keys::Key;
 use induction_drive::store::{FlashError, history::History};
 use motor_plant::Plant;
 
-/// See the head of the module.
+/// The drive and its motor, see the head of the module.
 pub struct Machine {
-    /// The motor with everything around it.
+    /// The motor and its surroundings.
     pub plant: Plant,
     drive: Drive,
     front_end: FrontEndState,
-    /// Compare values on their way: computed in the last period, in force in this one.
+    /// Compare values computed in the last period, which are applied in this one.
     pending: Compare,
     sample: Sample,
     periods: u32,
-    /// Periods from one record of the stream to the next, 0 is none; records that were not fetched.
+    /// Periods from one record of the stream to the next, 0 for none; records that were not fetched.
     streamed: (u32, VecDeque<Record>),
     trace: (Recorder<'static, TRACE_RECORDS>, trace::Reader<'static, TRACE_RECORDS>),
     session: Session,
     tracking: Option<Tracking>,
-    /// The result of a learning that was not fetched.
+    /// The result of a self-commissioning that was not fetched.
     found: Option<Learned>,
     history: History,
-    /// What a reset begins with.
+    /// Settings after a reset.
     pub saved: FirmwareSettings,
-    /// Whether a reset was asked for.
+    /// Whether a reset was requested.
     pub resets: bool,
     /// FNV-1a over the compare values and the currents of all periods.
     pub fingerprint: u64,
 }
 
 impl Machine {
-    /// The drive with these settings, off. Memory of a trace stays taken until the program ends.
+    /// The drive with these settings, off. The memory of a trace stays allocated until the program ends.
     ///
     /// # Errors
-    /// The settings make no drive.
+    /// No drive can be built with the settings.
     pub fn new(plant: Plant, settings: &FirmwareSettings) -> Result<Self, SettingsError> {
         let drive = Drive::new(settings.build()?);
         let memory: &Trace<TRACE_RECORDS> = Box::leak(Box::new(Trace::new()));
@@ -91,13 +91,13 @@ impl Machine {
         [own.into(), turns.rem_euclid(1.0), self.plant.rotor_flux().norm()]
     }
 
-    /// One control period, with all that its interrupt does and all that waits for it.
+    /// Simulates one control period, with all tasks of its interrupt.
     pub fn period(&mut self) {
         self.sample = self.plant.sample();
         let before = self.drive.state();
         let (compare, output) = self.drive.period(&mut self.front_end, &self.sample, &mut |_| {});
         if !compare.enabled {
-            // Off is off at once, not at the end of the period.
+            // Off is immediate, not at the end of the period.
             self.pending = Compare::OFF;
         }
         self.plant.set_chopper(output.chopper.into());
@@ -143,7 +143,7 @@ impl Machine {
 
     fn track(&mut self, record: &Record) {
         let Some(tracking) = &mut self.tracking else { return };
-        // Refused when the drive has just stopped.
+        // The drive refuses the command if it has just stopped.
         if let Some(tau_r) = tracking.take(record)
             && let Ok(accepted) = self.drive.command(&Command::RotorTimeConstant(tau_r))
         {

@@ -1,4 +1,4 @@
-//! What page and board say to each other, in the messages that `cargo live` has with its page.
+//! Messages between page and board, in the form that `cargo live` uses with its page.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -11,12 +11,13 @@ use serde_json::{Value, json};
 use crate::board::HostBoard;
 use crate::loops;
 
-/// From one question about the drive's state to the next, ms.
+/// Time from one question about the drive's state to the next, ms.
 const STATUS_MS: u32 = 200;
 /// Layout of a frame that the page understands.
 const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
 
-/// The greeting of the page: who the drive is, and whether the page fits it, by its answers to `version` and `describe stream`.
+/// The greeting of the page, from the answers to `version` and `describe stream`: the identity of the drive, and whether the page fits
+/// it.
 pub fn hello(version: Option<&String>, described: &[String]) -> Value {
     let objects: Vec<Value> =
         described.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
@@ -26,7 +27,7 @@ pub fn hello(version: Option<&String>, described: &[String]) -> Value {
     let fits = objects.iter().any(|object| object["frame"] == json!(LAYOUT));
     let misfit = match error {
         Some(error) => Some(format!(
-            "This firmware is older than the page: it has no live curves ({error}). All else works as far as the firmware \
+            "This firmware is older than the page: it has no live curves ({error}). Everything else works as far as the firmware \
              knows it. To update it: cargo xtask flash."
         )),
         None => (!fits).then(|| {
@@ -44,14 +45,14 @@ fn words(frame: &Frame) -> impl Iterator<Item = u8> + use<> {
     head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
 }
 
-/// Most frames that wait for a slow page; the oldest go first.
+/// Most frames that wait for a slow page; the oldest are dropped first.
 const MOST_FRAMES: usize = 6000;
 
 /// The frames of a stream on their way to the page.
 #[derive(Default)]
 pub struct Frames {
     waiting: VecDeque<Frame>,
-    /// Frames received; missing between those, dropped by the firmware or damaged; damaged on the wire; not taken by a slow page.
+    /// Frames received; missing between these, dropped by the firmware or damaged; damaged on the wire; not taken by a slow page.
     pub counts: [u64; 4],
     next: Option<u16>,
 }
@@ -71,13 +72,13 @@ impl Frames {
         self.waiting.push_back(frame);
     }
 
-    /// Those that wait, each as ten little-endian words: period, sequence number, values.
+    /// Returns the waiting frames, each as ten little-endian words: period, sequence number, values.
     pub fn take(&mut self) -> Vec<u8> {
         self.waiting.drain(..).flat_map(|frame| words(&frame)).collect()
     }
 }
 
-/// Who asks the drive.
+/// Source of a question to the drive.
 enum By {
     /// The page, with a number for the answer.
     Page(u32),
@@ -87,28 +88,28 @@ enum By {
     Hello,
 }
 
-/// A page's talk with a board in the same program.
+/// Conversation of a page with a board in the same program.
 pub struct Talk {
     /// The board.
     pub board: HostBoard,
-    /// Questions, of which the first was sent; the lines of its answer so far.
+    /// Questions, of which the first has been sent. The next field holds the lines of its answer so far.
     asks: VecDeque<(By, String)>,
     lines: Vec<String>,
-    /// Number of the question that was sent last, and whether it is not answered yet.
+    /// Number of the last question that was sent. The next field says whether it is still unanswered.
     tag: u32,
     awaited: bool,
     splitter: Splitter,
     line: Vec<u8>,
-    /// For the page.
+    /// Messages for the page.
     texts: Vec<Value>,
     frames: Frames,
     since_status_ms: u32,
-    /// Whether the drive is on its way to its first learning.
+    /// Whether the drive is before or in its first self-commissioning.
     begins: bool,
 }
 
 impl Talk {
-    /// With a board that has just been switched on.
+    /// A conversation with a board that has just been powered up.
     pub fn new(mut board: HostBoard) -> Self {
         board.write(b"@0 baud 2000000\n");
         Self {
@@ -126,7 +127,7 @@ impl Talk {
         }
     }
 
-    /// With a board that begins to learn its motor. Equal seeds give equal bits.
+    /// A conversation with a board that begins to learn its motor. Equal seeds give equal bits.
     ///
     /// # Errors
     /// As [`HostBoard::new`].
@@ -137,30 +138,30 @@ impl Talk {
         Ok(talk)
     }
 
-    /// A line of the page for the board; its answer gets this number.
+    /// Queues a line of the page for the board; its answer gets this number.
     pub fn ask(&mut self, number: u32, line: &str) {
         self.asks.push_back((By::Page(number), line.replace(['\r', '\n'], " ")));
     }
 
-    /// Stops the drive, past everything that waits.
+    /// Stops the drive, ahead of all waiting lines.
     pub fn stop(&mut self) {
         self.begins = false;
         self.texts.push(json!({ "stopped": "by the page" }));
         self.board.write(b"@0 stop\n");
-        // It has cut a list short, whose end does not come.
+        // The stop has cut a list short, whose end does not come.
         if self.awaited {
             self.answered(vec!["error: cut short by the stop".to_owned()]);
         }
     }
 
-    /// Whether the drive does what nobody wants to wait for.
+    /// Whether the simulation should run as fast as possible, because the drive is in a phase that is not worth waiting for.
     pub fn hurries(&self) -> bool {
-        // The page has its first picture first.
+        // The page gets its first picture before that.
         self.begins && self.frames.counts[0] > 0
             || self.board.machine.drive().state() == State::Learning
     }
 
-    /// So many milliseconds pass.
+    /// Simulates this number of milliseconds.
     pub fn advance(&mut self, ms: u32) {
         for _ in 0..ms {
             self.since_status_ms += 1;
@@ -205,7 +206,7 @@ impl Talk {
                 lines.push(rest.to_owned());
                 self.answered(lines);
             }
-            // The answer to a stop, or to a question that it has cut short.
+            // The answer to a stop, or to a question that a stop has cut short.
             Some((_, rest)) => self.texts.push(json!({ "line": rest })),
         }
     }
@@ -230,8 +231,8 @@ impl Talk {
         }
     }
 
-    /// The messages for the page as JSON, and the [frames](Frames::take). The page reads the messages first: the answer to a new stream
-    /// says what its frames hold.
+    /// Returns the messages for the page as JSON, and the [frames](Frames::take). The page reads the messages first: the answer to a new
+    /// stream describes its frames.
     pub fn take(&mut self) -> (String, Vec<u8>) {
         let mut texts = std::mem::take(&mut self.texts);
         texts.push(json!({ "tick": self.frames.counts, "flux": self.board.machine.flux() }));

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use crate::talk::Talk;
 
-/// The talk; a line from the page, or texts and frames for it.
+/// The conversation; a line from the page, or texts; and frames for the page.
 type Kept = (Option<Talk>, Vec<u8>, Vec<u8>);
 
 thread_local! {
@@ -15,13 +15,13 @@ fn with<R: Default>(act: impl FnOnce(&mut Talk) -> R) -> R {
     KEPT.with_borrow_mut(|(talk, ..)| talk.as_mut().map(act).unwrap_or_default())
 }
 
-/// Switches a board on, which learns its motor. Its settings are constants, of which tests make a board.
+/// Powers a board up, which learns its motor. Its settings are constants, and tests build the same board from them.
 #[unsafe(no_mangle)]
 extern "C" fn init(seed: u32) {
     KEPT.with_borrow_mut(|kept| kept.0 = Talk::learning(seed.into()).ok());
 }
 
-/// Place for a line of so many bytes.
+/// Returns the place for a line of this number of bytes.
 #[unsafe(no_mangle)]
 extern "C" fn line(bytes: usize) -> *mut u8 {
     KEPT.with_borrow_mut(|(_, text, _)| {
@@ -30,7 +30,7 @@ extern "C" fn line(bytes: usize) -> *mut u8 {
     })
 }
 
-/// Asks the line that was written there.
+/// Asks the line that was written to this place.
 #[unsafe(no_mangle)]
 extern "C" fn ask(number: u32) {
     let text = KEPT.with_borrow(|(_, text, _)| String::from_utf8_lossy(text).into_owned());
@@ -43,7 +43,7 @@ extern "C" fn stop() {
     with(Talk::stop);
 }
 
-/// So many milliseconds pass; whether the drive does what nobody wants to wait for.
+/// Simulates this number of milliseconds; returns whether the simulation should run as fast as possible.
 #[unsafe(no_mangle)]
 extern "C" fn advance(ms: u32) -> bool {
     with(|talk| {
@@ -52,26 +52,26 @@ extern "C" fn advance(ms: u32) -> bool {
     })
 }
 
-/// Takes what there is for the page.
+/// Takes the messages and frames for the page.
 #[unsafe(no_mangle)]
 extern "C" fn take() {
     let (text, frames) = with(Talk::take);
     KEPT.with_borrow_mut(|(_, places, kept)| (*places, *kept) = (text.into_bytes(), frames));
 }
 
-/// Where that is: texts, or frames.
+/// Address of these texts, or frames.
 #[unsafe(no_mangle)]
 extern "C" fn place(frames: bool) -> *const u8 {
     KEPT.with_borrow(|(_, text, kept)| if frames { kept.as_ptr() } else { text.as_ptr() })
 }
 
-/// Its bytes.
+/// Number of bytes of these texts, or frames.
 #[unsafe(no_mangle)]
 extern "C" fn length(frames: bool) -> usize {
     KEPT.with_borrow(|(_, text, kept)| if frames { kept.len() } else { text.len() })
 }
 
-/// A number that all compare values and currents so far have made: equal in two runs of the same steps with the same bits.
+/// A number computed from all compare values and currents so far: equal in two runs of the same steps with the same bits.
 #[unsafe(no_mangle)]
 extern "C" fn fingerprint() -> u64 {
     with(|talk| talk.board.machine.fingerprint)

@@ -1,4 +1,4 @@
-//! The board without hardware: it talks as the firmware does, learns, holds torque at rest, and computes the bits of the simulator.
+//! The board without hardware answers as the firmware does, learns, holds torque at rest, and computes the same bits as the simulator.
 
 use drive_core::{Command, Drive, Mode};
 use drive_web::board::{HostBoard, plant_settings, settings};
@@ -32,7 +32,7 @@ impl Session {
         self.frames.extend(frames);
     }
 
-    /// Waits for a message for which this holds.
+    /// Waits for a message for which `found` returns a value.
     fn until<T>(&mut self, what: &str, found: impl Fn(&Value) -> Option<T>) -> T {
         for _ in 0..PATIENCE_MS / 10 {
             let found = self.said.iter().enumerate().find_map(|(n, said)| Some((n, found(said)?)));
@@ -71,16 +71,16 @@ impl Session {
     }
 }
 
-/// The plant is that of the simulator, which has the same drive: the same seed gives the same bits.
+/// The plant equals the simulator's, which has the same drive: the same seed gives the same bits.
 #[test]
 fn the_same_seed_gives_the_bits_of_the_simulator() {
     let settings = settings();
     let plant = plant_settings(&settings);
     let mut theirs = sim_bench::config::plant_settings(&Config::default());
     (theirs.inverter, theirs.measurement) = (plant.inverter, plant.measurement);
-    // How deep a sag would be that there is none of.
+    // There is no sag of the dc link, so its depth does not matter.
     theirs.dc_link = plant.dc_link;
-    // The flux of a direct current of 0.7 A, which is also what no value means.
+    // The flux of a d-axis current of 0.7 A, which is also the value if none is set.
     assert_eq!(theirs.saliency.psi_n.take(), Some(0.7 * plant.machine.lm));
     assert_eq!(plant, theirs);
     let mut board = HostBoard::new(7).unwrap();
@@ -144,16 +144,16 @@ fn the_contacts_of_the_terminal_strip_start_turn_and_stop_the_drive() {
         session.announced("off: stopped");
     }
     assert!(session.ask("!strip START2")[0].contains("START2: allowed is ENABLE, START, STOP"));
-    // It must have been open for a tenth of a second.
+    // ENABLE must have been open for a tenth of a second.
     session.pass(200);
     session.ask("!strip ENABLE START PRESET1");
     session.announced("running: speed");
-    // ENABLE opens: no torque at once.
+    // ENABLE opens: the torque goes at once.
     session.ask("!strip START PRESET1");
     session.announced("off: stopped");
 }
 
-/// A drive under way, a while before its motor loses the saliency.
+/// A running drive, some time before its motor loses the saliency.
 fn running(seed: u64, mode: &str, reference: f64, load: &str) -> Session {
     let mut session = Session::learned(seed);
     session.ask(if mode == "torque" { "!load locked" } else { "!load free 0" });
@@ -181,30 +181,30 @@ fn until_off(session: &mut Session, longest: u32) -> (Option<u32>, f64) {
     (None, largest)
 }
 
-/// The page's guide states when the drive notices that the saliency is gone; these runs show it.
+/// The page's guide states when the drive detects that the saliency is gone; these runs show it.
 fn the_loss_of_the_saliency_is_told(seed: u64) {
-    // Under torque at once, before the angle is wrong.
+    // Under torque it is detected at once, before the angle is wrong.
     for (mode, reference, load) in [("torque", 2.0, "locked"), ("speed", 150.0, "free 0.4")] {
         let (off, largest) = until_off(&mut running(seed, mode, reference, load), 1000);
         println!("{seed}, {mode}, {load}: {off:?} ms, {largest:.0} deg");
         assert!(off.is_some_and(|ms| ms <= 50) && largest < 20.0, "{off:?}, {largest}");
     }
-    // Held at rest against a load, the shaft slips away first.
+    // If the shaft is held at rest against a load, it slips away first.
     let (off, largest) = until_off(&mut running(seed, "speed", 0.0, "free 0.4"), 3000);
     println!("{seed}, held at rest: {off:?} ms, {largest:.0} deg");
     assert!(off.is_some());
-    // An idle shaft that turns: later, or not, while the angle stays right.
+    // On an idle rotating shaft it is detected later, or not at all, while the angle stays right.
     let (off, largest) = until_off(&mut running(seed, "speed", 150.0, "free 0"), 10_000);
     println!("{seed}, idle: {off:?} ms, {largest:.0} deg");
     assert!(largest < 10.0, "{off:?}, {largest}");
-    // Without torque there is nothing to notice while the frame drifts (53 degrees in a minute); with the first torque there is.
+    // Without torque the drift of the frame (53 degrees in a minute) has no visible effect; with the first torque it is detected.
     let mut session = running(seed, "torque", 0.0, "locked");
     assert_eq!(until_off(&mut session, 5000).0, None);
     session.ask("torque 2");
     let (off, largest) = until_off(&mut session, 1000);
     println!("{seed}, first torque: {off:?} ms, {largest:.0} deg");
     assert!(off.is_some_and(|ms| ms <= 100) && largest < 60.0, "{off:?}, {largest}");
-    // Above the carrier not at all; on the way down.
+    // Above the speed range of the injection it is not detected; it is on the way down.
     let mut session = running(seed, "speed", 1200.0, "free 0.2");
     let (off, largest) = until_off(&mut session, 5000);
     assert!(off.is_none() && largest < 15.0, "{off:?}, {largest}");

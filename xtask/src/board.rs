@@ -1,5 +1,4 @@
-//! The virtual board: tests with the finished image on an emulated controller, faults, and the time that
-//! its control interrupt takes.
+//! The virtual board: tests with the finished image on an emulated controller, faults, and the execution time of its control interrupt.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +12,7 @@ use crate::{budget, image, run, times, toolchain};
 /// Environment variable by which the tests find the image.
 pub const ELF: &str = "INDUCTION_DRIVE_ELF";
 
-/// Environment variable by which they find the images of the other boards: a folder with one folder a board.
+/// Environment variable by which the tests find the images of the other boards: a folder with one folder per board.
 const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 
 /// Environment variable with the file to which each board appends the seconds that it simulated.
@@ -50,7 +49,7 @@ pub fn cycles(elf: &Path) -> Result<()> {
     run::step("cycles of the control interrupt", &mut command)
 }
 
-/// Injects faults into this image; fails if the outputs stay on with wrong control beyond a bound.
+/// Injects faults into this image; fails if the outputs stay on with wrong control beyond a limit.
 pub fn campaign(elf: &Path, board: &str, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let Faults { count, seed, class, rpm } = faults;
@@ -72,7 +71,7 @@ pub struct Faults {
     /// Only classes of faults whose name contains this
     #[arg(default_value = "")]
     pub class: String,
-    /// Speed of the shaft, rpm: 850 to 3500; the usual scene is at rest and at low speed
+    /// Speed of the shaft, rpm: 850 to 3500; without it the scene is at rest and at low speed
     #[arg(long)]
     pub rpm: Option<u32>,
 }

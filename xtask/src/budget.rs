@@ -10,7 +10,7 @@ use crate::sources;
 /// The file.
 const FILE: &str = "xtask/budgets.toml";
 
-/// What the project may take.
+/// Budgets of the project.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budgets {
@@ -38,12 +38,12 @@ pub struct Part {
     pub paths: Vec<String>,
 }
 
-/// Seconds on two quiet cores.
+/// Time limits, seconds on two quiet cores.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
     pub test_module: f64,
-    /// From a cold clone, by the command.
+    /// Time limit of each command, from a cold clone.
     pub commands: BTreeMap<String, u32>,
 }
 

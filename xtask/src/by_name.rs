@@ -1,4 +1,4 @@
-//! Ignored tests that need a program of others, run by name.
+//! Ignored tests that need a third-party program, run by name.
 
 use std::fs;
 use std::path::Path;
@@ -30,7 +30,7 @@ pub fn pages() -> Result<()> {
         fs::copy(session, folder.join("board.html"))?;
     }
     let (elf, web) = (image::build()?, web::build()?);
-    // One after the other: the virtual board keeps pace with the clock.
+    // Run one after the other, because the virtual board keeps pace with real time.
     let options = "--ignored --nocapture --test-threads=1";
     let mut test = run::cargo(&format!("test {} --test page -- {options}", run::TESTED));
     run::step(
@@ -49,7 +49,7 @@ pub fn bench_dump(elf: &Path, name: &str) -> Result<()> {
     run::step("registers of the board", &mut test)
 }
 
-/// Runs the clients of the field bus with this image. Gets those that are missing.
+/// Runs the clients of the field bus with this image. Installs those that are missing.
 pub fn bus(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     toolchain::ensure_bus_clients()?;

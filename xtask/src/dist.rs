@@ -1,4 +1,4 @@
-//! `cargo xtask dist`: everything of a release in one folder, the same byte for byte wherever it is built by the same compiler.
+//! `cargo xtask dist`: everything of a release in one folder, the same byte for byte wherever the same compiler builds it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::env::consts::EXE_SUFFIX;
@@ -19,7 +19,7 @@ use crate::{image, paths, python, run, tools, web};
 const SUMS: &str = "SHA256SUMS";
 /// Programs for this machine; each is named as its package.
 const PROGRAMS: [&str; 2] = ["hil-sim", "drive-live"];
-/// Texts of the repository by the folder that they are put into.
+/// Texts of the repository, with the folder that they are copied to.
 const TEXTS: [(&str, &str); 3] = [
     ("description", "docs/settings.md docs/modbus.md docs/faults.md tests/numbers.txt"),
     ("licences", "LICENSE-APACHE LICENSE-MIT"),
@@ -28,21 +28,21 @@ const TEXTS: [(&str, &str); 3] = [
 /// Names of files with a licence.
 const LICENCES: [&str; 5] = ["LICEN*", "[lL]icen*", "UNLICENSE*", "COPYING*", "NOTICE*"];
 
-/// What is built, and where to.
+/// Options of the release.
 #[derive(Args)]
 pub struct Dist {
-    /// A folder to copy it to from target/dist
+    /// A folder to which target/dist is copied
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The programs for this machine alone, with what belongs to them
+    /// Only the programs for this machine, with their licences and lists of crates
     #[arg(long)]
     programs: bool,
-    /// Builds all again in a clone elsewhere; fails if a file differs
+    /// Builds everything again in a clone elsewhere; fails if a file differs
     #[arg(long, conflicts_with = "programs")]
     twice: bool,
 }
 
-/// Makes the folder `target/dist`. Wheels of this version in `target/wheels` are taken in.
+/// Makes the folder `target/dist`. Existing wheels of this version in `target/wheels` are included.
 pub fn dist(options: &Dist) -> Result<()> {
     let folder = run::folder("dist")?;
     fs::remove_dir_all(&folder)?;
@@ -51,7 +51,7 @@ pub fn dist(options: &Dist) -> Result<()> {
     programs(&host, &folder.join("programs").join(&host))?;
     if !options.programs {
         let target = toolchain::for_target()?;
-        // The reference board last: the others leave their image at its path.
+        // The reference board comes last, because each build leaves its image at the same path.
         for board in image::boards()?.iter().rev() {
             let elf = image::build_for(&target, board)?;
             for (from, to) in [("", "elf"), ("bin", "bin"), ("hex", "hex")] {
@@ -118,7 +118,7 @@ fn same_elsewhere(here: &Path) -> Result<()> {
     let clone = elsewhere.join("clone");
     let mut git = run::command("git");
     run::step("clone", git.args(["clone", "--quiet"]).arg(run::root()).arg(&clone))?;
-    // Neither the program that makes the book nor a wheel is built by the release.
+    // The release builds neither the program that makes the book nor a wheel.
     for made in ["tools", "wheels"] {
         copy(&run::folder(made)?, &clone.join("target").join(made))?;
     }

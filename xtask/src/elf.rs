@@ -13,19 +13,19 @@ pub struct Instruction {
     pub address: u32,
     /// First half-word.
     pub first: u16,
-    /// Second half-word, of a long instruction.
+    /// Second half-word of a long instruction.
     pub second: Option<u16>,
 }
 
 impl Instruction {
-    /// Whether it is `blx` with a register, or `bx` with another than the link register.
+    /// Whether it is `blx` with a register, or `bx` with a register other than the link register.
     pub fn is_call_through_register(self) -> bool {
         let Self { first, .. } = self;
         first & 0xff87 == 0x4780 || (first & 0xff87 == 0x4700 && first >> 3 & 0xf != 14)
     }
 }
 
-/// Address of a symbol. Those of functions have bit 0 set.
+/// Address of a symbol. The addresses of functions have bit 0 set.
 pub fn address<'a>(symbol: &impl ObjectSymbol<'a>) -> u32 {
     symbol.address() as u32 & !1
 }
@@ -80,7 +80,7 @@ mod tests {
         assert_eq!(found(&[0x4798, 0x4770], &[(0, true)]), Some(0));
         assert_eq!(found(&[0x4770, 0x4760], &[(0, true)]), Some(2));
         assert_eq!(found(&[0x4770, 0x4770], &[(0, true)]), None);
-        // Behind a long instruction, in its second half, and in data.
+        // Not a call: after a long instruction, in its second half, and in data.
         assert_eq!(found(&[0xf000, 0x4798, 0x4770], &[(0, true)]), None);
         assert_eq!(found(&[0x4770, 0x4798], &[(2, false), (0, true)]), None);
         assert_eq!(found(&[0x4770, 0, 0x4798], &[(4, true), (2, false), (0, true)]), Some(4));

@@ -1,5 +1,5 @@
-//! Programs of others for the virtual board: the examples of `stm32g4xx-hal` that need no wiring, from the source in
-//! the registry's cache, and small programs on `embassy-stm32`.
+//! Third-party programs for the virtual board: the examples of `stm32g4xx-hal` that need no wiring, from the source in the registry's
+//! cache, and small programs on `embassy-stm32`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,13 +13,13 @@ use crate::toolchain::{self, Target};
 
 /// The programs on `embassy-stm32`.
 const EMBASSY: &str = "hil-sim/virtual-board/foreign";
-/// Examples of the HAL: without log, and those that need one.
+/// Examples of the HAL that need no log, and those that need one.
 const PLAIN: &[&str] = &["blinky", "clockout", "comp", "comp_w_dac", "dac", "opamp", "pwm"];
 const LOGGED: &[&str] = &["adc-one-shot", "independent_watchdog"];
-/// Environment variable by which the test finds them.
+/// Environment variable by which the test finds the programs.
 const FOLDER: &str = "INDUCTION_DRIVE_FOREIGN";
 
-/// Builds them all and runs them on the virtual board.
+/// Builds all programs and runs them on the virtual board.
 pub fn test() -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let target = toolchain::for_target()?;
@@ -45,14 +45,14 @@ pub fn test() -> Result<()> {
         fs::copy(built.join(&name), programs.join(format!("embassy-{name}")))?;
     }
     let mut test = board::ignored_test("foreign");
-    run::step("programs of others on the virtual board", test.env(FOLDER, programs))
+    run::step("third-party programs on the virtual board", test.env(FOLDER, programs))
 }
 
 /// A cargo command that builds a workspace for the microcontroller.
 fn cargo(target: &Target, workspace: &Path, folder: &Path) -> Command {
     let mut command = target.bare("build");
     command.current_dir(workspace).args(["--release", "--target", TARGET, "--target-dir"]);
-    // In place of the flags in .cargo/config.toml, which are the firmware's.
+    // Replaces the flags in .cargo/config.toml, which are the firmware's.
     command.arg(folder).env("RUSTFLAGS", "-Ctarget-cpu=cortex-m4 -Clink-arg=--nmagic");
     command
 }
@@ -60,7 +60,7 @@ fn cargo(target: &Target, workspace: &Path, folder: &Path) -> Command {
 /// A copy of the HAL's source, as a workspace of its own.
 fn copy_of_hal(folder: &Path) -> Result<PathBuf> {
     let metadata = run::output("cargo", &["metadata", "--format-version", "1"])?;
-    // The path of its manifest, without a parser for the whole.
+    // Finds the path of its manifest, without a parser for the whole output.
     let is_it = |text: &&str| text.ends_with("Cargo.toml") && text.contains("/stm32g4xx-hal-");
     let source = metadata.split('"').find(is_it);
     let source = Path::new(source.context("no stm32g4xx-hal")?).parent().context("no folder")?;

@@ -8,12 +8,12 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::toolchain::{self, Target};
 use crate::{paths, run, seal, sections, sources, stack};
 
-/// The name that probe-rs has for the controller of the board.
+/// Name of the board's controller in probe-rs.
 pub const CHIP: &str = "STM32G474RETx";
 
-/// The variable by which the firmware learns its board when it is built.
+/// The variable that tells the firmware its board when it is built.
 const BOARD: &str = "INDUCTION_DRIVE_BOARD";
-/// The directory of build results with the images of the other boards, one folder a board.
+/// The directory of build results with the images of the other boards, one folder per board.
 pub const BOARDS: &str = "boards";
 /// The board whose image is built unless another is named.
 pub const REFERENCE: &str = "reference";
@@ -31,9 +31,9 @@ pub fn build() -> Result<PathBuf> {
     build_for(&toolchain::for_target()?, REFERENCE)
 }
 
-/// Builds and checks the images of all boards; returns the path of that of the reference board.
+/// Builds and checks the images of all boards; returns the path of the reference board's image.
 pub fn build_all(target: &Target) -> Result<PathBuf> {
-    // The reference last: each leaves its image at the same path.
+    // The reference board comes last, because each build leaves its image at the same path.
     for board in boards()?.iter().filter(|board| *board != REFERENCE) {
         build_for(target, board)?;
     }
@@ -66,7 +66,7 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
     Ok(copy)
 }
 
-/// Checks an image: what the control interrupt calls, paths of this machine, sections.
+/// Checks an image: the calls of the control interrupt, paths of this machine, sections.
 fn check(elf: &Path) -> Result<()> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
     stack::check_interrupts(&bytes).context("the interrupts")?;
@@ -78,10 +78,10 @@ fn check(elf: &Path) -> Result<()> {
 const MAGIC: &[u8] = b"idboard1";
 const NAME: usize = 32;
 
-/// The board to flash: `wanted`, or the one whose image is in the flash, the first page of which is given.
+/// The board to flash: `wanted`, or the board of the image in the flash, whose first page is given.
 ///
 /// # Errors
-/// Nothing says which board it is, or another one than `wanted` is there.
+/// The flash names no board, or another one than `wanted`.
 fn board_to_flash(wanted: Option<&str>, page: &[u8], other_board: bool) -> Result<String> {
     let at = page.windows(MAGIC.len()).position(|window| window == MAGIC);
     let name = at.and_then(|at| page.get(at + MAGIC.len()..)?.get(..NAME));
@@ -97,10 +97,10 @@ fn board_to_flash(wanted: Option<&str>, page: &[u8], other_board: bool) -> Resul
     }
 }
 
-/// Builds the image of a board, writes it there and shows its log until interrupted. The board is that of the image in the flash, unless
-/// another is named.
+/// Builds the image of a board, writes it to the board and shows its log until interrupted. The board is that of the image in the flash,
+/// unless another is named.
 pub fn flash(board: Option<&str>, other_board: bool) -> Result<()> {
-    // Asked before the build, which takes minutes.
+    // Checked before the build, which takes minutes.
     run::probe_rs()?;
     let read = ["read", "--chip", CHIP, "b8", "0x08000000", "2048"];
     let page = page(&run::output("probe-rs", &read)?);
@@ -109,7 +109,7 @@ pub fn flash(board: Option<&str>, other_board: bool) -> Result<()> {
     run::step("flash", run::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
 }
 
-/// The bytes that `probe-rs read b8` has printed: in hexadecimal, with spaces between.
+/// The bytes that `probe-rs read b8` has printed: hexadecimal, separated by spaces.
 fn page(printed: &str) -> Vec<u8> {
     let words = printed.split_whitespace().filter(|word| word.len() == 2);
     words.filter_map(|word| u8::from_str_radix(word, 16).ok()).collect()

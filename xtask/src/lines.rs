@@ -3,7 +3,7 @@
 //! Blank lines count nowhere outside tests. Documentation is `///` and `//!`, a comment any other line
 //! that begins with `//`; everything else is code. Test lines are files below `tests/` and `benches/`,
 //! files named `tests.rs`, and items under `#[cfg(test)]` in column 0 that have a body in the same file.
-//! Beside Rust: JavaScript, Python and tables in TOML, without blank lines and comments, manifests and code of others.
+//! Other languages are JavaScript, Python and tables in TOML, without blank lines and comments, manifests and third-party code.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::{run, sources};
 /// Lines of Rust (code, documentation, comments, test code, all else in tests), and of each of [`OTHERS`].
 type Counts = [usize; 8];
 
-/// Other languages: ending of the files, and how a comment begins.
+/// Other languages: extension of the files, and the beginning of a comment.
 const OTHERS: [(&str, &str); 3] = [("js", "//"), ("py", "#"), ("toml", "#")];
 
 /// Prints the table; fails above a budget.
@@ -44,7 +44,7 @@ pub fn report() -> Result<()> {
     run::limit("lines of tests", all[3], budget.test_code, "lines")
 }
 
-/// The first part with a path that this one begins with.
+/// The first part with a path that is a beginning of this one.
 fn part_of(parts: &[Part], path: &Path) -> Option<usize> {
     let path = path.to_string_lossy();
     parts.iter().position(|part| part.paths.iter().any(|begin| path.starts_with(begin)))

@@ -27,6 +27,8 @@ mod times;
 mod toolchain;
 mod tools;
 mod web;
+#[cfg(test)]
+mod words;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,22 +40,21 @@ use clap::{Args, Parser};
 #[derive(Parser)]
 #[command(bin_name = "cargo xtask")]
 enum Task {
-    /// Everything a change must pass beside `cargo test`: format, modules, lints, documentation, page, firmware, and the
-    /// firmware on the virtual board. All of it runs; what failed is named at the end. Installs missing
-    /// programs, or prints the command to type
+    /// Everything a change must pass beside `cargo test`: format, modules, lints, documentation, page, firmware, and the firmware on the
+    /// virtual board. All steps run, and the failed ones are named at the end. Installs missing programs, or prints the command to type
     Test,
-    /// Before a commit: format, modules, lines, lints, unit tests, procedures. All that needs neither image nor emulator
+    /// Before a commit: format, modules, lines, lints, unit tests, procedures. These need neither image nor emulator
     Quick,
-    /// Lints the firmware, builds and checks the images of all boards, prints the memory that the first one uses
+    /// Lints the firmware, builds and checks the images of all boards, prints the memory use of the first one
     Images,
     /// Builds and checks the image for a board (also: cargo firmware)
     Firmware(Which),
     /// Builds the image of a board, writes it through a debug probe and shows its log
     Flash {
-        /// Name of the board; without it that of the image in the flash
+        /// Name of the board; without it the board of the image in the flash
         #[arg(long, value_name = "NAME")]
         board: Option<String>,
-        /// Write the image although the flash holds that of another board
+        /// Write the image although the flash holds one for another board
         #[arg(long)]
         other_board: bool,
     },
@@ -61,11 +62,11 @@ enum Task {
     Board,
     /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
     BenchDump(Which),
-    /// Runs programs of others on the virtual board: examples of stm32g4xx-hal, and ours on embassy-stm32
+    /// Runs third-party programs on the virtual board: examples of stm32g4xx-hal, and programs of this project on embassy-stm32
     Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above the budgets
     Cycles,
-    /// Runs mbpoll, pymodbus and LinuxCNC's vfdb_vfd on the bus of the virtual board. Gets them from Debian and PyPI
+    /// Runs mbpoll, pymodbus and LinuxCNC's vfdb_vfd on the bus of the virtual board. Installs them from Debian and PyPI
     Bus,
     /// Injects faults into the image on the virtual board
     Campaign {
@@ -88,25 +89,25 @@ enum Task {
     Lines,
     /// Fails if modules of a crate refer to each other in a circle
     Rooms,
-    /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught.
-    /// Gets cargo-mutants from crates.io
+    /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught. Installs cargo-mutants from
+    /// crates.io
     Mutants {
         /// Share of the places, K/N with K from 0
         #[arg(default_value = "7/45")]
         shard: String,
     },
-    /// Builds the pages in docs/. Gets mdbook from crates.io
+    /// Builds the pages in docs/. Installs mdbook from crates.io
     Book,
-    /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
-    /// the text of a plot is too small. Drives the live page on the virtual board
+    /// Makes pages and pictures of them in Chromium, which it installs; fails if a page overflows at 420 pixels or the text of a plot is
+    /// too small. Drives the live page on the virtual board
     Pages,
     /// Builds the drive in a browser, firmware and motor on the live page: a folder of static files
     Web,
-    /// Builds the wheel for Python into target/wheels and tests it in a clean environment. Gets maturin, numpy and more from PyPI
+    /// Builds the wheel for Python into target/wheels and tests it in a clean environment. Installs maturin, numpy and more from PyPI
     Python,
     /// Makes the folder of a release: images, programs, drive in a browser, book, lists of crates, licences, check sums
     Dist(dist::Dist),
-    /// Long proofs in shards, which a later call continues. Lists them, or does one
+    /// Long proofs in shards, which a later call continues. Without a name it lists them
     Prove {
         /// Name of the proof
         name: Option<String>,
@@ -168,7 +169,7 @@ fn run(task: Task) -> Result<()> {
     }
 }
 
-/// What most changes break, without image and emulator.
+/// Runs the checks that a typical change is most likely to break, without image and emulator.
 fn quick() -> Result<()> {
     let mut steps = run::Steps::new();
     before_tests(&mut steps);
@@ -180,7 +181,7 @@ fn quick() -> Result<()> {
 
 /// Format, modules, lines and lints of the main workspace.
 fn before_tests(steps: &mut run::Steps) {
-    steps.run("programs of others", toolchain::ensure_format_and_lints);
+    steps.run("third-party programs", toolchain::ensure_format_and_lints);
     steps.command("format", run::cargo("fmt --all --check"));
     let fuzz = run::cargo("fmt --check --manifest-path fuzz/Cargo.toml");
     steps.command("format of the fuzz targets", fuzz);
@@ -199,10 +200,10 @@ fn images() -> Result<()> {
     size::report(&image::build_all(&target)?)
 }
 
-/// What `cargo test` leaves out, the quick things first. All of it runs, also when a step fails.
+/// Runs the checks that `cargo test` leaves out, the quick ones first. All of them run, also when one fails.
 fn test() -> Result<()> {
     let mut steps = run::Steps::new();
-    // One after the other: they are installed.
+    // Run one after the other, because they are installed.
     let target = steps.run("compiler for the controller", toolchain::for_target);
     let compiler = steps.run("compiler for the emulator", toolchain::ensure_c_compiler);
     // An image is linked on one core.

@@ -4,11 +4,11 @@
 pub struct Entry<'a> {
     /// Address at run time.
     pub run: u64,
-    /// Address of the contents, from where they are copied at start.
+    /// Address of the contents from which they are copied at start.
     pub load: u64,
     /// Bytes.
     pub size: u64,
-    /// Such as `.ccm`; `FILE.o:(.text.ADC1_2)`; `ADC1_2`.
+    /// Name, such as `.ccm`; `FILE.o:(.text.ADC1_2)`; `ADC1_2`.
     pub name: &'a str,
 }
 

@@ -12,7 +12,7 @@ use syn::{Attribute, Ident, Item, UseTree};
 
 use crate::{run, sources};
 
-/// The segments of a path, such as `crate::a::B`. For a module, those below the root of its crate.
+/// The segments of a path, such as `crate::a::B`. For a module, the segments below the root of its crate.
 pub type Name = Vec<String>;
 /// The modules of a crate.
 pub type Modules = BTreeMap<Name, Module>;
@@ -20,7 +20,7 @@ pub type Modules = BTreeMap<Name, Module>;
 /// One module.
 #[derive(Default)]
 pub struct Module {
-    /// The names that it imports, and from where.
+    /// The names that it imports, with the modules that they come from.
     pub imports: BTreeMap<String, Name>,
     /// The modules from which it imports all names.
     pub globs: Vec<Name>,
@@ -108,8 +108,7 @@ impl Reader<'_> {
         self.refer(&path);
     }
 
-    /// Reads the paths in other code, arguments of macros and attributes included. Those in a group behind
-    /// `a::` begin with `prefix`.
+    /// Reads the paths in other code, including arguments of macros and attributes. Paths in a group after `a::` begin with `prefix`.
     fn tokens(&mut self, tokens: TokenStream, prefix: &[Ident]) {
         let mut tokens = tokens.into_iter();
         let (mut path, mut colons) = (prefix.to_vec(), 2);
@@ -129,7 +128,7 @@ impl Reader<'_> {
                     self.tokens(group.stream(), &path);
                 }
                 TokenTree::Group(group) if is_left_out(&group.stream().to_string()) => {
-                    // The item behind this attribute ends with a semicolon or with its body.
+                    // The item after this attribute ends with a semicolon or with its body.
                     tokens.find(|token| match token {
                         TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
                         other => other.to_string() == ";",

@@ -1,8 +1,7 @@
 //! Keeps the paths of this machine out of the image.
 //!
-//! The location of a panic is in the flash, and the names of all source files are in the debug
-//! information, which the hash of the image covers. With short names for the directories of this machine,
-//! two machines build the same image.
+//! The locations of panics are in the flash, and the names of all source files are in the debug information, which the hash of the image
+//! covers. With short names for the directories of this machine, two machines build the same image.
 
 use std::env;
 use std::path::PathBuf;
@@ -11,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::run;
 
-/// Directories of this machine, and their short names in the image. Where several fit, the last counts.
+/// Directories of this machine, and their short names in the image. If several match, the last one is used.
 fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut names = vec![(run::root().to_owned(), "."), (run::target_dir()?, "target")];
     // One directory for each registry, with a directory for each package. It exists, since this program
@@ -30,8 +29,8 @@ pub fn cargo_home() -> Result<PathBuf> {
     }
 }
 
-/// An option of cargo that makes the compiler for a target write the short names, and gives it more flags. It adds
-/// to the flags of the target in `.cargo/config.toml`; the variables of the environment would replace them.
+/// An option of cargo that makes the compiler for a target write the short names, and gives it further flags. It adds to the flags of the
+/// target in `.cargo/config.toml`; environment variables would replace these.
 pub fn option(target: &str, more: &[&str]) -> Result<String> {
     let mut flags: Vec<String> = more.iter().map(|&flag| flag.to_owned()).collect();
     for (long, short) in short_names()? {

@@ -1,7 +1,7 @@
 //! `cargo xtask prove`: long proofs in shards, not part of the test. `xtask/proofs.toml` states them.
 //!
-//! The output of each finished shard is kept in `target/prove/NAME/COMMIT/`. A later call goes on with
-//! the missing ones. With `K/N` it does the Kth of N parts, so that N machines share a proof.
+//! The output of each finished shard is kept in `target/prove/NAME/COMMIT/`. A later call continues with the missing ones. With `K/N` it
+//! does the Kth of N parts, so that N machines share a proof.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -33,7 +33,7 @@ struct Proof {
     commands: Vec<String>,
     #[serde(default = "one")]
     seeds: usize,
-    /// From seed to seed; the first is 1.
+    /// Distance between seeds; the first is 1.
     #[serde(default = "one")]
     step: usize,
     /// Metrics of a shard: the least and the largest value.
@@ -95,7 +95,7 @@ pub fn prove(name: &str, part: &str) -> Result<()> {
     list()
 }
 
-/// The files of the results of all shards. They hold for one commit.
+/// The files of the results of all shards. They are valid for one commit.
 fn results(proof: &Proof) -> Result<Vec<PathBuf>> {
     let commit = run::output("git", &["rev-parse", "--short=10", "HEAD"])?;
     let dir = run::target_dir()?.join("prove").join(&proof.name).join(commit);

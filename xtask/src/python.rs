@@ -1,4 +1,4 @@
-//! `cargo xtask python`: the module of Python, as a wheel, and its tests in an environment that has nothing else.
+//! `cargo xtask python`: the module for Python, as a wheel, and its tests in an environment with nothing else.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,14 +9,14 @@ use glob::glob;
 
 use crate::{paths, run};
 
-/// The wheels of this version, by systems.
+/// The wheels of this version, sorted by system.
 pub fn wheels() -> Result<Vec<PathBuf>> {
     let names = concat!("wheels/*-", env!("CARGO_PKG_VERSION"), "-*.whl");
     let found = glob(&run::target_dir()?.join(names).to_string_lossy())?;
     found.collect::<Result<_, _>>().context("wheels")
 }
 
-/// Builds the wheel of this version into `target/wheels`, with the program that it is compared with, and runs the tests.
+/// Builds the wheel of this version into `target/wheels`, and the program that it is compared with, and runs the tests.
 pub fn test() -> Result<()> {
     let host = run::output("rustc", &["--print", "host-tuple"])?;
     let options = ["--locked", "--profile", run::SHIPPED, &paths::option(&host, &[])?];

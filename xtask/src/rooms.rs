@@ -1,9 +1,8 @@
-//! `cargo xtask rooms`: no circle between the modules of a crate.
+//! `cargo xtask rooms`: checks that the modules of a crate do not refer to each other in a circle.
 //!
-//! A module refers to another by a path, an import, or a name that a third module re-exports; a name from
-//! the root of the crate counts for the module that defines it. References are compared between siblings:
-//! one from `a::b` to `c::d` is an arrow from `a` to `c`. Those between a module and its own children do
-//! not count.
+//! A module refers to another by a path, an import, or a name that a third module re-exports; a name from the root of the crate counts
+//! for the module that defines it. References are compared between siblings: a reference from `a::b` to `c::d` is an arrow from `a` to
+//! `c`. References between a module and its own children do not count.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
@@ -13,7 +12,7 @@ use anyhow::{Result, ensure};
 use crate::modules::{self, Modules, Name};
 use crate::sources;
 
-/// Most modules that a path goes through before it is taken for one that leads to itself.
+/// Most modules that a path goes through; a longer path counts as one that leads to itself.
 const LONGEST: usize = 64;
 
 /// Arrows between siblings, each with one of its places.
@@ -80,7 +79,7 @@ fn arrows(modules: &Modules) -> Arrows {
     arrows
 }
 
-/// Lists the modules that a path goes `through`, which is written in the module `at`.
+/// Lists the modules that a path goes `through`; the path is written in the module `at`.
 fn follow(modules: &Modules, at: &[String], path: &[String], through: &mut Vec<Name>) {
     through.push(at.to_vec());
     let Some((first, rest)) = path.split_first().filter(|_| through.len() < LONGEST) else {
@@ -95,7 +94,7 @@ fn follow(modules: &Modules, at: &[String], path: &[String], through: &mut Vec<N
         _ if modules.contains_key(&child) => follow(modules, &child, rest, through),
         _ => match module.imports.get(first) {
             Some(from) => follow(modules, at, &[from, rest].concat(), through),
-            // The name can be from any of these.
+            // The name can come from any of these modules.
             None => module.globs.iter().for_each(|glob| {
                 follow(modules, at, &[glob, path].concat(), through);
             }),
@@ -182,7 +181,7 @@ mod tests {
         assert_eq!(found(&format!("{root} mod a {{ fn f(b: crate::B) {{}} }}")), ["a b a"]);
         assert_eq!(found(&format!("{root} mod a {{ use crate::B as Other; }}")), ["a b a"]);
         assert_eq!(found(&format!("{root} mod a {{ use super::*; fn f(b: B) {{}} }}")), ["a b a"]);
-        // Over two re-exports, the second of all names.
+        // Through two re-exports, the second of which covers all names.
         let text = "pub use a::*; pub use b::B; mod a { pub struct A; pub use super::c::C; use crate::B; }";
         let rest = "mod b { pub struct B; } mod c { pub struct C; fn f() -> crate::A {} }";
         assert_eq!(found(&format!("{text} {rest}")), ["a c a"]);

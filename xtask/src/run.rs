@@ -1,4 +1,4 @@
-//! Commands: where they run, how they are shown, and how long they take.
+//! Commands: their folder, their output, and their run time.
 
 use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
@@ -18,15 +18,16 @@ pub const BROWSER: &str = "wasm32-unknown-unknown";
 /// Profile of the image that is flashed.
 pub const PROFILE: &str = "firmware";
 
-/// Packages of `cargo test`, live page and tasks. A smaller selection would want other features of the crates below, and build them again.
+/// Packages of `cargo test`, live page and tasks. A smaller selection would need other features of the crates below, and build them
+/// again.
 pub const TESTED: &str =
     "--workspace --exclude induction-drive-benches --exclude induction-drive-python";
 
 /// Profile of the programs and the wheel of a release.
 pub const SHIPPED: &str = "shipped";
 
-/// The root of the workspace. Cargo names the folder of this package when it starts the program: a program that was built in another
-/// clone, into a folder that both share, works on the clone that it is started in.
+/// The root of the workspace. Cargo names the folder of this package when it starts the program. So a program that was built in another
+/// clone, into a folder that both share, works on the clone in which it is started.
 pub fn root() -> &'static Path {
     static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
         let package = env::var_os("CARGO_MANIFEST_DIR");
@@ -44,7 +45,7 @@ pub fn target_dir() -> Result<PathBuf> {
     }
 }
 
-/// A directory of build results, made if it is not there.
+/// A directory of build results, made if it does not exist.
 pub fn folder(name: impl AsRef<Path>) -> Result<PathBuf> {
     let folder = target_dir()?.join(name);
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -58,8 +59,8 @@ pub fn cargo(arguments: &str) -> Command {
     command
 }
 
-/// Lets a command compile without the flags of the environment, and not by increments, as two packages of [`SHIPPED`] would be: both
-/// leave traces.
+/// Makes a command compile without the flags of the environment and without incremental compilation, as two packages of [`SHIPPED`] would
+/// be compiled: both leave traces in the result.
 pub fn plain(command: &mut Command) -> &mut Command {
     command.env("CARGO_INCREMENTAL", "0").env_remove("RUSTFLAGS");
     command.env_remove("CARGO_ENCODED_RUSTFLAGS")
@@ -93,7 +94,7 @@ pub struct Beside {
 /// The steps of a task that goes on when one fails.
 pub struct Steps {
     began: Instant,
-    /// Name, time, and how it ended; `None` if it was not run, because a step that it needs failed.
+    /// Name, time, and result; `None` if the step was not run, because a step that it needs failed.
     ended: Vec<(&'static str, Duration, Option<Result<()>>)>,
 }
 
@@ -104,7 +105,7 @@ impl Steps {
     }
 
     /// Starts a task of this program, which uses one core while the next steps use the other. [`Self::joined`] waits for it and
-    /// prints what it printed.
+    /// prints its output.
     pub fn beside(name: &'static str, task: &[&str]) -> Result<Beside> {
         println!("\n==> {name}: cargo xtask {}, beside the next steps", task.join(" "));
         let output = folder("beside")?.join(name.replace(' ', "-"));
@@ -115,19 +116,19 @@ impl Steps {
         Ok(Beside { name, began: Instant::now(), child, output })
     }
 
-    /// Waits for a task that runs beside the steps; whether it passed.
+    /// Waits for a task that runs beside the steps; returns `Some` if it passed.
     pub fn joined(&mut self, beside: Beside) -> Option<()> {
         let Beside { name, began, child, output } = beside;
         let status = child.and_then(|mut child| Ok(child.wait()?));
         let result = status.and_then(|status| {
-            println!("\n==> {name}: what it printed\n{}", fs::read_to_string(output)?);
+            println!("\n==> {name}: its output\n{}", fs::read_to_string(output)?);
             ensure!(status.success(), "{name}, {status}");
             Ok(())
         });
         self.note(name, began, Some(result))
     }
 
-    /// Runs a step; its result, if it passes.
+    /// Runs a step; returns its result, if it passes.
     pub fn run<T>(&mut self, name: &'static str, step: impl FnOnce() -> Result<T>) -> Option<T> {
         self.with(Some(()), name, |()| step())
     }
@@ -149,7 +150,7 @@ impl Steps {
         self.note(name, began, needed.map(step))
     }
 
-    /// Notes and prints how a step ended; its result, if it passed.
+    /// Notes and prints the result of a step; returns it, if the step passed.
     fn note<T>(
         &mut self,
         name: &'static str,
@@ -174,7 +175,7 @@ impl Steps {
         passed
     }
 
-    /// Prints how every step ended, and the seconds that the whole command may take.
+    /// Prints the result of every step, and the time limit of the whole command, seconds.
     ///
     /// # Errors
     /// The steps that failed or were not run, with the reasons.
@@ -219,10 +220,10 @@ pub fn limit<T: Display + PartialOrd>(what: &str, used: T, limit: T, unit: &str)
     Ok(())
 }
 
-/// The output of a command, without white space around it.
+/// The output of a command, without surrounding white space.
 ///
 /// # Errors
-/// It does not run, or it fails: all that it said.
+/// The command does not run, or it fails: its whole output.
 pub fn said(command: &mut Command) -> Result<String> {
     let output = command.output().with_context(|| format!("cannot run: {command:?}"))?;
     let decoded = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
@@ -231,12 +232,12 @@ pub fn said(command: &mut Command) -> Result<String> {
     Ok(text)
 }
 
-/// The same of a program with these arguments.
+/// The output of a program with these arguments.
 pub fn output(program: &str, arguments: &[&str]) -> Result<String> {
     said(command(program).args(arguments))
 }
 
-/// Fails if probe-rs is not there.
+/// Fails if probe-rs is not installed.
 pub fn probe_rs() -> Result<()> {
     let probe = command("probe-rs").arg("--version").output();
     if probe.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound) {

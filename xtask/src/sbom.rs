@@ -1,6 +1,6 @@
 //! The crates in a program, as CycloneDX JSON: what cargo builds for one target with that target's features.
 //!
-//! Own code beside cargo-cyclonedx 0.5, which joins the features of all targets and tests, and writes a new number each time.
+//! Own code replaces cargo-cyclonedx 0.5, which joins the features of all targets and tests, and writes a new number each time.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use serde_json::{Value, json};
 
 use crate::{run, sources};
 
-/// What is known of each crate, by `NAME@VERSION`.
+/// Information on each crate, by `NAME@VERSION`.
 type Crates = BTreeMap<String, String>;
 
 /// The crates of a program.
 pub struct Sbom {
-    /// Licences of those in the program, its own package among them.
+    /// Licences of the crates in the program, including its own package.
     inside: Crates,
-    /// The same, with those that run while it is built: macros, build scripts and what they need.
+    /// Licences of these crates and of those that run during the build: macros, build scripts and their dependencies.
     all: Crates,
-    /// Check sums of the packages of others in `Cargo.lock`.
+    /// Check sums of the third-party packages in `Cargo.lock`.
     sums: Crates,
 }
 
@@ -34,7 +34,7 @@ impl Sbom {
         Ok(Self { inside, all, sums: sums(&sources::read("Cargo.lock")?)? })
     }
 
-    /// The crates of others in the program.
+    /// The third-party crates in the program.
     pub fn of_others(&self) -> impl Iterator<Item = &String> {
         self.sums.keys().filter(|one| self.inside.contains_key(*one))
     }
@@ -54,7 +54,7 @@ impl Sbom {
     /// The document for a package's program of this kind, built by this compiler. The same crates give the same text.
     pub fn document(&self, package: &str, kind: &str, compiler: &str) -> Result<String> {
         let version = env!("CARGO_PKG_VERSION");
-        // Not in `Cargo.lock`.
+        // The standard library is not in `Cargo.lock`.
         let library = json!({ "type": "library", "name": "rust-std", "version": compiler });
         let mut components = vec![library];
         for (one, licence) in &self.all {
@@ -80,7 +80,7 @@ fn crates(tree: &str) -> Result<Crates> {
     let lines = tree.lines().map(|line| {
         let (of, licence) = line.split_once('|')?;
         let (name, version) = of.split_once(" v")?;
-        // A slash is the older way to write a choice.
+        // A slash is the older way to write a choice of licences.
         Some((format!("{name}@{}", version.split(' ').next()?), licence.replace('/', " OR ")))
     });
     lines.collect::<Option<_>>().with_context(|| format!("cargo tree: {tree}"))
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(fixture().of_others().collect::<Vec<_>>(), ["az@1.3.0"]);
     }
 
-    /// What cargo resolves for the image by its other command.
+    /// Compares the list with the crates that another command of cargo resolves for the image.
     #[test]
     fn the_crates_of_the_image_are_those_that_cargo_resolves() {
         let sbom = Sbom::new("induction-drive", run::TARGET).unwrap();
@@ -179,8 +179,8 @@ mod tests {
         let found: BTreeSet<_> = found.iter().map(name).collect();
         let ours: BTreeSet<_> = sbom.inside.keys().cloned().collect();
         assert_eq!(ours.difference(&found).next(), None);
-        // That command joins the features of all targets and tests: rand_core's random numbers of the system are those of the host, and
-        // the settings are tested with serde.
+        // That command joins the features of all targets and tests: the operating system's random numbers in rand_core belong to the
+        // host, and the settings are tested with serde.
         let hosts = ["getrandom@", "cfg-if@", "serde@", "serde_core@"];
         let more = found.difference(&ours);
         let more: Vec<_> = more.filter(|one| !hosts.iter().any(|of| one.starts_with(of))).collect();

@@ -1,5 +1,5 @@
-//! The check sum in the finished image, which the firmware compares at every start (`src/chip/start.rs`), and the same image as
-//! `.bin` and `.hex` for programs that take no ELF.
+//! The check sum in the finished image, which the firmware compares at every start (`src/chip/start.rs`), and the same image as `.bin`
+//! and `.hex` for programs that do not read ELF.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use object::{LittleEndian, Object, ObjectSymbol};
 const FLASH: usize = 0x0800_0000;
 const SIZE: usize = 512 * 1024;
 
-/// Puts the check sum into an ELF; the same twice gives the same. Writes the other files beside it.
+/// Puts the check sum into an ELF file; doing it twice gives the same result. Writes the other files beside it.
 pub fn seal(path: &Path) -> Result<()> {
     let mut bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let elf: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes)?;
@@ -27,7 +27,7 @@ pub fn seal(path: &Path) -> Result<()> {
         let at = at.wrapping_sub(FLASH);
         if at < SIZE && !data.is_empty() {
             let end = at + data.len();
-            // As erased where nothing is.
+            // Gaps are filled as erased flash.
             flash.resize(flash.len().max(end.next_multiple_of(8)), 0xff);
             flash[at..end].copy_from_slice(data);
             place = if (at..end).contains(&check) { offset + check - at } else { place };

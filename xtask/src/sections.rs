@@ -1,7 +1,7 @@
-//! Checks that each input-section pattern of `memory.x` takes something in the link. A pattern that
-//! takes nothing hides a renamed module, whose code then stays in the slower flash.
+//! Checks that each input-section pattern of `memory.x` matches something in the link. A pattern that matches nothing hides a renamed
+//! module, whose code then stays in the slower flash.
 //!
-//! A pattern that may take nothing is marked by `/* optional: REASON */` on its line.
+//! A pattern that may match nothing is marked by `/* optional: REASON */` on its line.
 
 use anyhow::{Context, Result, ensure};
 use glob::Pattern;
@@ -11,12 +11,12 @@ use crate::map::{self, Level};
 /// The mark of an optional pattern, before its reason.
 const OPTIONAL: &str = "/* optional: ";
 
-/// Fails if a pattern takes no section that an earlier one has not taken; `map` is the map of lld.
+/// Fails if a pattern matches no section that earlier ones have left; `map` is the map of lld.
 pub fn check(memory_x: &str, map: &str) -> Result<()> {
     let empty = empty_patterns(memory_x, map)?;
     ensure!(
         empty.is_empty(),
-        "patterns of memory.x that take nothing, or nothing that an earlier one leaves:\n    {}\n\
+        "patterns of memory.x that match nothing, or nothing that an earlier one leaves:\n    {}\n\
          Delete them, or mark them on their lines: {OPTIONAL}REASON */",
         empty.join("\n    ")
     );
@@ -67,7 +67,7 @@ mod tests {
         assert!(
             empty(".ccm : { *(.text.*10drive_core*5steps*) }") == [".text.*10drive_core*5steps*"]
         );
-        // A star takes dots and underlines, and nothing at all.
+        // A star matches dots, underscores, and nothing at all.
         assert!(empty(".ccm : { *(.t*A*DC1_2*) *(*drive_core*) }").is_empty());
     }
 

@@ -1,16 +1,16 @@
 //! The most stack that the image can use, from its machine code.
 //!
-//! The frame of each function follows from its instructions that move the stack pointer; the call graph,
-//! from its calls. A call through a register could go to any function that nobody calls by name, so the
-//! deepest of those is taken; printing a line nests at most [`NESTED`] of them (text, value, part of
-//! the value, buffer). The nesting is an assumption about `core::fmt`: nothing here proves it.
-//! Recursion and a stack that grows by a register are refused: there would be no bound.
+//! The frame of each function follows from its instructions that move the stack pointer; the call graph, from its calls. A call through a
+//! register could go to any function that nobody calls by name, so the deepest of these is assumed; printing a line nests at most
+//! [`NESTED`] of them (text, value, part of the value, buffer). The nesting is an assumption about `core::fmt`: nothing here proves it.
+//! Recursion and a stack that grows by a register are refused, because then there is no limit.
 //!
-//! From the same graph follows where the control interrupt goes: it and all it calls lie in CCM. That is 128 MiB away from the flash,
-//! further than a call instruction reaches: a call out of it needs a veneer of the linker in CCM (`Thunk`), or a register. The register is
-//! refused; a veneer may lead to the cold code of the control alone, which `memory.x` gathers in a section of its own.
+//! The same graph shows where the control interrupt goes: the interrupt and all functions that it calls are in CCM. CCM is 128 MiB away
+//! from the flash, further than a call instruction reaches, so a call out of it needs a veneer of the linker in CCM (`Thunk`), or a
+//! register. A register is refused; a veneer may lead only to the cold code of the control, which `memory.x` gathers in a section of its
+//! own.
 //!
-//! Own code, since cargo-call-stack needs a nightly compiler.
+//! Own code, because cargo-call-stack needs a nightly compiler.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -21,14 +21,14 @@ use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use crate::elf::{self, Instruction};
 
-/// Calls through registers inside each other.
+/// Nested calls through registers.
 const NESTED: usize = 4;
 /// Bytes that the core pushes for an interrupt, with floating point and alignment.
 const EXCEPTION: u32 = 104 + 4;
-/// The interrupts by rising priority: one of each priority can interrupt main and those before it, once.
+/// The interrupts by rising priority: one of each priority can interrupt main and the interrupts before it, once.
 const INTERRUPTS: [&[&str]; 3] = [&["LPUART", "USART3"], &["ADC1_2"], &["NonMaskableInt"]];
-/// Part of the name of the panic handler, which panics only once: it comes on top of everything else,
-/// once, and what it calls may call it without end only in appearance.
+/// Part of the name of the panic handler. It panics only once, so its stack is added once to everything else; an endless recursion
+/// through it is only apparent.
 const PANIC: &str = "rust_begin_unwind";
 /// Parts of the names of functions that panic.
 const PANICS: [&str; 5] = [PANIC, "panic", "unwrap_failed", "expect_failed", "index_fail"];
@@ -36,8 +36,7 @@ const PANICS: [&str; 5] = [PANIC, "panic", "unwrap_failed", "expect_failed", "in
 const MAIN: &str = "main";
 /// Functions that only the processor calls, and that never return or have a stack of their own.
 const BY_PROCESSOR: [&str; 3] = ["Reset", "HardFault", "DefaultHandler"];
-/// Parts of the names of the functions of core that print numbers and padding. They call nothing through a register
-/// but the text's output.
+/// Parts of the names of the functions of core that print numbers and padding. The only register calls in them go to the text's output.
 const PRINTERS: [&str; 3] =
     ["4core3fmtNtB5_9Formatter", "4core3fmtNtB5_11PostPadding", "float_to_decimal"];
 /// Parts of the names of the outputs' functions.
@@ -86,8 +85,8 @@ fn most(mut depths: impl Iterator<Item = Result<u32>>) -> Result<u32> {
     depths.try_fold(0, |most, depth| Ok(most.max(depth?)))
 }
 
-/// Fails if an interrupt can come to a panic, to code in the bank of the flash that is written, or to a call through a
-/// register, of which nobody knows the target; or if the control interrupt is not in CCM, or leads out of it.
+/// Fails if an interrupt can reach a panic, code in the bank of the flash that is written, or a call through a register, whose target is
+/// unknown. Fails also if the control interrupt is not in CCM, or leads out of it.
 pub fn check_interrupts(image: &[u8]) -> Result<()> {
     let elf: ElfFile32 = ElfFile32::parse(image)?;
     let place = |name| -> Result<Range<u32>> {
@@ -181,7 +180,7 @@ fn add(function: &mut Function, begin: u32, instruction: Instruction) -> Result<
             bail!("the stack grows by a register at {address:#010x}")
         }
         _ if a & 0xf800 == 0xf000 && (b & 0xd000 == 0xd000 || b & 0xd000 == 0x9000) => {
-            // BL, and B.W where it leaves the function.
+            // BL, and B.W if it leaves the function.
             let (s, j1, j2) = (a >> 10 & 1, b >> 13 & 1, b >> 11 & 1);
             let (i1, i2) = (1 ^ j1 ^ s, 1 ^ j2 ^ s);
             let offset = s << 24 | i1 << 23 | i2 << 22 | (a & 0x3ff) << 12 | (b & 0x7ff) << 1;
@@ -196,7 +195,7 @@ fn add(function: &mut Function, begin: u32, instruction: Instruction) -> Result<
     Ok(())
 }
 
-/// The constant of an instruction, spread as Thumb does it.
+/// The constant of an instruction, expanded as in Thumb.
 fn expanded(immediate: u32) -> u32 {
     let byte = immediate & 0xff;
     match immediate >> 8 {
@@ -213,7 +212,7 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
     let start = find(functions, name)?;
     let called: Vec<u32> = functions.values().flat_map(|f| f.calls.iter().copied()).collect();
     let by_pointer = |at| !called.contains(&at) && !is_entry(&functions[&at].name);
-    // How deep a call through a register may get, with none inside it, one, and so on.
+    // Depth of a call through a register, with no nested one, one, and so on.
     let deepest = |through: Through, which: &dyn Fn(u32) -> bool| {
         let mut known = BTreeMap::new();
         let inside = functions.keys().filter(|at| which(**at));
@@ -230,9 +229,9 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
 /// The deepest the stack gets below a call through a register.
 #[derive(Clone, Copy, Default)]
 struct Through {
-    /// To an output of text.
+    /// Depth of a call to an output of text.
     output: u32,
-    /// To any function.
+    /// Depth of a call to any function.
     any: u32,
 }
 
@@ -300,8 +299,7 @@ mod tests {
         assert_eq!(frame(&[(0xf84d, 0xbd04)]), 4);
     }
 
-    /// The interrupts at 0, 10, 20, 30, each of 10 bytes, and one more function: the control interrupt calls it through a
-    /// veneer.
+    /// The interrupts at 0, 10, 20, 30, each of 10 bytes, and one more function, which the control interrupt calls through a veneer.
     fn interrupts(name: &str, at: u32) -> Functions {
         let function = |name: &str, end, calls: &[u32]| Function {
             name: name.into(),
@@ -344,12 +342,12 @@ mod tests {
         }
         sound.get_mut(&60).unwrap().calls_through_register = true;
         assert!(error(&sound).starts_with("a call through a register: ADC1_2"));
-        // A call to nowhere, and a veneer to nowhere.
+        // A call to a missing function, and a veneer to a missing function.
         sound.remove(&60);
         assert!(error(&sound).starts_with("no function at 0x3c"));
         sound.remove(&50);
         assert!(error(&sound).contains("no function middle"));
-        // Not reached.
+        // A panic that is not reached.
         let mut other = interrupts("core::panicking", 60);
         other.get_mut(&50).unwrap().calls.clear();
         check(&other).unwrap();
@@ -357,7 +355,7 @@ mod tests {
 
     #[test]
     fn calls_and_recursion_are_found() {
-        // bl +4 behind the instruction, from address 0
+        // bl +4 after the instruction, from address 0
         let mut function = Function { end: 8, ..Function::default() };
         add(&mut function, 0, instruction(0, 0xf000, 0xf802)).unwrap();
         assert_eq!(function.calls, [8]);

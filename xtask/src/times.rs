@@ -19,9 +19,9 @@ pub fn test(name: &str, command: Command) -> Result<()> {
     beside_simulated(name, command, Path::new(""))
 }
 
-/// As [`test()`], and shows beside the seconds of each test those that it simulated, which the tests append to a file.
+/// As [`test()`]; also shows the simulated time of each test beside its run time. The tests append the simulated seconds to a file.
 pub fn beside_simulated(name: &str, mut command: Command, simulated: &Path) -> Result<()> {
-    // A stable harness shows times only with this variable. As a runner's it does not reach the compiler.
+    // A stable harness shows times only with this variable. As a runner's variable it does not reach the compiler.
     let host = run::output("rustc", &["--print", "host-tuple"])?.to_uppercase().replace('-', "_");
     command.env(format!("CARGO_TARGET_{host}_RUNNER"), "env RUSTC_BOOTSTRAP=1");
     command.args(["--", "-Zunstable-options", "--report-time"]).stdout(Stdio::piped());
@@ -66,7 +66,7 @@ fn time_of(line: &str) -> Option<(&str, f64)> {
     Some((test, seconds.parse().ok()?))
 }
 
-/// The sum of the lines `TEST SECONDS` of a file, of one test or of all; none if there is no such file.
+/// The sum of the lines `TEST SECONDS` of a file, for one test or for all; 0 if there is no such file.
 fn simulated_s(file: &Path, test: Option<&str>) -> f64 {
     let text = fs::read_to_string(file).unwrap_or_default();
     let lines = text.lines().filter_map(|line| line.rsplit_once(' '));

@@ -1,9 +1,8 @@
-//! The programs that build for the microcontroller and for this machine, and how they get here.
+//! The programs that build for the microcontroller and for this machine, and their installation.
 //!
-//! Where rustup may install, it adds the target. Otherwise Debian's compiler builds the core library
-//! from Debian's sources, with results in a directory of its own, so that the two compilers do not
-//! replace each other's. Root installs Debian's packages; anybody else is told the command. Nothing is
-//! ever skipped.
+//! If rustup may install, it adds the target. Otherwise Debian's compiler builds the core library from Debian's sources, with results in
+//! a directory of its own, so that the two compilers do not replace each other's. Root installs Debian's packages; other users are told
+//! the command. No step is ever skipped.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,7 +19,7 @@ const DEBIAN_PACKAGES: &str = "rustc-web cargo-web rust-web-src rust-web-clippy 
 pub enum Target {
     /// The toolchain in use.
     InUse,
-    /// Debian's, with the core library built from source.
+    /// Debian's toolchain, with the core library built from source.
     Debian,
 }
 
@@ -38,7 +37,7 @@ impl Target {
             let path = std::env::var("PATH").unwrap_or_default();
             command
                 .args([subcommand, &format!("-Zbuild-std={library}")])
-                // A stable compiler builds the core library only with this.
+                // A stable compiler builds the core library only with this variable.
                 .env("RUSTC_BOOTSTRAP", "1")
                 // Debian's programs before those of rustup.
                 .env("PATH", format!("/usr/bin:{path}"))
@@ -64,9 +63,9 @@ impl Target {
         Ok(command)
     }
 
-    /// Builds the library of a package for a browser; where it lies.
+    /// Builds the library of a package for a browser; returns its path.
     pub fn browser(&self, package: &str) -> Result<PathBuf> {
-        // A library that is also one for Rust would not be optimised as a whole.
+        // A library that Rust can use as well would not be optimised as a whole.
         let mut command = self.with_library("rustc", "std,panic_abort");
         command.args(["--lib", "--crate-type", "cdylib"]);
         command.args(["--profile", "web", "--target", BROWSER, "--package", package]);
@@ -96,12 +95,12 @@ impl Target {
     }
 }
 
-/// Finds or gets a compiler for the microcontroller.
+/// Finds or installs a compiler for the microcontroller.
 pub fn for_target() -> Result<Target> {
     compiler(TARGET)
 }
 
-/// Finds or gets a compiler for a target: [`TARGET`] or [`BROWSER`].
+/// Finds or installs a compiler for a target: [`TARGET`] or [`BROWSER`].
 pub fn compiler(target: &str) -> Result<Target> {
     let (has_target, rustup) = (|| has(target), format!("rustup target add {target}"));
     if has_target() || rustup_may_install() {
@@ -115,7 +114,7 @@ pub fn compiler(target: &str) -> Result<Target> {
     Ok(Target::Debian)
 }
 
-/// Finds or gets `cargo fmt` and `cargo clippy` for the toolchain in use.
+/// Finds or installs `cargo fmt` and `cargo clippy` for the toolchain in use.
 pub fn ensure_format_and_lints() -> Result<()> {
     let tools = ["fmt --version", "clippy --version"];
     let there = || tools.iter().all(|words| run::said(&mut run::cargo(words)).is_ok());
@@ -123,19 +122,19 @@ pub fn ensure_format_and_lints() -> Result<()> {
     provide("cargo fmt or cargo clippy", there, rustup, "rustfmt-web rust-web-clippy")
 }
 
-/// Finds or gets a C compiler, for the emulator of the virtual board.
+/// Finds or installs a C compiler, for the emulator of the virtual board.
 pub fn ensure_c_compiler() -> Result<()> {
     let packages = "cmake gcc libc6-dev make pkg-config";
     let there = || ["cmake", "cc", "make", "pkg-config"].into_iter().all(answers);
     provide("cmake, make, pkg-config or a C compiler", there, "", packages)
 }
 
-/// Finds or gets Chromium, for pictures of pages.
+/// Finds or installs Chromium, for pictures of pages.
 pub fn ensure_chromium() -> Result<()> {
     provide("chromium", || answers("chromium"), "", "chromium")
 }
 
-/// Finds or gets the clients of the field bus that are programs of Debian: mbpoll, and LinuxCNC with its `vfdb_vfd`.
+/// Finds or installs the clients of the field bus that are programs of Debian: mbpoll, and LinuxCNC with its `vfdb_vfd`.
 pub fn ensure_bus_clients() -> Result<()> {
     let there = || {
         [("mbpoll", "-V"), ("halcmd", "-V"), ("vfdb_vfd", "-h")]
@@ -145,7 +144,7 @@ pub fn ensure_bus_clients() -> Result<()> {
     provide("mbpoll or LinuxCNC", there, "", "mbpoll linuxcnc-uspace")
 }
 
-/// Installs something that is not there, by a command of rustup or as packages of Debian.
+/// Installs a missing program, by a command of rustup or as packages of Debian.
 fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -> Result<()> {
     if there() {
         return Ok(());
@@ -167,7 +166,7 @@ fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -
     Ok(())
 }
 
-/// Whether a program is there.
+/// Whether a program is installed.
 fn answers(program: &str) -> bool {
     run::said(run::command(program).arg("--version")).is_ok()
 }

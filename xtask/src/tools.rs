@@ -1,4 +1,4 @@
-//! Programs from crates.io that cargo does not bring along, and the tasks that they do.
+//! Programs from crates.io that do not come with cargo, and their tasks.
 
 use std::path::PathBuf;
 
@@ -29,16 +29,16 @@ pub fn mutants(shard: &str) -> Result<()> {
     command
         .args(["mutants", "--package", "induction-drive-core", "--test-tool", "cargo", "-j2"])
         .args(["--exclude", "**/tests.rs", "--exclude", "**/tests/**"])
-        // The tests are built with the feature `printed`, which this module stands in for.
+        // The tests are built with the feature `printed`; the module `absent` replaces it otherwise.
         .args(["--exclude-re", "absent::"])
-        // A baseline would run the tests of the first package alone.
+        // A baseline would run only the tests of the first package.
         .args(["--test-package", "induction-drive-core,induction-drive", "--baseline", "skip"])
         .args(["--timeout", "300", "--sharding", "round-robin", "--shard", shard, "--output"])
         .arg(&output)
         .args(["--", "--lib", "--test", "filters", "--test", "procedures"])
         // With one target directory the two would wait for each other.
         .env_remove("CARGO_TARGET_DIR");
-    // Missed mutants are judged below. Anything else than 0, missed (2) or time-out (3) is a failure.
+    // Missed mutants are judged below. Any code other than 0, missed (2) or time-out (3) is a failure.
     let status = command.status().context("cargo-mutants")?;
     ensure!(matches!(status.code(), Some(0 | 2 | 3)), "cargo-mutants: {status}");
     let results = output.join("mutants.out");

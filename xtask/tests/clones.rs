@@ -7,7 +7,7 @@ use std::process::Command;
 /// A small package of the workspace, and its source.
 const PACKAGE: &str = "fpu-sqrt";
 const SOURCE: &str = "drive-core/sqrt/src/lib.rs";
-/// What the second clone has beside the first.
+/// Text that the second clone has in addition.
 const FAILING: &str = "\n#[test]\nfn of_the_second_clone() {\n    panic!(\"on purpose\");\n}\n";
 
 /// A copy of the tracked files.
@@ -32,7 +32,7 @@ fn passes(clone: &Path, shared: &Path) -> bool {
     command.current_dir(clone).env("CARGO_TARGET_DIR", shared);
     let output = command.output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
-    // Not a failure of the build.
+    // A failure must come from a test, not from the build.
     assert!(text.contains("test result: "), "{text}{}", String::from_utf8_lossy(&output.stderr));
     output.status.success()
 }

@@ -1,7 +1,7 @@
 //! Chromium without a window, over its DevTools protocol.
 //!
-//! Own code, because the crates for it (`chromiumoxide`, `headless_chrome`) bring a hundred thousand generated lines for the
-//! six methods that are used here.
+//! Own code, because the crates for it (`chromiumoxide`, `headless_chrome`) bring a hundred thousand generated lines for the six methods
+//! that are used here.
 
 use std::io::{BufRead as _, BufReader};
 use std::net::TcpStream;
@@ -13,14 +13,14 @@ use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-/// A browser, which ends with this value.
+/// A browser, which ends when this value is dropped.
 pub struct Browser {
     child: Child,
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     number: u64,
 }
 
-/// A page of it.
+/// A page of the browser.
 pub struct Page<'a> {
     browser: &'a mut Browser,
     target: Value,
@@ -28,7 +28,7 @@ pub struct Page<'a> {
 }
 
 impl Browser {
-    /// Files that a page saves go to `files`.
+    /// Starts the browser. Files that a page saves go to `files`.
     pub fn start(profile: &Path, files: &Path) -> Self {
         let mut child = Command::new("chromium")
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"])
@@ -41,7 +41,7 @@ impl Browser {
         let address = lines
             .find_map(|line| line.strip_prefix("DevTools listening on ").map(str::to_owned))
             .expect("chromium says where it listens");
-        // It must not wait for a reader of its messages.
+        // The browser must not wait for a reader of its messages.
         std::thread::spawn(move || lines.for_each(drop));
         let (socket, _) = tungstenite::connect(address).expect("chromium answers");
         let mut browser = Self { child, socket, number: 0 };
@@ -50,7 +50,7 @@ impl Browser {
         browser
     }
 
-    /// Calls a method; its result. Events are passed over.
+    /// Calls a method and returns its result. Events are ignored.
     fn call(&mut self, session: &Value, method: &str, parameters: Value) -> Value {
         self.number += 1;
         let mut message = json!({ "id": self.number, "method": method, "params": parameters });
@@ -75,7 +75,7 @@ impl Browser {
         let session = self.call(&Value::Null, "Target.attachToTarget", attach)["sessionId"].clone();
         let mut page = Page { browser: self, target, session };
         page.call("Page.bringToFront", json!({}));
-        // The empty page before it is complete, too.
+        // The empty page before the requested one is complete, too.
         let loaded = "location.href != 'about:blank' && document.readyState == 'complete'";
         page.until(loaded, Duration::from_secs(20));
         page
@@ -134,7 +134,7 @@ impl Page<'_> {
         }
     }
 
-    /// Sets the size in pixels, and dark or light.
+    /// Sets the size in pixels, and a dark or light scheme.
     pub fn shape(&mut self, width: u32, height: u32, dark: bool) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 700 });
         self.call("Emulation.setDeviceMetricsOverride", size);
@@ -143,7 +143,7 @@ impl Page<'_> {
         self.call("Emulation.setEmulatedMedia", feature);
     }
 
-    /// Writes a picture of what is in sight.
+    /// Writes a picture of the visible part.
     pub fn picture(&mut self, file: &Path) {
         self.write("Page.captureScreenshot", file);
     }

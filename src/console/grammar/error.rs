@@ -9,7 +9,7 @@ use crate::console::line::LONGEST_TAG;
 use crate::link::trace::SIGNALS;
 use crate::settings::keys::Key;
 
-/// The tag of a request is too long, or none.
+/// The tag of a request is too long or empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
     "a tag has 1 to {LONGEST_TAG} characters between `@` and a space; the request was not carried out"
@@ -30,10 +30,10 @@ pub enum ParseError<'a> {
     /// This word is missing.
     #[error("{0} is missing")]
     Missing(&'static str),
-    /// A word more than the command takes.
+    /// More words than the command takes.
     #[error("too many words, from `{0}` on")]
     TooMuch(&'a str),
-    /// More of these than this number.
+    /// More items than allowed.
     #[error("more than {most} {what}")]
     TooMany {
         /// The things that are counted.
@@ -44,7 +44,7 @@ pub enum ParseError<'a> {
     /// Not a finite number.
     #[error("not a number: {word} ({what})")]
     Number {
-        /// What it stands for, with its unit.
+        /// Meaning of the number, with its unit.
         what: &'static str,
         /// The word.
         word: &'a str,
@@ -52,7 +52,7 @@ pub enum ParseError<'a> {
     /// Not one of these words.
     #[error("{what} = {word}: not one of: {all}")]
     OneOf {
-        /// What it stands for.
+        /// Meaning of the word.
         what: &'static str,
         /// The word.
         word: &'a str,
@@ -62,7 +62,7 @@ pub enum ParseError<'a> {
     /// Not a whole number in this range.
     #[error("{what} = {word}: not a whole number from {min} to {max}")]
     Whole {
-        /// What it stands for.
+        /// Meaning of the number.
         what: &'static str,
         /// The word.
         word: &'a str,

@@ -1,4 +1,4 @@
-//! What a trace is to record, and a stream to send.
+//! Requests for a trace and for a stream.
 
 use drive_settings::value;
 
@@ -34,18 +34,18 @@ pub(super) fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, 
     Ok(plan)
 }
 
-/// A stream that is asked for.
+/// A requested stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stream {
     /// Its signals.
     pub choice: SignalChoice,
     /// Control periods from one frame to the next.
     pub divider: u16,
-    /// Without a line for so long the drive stops, s; 0: never.
+    /// Time without a line after which the drive stops, s; 0: never.
     pub alive_s: f32,
 }
 
-/// Frames a second of a stream without a rate.
+/// Frames per second of a stream for which no rate is given.
 const USUAL_RATE: u16 = 100;
 
 /// The stream with this signal and others.

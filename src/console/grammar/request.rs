@@ -1,4 +1,4 @@
-//! What a valid line asks for.
+//! The request of a valid line.
 
 use drive_core::Fault;
 use heapless::Vec;
@@ -17,7 +17,7 @@ pub const WORDS_IN_LINE: usize = 8;
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// An order to the desk.
+    /// A request to the command arbiter.
     Order(Order),
     /// Stage settings.
     Set(Assignments),
@@ -33,7 +33,7 @@ pub enum Request {
     Describe(&'static str),
     /// List the lines that restore settings and learned values.
     Backup,
-    /// List the result of the last learning.
+    /// List the result of the last self-commissioning.
     Learned,
     /// Words of a learned result, from this index on.
     Restore(usize, Vec<u32, WORDS_IN_LINE>),
@@ -78,7 +78,7 @@ pub enum Level {
     Warn,
     /// Changes of state as well.
     Info,
-    /// What the drive does, once a second, as well.
+    /// The drive's operating point, once a second, as well.
     Debug,
 }
 

@@ -27,7 +27,7 @@ fn what_is_no_line_is_one_error_and_the_next_line_is_whole() {
     assert_eq!(read(&long), [Err(LineError::TooLong), Ok("ok".to_owned())]);
     assert_eq!(read(b"st\xffop\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
     assert_eq!(read(b"st\0op\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
-    // A backspace does not heal.
+    // A backspace does not undo the error.
     assert_eq!(read(b"\xff\x08stop\n"), [Err(LineError::NotText)]);
 }
 
@@ -36,7 +36,7 @@ fn keys_that_write_nothing_are_ignored() {
     let text = |t: &str| Ok(t.to_owned());
     // Cursor keys, delete forward, function keys, and Tab.
     assert_eq!(read(b"st\x1b[A\x1b[1;5Co\x1b[3~p\x1bOP\t\n"), [text("stop")]);
-    // A line ends inside of a sequence, too.
+    // A line ends inside a sequence, too.
     assert_eq!(read(b"stop\x1b[\nok\n"), [text("stop"), text("ok")]);
     assert_eq!(read(b"st\x1bop\nok\n"), [Err(LineError::NotText), text("ok")]);
 }
@@ -49,7 +49,7 @@ fn the_line_is_killed_by_control_characters() {
     assert_eq!(read(b"torque 3\x03\n"), []);
 }
 
-/// The screen of a terminal, one line of it: what the echo leaves there is what is taken.
+/// One line of a terminal's screen: the text that the echo leaves there is the text that is taken.
 #[test]
 fn the_echo_shows_the_line_as_it_is_taken() {
     for typed in ["stop", "storq\x08\x7fp", "torque 3\x15stop", "\x08st\x1b[Aop\t", "st\x03stop"] {
@@ -67,7 +67,7 @@ fn the_echo_shows_the_line_as_it_is_taken() {
                 '\r' | '\n' => screen.clear(),
                 '\x08' => {
                     screen.pop();
-                    // The blank over it, and back again.
+                    // A blank over the character, and back again.
                     assert_eq!((shown.next(), shown.next()), (Some(' '), Some('\x08')));
                 }
                 c => screen.push(c),

@@ -6,12 +6,12 @@ use hil_sim::rig::Rig;
 use super::*;
 use crate::desk::news::News;
 
-/// Bytes a second of the wire.
+/// Bytes per second of the wire.
 const BYTES_PER_S: f64 = 11_520.0;
-/// Longest from a fault to its announcement, s.
+/// Longest time from a fault to its announcement, s.
 const LATEST_S: f64 = 0.2;
 
-/// A drive with its motor that is in a state.
+/// A drive with its motor in this state.
 fn in_state(state: State) -> Rig {
     let mut config = hil_sim::Config::default();
     config.drive.angle_source =
@@ -46,19 +46,19 @@ fn in_state(state: State) -> Rig {
     panic!("never {state}, but {}", rig.drive.state());
 }
 
-/// Polls the console as the wire lets it go on, ten times a millisecond, until a line begins so; the time and the line.
+/// Polls the console as the wire allows, ten times a millisecond, until a line begins with this text; returns the time and the line.
 fn until_line(talk: &mut Talk, begins: &str) -> (f64, String) {
     const POLL_S: f64 = 1e-4;
     let mut room = 0.0;
     for poll in 0..20_000 {
         talk.now_ms += u32::from(poll % 10 == 9);
         room += BYTES_PER_S * POLL_S;
-        // What the transmit queue of 512 bytes has sent.
+        // The space that the transmit queue of 512 bytes has freed by sending.
         talk.port.room = (talk.port.room + room as usize).min(511);
         room -= room.floor();
         talk.poll();
         if let Some(line) = talk.port.received.lines().find(|line| line.starts_with(begins)) {
-            // The queue is sent behind it.
+            // The queue is sent after it.
             let sent = (511 - talk.port.room) as f64 / BYTES_PER_S;
             return (f64::from(poll) * POLL_S + sent, line.to_owned());
         }
@@ -79,7 +79,7 @@ const STATES: [State; 10] = [
     State::Stopping,
 ];
 
-/// In every state, and while nothing, a list, or a trace is being printed.
+/// In every state, while nothing is being printed, and while a list or a trace is.
 #[test]
 fn a_fault_in_any_state_is_told_in_words_within_a_fifth_of_a_second() {
     for state in STATES {
@@ -110,7 +110,7 @@ fn a_fault_in_any_state_is_told_in_words_within_a_fifth_of_a_second() {
     }
 }
 
-/// What was being printed goes on behind the announcement.
+/// The interrupted output goes on after the announcement.
 #[test]
 fn an_announcement_comes_between_the_lines_of_a_list() {
     let mut talk = Talk::new();
@@ -124,7 +124,7 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
     assert_eq!(lines.len(), keys::COUNT + 2);
     let fault = lines.iter().position(|line| line.starts_with("* fault ")).unwrap();
     assert!((1..20).contains(&fault) && lines.last().unwrap() == "ok");
-    // Once.
+    // It is announced once.
     talk.now_ms += 60_000;
     assert!(talk.say("").is_empty());
 }
@@ -164,7 +164,7 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
     // A stop that is off at once is answered with ok.
     talk.ask("start");
     assert_eq!(talk.say("stop\n"), ["ok"]);
-    // With voltage and frequency there is no torque to take away first; by the ramp the shaft comes to rest.
+    // With V/f control there is no torque to remove first; by the ramp the shaft comes to rest.
     for stop in [Stop::Coast, Stop::Ramp] {
         let mut rig = in_state(State::VoltsPerHertz);
         let mut talk = Talk::new();
@@ -191,7 +191,7 @@ fn a_learning_tells_its_progress_and_its_end() {
     let expected: f64 = seconds.strip_suffix(" s left").unwrap().parse().unwrap();
     let began = rig.time();
     let (mut told, mut lines) = (0, Vec::new());
-    // 80 ms at a time.
+    // One step is 80 ms.
     while rig.drive.state() == State::Learning {
         rig.wait(0.08);
         talk.drive.drive = rig.drive.clone();
@@ -201,7 +201,7 @@ fn a_learning_tells_its_progress_and_its_end() {
         told = if lines.is_empty() { told + 80 } else { 0 };
         assert!(told < 10_000, "silent for {told} ms");
     }
-    // The flux turns a little slower at first at every point.
+    // The flux rotates a little slower at the beginning of every point.
     let took = rig.time() - began;
     println!("{took} s, {expected} s were expected");
     assert!((took / expected - 1.0).abs() < 0.05, "{took} s, {expected} s were expected");

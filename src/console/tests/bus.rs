@@ -37,7 +37,7 @@ impl Both {
         answer[1..answer.len() - 2].to_vec()
     }
 
-    /// Writes a register: the exception, 0 if there is none.
+    /// Writes a register; returns the exception, or 0.
     fn write(&mut self, at: u16, word: u16) -> u8 {
         let pdu = [&[6], &at.to_be_bytes()[..], &word.to_be_bytes()].concat();
         let answer = self.ask(&pdu);
@@ -69,13 +69,13 @@ fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
     }
     assert_eq!(both.set("motor.r_s", 5.5), 4);
     assert!(both.talk.drive.commands.is_empty());
-    // A refusal that is repeated is told once.
+    // A repeated refusal is told once.
     let said = both.talk.say("");
     let words = "* bus: refused: the console commands: `set bus.commands bus` lets the bus";
     assert_eq!(said.iter().filter(|line| *line == words).count(), 1, "{said:?}");
     // Switch on disabled, and not remote.
     assert_eq!((both.read(0x6041) & 0x26f, both.read(0x5009)), (0x40, 0));
-    // The release that LinuxCNC writes all the time does not stop the console's run; a stop does.
+    // LinuxCNC writes the release all the time: it does not stop the console's run, but a stop does.
     both.talk.say("start speed\n");
     assert_eq!((both.write(0x2000, 0), both.write(0x2000, 1)), (0, 0));
     assert_eq!(both.talk.drive.commands, [Command::Start(Mode::Speed), Command::Stop(Stop::Coast)]);
@@ -96,7 +96,7 @@ fn the_bus_commands_with_frequencies() {
     assert_eq!((both.write(0x2000, 18), both.read(0x2000)), (0, 18));
     assert_eq!(both.write(0x2001, 500), 0);
     assert_eq!((both.write(0x2000, 34), both.read(0x2000)), (0, 34));
-    // Only the direction; both directions turn it round.
+    // Only the direction changes; both directions reverse it.
     assert_eq!((both.write(0x2000, 16), both.write(0x2000, 0x32)), (0, 0));
     assert_eq!(both.write(0x2000, 1), 0);
     let speed = Command::Speed;
@@ -106,11 +106,11 @@ fn the_bus_commands_with_frequencies() {
     assert_eq!(commands[0], Command::Start(Mode::Speed));
     assert_eq!(commands[1..6], given);
     assert_eq!(commands[6..], [Command::Stop(Stop::Coast)]);
-    // A jog, bits of no meaning, an external fault.
+    // Refused: a jog, bits without a meaning, an external fault.
     for (at, word) in [(0x2000, 3), (0x2000, 0x80), (0x2002, 1)] {
         assert_eq!(both.write(at, word), 3, "{at:#x} {word}");
     }
-    // Read-only, and nowhere.
+    // A read-only register, and an address without a register.
     assert_eq!((both.write(0x2103, 0), both.write(0x3000, 0)), (2, 2));
 }
 
@@ -143,7 +143,7 @@ fn the_control_word_runs_and_stops_in_three_ways() {
     both.talk.drive.commands.clear();
     assert_eq!(both.write(0x6040, 0x80), 0);
     assert_eq!(both.talk.drive.commands, [Command::Stop(Stop::Now)]);
-    // The console's drive is stopped by anybody, but cleared and run by nobody else.
+    // Any side may stop the console's drive, but only the console clears and runs it.
     let mut both = Both::new("");
     assert_eq!(
         (both.write(0x6040, 15), both.write(0x6040, 0x86), both.write(0x6040, 2)),
@@ -156,7 +156,7 @@ fn the_control_word_runs_and_stops_in_three_ways() {
 fn silence_of_the_one_that_commands_stops_the_drive() {
     let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
     both.write(0x2000, 18);
-    // The console does not keep it alive.
+    // Lines at the console do not keep the bus alive.
     for _ in 0..15 {
         both.talk.now_ms += 100;
         both.talk.ask("status");
@@ -173,7 +173,7 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
         both.talk.ask("get motor.r_s"),
         "motor.r_s = 5.3 ohm (0.0001 to 1000); staged, in force: 5.4; stator resistance of a phase"
     );
-    // Out of range, no number, no whole number, no such word, of the board; nothing of it is staged.
+    // Refused values: out of range, not a number, not a whole number, no such word, a setting of the board. None of them is staged.
     for (name, value) in [
         ("motor.r_s", 1e9),
         ("motor.r_s", f32::NAN),
@@ -190,13 +190,13 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
         (both.write(0x4000, 0), both.ask(&[16, 0x40, 1, 0, 2, 4, 0, 0, 0, 0])),
         (3, vec![0x90, 3])
     );
-    // A start puts it in force: taken at once, done behind the answer, and the console hears nothing.
+    // A start puts the settings in force. It is accepted at once and carried out after the answer, and the console prints nothing.
     both.talk.say("");
     assert_eq!((both.write(0x2001, 300), both.write(0x2000, 18)), (0, 0));
     assert!(both.talk.drive.commands.is_empty());
     // Every request until then is answered with exception 6.
     assert_eq!((both.write(0x2000, 1), both.ask(&[3, 0x21, 1, 0, 1])), (6, vec![0x83, 6]));
-    // What came meanwhile is not answered: the master has given it up.
+    // Requests received meanwhile are not answered: the master has given them up.
     let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
     both.bus.asked.push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
     let Talk { front, drive, .. } = &mut both.talk;
@@ -206,7 +206,7 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     assert!(both.bus.asked.is_empty() && both.bus.answers.is_empty());
     let started = &both.talk.drive.commands[1..];
     assert_eq!(started, [Command::Start(Mode::Speed), Command::Speed(90.0)]);
-    // Not while it runs; dropped, set to `auto` again and saved while it is off.
+    // Refused while the drive runs. While it is off: dropped, set to `auto` again, and saved.
     assert_eq!((both.set("motor.r_s", 5.2), both.write(0x4fff, 1)), (4, 4));
     both.write(0x2000, 1);
     assert_eq!(
@@ -219,7 +219,7 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     assert_eq!(both.write(0x4fff, 9), 3);
 }
 
-/// Every hardware setting, with the value that it has, in the range or not; the console says once why.
+/// Every hardware setting is refused, even with its present value, in the range or not; the console tells the reason once.
 #[test]
 fn settings_of_the_hardware_are_not_for_the_bus() {
     let mut both = Both::by_bus();
@@ -241,7 +241,7 @@ fn settings_of_the_hardware_are_not_for_the_bus() {
             )]
         );
     }
-    // Not beside others either.
+    // Refused beside other settings, too.
     assert_eq!(both.read(0x4fff), 0);
 }
 
@@ -272,7 +272,7 @@ fn the_bus_never_loosens_what_protects() {
         ("bus.alive", 1.0),
         ("stop.coasts_s", 1.0),
         ("limits.dc_under_v", 100.0),
-        // By their rules.
+        // Values that follow from other settings by their rules.
         ("nameplate.current_a", 5.0),
         ("motor.r_s", 50.0),
     ];
@@ -297,7 +297,7 @@ fn the_bus_never_loosens_what_protects() {
         assert_eq!(both.set(name, again), 0, "{name}: as the console had it");
         assert_eq!(both.write(0x4fff, 3), 0);
     }
-    // The console may, and then the bus up to there.
+    // The console may loosen it, and then the bus may up to that value.
     let status = both.talk.ask("status");
     assert!(!status.contains("looser"), "{status}");
     both.talk.say("set limits.speed_rpm 2500\napply\n");
@@ -314,7 +314,7 @@ fn faults_are_listed_and_cleared() {
     let mut both = Both::by_bus();
     both.talk.now_ms = 12_345;
     both.write(0x2000, 18);
-    // Pulled by the power stage.
+    // The power stage pulls the break.
     let pulled = Measured { hardware: Hardware::BREAK, ..Measured::default() };
     both.talk.drive.drive.step(&pulled);
     let State::Fault(fault) = both.talk.drive.drive.state() else { panic!() };
@@ -324,13 +324,13 @@ fn faults_are_listed_and_cleared() {
     assert_eq!(both.read(0x6041) & 0x4f, 8);
     assert_eq!(both.write(0x2000, 18), 4, "latched");
     assert_eq!((both.write(0x2002, 2), both.read(0x2100)), (0, 0));
-    // Cleared, and stopped before the next run.
+    // Cleared, then stopped before the next run.
     assert_eq!((both.write(0x2000, 18), both.write(0x2000, 1), both.write(0x2000, 18)), (4, 0, 0));
     assert_eq!(both.read(0x5100), code);
 }
 
 proptest! {
-    /// Whatever frames come, the slave answers afterwards, and only the commander starts the drive.
+    /// After any frames the slave still answers, and only the commander starts the drive.
     #[test]
     fn any_frames_leave_a_bus_that_answers(frames: Vec<(u8, Vec<u8>)>, by_bus: bool) {
         let mut both = if by_bus { Both::by_bus() } else { Both::new("") };

@@ -1,4 +1,4 @@
-//! The commissioning at the console: what is asked for, told, and accepted.
+//! The commissioning at the console: its requests, its lines, and the acceptance of its results.
 
 use drive_commission::{Refusal, Step};
 use drive_settings::Settings;
@@ -10,12 +10,12 @@ use super::*;
 use crate::commissioning::{News, Session};
 use crate::link::ring::Record;
 
-/// A session on a simulated motor of 6 ohm, which a drive with these settings has found.
+/// A session on a simulated motor of 6 ohm that a drive with these settings has identified.
 fn found_on_a_motor(settings: &Settings) -> Session {
     let mut config = Config::default();
     config.motor.r_s = 6.0;
     config.load.mode = LoadMode::Free;
-    // The bench has converters of its own.
+    // The simulation bench has its own ADCs.
     let mut rig = Rig::new(&plant_settings(&config), &config.drive, 1).unwrap();
     let mut session = Session::new(settings);
     session.begin(Step::Nameplate, Step::Leakage);
@@ -78,7 +78,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     assert_eq!(told, [why.as_str(), "* commissioning: ended; the settings are as they were"]);
 }
 
-/// Lines that the console tells until the commissioning has ended.
+/// Lines that the console prints until the commissioning has ended.
 fn told(talk: &mut Talk) -> Vec<String> {
     let mut told = Vec::new();
     for _ in 0..20 {
@@ -95,7 +95,7 @@ fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     assert_eq!(talk.ask("accept"), "error: nothing new was found: `commission` first");
     assert_eq!(talk.drive.saved, None);
     talk.drive.session = found_on_a_motor(&before.drive);
-    // Staged values of the user stay.
+    // Values that the user has staged stay.
     assert_eq!(talk.ask("set motor.inertia 0.02"), "ok: staged");
     let answers = talk.say("accept\n");
     assert_eq!(answers.last().unwrap(), "ok", "{answers:?}");
@@ -106,7 +106,7 @@ fn accept_puts_in_force_and_saves_what_was_found_and_nothing_else() {
     assert_eq!(saved.drive.nameplate, before.drive.nameplate);
     assert_eq!(saved.drive.limits, before.drive.limits);
     assert!(saved.command.wiring_checked);
-    // It is in force, so there is nothing new.
+    // The result is in force, so there is nothing new.
     assert!(talk.ask("accept").starts_with("error: nothing new"));
     assert!(talk.drive.commands.iter().any(|command| matches!(command, Command::Configure(_))));
 }

@@ -6,7 +6,7 @@ use super::grammar::parse;
 use super::help::HELP;
 use crate::generated;
 
-/// A typed line stands behind `> ` in a block `console`.
+/// A typed line follows `> ` in a block `console`.
 #[test]
 fn every_line_of_the_pages_is_understood() {
     let docs = generated::root().join("docs");

@@ -36,7 +36,7 @@ pub struct FakeDrive {
     pub running: bool,
     /// Last sample.
     pub sample: Sample,
-    /// The trace that was asked for last, and whether its trigger has come.
+    /// The last requested trace, and whether its trigger has come.
     pub plan: Option<Plan>,
     /// See `plan`.
     pub triggered: bool,
@@ -50,7 +50,7 @@ pub struct FakeDrive {
     pub saved: Option<FirmwareSettings>,
     /// Whether the flash fails.
     pub worn_out: bool,
-    /// Result of a learning, not yet fetched.
+    /// Result of a self-commissioning, not yet fetched.
     pub found: Option<Learned>,
     /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
@@ -62,12 +62,12 @@ pub struct FakeDrive {
     pub history: History,
     /// Whether the pins of the gates are connected.
     pub connected: bool,
-    /// Settings that protect and were changed, in order.
+    /// Protective settings that were changed, in order.
     pub changed: Vec<&'static str>,
 }
 
 impl FakeDrive {
-    /// A running one.
+    /// A running drive.
     pub fn new(drive: Drive) -> Self {
         Self {
             drive,
@@ -201,7 +201,7 @@ impl Firmware for FakeDrive {
     }
 }
 
-/// An accepted result of a learning.
+/// An accepted result of a self-commissioning.
 pub fn found() -> Learned {
     let slope = SlopeTable::of_flux_saliency(Grid::REFERENCE, -0.035);
     Learned {
@@ -236,7 +236,7 @@ pub struct FakePort {
     pub received: String,
     /// Frames of the console.
     pub frames: Vec<Frame>,
-    /// Tells the two apart.
+    /// Tells frames and lines apart.
     pub splitter: Splitter,
     /// Bits per second that were set last; 0: none.
     pub baud: u32,
@@ -310,7 +310,7 @@ impl modbus::Port for FakeBus {
 pub struct FakeStrip {
     /// Contacts that are closed.
     pub closed: Wires,
-    /// Codes of reference, second reference, and motor sensor.
+    /// ADC counts of reference, second reference, and motor sensor.
     pub codes: [Option<u16>; 3],
     /// Outputs that were set last.
     pub outputs: [bool; 3],

@@ -1,4 +1,4 @@
-//! Learning at the console: when it is needed, anew, and again at another rotor position.
+//! Saliency self-commissioning at the console: when it is needed, from scratch, and again at another rotor position.
 
 use drive_core::AngleSource;
 use drive_core::carrier::Asymmetry;
@@ -14,7 +14,7 @@ fn fresh() -> FirmwareSettings {
     settings
 }
 
-/// What the drive was configured with last.
+/// The coefficients with which the drive was configured last.
 fn configured(talk: &Talk) -> &drive_core::Coefficients {
     let last = talk.drive.commands.iter().rev().find_map(|command| match command {
         Command::Configure(coefficients) => Some(coefficients),
@@ -33,7 +33,7 @@ fn result(gain: f32, asymmetry: Asymmetry, misfit: f32) -> Learned {
     Learned { gain_mismatch: Fitted { value: gain, misfit, accepted: true }, asymmetry, ..found() }
 }
 
-/// Ends the learning with this result.
+/// Ends the self-commissioning with this result.
 fn ends_with(talk: &mut Talk, found: Learned) -> String {
     talk.drive.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     talk.drive.found = Some(found);
@@ -52,7 +52,7 @@ fn a_drive_that_has_not_learned_does_not_start_without_an_encoder() {
         );
         assert_eq!(talk.drive.drive.state(), State::Off);
     }
-    // With the encoder, where it is allowed, and once it has learned.
+    // With the encoder where that is allowed, and once the drive has learned.
     assert_eq!(talk.ask("set angle_source encoder"), "ok: staged");
     assert_eq!((talk.ask("start"), talk.ask("stop")), ("ok".into(), "ok".into()));
     assert_eq!(talk.ask("set angle_source injection injection.allow_unlearned yes"), "ok: staged");
@@ -64,7 +64,7 @@ fn a_drive_that_has_not_learned_does_not_start_without_an_encoder() {
     assert_eq!(Talk::with(learned).ask("start"), "ok");
 }
 
-/// The drive has the learned values of before while it learns again, and not while it learns anew.
+/// The drive keeps its learned values while it learns again at another rotor position, and drops them while it learns from scratch.
 #[test]
 fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     let asymmetry = |constant, sin, cos| Asymmetry { constant, sin, cos };
@@ -73,19 +73,19 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
         talk.ask("learn again"),
         "error: nothing is learned with these settings: `learn` first"
     );
-    // Nothing to leave out: no design.
+    // There is nothing to leave out, so no design takes place.
     assert_eq!(talk.say("learn\n"), ["ok"]);
     assert!(matches!(talk.drive.commands[..], [Command::Start(Mode::Learning)]));
     let first = result(0.01, asymmetry(0.002, 0.003, -0.004), 0.0054);
     assert_eq!(
         ends_with(&mut talk, first),
         "* learned: slope -0.0700 /rad, torque current up to 2.75 A; one rotor position: `learn again` at another \
-         tells slots from the stator; `save` keeps it"
+         separates slot effects from the stator; `save` keeps it"
     );
 
     assert_eq!(talk.say("learn again\n"), ["ok"]);
     assert!(matches!(talk.drive.commands[1..], [Command::Start(Mode::Learning)]), "as it was");
-    // The slots have turned: the difference to the first.
+    // The rotor slots have moved: the result tells the difference to the first one.
     let told = ends_with(&mut talk, result(-0.004, asymmetry(-0.001, 0.0, 0.006), 0.006));
     assert_eq!(told, "* learned: slope -0.0700 /rad, torque current up to 2.75 A; `save` keeps it");
     let both = talk.front.desk.settings().in_force().learned.unwrap();
@@ -93,13 +93,13 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     assert!(both.asymmetry.plus(&asymmetry(0.0015, 0.003, -0.001), -1.0).size() < 1e-6, "{both:?}");
     assert_eq!(both.positions, 2);
     assert!(talk.say("learned\n")[0].contains("; rotor positions 2; asymmetry 0.00350; "));
-    // The next start is with the mean.
+    // The next start uses the mean.
     assert_eq!(talk.say("start\n"), ["* designing...", "ok"]);
     assert_eq!(*configured(&talk), with(Some(both)));
     talk.say("stop\n");
     assert_eq!(talk.say("start\nstop\n"), ["ok", "ok"], "once");
 
-    // Anew: without it, and only the new result is left.
+    // From scratch: without the earlier result, and only the new one is left.
     assert_eq!(talk.say("learn\n"), ["* designing...", "ok"]);
     assert_eq!(*configured(&talk), with(None));
     let third = result(0.002, Asymmetry::default(), 0.0);
@@ -107,7 +107,7 @@ fn learn_begins_anew_and_learn_again_adds_a_rotor_position() {
     assert_eq!(talk.front.desk.settings().in_force().learned, Some(third));
 }
 
-/// A learning that finds nothing leaves what was learned before in force.
+/// A self-commissioning without a result leaves the values learned before in force.
 #[test]
 fn after_a_refused_learning_the_result_before_holds() {
     for end in ["refused", "stopped", "fault"] {

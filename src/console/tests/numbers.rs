@@ -1,7 +1,7 @@
-//! Numbers for life: of settings with their words, signals, faults and records, commands, and registers.
+//! Permanent numbers: of settings with their words, signals, faults and records, commands, and registers.
 //!
-//! `tests/numbers.txt` has every number that was ever given, a line each: `KIND NUMBER NAME`, or `KIND NUMBER retired: NAME`. A new
-//! one is added with `WRITE_DOCS=1`. What has another name gets it there by hand; nothing else of the file ever changes.
+//! `tests/numbers.txt` has every number that was ever given, one per line: `KIND NUMBER NAME`, or `KIND NUMBER retired: NAME`. A new one
+//! is added with `WRITE_DOCS=1`. If an item is renamed, its name in the file is changed by hand; nothing else of the file ever changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::{env, fs};
@@ -32,7 +32,7 @@ fn given(kind: &str, number: impl ToString, name: impl ToString) -> Given {
     (format!("{kind} {}", number.to_string()), name.to_string())
 }
 
-/// What the code declares.
+/// The numbers that the code declares.
 fn declared() -> Vec<Given> {
     let mut all: Vec<_> =
         ROWS.iter().map(|row| given("register", format!("0x{:04x}", row.at), row.help)).collect();
@@ -68,7 +68,7 @@ fn listed(list: &str) -> Vec<Given> {
     list.lines().map(line).collect()
 }
 
-/// What is wrong with the numbers.
+/// Errors between the list and the declared numbers.
 fn wrong(list: &[Given], declared: &[Given]) -> BTreeSet<String> {
     let mut wrong = BTreeSet::new();
     for (place, all) in [(FILE, list), ("the code", declared)] {
@@ -114,8 +114,8 @@ fn numbers_are_for_life() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A number that changed, that vanished, that was given twice or belongs to another is told; a new name or a retirement that
-/// stands in the list is not.
+/// A number that changed, vanished, was given twice or belongs to another item is reported; a new name or a retirement that is in the
+/// list is not.
 #[test]
 fn what_is_wrong_with_numbers_is_told() {
     let list = "setting 0 a\nsetting 1 b\nfault 1 c\nfault 2 retired: d\n";
@@ -123,7 +123,7 @@ fn what_is_wrong_with_numbers_is_told() {
     for (now, wrongs) in [
         ("setting 0 a\nsetting 1 b\nfault 1 c", 0),
         ("fault 1 c\nsetting 1 b\nsetting 0 a", 0),
-        // New and not in the list, vanished, renamed, another number, exchanged, taken twice, one that was retired.
+        // New and not in the list, vanished, renamed, another number, exchanged, taken twice, reused after retirement.
         ("setting 0 a\nsetting 1 b\nfault 1 c\nfault 3 e", 1),
         ("setting 0 a\nfault 1 c", 1),
         ("setting 0 a\nsetting 1 e\nfault 1 c", 1),
@@ -140,7 +140,7 @@ fn what_is_wrong_with_numbers_is_told() {
     assert_eq!(told(&format!("{list}setting 0 f\n"), "setting 0 f\nsetting 1 b\nfault 1 c"), 1);
 }
 
-/// The registers of the settings are those of their numbers; all others of their page read as 0 and are no address of a write.
+/// The registers of the settings follow from their numbers; all other registers of their page read as 0 and cannot be written.
 #[test]
 fn registers_of_settings_follow_from_their_numbers() {
     let mut both = Both::by_bus();
@@ -162,7 +162,7 @@ fn registers_of_settings_follow_from_their_numbers() {
     }
 }
 
-/// Each signal as a trace shows it; the others of the page read as 0.
+/// Each signal reads as in a trace; the other registers of the page read as 0.
 #[test]
 fn signals_have_registers_by_their_numbers() {
     let mut both = Both::by_bus();
@@ -184,7 +184,7 @@ fn signals_have_registers_by_their_numbers() {
     assert_eq!(both.ask(&[16, 0x30, 0, 0, 2, 4, 0, 0, 0, 0]), [0x90, 2]);
 }
 
-/// A master set up today: with 20 settings inserted and five renamed each of its numbers has the same value.
+/// A master set up today still works: with 20 settings inserted and five renamed, each of its numbers has the same value.
 #[test]
 fn inserted_and_renamed_settings_leave_the_others_where_they_are() {
     use drive_core::AngleSource;

@@ -1,4 +1,4 @@
-//! The passport of a motor from the real console: its twin behaves as the motor does.
+//! The passport of a motor from the real console: its simulation model behaves as the motor does.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use crate::commissioning::{News, Session};
 use crate::desk::news;
 use crate::link::ring::Record;
 
-/// The drive of a configuration commissions its motor, accepts, and learns; what its console says then, and its settings.
+/// The drive of a configuration commissions its motor, accepts the result, and learns; returns the console's text and the settings.
 fn console_of(config: &Config, seed: u64) -> (String, FirmwareSettings) {
     let mut config = config.clone();
     config.prepare.learn = false;
@@ -71,7 +71,7 @@ fn file(name: &str) -> PathBuf {
     folder.join(name)
 }
 
-/// Regions of the speed; largest differences of the torque, % of that at the limit, and of the angle error, degrees rms.
+/// Speed ranges, the largest difference of the torque in % of the torque at the limit, and of the angle error in degrees rms.
 fn apart(motor: &str, runs: u32) -> (usize, f64, f64) {
     let mut original = Config::of_motor(Some(motor)).unwrap();
     let (text, settings) = console_of(&original, 1);
@@ -105,7 +105,8 @@ fn apart(motor: &str, runs: u32) -> (usize, f64, f64) {
 #[test]
 fn the_twin_of_a_motor_behaves_as_it_does() {
     let (regions, torque, error) = apart("dissertation", 3);
-    // The aim is 1 % of torque: with high flux it is met up to the rated speed (0.06 %), and missed where the field is weakened (1.14 %).
+    // The aim is 1 % of torque. With high flux it is met up to the rated speed (0.06 %), and missed in the field-weakening range (1.14
+    // %).
     assert!(regions == 8 && torque < 1.2 && error < 0.3, "{regions}: {torque} % {error}");
 }
 
@@ -132,7 +133,7 @@ fn what_a_passport_lacks_is_named() {
     for name in ["r_b over r_c, less 1", "gain mismatch", "slope", "torque current up to"] {
         assert!(names.contains(&name), "{name}: {names:?}");
     }
-    // Of the console.
+    // Items missing in the console's text.
     let without = |what: &str| {
         text.lines().filter(|line| !line.contains(what)).collect::<Vec<_>>().join("\n")
     };
@@ -151,7 +152,7 @@ fn what_a_passport_lacks_is_named() {
         let error = of_console(&text).expect_err(why);
         assert!(error.contains(why), "{error}");
     }
-    // Of the file.
+    // Items missing in the file.
     let path = file("lacks.json");
     write(&passport, &path).unwrap();
     let whole = std::fs::read_to_string(&path).unwrap();

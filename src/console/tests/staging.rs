@@ -1,7 +1,7 @@
 use super::*;
 use crate::settings::staging::UNCONFIRMED;
 
-/// A console whose settings in force and staged are these, by name.
+/// The value of a setting in force and the staged one, by its name.
 fn shown(talk: &Talk, name: &str) -> (String, String) {
     let (key, settings) = (keys::find(name).unwrap(), talk.front.desk.settings());
     (key.get(settings.in_force()).to_string(), key.get(settings.latest()).to_string())
@@ -71,17 +71,17 @@ fn a_line_is_staged_whole_or_not_at_all() {
     assert_eq!(talk.ask("revert"), "ok: 0 staged values dropped");
 }
 
-/// A range that depends on another setting is that beside the staged values.
+/// A range that depends on another setting follows the staged values.
 #[test]
 fn ranges_are_those_beside_the_staged_values() {
     let mut talk = Talk::new();
     assert!(talk.ask("set limits.trip_a 20").starts_with("error: limits.trip_a = 20: allowed is"));
     let scales = "set scales.current_a.gain 0.05 scales.current_a.offset -100";
-    // Of the hardware.
+    // A setting of the hardware.
     assert_eq!(talk.ask(scales), format!("ok: staged; {UNCONFIRMED}"));
     assert_eq!(talk.ask(&scales.replace("_a.", "_b.")), "ok: staged");
     assert_eq!(talk.ask("set limits.trip_a 20 limits.current_a 15"), "ok: staged");
-    // What a later value makes wrong is found when all is put in force; the drive stays as it is.
+    // If a later value makes a staged one wrong, this is found when all values are put in force; the drive stays as it is.
     assert_eq!(talk.ask("set limits.trip_a 10"), "ok: staged");
     let refused =
         "error: limits.current_a = 15: allowed is 0.01 to 10 A; not in force, still staged";
@@ -137,17 +137,17 @@ fn start_and_save_put_staged_values_in_force_first() {
         said,
         [
             "* designing...",
-            "* applied: dead time and carrier hold from the next reset on, if saved; the board has to be confirmed again before a start",
+            "* applied: dead time and switching frequency change at the next reset, if saved; the board has to be confirmed again before a start",
             "ok"
         ]
     );
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.6);
     talk.ask("set inverter.dead_time_s 2.9e-6");
-    let remark = "ok: dead time and carrier hold from the next reset on, if saved";
+    let remark = "ok: dead time and switching frequency change at the next reset, if saved";
     assert_eq!(talk.say("apply\n"), ["* designing...", remark]);
 }
 
-/// The time of a design, seconds, is not silence of the user.
+/// A design takes seconds, and they do not count as silence of the user.
 #[test]
 fn a_start_after_a_design_is_not_stopped_for_silence() {
     let mut talk = Talk::new();
@@ -190,7 +190,7 @@ fn a_backup_restores_settings_and_what_was_learned() {
     let replies = other.say(lines.join("\r\n") + "\r\n");
     assert!(replies.iter().all(|reply| !reply.starts_with("error")), "{replies:#?}");
     let mut expected = *talk.front.desk.settings().in_force();
-    // Whoever restores checks the wiring.
+    // After a restore the wiring is checked.
     expected.command.wiring_checked = false;
     assert_eq!(*other.front.desk.settings().in_force(), expected);
     assert_eq!(other.front.desk.settings().in_force().learned, Some(found()));
@@ -219,16 +219,16 @@ fn damaged_learned_values_are_refused() {
         "error: learned: more than 61 words"
     );
     assert!(!other.front.desk.settings().is_staged());
-    // Whole, but then other settings.
+    // A whole result, but then other settings.
     assert_eq!(other.say(words.join("\n") + "\n").pop().unwrap(), "ok: staged");
-    let dropped = "ok: staged; what was restored belongs to other settings and is dropped";
+    let dropped = "ok: staged; the restored values belong to other settings and are dropped";
     assert_eq!(other.ask("set motor.r_s 5"), dropped);
     assert_eq!(other.ask("apply"), "ok");
     assert_eq!(other.front.desk.settings().in_force().learned, None);
 }
 
-/// A result that was learned with one zero vector is forgotten when both are switched on, and its backup is refused then; and the
-/// other way round.
+/// A result that was learned with one zero vector is discarded when both are switched on, and its backup is then refused. The same holds
+/// the other way round.
 #[test]
 fn learned_values_hold_for_one_zero_vector_or_for_both() {
     for (learned, other) in [("no", "yes"), ("yes", "no")] {
@@ -241,15 +241,15 @@ fn learned_values_hold_for_one_zero_vector_or_for_both() {
         let words = backup.iter().filter(|line| line.starts_with("learned "));
         let words = words.cloned().collect::<Vec<_>>().join("\n") + "\n";
         let forgotten =
-            "ok: what was learned with another scales.both_zero_vectors is forgotten: learn again";
+            "ok: values learned with another scales.both_zero_vectors are dropped: learn again";
         assert_eq!(talk.say(set(other)).last().unwrap(), forgotten);
         assert_eq!(talk.front.desk.settings().in_force().learned, None);
         let refused = format!(
-            "error: learned: with scales.both_zero_vectors = {learned}; set it so before, or learn again"
+            "error: learned: with scales.both_zero_vectors = {learned}; set it to this first, or learn again"
         );
         assert_eq!(talk.say(words.clone()).last().unwrap(), &refused);
         assert_eq!(talk.front.desk.settings().latest().learned, None);
-        // Beside the setting that it was learned with it is taken.
+        // With the setting that it was learned with, it is accepted.
         talk.say(set(learned));
         assert_eq!(talk.say(words).last().unwrap(), "ok: staged");
         assert_eq!(talk.ask("apply"), "ok");
@@ -257,7 +257,7 @@ fn learned_values_hold_for_one_zero_vector_or_for_both() {
     }
 }
 
-/// Earlier firmware learned with other rules, and printed 37 words at least: the refusal names the rules, not the missing words.
+/// Earlier firmware learned with other rules, and printed 37 words or more: the refusal names the rules, not the missing words.
 #[test]
 fn a_result_of_earlier_firmware_is_refused() {
     for count in [37, 38, crate::store::learned::WORDS] {
@@ -305,7 +305,7 @@ fn a_reboot_loses_nothing_silently_and_waits_for_its_answer() {
 #[test]
 fn an_update_waits_for_what_the_loader_needs() {
     let mut talk = Talk::new();
-    // 0.11 V a code: 21 V, then 19 V.
+    // 0.11 V a count: 21 V, then 19 V.
     talk.drive.sample.dc_link = 191;
     let charged = "error: the dc link has 21 V, and ST's loader drives a gate: 20 V at most";
     assert_eq!(talk.ask("update gates-off"), charged);

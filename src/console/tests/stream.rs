@@ -1,4 +1,4 @@
-//! The stream beside the lines, the rate of the port, and what a lost link does.
+//! The stream beside the lines, the rate of the port, and the effect of a lost link.
 
 use super::*;
 use crate::board;
@@ -78,7 +78,7 @@ fn text_goes_first_and_a_list_last() {
     (0..6).for_each(|n| talk.sample(60 * n, 1.0));
     talk.port.sent.extend(b"help\n");
     talk.poll();
-    // Frames of 15 bytes fill the room; the list waits.
+    // Frames of 15 bytes fill the space; the list waits.
     assert_eq!(talk.port.frames.len(), 4);
     assert_eq!(talk.port.received, "");
     talk.port.room = 45;
@@ -107,7 +107,7 @@ fn the_rate_changes_behind_the_answer_and_falls_back_without_a_valid_line() {
     }
     talk.pass(board::SERIAL_FALL_BACK_MS - 10);
     assert_eq!(talk.port.baud, 2_000_000);
-    // What is no line does not count.
+    // Bytes that form no line do not count.
     talk.port.sent.extend(b"\x00\xff\n");
     talk.pass(20);
     assert_eq!(talk.port.baud, board::SERIAL_BAUD);
@@ -138,7 +138,7 @@ fn a_link_that_is_lost_stops_the_drive_if_the_stream_asks_for_it() {
     assert_eq!(talk.drive.streamed.0, 0);
 }
 
-/// A design takes seconds, during which nothing is read: what came meanwhile is a sign of life of its end.
+/// A design takes seconds, during which nothing is read: lines received meanwhile count as signs of life at its end.
 #[test]
 fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
     let mut talk = Talk::new();
@@ -152,7 +152,7 @@ fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
     let answer = talk.say("");
     assert_eq!(answer.last().map(String::as_str), Some("ok"));
     assert_eq!((talk.drive.streamed.0, talk.port.baud), (3, 2_000_000));
-    // The commissioning designs outside of the console.
+    // The commissioning designs outside the console.
     talk.port.sent.extend(b"\n\n");
     talk.now_ms += 3000;
     talk.poll();

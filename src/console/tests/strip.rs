@@ -6,8 +6,8 @@ use crate::terminals::Wires;
 
 const ALL_OPEN: Wires = Wires(0);
 
-/// A console with a strip that commands, by a switch at START and with a reference of 4 to 20 mA, unless `lines` say otherwise; ENABLE
-/// is closed.
+/// A console with a strip that commands, with a switch at START and a reference of 4 to 20 mA unless `lines` say otherwise; ENABLE is
+/// closed.
 struct Panel(Talk);
 
 impl Panel {
@@ -75,10 +75,10 @@ fn a_switch_starts_and_stops_with_the_reference_as_speed() {
     panel.ma(12.0);
     panel.wait(20);
     assert_eq!(panel.commands(), [Command::Speed(750.0)]);
-    // Nothing new, nothing said.
+    // Without a change nothing is told.
     panel.wait(500);
     assert_eq!(panel.commands(), []);
-    // Preset speeds come before the reference; the direction is that of the start.
+    // Preset speeds have priority over the reference; the direction is that of the start.
     panel.close(Wires(1 << 5));
     panel.close(Wires(1 << 6));
     panel.open(Wires(1 << 5));
@@ -103,7 +103,7 @@ fn a_switch_starts_and_stops_with_the_reference_as_speed() {
 #[test]
 fn buttons_start_by_an_edge_and_a_broken_wire_of_stop_stops() {
     let mut panel = Panel::new("set strip.start buttons\n");
-    // STOP open.
+    // STOP is open.
     panel.close(Wires::START);
     panel.open(Wires::START);
     panel.close(Wires::STOP);
@@ -118,14 +118,14 @@ fn buttons_start_by_an_edge_and_a_broken_wire_of_stop_stops() {
     assert_eq!((panel.commands(), panel.off()), (vec![], true));
 }
 
-/// What is closed as the strip begins to command, with the power or by a setting, starts nothing, in whatever order it comes.
+/// A contact that is closed when the strip begins to command, at power-up or by a setting, starts nothing, in any order of the contacts.
 #[test]
 fn no_start_by_power_or_by_a_change_of_the_commander() {
     for start in ["switch", "buttons"] {
         let mut panel = Panel::new(&format!("set strip.start {start}\n"));
         let all = Wires(0x1f);
         let settings = *panel.0.front.desk.settings().in_force();
-        // The supply of the contacts comes after that of the chip, and bounces.
+        // The supply of the contacts comes after the chip's supply, and bounces.
         for late in [0, 1, 30, 3000] {
             panel.0.front = Front::new(settings);
             panel.0.strip.closed = ALL_OPEN;
@@ -167,7 +167,7 @@ fn enable_stops_whoever_commands_and_starts_nothing() {
         panel.close(Wires::ENABLE);
         panel.wait(1000);
         assert_eq!(panel.commands(), [], "{commander}");
-        // The others have a start of their own.
+        // Another commander has a start of its own.
         panel.open(Wires::START);
         panel.0.drive.drive.command(&START).unwrap();
         panel.commands();
@@ -188,7 +188,7 @@ fn after_a_fault_the_start_needs_a_new_edge() {
     assert_eq!(panel.commands(), [START, Command::Speed(0.0)]);
     panel.wait(2);
     assert!(panel.0.strip.outputs == [false, true, false]);
-    // With the fault latched a new edge is refused, and told.
+    // With the fault latched a new edge is refused, and the refusal is told.
     panel.open(Wires::START);
     panel.close(Wires::START);
     assert_eq!(panel.commands(), [START]);
@@ -225,7 +225,7 @@ fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
     assert!(said.iter().any(|line| line.contains(why)), "{said:?}");
     assert!(panel.0.ask("status").contains(why));
     assert!(panel.off() && panel.0.strip.outputs[1]);
-    // It comes back: latched, and a new edge is not enough.
+    // The reference comes back: the fault is latched, and a new edge is not enough.
     panel.ma(12.0);
     panel.wait(1000);
     panel.open(Wires::START);
@@ -244,8 +244,8 @@ fn a_lost_reference_ramps_to_zero_and_is_latched_by_name() {
     assert_eq!(panel.commands(), [Command::Speed(300.0)]);
 }
 
-/// A brake: the drive is told before each start that there is one, the output opens it while the drive regulates, and a fault says what
-/// holds the load.
+/// A brake: the drive is told before each start that there is one, the output opens the brake while the drive regulates, and a fault
+/// message says what holds the load.
 #[test]
 fn a_brake_is_told_to_the_drive_and_opens_only_while_it_regulates() {
     let mut panel = Panel::new("set strip.brake yes strip.brake_s 0.3\n");
@@ -255,9 +255,9 @@ fn a_brake_is_told_to_the_drive_and_opens_only_while_it_regulates() {
     panel.0.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     panel.wait(2);
     let said = panel.0.say("").concat();
-    assert!(said.contains("the brake closes now, and alone holds the load"), "{said}");
+    assert!(said.contains("the brake closes now and holds the load alone"), "{said}");
     assert_eq!(panel.0.strip.outputs, [false, true, false]);
-    // Without it the drive is told once.
+    // Without a brake the drive is told so once.
     panel.0.say("clear\nset strip.brake no\napply\n");
     panel.commands();
     for told in [Some(Command::Brake(0.0)), None] {

@@ -1,4 +1,4 @@
-//! Requests with a tag, and the lines that come unasked.
+//! Requests with a tag, and unrequested lines.
 
 use super::*;
 
@@ -31,7 +31,7 @@ fn the_last_line_of_an_answer_and_no_other_repeats_the_tag() {
             assert_eq!(before, before_plain);
         }
     }
-    // The tag holds for one request, and what comes unasked has none.
+    // The tag applies to one request, and unrequested lines have none.
     assert_eq!(talk.say("stop\n"), ["ok"]);
     assert_eq!(talk.say("@1 start speed\n"), ["@1 ok"]);
     talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
@@ -54,7 +54,7 @@ fn a_request_with_a_malformed_tag_is_not_carried_out() {
     assert!(talk.ask("* stop").starts_with("error: no such command: *"));
 }
 
-/// A design comes before the answer, and the field bus is served meanwhile.
+/// A design takes place before the answer, and the field bus is served meanwhile.
 #[test]
 fn an_answer_that_takes_long_has_the_tag_of_its_request() {
     let mut talk = Talk::new();
@@ -72,7 +72,7 @@ fn a_line_cuts_a_list_short_whose_tag_then_never_comes() {
     let told = talk.say("@2 stop\n");
     assert!(told.len() > 2 && told.iter().all(|line| !line.starts_with("@1 ")), "{told:?}");
     assert_eq!(told.last().unwrap(), "@2 ok");
-    // So does a damaged one; whose it is, nobody knows.
+    // A damaged line does the same; nobody knows whose it is.
     talk.port.sent.extend(b"@3 help\n");
     for _ in 0..3 {
         talk.poll();

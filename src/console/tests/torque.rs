@@ -9,7 +9,7 @@ use hil_sim::rig::Rig;
 
 use super::*;
 
-/// Least and largest torque, Nm, and torque current, A, in a status line.
+/// Least and largest torque, Nm, and q-axis current, A, in a status line.
 fn promised(status: &str) -> ([f64; 2], [f64; 2]) {
     let (_, rest) = status.split_once("torque now ").unwrap();
     let numbers: Vec<f64> =
@@ -61,7 +61,7 @@ fn a_drive_that_is_off_has_the_torque_of_a_shaft_at_rest_and_a_fault_has_none() 
     let (i_d, all) = (settings.i_d(), settings.current_limit_a());
     let (i_q, per_a) = ((all * all - i_d * i_d).sqrt(), settings.motor.torque_per_ampere(i_d));
     let status = talk.ask("status");
-    // What the sensors say is shown while nothing flows, by their calibration.
+    // While no current flows, the sensor values are shown by their calibration.
     let at = |line: drive_core::Line, code| format!("{:.2} A", line.at(code));
     let a = at(settings.scales.current_a, talk.drive.sample.current_a);
     let b = at(settings.scales.current_b, talk.drive.sample.current_b);

@@ -19,7 +19,7 @@ fn typed_characters_come_back_if_asked_for() {
         let said = std::mem::take(&mut talk.port.received);
         assert_eq!(said.as_bytes(), [byte]);
     }
-    // An announcement comes on a line of its own, and what was typed so far behind it.
+    // An announcement comes on a line of its own, followed by the text typed so far.
     talk.drive.drive.command(&Command::Start(Mode::Torque)).unwrap();
     talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     talk.poll();

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Wrong lines, and what the answer has to name: thing, value, and what is allowed or meant.
+/// Wrong lines, and the words that the answer has to contain: item, value, and the allowed or intended values.
 const WRONG: [(&str, &[&str]); 67] = [
     ("stpo", &["stpo", "`stop`"]),
     ("torqe 1", &["torqe", "`torque`"]),
@@ -88,6 +88,6 @@ fn wrong_lines_name_thing_value_and_what_is_allowed_and_change_nothing() {
     }
     assert_eq!(*talk.front.desk.settings().in_force(), before);
     assert_eq!(talk.drive.drive.state(), State::Off);
-    // The one that is no command of a drive that is off.
+    // The only valid command in the list, which a drive that is off refuses.
     assert_eq!(talk.drive.commands, [Command::Torque(1.0)]);
 }

@@ -7,22 +7,22 @@ use heapless::Vec;
 
 /// A signal of a trace.
 pub struct Signal {
-    /// Number for life, by which it has registers on the bus. No other signal ever gets it.
+    /// Permanent number, by which the signal has registers on the bus. No other signal ever gets it.
     pub id: u16,
     /// Name, which ends with the unit.
     pub name: &'static str,
 }
 
-/// What a control period began with and led to, beside the [`Telemetry`]; also while the drive is off.
+/// Inputs and results of a control period that the [`Telemetry`] does not have; they are valid also while the drive is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sampled {
-    /// Codes of the current sensors a, b and c; c is 0 where there is none.
+    /// ADC counts of the current sensors a, b and c; c is 0 if there is no sensor.
     pub currents: [u16; 3],
-    /// Code of the thermistor.
+    /// ADC counts of the thermistor.
     pub heat_sink: u16,
     /// 0 off, 1 starting, 2 running, 3 stopping, 100 + N in fault N.
     pub state: u8,
-    /// Why the torque is smaller than asked for: number of the [`Limiting`].
+    /// Reason why the torque is smaller than requested: number of the [`Limiting`].
     pub limit: u8,
 }
 
@@ -30,7 +30,7 @@ pub struct Sampled {
 pub const FAULT: u8 = 100;
 
 impl Sampled {
-    /// The signals of a control period with these samples, after which the drive is in this state.
+    /// The signals of a control period with these samples that left the drive in this state.
     #[inline]
     pub fn new(read: &Sample, state: State, limiting: Limiting) -> Self {
         Self {
@@ -43,29 +43,29 @@ impl Sampled {
 }
 
 impl Sampled {
-    /// Whether the drive is off, with a fault or without.
+    /// Whether the drive is off, with or without a fault.
     pub fn is_off(&self) -> bool {
         self.state == 0 || self.state >= FAULT
     }
 }
 
 impl Signal {
-    /// The unit that the name ends with; empty if there is none.
+    /// Unit at the end of the name; empty if there is none.
     pub fn unit(&self) -> &'static str {
         self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 
-    /// The line from the recorded value to the unit of the name, with these settings; 0 for a sensor that there is not, and where
-    /// it is no line.
+    /// The line from the recorded value to the unit of the name, with these settings. 0 if the sensor does not exist or its
+    /// characteristic is not a line.
     pub fn line(&self, settings: &Settings) -> Line {
         let (scales, motor) = (&settings.scales, &settings.motor);
         let gain = match self.name {
-            // Electrical turns per control period.
+            // Recorded in electrical turns per control period.
             "flux_hz" => 1.0 / PERIOD_S,
             "speed_rpm" => 60.0 / PERIOD_S / f32::from(motor.pole_pairs),
-            // The product of the two currents.
+            // Recorded as the product of the two currents.
             "torque_nm" => motor.torque_per_ampere(1.0),
-            // Codes, shown without the offset that a start measures.
+            // Recorded as ADC counts, shown without the offset that a start measures.
             "i_a_a" => return scales.of_code(scales.current_a),
             "i_b_a" => return scales.of_code(scales.current_b),
             "i_c_a" if scales.sensors == CurrentSensors::LowSide => return scales.current_c,
@@ -88,13 +88,14 @@ impl Signal {
 /// A value for each of the [`SIGNALS`].
 pub type Values = [f32; SIGNALS.len()];
 
-/// The signals, each with its number for life (a new one takes the next of `tests/numbers.txt`) and its value as it is recorded.
+/// The signals, each with its permanent number (a new one takes the next of `tests/numbers.txt`) and its value as it is recorded.
 macro_rules! signals {
     (|$t:ident, $s:ident| $($id:literal: $name:literal = $value:expr,)+) => {
         /// Signals that can be recorded. The names end with the unit.
         pub const SIGNALS: &[Signal] = &[$(Signal { id: $id, name: $name }),+];
 
-        /// The values of all signals as they are recorded. All at once: the choice of one by its index costs more than its value.
+        /// The values of all signals as they are recorded. All are computed at once, because the choice of one by its index costs more
+        /// than its value.
         pub fn values($t: &Telemetry, $s: &Sampled) -> Values {
             [$($value),+]
         }
@@ -128,8 +129,8 @@ signals! { |t, s|
 const SPEED: usize = 2;
 const ENERGISED: [usize; 9] = [1, 3, 4, 5, 6, 7, 8, 9, 16];
 
-/// The values as they are shown: a drive that is off has no current and no torque, whatever its last step saw, and the shaft this speed,
-/// electrical turns per control period.
+/// The values as they are shown. A drive that is off has no current and no torque, whatever its last step measured, and the shaft has
+/// this speed, electrical turns per control period.
 pub fn shown(telemetry: &Telemetry, sampled: &Sampled, shaft: f32) -> Values {
     let mut values = values(telemetry, sampled);
     if sampled.is_off() {
@@ -163,12 +164,12 @@ impl SignalChoice {
         Self { signals: Vec::new() }
     }
 
-    /// The default: angle, currents and their reference, voltages, saliency, position.
+    /// The default: angle, currents and their references, voltages, saliency, position.
     pub fn usual() -> Self {
         Self { signals: [0, 5, 6, 4, 7, 8, 9, 12].into_iter().collect() }
     }
 
-    /// Adds a signal by its index; `false` if there is no room for it.
+    /// Adds a signal by its index; `false` if no more signals fit.
     pub fn add(&mut self, signal: u8) -> bool {
         self.signals.push(signal).is_ok()
     }
@@ -178,7 +179,7 @@ impl SignalChoice {
         self.signals.iter().filter_map(|signal| SIGNALS.get(usize::from(*signal)))
     }
 
-    /// Writes the values of the signals, of those of all signals.
+    /// Writes the values of the chosen signals, taken from those of all signals.
     pub fn record(&self, record: &mut Record, values: &Values) {
         for (place, signal) in record.iter_mut().zip(&self.signals) {
             *place = values.get(usize::from(*signal)).copied().unwrap_or(0.0);

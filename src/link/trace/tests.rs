@@ -15,7 +15,7 @@ fn at(turns: f32) -> Telemetry {
     Telemetry { turns, ..Telemetry::default() }
 }
 
-/// Numbers from the trigger, and turns, of all records.
+/// Number relative to the trigger, and turns, of all records.
 fn all<const N: usize>(reader: &Reader<'_, N>) -> Vec<(i16, f32)> {
     (0..).map_while(|i| reader.get(i)).map(|(n, record)| (n, record[7])).collect()
 }
@@ -57,11 +57,11 @@ fn a_trace_of_a_fault_ends_with_it() {
         recorder.step(&RUNNING, &at(period as f32));
     }
     assert!(reader.recording());
-    // In a period that would not be due.
+    // The fault comes in a period that would not be due.
     recorder.step(&RUNNING, &at(10.0));
     recorder.step(&FAILED, &at(11.0));
     assert_eq!(all(&reader), [(-3, 6.0), (-2, 8.0), (-1, 10.0), (0, 11.0)]);
-    // One that comes before the ring is full.
+    // The fault comes before the ring is full.
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
     recorder.step(&RUNNING, &at(1.0));
     recorder.step(&FAILED, &at(2.0));
@@ -86,7 +86,7 @@ fn a_level_keeps_a_quarter_from_before_it() {
     };
     let rising: Vec<(i16, f32)> = (-2..6).map(|n| (n, 20.0 + f32::from(n))).collect();
     assert_eq!(record(&mut recorder, &mut reader, true, 0), rising);
-    // Fewer if it comes early.
+    // There are fewer records before it if it comes early.
     let early: Vec<(i16, f32)> = (-1..7).map(|n| (n, 20.0 + f32::from(n))).collect();
     assert_eq!(record(&mut recorder, &mut reader, true, 19), early);
     let falling: Vec<(i16, f32)> = (-2..6).map(|n| (n, 19.0 - f32::from(n))).collect();
@@ -105,7 +105,7 @@ fn a_trace_that_waits_for_its_trigger_can_be_ended() {
     assert!(reader.begin(&plan(1, 1, Trigger::Now)));
 }
 
-/// Every signal is its own, under its name.
+/// Every signal is recorded under its own name.
 #[test]
 fn signals_are_recorded_as_they_were_chosen() {
     let telemetry = Telemetry {
@@ -192,7 +192,7 @@ fn state_and_limit_are_numbers() {
     }
 }
 
-/// 1/4 of a revolution of a four-pole shaft a second is 1/2 electrical turn a second, 15 rpm.
+/// 1/4 revolution per second of a four-pole shaft is 1/2 electrical turn per second, 15 rpm.
 #[test]
 fn speeds_are_shown_in_the_unit_of_their_name() {
     let settings = Settings::default();
@@ -206,7 +206,7 @@ fn speeds_are_shown_in_the_unit_of_their_name() {
     assert_eq!(factor("torque_nm"), settings.motor.torque_per_ampere(1.0));
 }
 
-/// A code of a sensor is shown by the calibration of that sensor, also while the drive is off.
+/// ADC counts of a sensor are shown by the calibration of that sensor, also while the drive is off.
 #[test]
 fn sensors_are_shown_in_amperes() {
     let mut settings = Settings::default();
@@ -223,17 +223,17 @@ fn sensors_are_shown_in_amperes() {
     assert_eq!(shown("i_c_a", &settings), settings.scales.current_c.at(2500));
 }
 
-/// What the signals are, for the page.
+/// Meanings of the signals, for the page.
 const MEANINGS: [(&str, &str); 20] = [
     ("phi_deg", "estimated flux angle, electrical degrees"),
     ("flux_hz", "frequency of the flux, electrical"),
     ("speed_rpm", "speed of the shaft, mechanical"),
-    ("i_d_ref_a", "filtered reference of the direct current"),
-    ("i_q_ref_a", "filtered reference of the torque current"),
-    ("i_d_a", "filtered direct current in the estimated flux frame"),
-    ("i_q_a", "filtered torque current in the estimated flux frame"),
-    ("v_d_v", "direct voltage without the carrier"),
-    ("v_q_v", "quadrature voltage without the carrier"),
+    ("i_d_ref_a", "filtered reference of the d-axis current"),
+    ("i_q_ref_a", "filtered reference of the q-axis current"),
+    ("i_d_a", "filtered d-axis current in the estimated flux frame"),
+    ("i_q_a", "filtered q-axis current in the estimated flux frame"),
+    ("v_d_v", "d-axis voltage without the injection"),
+    ("v_q_v", "q-axis voltage without the injection"),
     ("delta_i_a", "current difference of the printed demodulators"),
     ("saliency", "`q` of the synchronous demodulation"),
     ("dc_link_v", "voltage of the dc link"),
@@ -266,7 +266,7 @@ fn the_manual_lists_the_signals() {
     generated::check("console.md", "signals", &table);
 }
 
-/// A drive that is off shows neither current nor voltage nor torque, and the speed that it is given; one that runs shows all.
+/// A drive that is off shows neither current nor voltage nor torque, and shows the given speed; a drive that runs shows all signals.
 #[test]
 fn a_drive_that_is_off_shows_no_current() {
     let d_q = Dq::new(1.0, 1.0);

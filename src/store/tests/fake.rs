@@ -3,10 +3,10 @@
 use crate::board::STORED_SLOTS;
 use crate::store::*;
 
-/// Flash that loses power, with what a power failure leaves drawn from random bits.
+/// A flash that loses power; random bits decide what a power failure leaves.
 #[derive(Clone, Debug)]
 pub struct Fake {
-    /// `None` is torn.
+    /// Contents; `None` is a torn double word.
     pub words: [[Option<u64>; SLOT_WORDS]; STORED_SLOTS],
     /// Operations until the power fails.
     pub left: Option<usize>,
@@ -45,7 +45,7 @@ impl Fake {
         }
     }
 
-    /// Of `old` and `new`, what a power failure leaves.
+    /// The contents that a power failure leaves when `new` replaces `old`.
     fn left_of(&mut self, old: Option<u64>, new: u64) -> Option<u64> {
         match self.next() % 4 {
             0 => old,

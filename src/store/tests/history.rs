@@ -22,7 +22,7 @@ struct Life {
 }
 
 impl Life {
-    /// A cycle: start, run, stop or fault, rest. Writes where it is due, as the main loop does. Stops where the power fails.
+    /// A cycle: start, run, stop or fault, rest. Writes when that is due, as the main loop does. Stops if the power fails.
     fn cycle(&mut self, fake: &mut Fake) -> bool {
         let draw = |random: &mut u64, n: u64| {
             *random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -57,8 +57,8 @@ fn an_erased_flash_is_a_new_drive() {
     assert_eq!(seen(&load(&mut Fake::new())), (0, 0, 0, vec![]));
 }
 
-/// Over many pages: after each reset times and starts are at most what the time between two writes leaves behind, they
-/// never go back, and the last faults are there in their order.
+/// Over many pages: after each reset, times and starts lack at most the time between two writes, they never decrease, and the last faults
+/// are there in their order.
 #[test]
 fn what_was_counted_is_there_after_a_reset() {
     let mut fake = Fake::new();
@@ -72,7 +72,7 @@ fn what_was_counted_is_there_after_a_reset() {
         let (powered, running, starts, faults) = seen(&life.history);
         life.history = load(&mut fake);
         let after = seen(&life.history);
-        // A minute of rounding for the time powered.
+        // The time powered is rounded to a minute.
         assert!(
             after.0 <= powered && powered - after.0 < LONG_S + 60,
             "{n}: {powered} {}",
@@ -88,8 +88,8 @@ fn what_was_counted_is_there_after_a_reset() {
     assert_eq!(life.history.faults().count(), FAULTS);
 }
 
-/// The power fails in every operation of several pages, with whatever that leaves: what was written before is there, and
-/// the log goes on.
+/// The power fails in every operation of several pages, with random contents of the torn word: all earlier entries are there, and the log
+/// goes on.
 fn whenever_the_power_fails(seeds: Range<u64>) {
     for seed in seeds {
         for operation in (0..700).step_by(1 + seed as usize % 3) {
@@ -103,14 +103,14 @@ fn whenever_the_power_fails(seeds: Range<u64>) {
                 if !whole {
                     break;
                 }
-                // What a reset would find here.
+                // History that a reset would find here.
                 before = seen(&load(&mut fake));
             }
             fake.left = None;
             life.history = load(&mut fake);
             let after = seen(&life.history);
             assert!(after.0 >= before.0 && after.1 >= before.1 && after.2 >= before.2);
-            // Of a cycle at most one fault is new.
+            // At most one fault of a cycle is new.
             let older = after.3.get(1..).unwrap_or_default();
             let same = after.3 == before.3 || before.3.starts_with(older);
             assert!(same, "{operation}: {:?}, then {:?}", before.3, after.3);
@@ -134,7 +134,7 @@ fn whenever_the_power_fails_what_was_written_is_there_with_more_seeds() {
     whenever_the_power_fails(3..8);
 }
 
-/// Erasures that the head of the module states: a start and a stop without end.
+/// Number of erasures, as the head of the module states: continuous starts and stops.
 #[test]
 fn the_flash_lasts() {
     let mut fake = Fake::new();

@@ -13,12 +13,12 @@ fn board_of_1abee12(record: &[u8]) -> Fake {
     fake
 }
 
-/// By the hashes of the names: records have numbers from version 2 on.
+/// The record has hashes of the names; only version 2 and later have numbers.
 #[test]
 fn records_saved_by_commit_1abee12_are_read() {
     let defaults = include_bytes!("defaults-1abee12.bin");
     let mut expected = board();
-    // That firmware had no rules: these numbers stood in its settings.
+    // That firmware had no rules: these numbers were in its settings.
     for (name, value) in [
         ("inverter.full_compensation_a", "0.03"),
         ("injection.amplitude_v", "50"),
@@ -47,18 +47,18 @@ fn records_saved_by_commit_1abee12_are_read() {
 
     let changed = include_bytes!("changed-1abee12.bin");
     let mut expected = board();
-    // The values that its console showed: none is the default.
+    // The values that its console showed; none is the default.
     for line in include_str!("changed-1abee12.txt").lines() {
         let (name, value) = line.split_once(' ').unwrap();
         let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
         key.set(&mut expected, key.parse(value).unwrap());
     }
-    // That firmware learned with other rules: its result is left out.
+    // That firmware learned with other rules, so its result is left out.
     assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
 }
 
-/// Earlier firmware had other rules for direct current, current limit, table and dead time. The drive leaves out what it learned, complete or
-/// not, and keeps its settings. A start without an encoder then needs a learning.
+/// Earlier firmware had other rules for d-axis current, current limit, table and dead time. The drive leaves out the values learned by
+/// it, complete or not, and keeps its settings. A start without an encoder then needs a self-commissioning.
 #[test]
 fn a_result_of_other_rules_is_left_out() {
     let new = with_learned();
@@ -82,7 +82,7 @@ fn a_result_of_other_rules_is_left_out() {
         let mut loaded = expected;
         loaded.drive.angle_source = AngleSource::Encoder;
         assert!(Drive::new(loaded.build().unwrap()).command(&start).is_ok());
-        // Without the word that holds the rules it is no result.
+        // Without the word that holds the rules the values are no result.
         record[codec::WORDS - lacks as usize - 1] = u64::MAX;
         record[flags] = record[flags - 1];
         record[0] -= 1 << 48;

@@ -37,7 +37,7 @@ struct Table {
 // SAFETY: only addresses, which the firmware itself never follows.
 unsafe impl Sync for Table {}
 
-/// Offset in the drive of its state, behind the count of changes.
+/// Offset in the drive of its state, which follows the count of changes.
 const STATE: usize = Drive::CHANGES + size_of::<u32>();
 
 /// The address at this offset in the drive.
