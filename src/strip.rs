@@ -1,7 +1,7 @@
 //! The terminal strip: wires to a panel or a PLC as an interface of the command arbiter, beside console and field bus.
 //!
-//! Data flow: [`Port`] reads the pins; [`Debounce`] turns them into [`Wires`], once a millisecond; [`Desk::hold`] says whether they let
-//! the drive run; the [`Sequence`] turns START into starts and stops; a [reference](mod@reference) gives a speed. Nothing here waits.
+//! Data flow: [`Port`] reads the pins. [`Debounce`] turns them into [`Wires`], once a millisecond. [`Desk::interlock`] says whether they
+//! let the drive run. The [`Sequence`] turns START into starts and stops. A [reference](mod@reference) gives a speed. Nothing here waits.
 
 pub mod debounce;
 pub mod reference;
