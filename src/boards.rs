@@ -273,7 +273,7 @@ impl PartialEq for Board {
 }
 
 impl Board {
-    /// ADC counts of the maximum operating voltage of the dc link, which no setting of the scale raises.
+    /// ADC counts at the maximum operating voltage, which no setting of the scale raises.
     pub const fn highest_dc_link(&self) -> u16 {
         let Line { gain, offset } = self.dc_link.line.value;
         // Rounded up: the limit itself is allowed.

@@ -79,7 +79,7 @@ faults! {
     InverterOverload = 44, "the inverter has carried too much current for too long";
     ThermistorOpen = 45, "thermistor of the heat sink open: colder than -40 degC";
     ThermistorShorted = 46, "thermistor of the heat sink shorted: hotter than 200 degC";
-    NotCaught = 47, "the flying start onto the rotating shaft failed";
+    NotCaught = 47, "the flying start failed";
     Stalled = 48, "the motor stays at its current limit and hardly turns";
     ChopperOff = 49, "the chip has switched the brake chopper off";
     WrongClock = 50, "the core clock and the clock of the watchdog do not agree";

@@ -96,7 +96,7 @@ settings! {
     Scales "scales." [scales] {
         /// Current a, A.
         current_a: Line = Line::CHANNEL_A => [
-            /// current a per ADC count; negative if a current into the motor lowers the count
+            /// current a per ADC count; negative if current into the motor lowers it
             "scales.current_a.gain" [scales.current_a] gain: f32, 17: number("A")
                 .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 2.5)).learned().hardware();
             /// current a at 0 ADC counts
@@ -123,13 +123,13 @@ settings! {
                 CurrentSensors::LowSide => s.offset_range(s.scales.current_c),
             }).learned().hardware();
         ];
-        /// sensors of the currents: two in the lines a and b, or three shunts below the low sides
+        /// current sensors: two in lines a and b, or three shunts below the low sides
         sensors: CurrentSensors = CurrentSensors::InLine, 23: word().changed(Change::Board).learned();
-        /// whether the currents are sampled in both zero vectors, and their mean is used; not with shunts below the low sides
+        /// whether currents are means of samples in both zero vectors; not with shunts
         ///
         /// The mean has less noise, and is a quarter of a period older.
         both_zero_vectors: bool = false, 24: word().learned();
-        /// time from the turn-on of a low side until its shunt can be sampled
+        /// time from turn-on of a low side until its shunt can be sampled
         ///
         /// The dead time is not included.
         shunt_settle_s: f32 = 2e-6, 25: number("s").from_to(0.0, 20e-6).changed(Change::Board).learned();
@@ -140,9 +140,9 @@ settings! {
             /// dc link at 0 ADC counts
             "scales.dc_link.offset" [scales.dc_link] offset: f32, 27: number("V").from_to(-100.0, 100.0).learned().hardware();
         ];
-        /// ADC counts of the maximum operating voltage of the dc link. They are counts so that no scale can raise the limit.
+        /// ADC counts at the maximum operating voltage. They are counts so that no scale can raise the limit.
         dc_link_highest: u16 = 4095 => [
-            /// ADC counts of the maximum operating voltage of the dc link
+            /// ADC counts at the maximum operating voltage
             "scales.dc_link.highest" [scales] dc_link_highest: u16, 28: whole().from_to(100.0, 4095.0).changed(Change::Board);
             /// nominal voltage of the dc link
             "inverter.dc_link_v" [inverter] dc_link_v: f32, 29: number("V").beside(|s| (10.0, s.dc_link_max_v()));
@@ -166,7 +166,7 @@ settings! {
         ohm_25: f32 = 10_000.0, 33: number("ohm").from_to(10.0, 1e6).hardware();
         /// B constant of that thermistor
         beta_k: f32 = 3435.0, 34: number("K").from_to(1000.0, 10_000.0).hardware();
-        /// resistor in series with that thermistor
+        /// series resistor of the thermistor
         divider_ohm: f32 = 4700.0, 35: number("ohm").from_to(10.0, 1e6).hardware();
         /// whether the thermistor is the one at ground
         ///
@@ -210,13 +210,13 @@ settings! {
         current_plant: CurrentPlant = CurrentPlant::DEFAULT => [
             /// plant that the current controllers are designed for
             "current_plant" [current_plant] source: PlantSource, 38: word();
-            /// gain of the identified plant k/(z - p) of the d axis
+            /// gain k of the d-axis plant k/(z - p)
             "current_plant.d.k" [current_plant.d] k: Option<f32>, 39: auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 1000.0);
-            /// pole of the identified plant of the d axis
+            /// pole p of the d-axis plant
             "current_plant.d.p" [current_plant.d] p: Option<f32>, 40: auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
-            /// gain of the identified plant k/(z - p) of the q axis
+            /// gain k of the q-axis plant k/(z - p)
             "current_plant.q.k" [current_plant.q] k: Option<f32>, 41: auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 1000.0);
-            /// pole of the identified plant of the q axis
+            /// pole p of the q-axis plant
             "current_plant.q.p" [current_plant.q] p: Option<f32>, 42: auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
         ];
         /// whether known delays are left uncompensated, as in the dissertation
@@ -305,12 +305,12 @@ settings! {
         ///
         /// Without an encoder the speed loop is always designed for this frequency.
         bandwidth_hz: f32 = 3.5, 52: number("Hz").from_to(0.1, 30.0);
-        /// saliency fixed to the flux, until the saliency sensitivity is learned
+        /// saliency fixed to the flux, until learned
         ///
         /// The value is valid at the nominal magnetising current. If it is negative, the inductance along the flux is the larger
         /// one. Near zero the loop would have no gain.
         flux_saliency: f32 = -0.035, 53: number().beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
-        /// whether a drive that has not learned starts without an encoder
+        /// whether an unlearned drive starts without an encoder
         ///
         /// It is meant for motors whose saliency is known from elsewhere, for example from a simulation model.
         allow_unlearned: bool = false, 54: word().guarded(Guard::Lower);
@@ -330,7 +330,7 @@ settings! {
         monitor: bool = true, 57: word().guarded(Guard::Raise);
         /// Injection current over the q-axis current for the lock monitor, learned with the shaft locked; guessed if unset.
         carrier: Option<CarrierTable> = None;
-        /// allowed saliency deficit: missing share of the flux-fixed saliency
+        /// allowed saliency deficit, a share
         ///
         /// 1 means zero flux.
         allowed_loss: f32 = 0.55, 58: number().from_to(0.3, 0.9).guarded(Guard::Lower);
@@ -347,11 +347,11 @@ settings! {
 
     /// The back-EMF observer that takes over from the injection at speed; see `drive_core::flux::observer`.
     ObserverSettings "observer." [observer] {
-        /// whether a back-EMF observer gives the angle at speed, where the injection ends
+        /// whether a back-EMF observer gives the angle at speed
         ///
         /// Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
         enabled: bool = true, 62: word();
-        /// leakage inductance of the fundamental wave at zero current, as a share of the leakage of motor.*
+        /// fundamental-wave leakage at zero current, as a share of that of motor.*
         leakage_share: f32 = 1.0, 63: number().from_to(0.5, 2.0);
         /// change of that share per ampere of stator current, peak
         leakage_slope: f32 = 0.0, 64: number("1/A").from_to(-10.0, 10.0);
@@ -381,7 +381,7 @@ settings! {
         /// move by more than half a turn in between.
         speed_rpm: Option<f32> = None, 69: auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
             .beside(|s| (1.0, 500.0 / s.nameplate.frequency_hz * s.nameplate.speed_rpm)).guarded(Guard::Lower);
-        /// largest voltage that the motor model does not explain at standstill
+        /// largest unexplained voltage at standstill
         ///
         /// By rule it is an error of 26 % of the stator resistance at the current limit, plus 2.3 % of the dc link for the
         /// inverter voltage error; at most the dc link.
@@ -389,30 +389,30 @@ settings! {
             70: auto("V", unexplained_v: |s| (0.26 * s.current_limit_a() * s.motor.r_s + s.share_of_dc_link(7.086)).min(s.inverter.dc_link_v)).from_to(0.01, 1000.0).guarded(Guard::Lower);
         /// continuous current of the motor at standstill, peak
         motor_a: Option<f32> = None, 71: auto("A", motor_a: |s| s.rated_a()).beside(|s| (0.01, 3.0 * s.rated_a())).guarded(Guard::Lower);
-        /// thermal time constant of the motor's windings
+        /// thermal time constant of the windings
         ///
         /// The default lies between the time constants of the trip classes 10 and 20 (IEC 60947-4-1: 7.2 times the rated current for 10
         /// and 20 s mean 518 and 1037 s). A warm motor withstands 150 % of its torque for 60 s.
         motor_s: f32 = 600.0, 72: number("s").from_to(1.0, 10_000.0).guarded(Guard::Lower);
         /// continuous current of the inverter, peak
         inverter_a: Option<f32> = None, 73: auto("A", inverter_a: |s| s.current_limit_a()).beside(|s| (0.01, s.trip_a())).guarded(Guard::Lower);
-        /// thermal time constant of the inverter's switches to the heat sink
+        /// thermal time constant of the switches
         inverter_s: f32 = 5.0, 74: number("s").from_to(0.1, 1000.0).guarded(Guard::Lower);
         /// temperature of the heat sink that trips
         ///
         /// The default suits most power modules.
         heat_sink_c: f32 = 85.0, 75: number("degC").from_to(0.0, 150.0).hardware();
-        /// temperature of the heat sink above which the current limit falls, to zero where the drive trips
+        /// heat-sink temperature above which the current limit falls, to zero at the trip
         derate_c: Option<f32> = None, 76: auto("degC", derate_c: |s| s.limits.heat_sink_c - 15.0).beside(|s| (-40.0, s.limits.heat_sink_c)).guarded(Guard::Lower);
-        /// largest current from the dc link, motoring; 1000 for none
+        /// largest current from the dc link, motoring; 1000: none
         ///
         /// A limit lies above the copper losses of the d-axis current.
         dc_motoring_a: f32 = DcLimit::NONE.current_a, 126: number("A").beside(|s| (s.magnetising_w() / s.inverter.dc_link_v, DcLimit::NONE.current_a)).guarded(Guard::Lower);
-        /// largest current into the dc link, generating; 1000 for none
+        /// largest current into the dc link, generating; 1000: none
         dc_generating_a: f32 = DcLimit::NONE.current_a, 127: number("A").from_to(0.0, DcLimit::NONE.current_a).guarded(Guard::Lower);
-        /// largest power from the dc link, motoring; 1e6 for none
+        /// largest power from the dc link, motoring; 1e6: none
         motoring_w: f32 = DcLimit::NONE.power_w, 128: number("W").beside(|s| (s.magnetising_w(), DcLimit::NONE.power_w)).guarded(Guard::Lower);
-        /// largest power into the dc link, generating; 1e6 for none
+        /// largest power into the dc link, generating; 1e6: none
         generating_w: f32 = DcLimit::NONE.power_w, 129: number("W").from_to(0.0, DcLimit::NONE.power_w).guarded(Guard::Lower);
     }
 
@@ -428,16 +428,16 @@ settings! {
         /// the saliency check also while the flux is restored.
         magnetise_s: Option<f32> = None, 79: auto("s", magnetise_s: |s| f32::max(0.8, 5.0 * s.motor.tau_r()))
             .beside(|s| (if s.watches_lock() && !s.injection.synchronous.check { 0.5 } else { 0.0 }, 60.0));
-        /// flux that the rule for `sequence.i_d` aims at: low as in the dissertation, or high
+        /// flux of the rule for `sequence.i_d`: low as in the dissertation, or high
         flux: Flux = Flux::Low, 80: word().learned();
         /// magnetising (d-axis) current, peak
         ///
         /// 0.7 A is the current of section 3.10. With high flux it is the current of the rated flux, but at most 0.707 times the rated
         /// current and 0.707 times the current limit, which give the largest torque.
         i_d: Option<f32> = None, 81: auto("A", i_d: Settings::i_d_rule).beside(|s| (0.01, s.current_limit_a())).learned();
-        /// rate at which the q-axis current falls at a stop
+        /// fall of the q-axis current at a stop
         stop_a_per_s: Option<f32> = None, 82: auto("A/s", stop_a_per_s: |s| s.share_of_rated(30.0)).from_to(0.1, 1e5).guarded(Guard::Raise);
-        /// whether a start with the observer first looks for a rotating shaft (flying start)
+        /// whether a start first looks for a rotating shaft (flying start)
         ///
         /// The search takes 0.25 s and is done without an encoder only.
         catch: bool = true, 83: word();
@@ -466,7 +466,7 @@ settings! {
         ramp_rpm_per_s: Option<f32> = None, 87: auto("rpm/s", ramp_rpm_per_s: |s| s.share_of_poles(300.0)).from_to(1.0, 1e5).guarded(Guard::Raise);
         /// deceleration of a quick stop
         quick_rpm_per_s: Option<f32> = None, 88: auto("rpm/s", quick_rpm_per_s: |s| 3.0 * s.ramp_rpm_per_s()).beside(|s| (s.ramp_rpm_per_s(), 3e5)).guarded(Guard::Raise);
-        /// time in which the acceleration reaches its full value, in speed mode and in a stop by the ramp; 0: at once
+        /// time for the acceleration to reach its full value, in speed mode and ramp stops; 0: at once
         s_ramp_s: f32 = 0.0, 89: number("s").from_to(0.0, 10.0).guarded(Guard::Lower);
         /// phase margin of the speed loop: more is calmer and slower; without an encoder 45 only with a stiff shaft
         ///
@@ -478,13 +478,13 @@ settings! {
     /// Limits of the torque by the voltage of the dc link, and the brake resistor; see `drive_core::dc_link`. Unset values follow
     /// [`rules`](super::rules). By default there is no brake resistor. If one is fitted, its energy and power are printed on it.
     BrakingSettings "braking." [braking] {
-        /// braking limit: dc link at which generating torque ends
+        /// dc link at which generating torque ends
         high_v: Option<f32> = None, 91: auto("V", dc_high_v: |s| s.share_of_dc_link(390.0).min(HIGH_OF_TRIP * s.dc_over_v()).min(WITHIN * s.highest_dc_link_v()))
             .beside(|s| (s.inverter.dc_link_v + MARGIN * s.inverter.dc_link_v, s.dc_over_v().min(s.highest_dc_link_v())));
-        /// dc link at which motoring torque ends; below it kinetic buffering begins
+        /// dc link below which kinetic buffering replaces motoring torque
         low_v: Option<f32> = None, 92: auto("V", dc_low_v: |s| f32::max(s.share_of_dc_link(260.0), LOW_OF_TRIP * s.dc_under_v()))
             .beside(|s| (s.dc_under_v() + MARGIN * s.dc_under_v(), s.inverter.dc_link_v - MARGIN * s.inverter.dc_link_v));
-        /// d-axis current that is added while generating torque is limited; 0 for none
+        /// d-axis current added while generating torque is limited; 0: none
         flux_a: Option<f32> = None, 93: auto("A", braking_flux_a: |s| f32::min(s.share_of_rated(1.0), WITHIN * s.current_limit_a()))
             .beside(|s| (0.0, s.current_limit_a()));
         /// brake resistor behind the chopper; 0 for none
@@ -497,7 +497,7 @@ settings! {
 
     /// The supply of the dc link.
     SupplySettings "supply." [supply] {
-        /// time that the dc link must be steady before the precharge relay closes; 0 without a relay
+        /// time of a steady dc link before the precharge relay closes; 0: no relay
         ///
         /// See `drive_core::supply`.
         relay_s: f32 = 0.0, 97: number("s").from_to(0.0, 60.0).guarded(Guard::Raise);
@@ -513,7 +513,7 @@ settings! {
         /// The rule gives the magnetising current of most motors, 0.45 times the rated current.
         boost_a: Option<f32> = None, 99: auto("A", boost_a: |s| f32::min(0.45 * s.rated_a(), 0.6 * s.current_limit_a()))
             .beside(|s| (0.01, s.current_limit_a()));
-        /// share of the slip that is compensated in V/f control
+        /// share of the slip that V/f control compensates
         slip_share: f32 = 1.0, 100: number().from_to(0.0, 1.5);
     }
 }
