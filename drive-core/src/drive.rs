@@ -185,11 +185,6 @@ impl Start {
             Self::Test(_) => Mode::Commissioning,
         }
     }
-
-    /// Whether the start begins with a flying start. A drive that learns has a locked shaft.
-    pub fn catches(&self, c: &Coefficients) -> bool {
-        c.flying_start.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
-    }
 }
 
 /// A drive that regulates the current in the flux frame.
@@ -497,7 +492,7 @@ impl Drive {
                 // instead of using one of three base addresses within reach.
                 let (field, c, kept) = black_box((field, &self.c, &mut self.kept));
                 match checked {
-                    Ok(()) => field.step(c, kept, measured, put_out).map(Some),
+                    Ok(()) => c.step_field(field, kept, measured, put_out).map(Some),
                     Err(fault) => Err(fault.into()),
                 }
             }
@@ -525,7 +520,7 @@ impl Drive {
         let (is_off, is_energised) = (self.is_off(), self.is_energised());
         let (c, k) = (&self.c, &mut self.kept);
         if k.elapsed % Thermal::EVERY == Thermal::EVERY - 1 {
-            k.load(c, measured, is_energised)?;
+            c.load(k, measured, is_energised)?;
         }
         if is_off {
             return Ok(None);
@@ -533,8 +528,8 @@ impl Drive {
         checked?;
         match &mut self.phase {
             Phase::Prepare(_) => Ok(self.prepare(measured)?),
-            Phase::Test(test) => Ok(Some(test.step(c, k, measured)?)),
-            Phase::Scalar(scalar) => scalar.step(c, k, measured).map(Some),
+            Phase::Test(test) => Ok(Some(c.step_test(test, k, measured)?)),
+            Phase::Scalar(scalar) => c.step_scalar(scalar, k, measured).map(Some),
             Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(None),
         }
     }
@@ -550,7 +545,7 @@ impl Drive {
     #[cold]
     fn end(&mut self, end: End) {
         if let Phase::Field(field) = &self.phase {
-            field.show(&self.c, &mut self.kept);
+            self.c.show(field, &mut self.kept);
         }
         let fault = match (end, &self.phase) {
             (End::Stopped, _) => None,

@@ -15,28 +15,30 @@ const PROOF: u32 = 600;
 /// Share of that current by which the measured current may deviate.
 const PROOF_ERROR: f32 = 0.3;
 
-impl Field {
+impl Common {
     /// Returns the phase that follows when the flux was built up and verified.
-    pub(super) fn behind_the_flux(k: &Common) -> FluxPhase {
-        if k.brake > 0 { FluxPhase::Prove } else { FluxPhase::ready() }
+    pub(super) fn behind_the_flux(&self) -> FluxPhase {
+        if self.brake > 0 { FluxPhase::Prove } else { FluxPhase::ready() }
     }
 
     /// Returns the goal for a shaft that has come to rest.
-    pub(super) fn at_rest(k: &Common) -> Goal {
-        if k.brake > 0 { Goal::Hold { left: k.brake } } else { Goal::Release }
+    pub(super) fn at_rest(&self) -> Goal {
+        if self.brake > 0 { Goal::Hold { left: self.brake } } else { Goal::Release }
     }
+}
 
+impl Coefficients {
     /// Returns the current while the torque is proven, A. The brake is closed, and the q-axis current must follow its reference.
     ///
     /// # Errors
     /// [`Fault::TorqueNotProven`].
     #[cold]
-    pub(super) fn prove(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
-        let wanted = PROOF_SHARE * c.protection.i_q;
+    pub(super) fn prove(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+        let wanted = PROOF_SHARE * self.protection.i_q;
         if k.elapsed >= PROOF {
             let missing = (wanted - k.seen.current.q).abs();
             Fault::TorqueNotProven.unless(missing <= PROOF_ERROR * wanted)?;
-            self.enter(k, FluxPhase::ready());
+            s.enter(k, FluxPhase::ready());
         }
         Ok(Dq { d: k.references.current.d, q: wanted })
     }

@@ -205,7 +205,7 @@ impl Drive {
         if field.frame != Frame::Tracked {
             return Err(Refused::NeedsInjection);
         }
-        if !k.is_at_standstill(c) {
+        if !c.is_at_standstill(k) {
             return Err(Refused::Turning);
         }
         k.no_torque(k.references.current.d, c.injection_axis);

@@ -19,27 +19,6 @@ use crate::protect::saliency_check::SaliencyCheckAction;
 use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured};
 
 impl Field {
-    /// Begins without current, for this goal.
-    pub fn begin(&mut self, c: &Coefficients, goal: Goal, carried: &CarryOver) {
-        self.frame = match (c.source, goal) {
-            (_, Goal::Learn) => Frame::LockedShaft,
-            (AngleSource::Encoder, _) => Frame::Encoder,
-            (AngleSource::Injection, _) => Frame::Tracked,
-        };
-        self.goal = goal;
-        // A flying start measures none of these quantities.
-        self.carried = *carried;
-        self.inverter_drop.volts = carried.inverter_drop;
-        self.observer.resistance = carried.resistance;
-        c.turn(&mut self.axes, 0.0, c.injection_axis, false);
-        c.estimator.start(&mut self.estimator);
-        // A self-commissioning begins without the earlier asymmetry.
-        if self.frame != Frame::LockedShaft {
-            self.estimator.changed = carried.asymmetry;
-        }
-        self.observer.start(c.observer.as_ref());
-    }
-
     pub fn state(&self) -> State {
         match (&self.flux, &self.goal) {
             (_, Goal::Brake { .. }) => State::Braking,
@@ -78,31 +57,65 @@ impl Field {
         }
     }
 
+    /// Continues in this phase of the flux.
+    #[inline(always)] // writes the small phase only, not the memory that it shares
+    pub fn enter(&mut self, k: &mut Common, flux: FluxPhase) {
+        (self.flux, k.elapsed) = (flux, 0);
+    }
+
+    /// Returns the angle of the rotor, flux less slip, counted as by an encoder.
+    #[inline(never)] // inlined at both calls, 8 bytes more of control code
+    pub fn count_by_flux(&mut self) -> u32 {
+        self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
+    }
+}
+
+impl Coefficients {
+    /// Begins without current, for this goal.
+    pub(super) fn begin_field(&self, s: &mut Field, goal: Goal, carried: &CarryOver) {
+        s.frame = match (self.source, goal) {
+            (_, Goal::Learn) => Frame::LockedShaft,
+            (AngleSource::Encoder, _) => Frame::Encoder,
+            (AngleSource::Injection, _) => Frame::Tracked,
+        };
+        s.goal = goal;
+        // A flying start measures none of these quantities.
+        s.carried = *carried;
+        s.inverter_drop.volts = carried.inverter_drop;
+        s.observer.resistance = carried.resistance;
+        self.turn(&mut s.axes, 0.0, self.injection_axis, false);
+        self.estimator.start(&mut s.estimator);
+        // A self-commissioning begins without the earlier asymmetry.
+        if s.frame != Frame::LockedShaft {
+            s.estimator.changed = carried.asymmetry;
+        }
+        s.observer.start(self.observer.as_ref());
+    }
+
     /// Runs one period. The compare values go to `put_out` before the checks and slow tasks.
     ///
     /// # Errors
     /// The reason why the outputs are switched off: a fault, or the end of a stop.
-    pub fn step(
-        &mut self,
-        c: &Coefficients,
+    pub(super) fn step_field(
+        &self,
+        s: &mut Field,
         k: &mut Common,
         measured: &Measured,
         put_out: &mut dyn FnMut(Compare),
     ) -> Result<[f32; 3], End> {
-        if self.frame == Frame::Encoder {
+        if s.frame == Frame::Encoder {
             k.rotor_count = measured.encoder;
-            k.seen.turns = c.motion.turns(&self.motion, k.rotor_count);
+            k.seen.turns = self.motion.turns(&s.motion, k.rotor_count);
         }
         let measured_current = measured.current();
-        let wanted = self.advance(c, k)?;
-        let counted = self.frame.is_counted();
-        let s = self;
+        let wanted = self.advance(s, k)?;
+        let counted = s.frame.is_counted();
         let index = s.carrier.advance();
         let carrier_is_off = s.hand_over.is_carrier_off();
         let direct = if carrier_is_off { DIRECT_SHARE_WITHOUT_CARRIER } else { DIRECT_SHARE };
         let reference = Dq {
-            d: c.current_loop.d.filter(&mut s.reference[0], direct, wanted.d),
-            q: c.current_loop.q.filter(&mut s.reference[1], direct, wanted.q),
+            d: self.current_loop.d.filter(&mut s.reference[0], direct, wanted.d),
+            q: self.current_loop.q.filter(&mut s.reference[1], direct, wanted.q),
         };
         k.seen.reference = reference;
 
@@ -110,7 +123,7 @@ impl Field {
         let flux = if counted {
             // During self-commissioning the shaft is locked, and the flux may lead the frame.
             let count = if s.frame == Frame::Encoder { measured.encoder } else { 0 };
-            let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
+            let flux = self.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
             flux.less(s.lead)
         } else {
             s.estimator.flux()
@@ -121,15 +134,15 @@ impl Field {
 
         // The expected injection current is subtracted; the filter removes the rest. (Its notch is 6 Hz
         // wide. Alone it would pass the sidebands of a rotating injection.)
-        let carrier = if carrier_is_off || !c.inject {
+        let carrier = if carrier_is_off || !self.inject {
             CarrierPeriod::default()
         } else {
-            s.carrier.at(&c.injection, index)
+            s.carrier.at(&self.injection, index)
         };
         let carrier_axis = phi.turned_by(axes.carrier);
-        if c.demodulate {
+        if self.demodulate {
             let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
-            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
+            self.estimator.observe(&mut s.estimator, &sample, flux.freq);
             k.seen.delta_i = s.estimator.delta_i;
         }
         let rest = measured_current - AlphaBeta::along(carrier_axis, carrier.sampled);
@@ -139,25 +152,25 @@ impl Field {
         let current = seen.to_dq(flux_axis);
 
         // Angles for the next sample.
-        let trust = s.trust(c, k.elapsed);
+        let trust = self.trust(s, k.elapsed);
         let (flux_current, rotor_freq) = if counted {
             let flux_current = current.seen_from(s.lead_axis);
-            c.indirect.slip(&mut s.indirect, flux_current.q);
+            self.indirect.slip(&mut s.indirect, flux_current.q);
             (flux_current, s.indirect.rotor_freq)
         } else {
             // The slip is computed from the reference, because the measured current would feed the angle error back.
-            c.indirect.slip(&mut s.indirect, reference.q);
+            self.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, rest, phi);
+            let turning = self.observe_fundamental(s, index, rest, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if trust.rotates && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
-                return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
+            if trust.rotates && self.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+                return Err(self.not_finite_in_field(s, k).unwrap_or(Fault::LostAngle).into());
             }
             (reference, s.estimator.rotor_freq)
         };
 
         // Current loop.
-        let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
+        let voltage = self.current_loop.step(&mut s.current_loop, reference - current)
             + s.induced.at(reference) * s.induced_share
             + k.references.test_voltage;
 
@@ -173,18 +186,18 @@ impl Field {
         };
         let expected = (current + coming).to_alpha_beta(applied);
         let half_change = (axes.injection * carrier.half_change).to_alpha_beta(applied);
-        let signs = c.dead_time.signs(expected.to_abc(), half_change.to_abc());
-        let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
-        let modulated = c.modulator.step(total, compensation, measured.dc_link);
+        let signs = self.dead_time.signs(expected.to_abc(), half_change.to_abc());
+        let compensation = self.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
+        let modulated = self.modulator.step(total, compensation, measured.dc_link);
         (k.seen.current, k.seen.voltage) = (current, voltage);
         (k.seen.measured, k.seen.realised) = (measured_current, modulated.realised);
         (k.seen.dc_link, k.seen.rotor_freq) = (measured.dc_link, rotor_freq);
         if modulated.limited {
             let missing = modulated.realised - total;
-            c.current_loop.condition(&mut s.current_loop, missing.to_dq(applied));
+            self.current_loop.condition(&mut s.current_loop, missing.to_dq(applied));
         }
         s.prediction.collect(measured_current, modulated.realised);
-        if !counted && c.observer.is_some() {
+        if !counted && self.observer.is_some() {
             s.observer.put_out(modulated.realised - carrier_voltage);
         }
 
@@ -196,15 +209,15 @@ impl Field {
                 signs: signs.to_abc().to_alpha_beta().to_dq(applied),
                 dc_link: measured.dc_link,
             };
-            s.measure_drop(c, k.elapsed, &sample);
+            self.measure_drop(s, k.elapsed, &sample);
         }
 
         // A state that is not finite gives no output. (The voltage contains current and reference of the
         // previous step, and the speed contains the demodulated signal.)
         if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
-            return Err(s.not_finite(c, k).unwrap_or(Fault::NonFiniteState).into());
+            return Err(self.not_finite_in_field(s, k).unwrap_or(Fault::NonFiniteState).into());
         }
-        put_out(c.front_end.compare(modulated.duties));
+        put_out(self.front_end.compare(modulated.duties));
 
         // Checks and slow tasks, one per sample.
         let results = StepResults {
@@ -219,46 +232,46 @@ impl Field {
             rotor_freq,
             trust,
         };
-        c.run_slot(s, k, index, &results)?;
+        self.run_slot(s, k, index, &results)?;
         Ok(modulated.duties)
     }
 
     /// Measures the inverter voltage error, and with it the stator resistance.
     #[cold]
-    fn measure_drop(&mut self, c: &Coefficients, elapsed: u32, sample: &DropSample) {
-        if let Some(ratio) = c.inverter_drop.step(&mut self.inverter_drop, elapsed, sample) {
-            self.observer.resistance.take(ratio - 1.0);
-            self.estimator.filter.start(self.observer.resistance.deviation);
+    fn measure_drop(&self, s: &mut Field, elapsed: u32, sample: &DropSample) {
+        if let Some(ratio) = self.inverter_drop.step(&mut s.inverter_drop, elapsed, sample) {
+            s.observer.resistance.take(ratio - 1.0);
+            s.estimator.filter.start(s.observer.resistance.deviation);
         }
     }
 
     /// Copies the state of the demodulation, the checks and the position to the telemetry.
-    pub fn show(&self, c: &Coefficients, k: &mut Common) {
-        let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
+    pub(super) fn show(&self, s: &Field, k: &mut Common) {
+        let (saliency, seen) = (s.estimator.saliency(), &mut k.seen);
         seen.saliency = saliency.q;
         seen.carrier_squared = saliency.carrier_squared;
-        seen.carrier_share = self.carrier.share;
-        seen.saliency_loss = self.lock.loss;
-        seen.inverter_drop = self.inverter_drop.volts;
-        seen.turns = c.motion.turns(&self.motion, k.rotor_count);
+        seen.carrier_share = s.carrier.share;
+        seen.saliency_loss = s.lock.loss;
+        seen.inverter_drop = s.inverter_drop.volts;
+        seen.turns = self.motion.turns(&s.motion, k.rotor_count);
     }
 
     /// Returns the current to regulate, A. Enters the next phase of the flux or the next goal when it is due.
     ///
     /// # Errors
     /// The reason why the outputs are switched off.
-    fn advance(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
-        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
-            return self.find_flux(c, k);
+    fn advance(&self, s: &mut Field, k: &mut Common) -> Result<Dq, End> {
+        if !matches!(s.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+            return self.find_flux(s, k);
         }
-        let i_q = match self.goal {
+        let i_q = match s.goal {
             Goal::Torque => k.references.current.q,
             Goal::Speed { .. } | Goal::Position { .. } | Goal::Brake { .. } | Goal::Hold { .. } => {
-                self.follow(c, k)
+                self.follow(s, k)
             }
-            Goal::Learn => self.learn(c, k)?,
+            Goal::Learn => self.learn(s, k)?,
             Goal::Release => {
-                let (i_q, ramp) = (&mut k.references.current.q, c.sequence.stop_ramp);
+                let (i_q, ramp) = (&mut k.references.current.q, self.sequence.stop_ramp);
                 if i_q.abs() > ramp && k.elapsed < COAST {
                     *i_q -= limited(*i_q, ramp);
                 } else {
@@ -274,22 +287,22 @@ impl Field {
 
     /// Returns the current while the flux is found, built up and verified, A.
     #[cold]
-    fn find_flux(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, End> {
-        Ok(match self.flux {
-            FluxPhase::Search(_) => self.search(c, k)?,
-            FluxPhase::Asymmetry(_) => self.measure_asymmetry(c, k)?,
-            FluxPhase::Build { from } => self.build(c, k, k.elapsed.wrapping_sub(from))?,
-            FluxPhase::Hold => self.magnetise(c, k)?,
-            FluxPhase::Verify => self.verify(c, k)?,
-            FluxPhase::Prove => self.prove(c, k)?,
+    fn find_flux(&self, s: &mut Field, k: &mut Common) -> Result<Dq, End> {
+        Ok(match s.flux {
+            FluxPhase::Search(_) => self.search_shaft(s, k)?,
+            FluxPhase::Asymmetry(_) => self.measure_asymmetry(s, k)?,
+            FluxPhase::Build { from } => self.build_flux(s, k, k.elapsed.wrapping_sub(from))?,
+            FluxPhase::Hold => self.magnetise(s, k)?,
+            FluxPhase::Verify => self.verify(s, k)?,
+            FluxPhase::Prove => self.prove(s, k)?,
             FluxPhase::Ready(_) | FluxPhase::Learn(_) => Dq::ZERO,
         })
     }
 
     /// Returns the q-axis current of the speed or the position loop, A.
-    fn follow(&mut self, c: &Coefficients, k: &mut Common) -> f32 {
+    fn follow(&self, s: &mut Field, k: &mut Common) -> f32 {
         let mut range = k.limits.now.i_q;
-        let goal = match &mut self.goal {
+        let goal = match &mut s.goal {
             Goal::Speed { speed, jog } => {
                 // A jog that is not repeated ends.
                 if *jog > 0 {
@@ -312,34 +325,28 @@ impl Field {
             }
             Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
         };
-        let estimated = k.seen.rotor_freq * c.speed_per_freq;
-        let i_q = c.motion.step(&mut self.motion, goal, k.rotor_count, estimated, range);
+        let estimated = k.seen.rotor_freq * self.speed_per_freq;
+        let i_q = self.motion.step(&mut s.motion, goal, k.rotor_count, estimated, range);
         k.references.current.q = i_q;
-        match self.goal {
-            Goal::Brake { .. } if c.motion.is_at_rest(&self.motion) => {
-                (self.goal, k.elapsed) = (Self::at_rest(k), 0);
+        match s.goal {
+            Goal::Brake { .. } if self.motion.is_at_rest(&s.motion) => {
+                (s.goal, k.elapsed) = (k.at_rest(), 0);
             }
-            Goal::Hold { left: 0 } => (self.goal, k.elapsed) = (Goal::Release, 0),
+            Goal::Hold { left: 0 } => (s.goal, k.elapsed) = (Goal::Release, 0),
             _ => {}
         }
         i_q
     }
 
-    /// Continues in this phase of the flux.
-    #[inline(always)] // writes the small phase only, not the memory that it shares
-    pub fn enter(&mut self, k: &mut Common, flux: FluxPhase) {
-        (self.flux, k.elapsed) = (flux, 0);
-    }
-
     /// Continues with a shaft at rest: measures the asymmetry if that is useful, then builds up the flux.
     #[cold]
-    pub fn continue_at_standstill(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
-        let learns = self.frame == Frame::LockedShaft;
-        if c.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
-            self.carrier.set(AtStart::CARRIER_SHARE);
-            self.enter(k, FluxPhase::Asymmetry(AtStartState::new(learns)));
+    pub(super) fn continue_at_standstill(&self, s: &mut Field, k: &mut Common, encoder: u32) {
+        let learns = s.frame == Frame::LockedShaft;
+        if self.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
+            s.carrier.set(AtStart::CARRIER_SHARE);
+            s.enter(k, FluxPhase::Asymmetry(AtStartState::new(learns)));
         } else {
-            self.enter_hold(c, k, encoder);
+            self.enter_hold(s, k, encoder);
         }
     }
 
@@ -348,59 +355,59 @@ impl Field {
     /// # Errors
     /// [`Fault::NothingLearned`] if the asymmetry is larger than a self-commissioning accepts.
     #[cold]
-    fn measure_asymmetry(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
-        let (Some(at_start), FluxPhase::Asymmetry(state)) = (&c.at_start, &mut self.flux) else {
+    fn measure_asymmetry(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+        let (Some(at_start), FluxPhase::Asymmetry(state)) = (&self.at_start, &mut s.flux) else {
             return Ok(Dq::ZERO);
         };
-        if let Some(axis) = at_start.step(state, k.elapsed, self.estimator.saliency().q) {
+        if let Some(axis) = at_start.step(state, k.elapsed, s.estimator.saliency().q) {
             k.references.injection_axis = axis;
             return Ok(Dq::ZERO);
         }
-        k.references.injection_axis = c.injection_axis;
-        self.carrier.set(1.0);
-        self.at_start = Some(state.found());
-        if let (Frame::Tracked, Some(change)) = (self.frame, at_start.change(state)) {
-            let known = &mut self.estimator.changed;
+        k.references.injection_axis = self.injection_axis;
+        s.carrier.set(1.0);
+        s.at_start = Some(state.found());
+        if let (Frame::Tracked, Some(change)) = (s.frame, at_start.change(state)) {
+            let known = &mut s.estimator.changed;
             *known = known.plus(&change, 1.0);
             if known.size() > LARGEST_ASYMMETRY {
                 return Err(Fault::NothingLearned);
             }
         }
-        self.observer.start(c.observer.as_ref());
-        self.enter_hold(c, k, 0);
+        s.observer.start(self.observer.as_ref());
+        self.enter_hold(s, k, 0);
         Ok(Dq::ZERO)
     }
 
     /// Fixes the frame along phase a and builds up the flux there.
     #[cold]
-    pub fn enter_hold(&mut self, c: &Coefficients, k: &mut Common, encoder: u32) {
-        (self.lock, self.inverter_drop) = Default::default();
-        k.rotor_count = match c.source {
+    pub(super) fn enter_hold(&self, s: &mut Field, k: &mut Common, encoder: u32) {
+        (s.lock, s.inverter_drop) = Default::default();
+        k.rotor_count = match self.source {
             AngleSource::Encoder => encoder,
-            AngleSource::Injection => self.count_by_flux(),
+            AngleSource::Injection => s.count_by_flux(),
         };
-        c.motion.start(&mut self.motion, k.rotor_count);
+        self.motion.start(&mut s.motion, k.rotor_count);
         if let Some(home) = k.home {
-            self.motion.origin = home;
-            let here = c.motion.turns(&self.motion, k.rotor_count);
-            if let Goal::Position { turns, .. } = &mut self.goal {
+            s.motion.origin = home;
+            let here = self.motion.turns(&s.motion, k.rotor_count);
+            if let Goal::Position { turns, .. } = &mut s.goal {
                 turns.get_or_insert(here);
             }
         }
-        self.enter(k, FluxPhase::Hold);
+        s.enter(k, FluxPhase::Hold);
     }
 
     /// Returns the current while the flux is built up and the saliency is checked, A.
     #[cold]
-    fn magnetise(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
-        let level = c.inverter_drop.level(k.elapsed);
+    fn magnetise(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+        let level = self.inverter_drop.level(k.elapsed);
         let magnetising = Dq { d: level * k.references.current.d, q: 0.0 };
-        let learns = self.frame == Frame::LockedShaft;
-        let phase = match (k.elapsed.checked_sub(c.sequence.magnetise), c.saliency_check) {
+        let learns = s.frame == Frame::LockedShaft;
+        let phase = match (k.elapsed.checked_sub(self.sequence.magnetise), self.saliency_check) {
             (None, _) => return Ok(magnetising),
             (Some(_), None) => SaliencyCheckAction::Passed,
             (Some(n), Some(check)) => {
-                check.step(&mut self.saliency_check, n, self.estimator.saliency().q)
+                check.step(&mut s.saliency_check, n, s.estimator.saliency().q)
             }
         };
         match phase {
@@ -408,20 +415,20 @@ impl Field {
                 k.references.injection_axis = SaliencyCheck::LOOK_AXIS;
                 return Ok(Dq::ZERO);
             }
-            SaliencyCheckAction::Restore => k.references.injection_axis = c.injection_axis,
+            SaliencyCheckAction::Restore => k.references.injection_axis = self.injection_axis,
             SaliencyCheckAction::Passed => {
-                self.flux = if learns {
+                s.flux = if learns {
                     FluxPhase::Learn(LearningState::default())
-                } else if c.lock_monitor.is_some() {
+                } else if self.lock_monitor.is_some() {
                     FluxPhase::Verify
                 } else {
-                    Self::behind_the_flux(k)
+                    k.behind_the_flux()
                 };
                 k.elapsed = 0;
             }
             // A self-commissioning judges the saliency sensitivity instead.
             SaliencyCheckAction::Failed if learns => {
-                k.references.injection_axis = c.injection_axis;
+                k.references.injection_axis = self.injection_axis;
             }
             SaliencyCheckAction::Failed => return Err(Fault::NoSaliency),
         }
@@ -430,27 +437,21 @@ impl Field {
 
     /// Returns the current while the lock is verified, A. The axis is tracked for a while without torque.
     #[cold]
-    fn verify(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
-        if k.elapsed >= c.sequence.verify {
-            if k.seen.rotor_freq.abs() > c.sequence.pushed_freq {
+    fn verify(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+        if k.elapsed >= self.sequence.verify {
+            if k.seen.rotor_freq.abs() > self.sequence.pushed_freq {
                 return Err(Fault::LostLock);
             }
-            let phase = Self::behind_the_flux(k);
-            self.enter(k, phase);
+            let phase = k.behind_the_flux();
+            s.enter(k, phase);
         }
         Ok(Dq { d: k.references.current.d, q: 0.0 })
     }
 
-    /// Returns the angle of the rotor, flux less slip, counted as by an encoder.
-    #[inline(never)] // inlined at both calls, 8 bytes more of control code
-    pub fn count_by_flux(&mut self) -> u32 {
-        self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
-    }
-
     /// Returns the fault of a result that is not finite: settings, references or state, whichever is not finite.
     #[cold]
-    fn not_finite(&self, c: &Coefficients, k: &Common) -> Option<Fault> {
-        let state = (!self.estimator.is_finite()).then_some(Fault::NonFiniteState);
-        k.not_finite(c, self.goal.is_finite()).or(state)
+    fn not_finite_in_field(&self, s: &Field, k: &Common) -> Option<Fault> {
+        let state = (!s.estimator.is_finite()).then_some(Fault::NonFiniteState);
+        self.not_finite(k, s.goal.is_finite()).or(state)
     }
 }

@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::{Common, Field, FluxPhase};
+use super::{Common, Field, FluxPhase, Start};
 use crate::current::pi::ReferenceState;
 use crate::flux::catch::{self, SearchResult};
 use crate::flux::hand_over::HandOver;
@@ -46,93 +46,23 @@ impl Residual {
     pub fn after(self, periods: u32) -> Self {
         Self { ago: self.ago.saturating_add(periods), ..self }
     }
+}
 
-    /// Whether some of the flux may be left.
-    pub fn is_recent(&self, c: &Coefficients) -> bool {
-        c.flying_start.is_some_and(|start| self.ago < start.flux_decay)
+impl FlyingStart {
+    /// Whether some of a residual flux may be left.
+    pub(super) fn is_recent(&self, residual: &Residual) -> bool {
+        residual.ago < self.flux_decay
     }
 
-    /// Whether the flux would still drive too much current `elapsed` periods later.
-    pub fn waits(&self, c: &Coefficients, elapsed: u32) -> bool {
-        let Some(start) = &c.flying_start else { return false };
-        let x = self.ago.saturating_add(elapsed) as f32 * start.decay;
+    /// Whether a residual flux would still drive too much current `elapsed` periods later.
+    pub(super) fn waits(&self, residual: &Residual, elapsed: u32) -> bool {
+        let x = residual.ago.saturating_add(elapsed) as f32 * self.decay;
         // The flux decays by e^x, which is more than this series.
-        self.volts > start.residual_v * (1.0 + x * (1.0 + 0.5 * x))
+        residual.volts > self.residual_v * (1.0 + x * (1.0 + 0.5 * x))
     }
 }
 
 impl Field {
-    /// Returns the current during the search for a rotating shaft, A.
-    ///
-    /// # Errors
-    /// [`Fault::NotCaught`] if the shaft rotates too fast.
-    #[cold]
-    pub(super) fn search(&mut self, c: &Coefficients, k: &mut Common) -> Result<Dq, Fault> {
-        let (Some(start), FluxPhase::Search(search)) = (&c.flying_start, &mut self.flux) else {
-            self.continue_at_standstill(c, k, 0);
-            return Ok(Dq::ZERO);
-        };
-        // At first there is no current, so that the bootstrap capacitors charge and a residual flux is not short-circuited.
-        let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
-            return Ok(Dq::ZERO);
-        };
-        let drives = self.carried.residual.is_some_and(|flux| flux.volts > NEGLIGIBLE_EMF_V);
-        if n == 0 && !drives {
-            self.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * start.current);
-        }
-        let d = if drives { FlyingStart::WITH_FLUX * start.current } else { start.current };
-        if n > catch::FROM {
-            c.current_loop.freeze_integrator(&mut self.current_loop);
-        }
-        match search.step(n, self.observer.change) {
-            SearchResult::Searching => {}
-            SearchResult::Standing => {
-                self.carried.residual = None;
-                self.hand_over = HandOver::default();
-                self.continue_at_standstill(c, k, 0);
-            }
-            SearchResult::Turning(flux_freq) => {
-                let freq = start.path.rotor(flux_freq);
-                if freq.abs() > HIGHEST {
-                    return Err(Fault::NotCaught);
-                }
-                self.carried.residual = None;
-                self.flux = FluxPhase::Build { from: k.elapsed };
-                self.estimator.preset_speed(freq);
-                self.indirect = IndirectState::default();
-                self.observer.start(c.observer.as_ref());
-            }
-        }
-        Ok(Dq { d, q: 0.0 })
-    }
-
-    /// Returns the current while the flux of a rotating rotor builds up, `n` periods after the beginning. The goal is as much
-    /// flux as the voltage allows, with the full current until it has built up.
-    ///
-    /// # Errors
-    /// [`Fault::NotCaught`] if no voltage shows the flux. In a frame that does not rotate with the rotor there is no flux.
-    #[cold]
-    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Common, n: u32) -> Result<Dq, Fault> {
-        let most = k.limits.voltage.most.d;
-        let missing = most - c.observer.as_ref().map_or(most, |o| o.magnetising(&self.observer));
-        let (current, built) = c.flying_start.map_or((most, 0), |s| (s.current, s.build_up));
-        let d = within(most + FORCING_GAIN * missing, (0.0, current));
-        if n >= built {
-            Fault::NotCaught.unless(c.prediction.sees_flux(&self.prediction))?;
-            // At speed the injection current without torque does not predict the current under torque, so the baseline is measured
-            // later.
-            if self.hand_over.leads {
-                self.lock = LockMonitorState::default();
-            }
-            // The loops continue from the present speed of the shaft.
-            let speed = self.estimator.rotor_freq / c.freq_per_speed;
-            c.motion.start(&mut self.motion, k.rotor_count);
-            c.motion.take_over(&mut self.motion, k.rotor_count, speed, 0.0);
-            self.enter(k, FluxPhase::ready());
-        }
-        Ok(Dq { d, q: 0.0 })
-    }
-
     /// Returns the fault to be reported for this one. While a rotating shaft is searched or magnetised, a wrong speed shows as
     /// an unexplained voltage or current, which is reported as a failed flying start.
     #[cold]
@@ -145,5 +75,84 @@ impl Field {
             ) => NotCaught,
             _ => fault,
         }
+    }
+}
+
+impl Coefficients {
+    /// Returns the flying start with which this start begins. A drive that learns has a locked shaft.
+    pub(super) fn catches(&self, start: &Start) -> Option<&FlyingStart> {
+        let catches = matches!(start, Start::Field(goal) if goal.regulates());
+        self.flying_start.as_ref().filter(|_| catches)
+    }
+
+    /// Returns the current during the search for a rotating shaft, A.
+    ///
+    /// # Errors
+    /// [`Fault::NotCaught`] if the shaft rotates too fast.
+    #[cold]
+    pub(super) fn search_shaft(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+        let (Some(start), FluxPhase::Search(search)) = (&self.flying_start, &mut s.flux) else {
+            self.continue_at_standstill(s, k, 0);
+            return Ok(Dq::ZERO);
+        };
+        // At first there is no current, so that the bootstrap capacitors charge and a residual flux is not short-circuited.
+        let Some(n) = k.elapsed.checked_sub(self.sequence.precharge) else {
+            return Ok(Dq::ZERO);
+        };
+        let drives = s.carried.residual.is_some_and(|flux| flux.volts > NEGLIGIBLE_EMF_V);
+        if n == 0 && !drives {
+            s.reference[0] = ReferenceState::at_rest(INITIAL_SHARE * start.current);
+        }
+        let d = if drives { FlyingStart::WITH_FLUX * start.current } else { start.current };
+        if n > catch::FROM {
+            self.current_loop.freeze_integrator(&mut s.current_loop);
+        }
+        match search.step(n, s.observer.change) {
+            SearchResult::Searching => {}
+            SearchResult::Standing => {
+                s.carried.residual = None;
+                s.hand_over = HandOver::default();
+                self.continue_at_standstill(s, k, 0);
+            }
+            SearchResult::Turning(flux_freq) => {
+                let freq = start.path.rotor(flux_freq);
+                if freq.abs() > HIGHEST {
+                    return Err(Fault::NotCaught);
+                }
+                s.carried.residual = None;
+                s.flux = FluxPhase::Build { from: k.elapsed };
+                s.estimator.preset_speed(freq);
+                s.indirect = IndirectState::default();
+                s.observer.start(self.observer.as_ref());
+            }
+        }
+        Ok(Dq { d, q: 0.0 })
+    }
+
+    /// Returns the current while the flux of a rotating rotor builds up, `n` periods after the beginning. The goal is as much
+    /// flux as the voltage allows, with the full current until it has built up.
+    ///
+    /// # Errors
+    /// [`Fault::NotCaught`] if no voltage shows the flux. In a frame that does not rotate with the rotor there is no flux.
+    #[cold]
+    pub(super) fn build_flux(&self, s: &mut Field, k: &mut Common, n: u32) -> Result<Dq, Fault> {
+        let most = k.limits.voltage.most.d;
+        let missing = most - self.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
+        let (current, built) = self.flying_start.map_or((most, 0), |s| (s.current, s.build_up));
+        let d = within(most + FORCING_GAIN * missing, (0.0, current));
+        if n >= built {
+            Fault::NotCaught.unless(self.prediction.sees_flux(&s.prediction))?;
+            // At speed the injection current without torque does not predict the current under torque, so the baseline is measured
+            // later.
+            if s.hand_over.leads {
+                s.lock = LockMonitorState::default();
+            }
+            // The loops continue from the present speed of the shaft.
+            let speed = s.estimator.rotor_freq / self.freq_per_speed;
+            self.motion.start(&mut s.motion, k.rotor_count);
+            self.motion.take_over(&mut s.motion, k.rotor_count, speed, 0.0);
+            s.enter(k, FluxPhase::ready());
+        }
+        Ok(Dq { d, q: 0.0 })
     }
 }

@@ -52,14 +52,14 @@ impl Drive {
     }
 }
 
-impl Field {
+impl Coefficients {
     /// Returns the q-axis current to regulate during self-commissioning, A, and turns the frame behind the flux.
     /// At the end an accepted result replaces the settings, and the drive stops.
     #[cold]
-    pub(super) fn learn(&mut self, c: &Coefficients, k: &mut Common) -> Result<f32, End> {
-        let FluxPhase::Learn(learning) = &mut self.flux else { return Ok(0.0) };
-        let saliency = *self.estimator.saliency();
-        let signal = if c.learning.normalised { saliency.q } else { self.estimator.delta_i };
+    pub(super) fn learn(&self, s: &mut Field, k: &mut Common) -> Result<f32, End> {
+        let FluxPhase::Learn(learning) = &mut s.flux else { return Ok(0.0) };
+        let saliency = *s.estimator.saliency();
+        let signal = if self.learning.normalised { saliency.q } else { s.estimator.delta_i };
         let sample = LearningSample {
             signal,
             carrier_squared: saliency.carrier_squared,
@@ -67,17 +67,15 @@ impl Field {
             flux_freq: k.seen.flux_freq,
             voltage: k.seen.voltage,
         };
-        let next = c.learning.step(learning, &sample)?.ok_or(End::Measured)?;
+        let next = self.learning.step(learning, &sample)?.ok_or(End::Measured)?;
         let lead = Angle::from_radians(next.lead);
-        if lead != self.lead {
-            (self.lead, self.lead_axis) = (lead, lead.unit_vector());
+        if lead != s.lead {
+            (s.lead, s.lead_axis) = (lead, lead.unit_vector());
         }
         k.references.current.q = next.i_q;
         Ok(next.i_q)
     }
-}
 
-impl Coefficients {
     /// Replaces settings by an accepted result of a self-commissioning.
     #[cold]
     pub fn take(&mut self, learned: &Learned) {

@@ -28,47 +28,48 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    pub fn start(&mut self, c: &Coefficients) {
-        let voltage = c.voltage_limit.start();
-        *self = Self {
-            voltage,
-            power_error: 0.0,
-            now: DcLinkLimits::default(),
-            why: Limiting::None,
-            ..*self
-        };
-        self.now.i_q = (-voltage.most.q, voltage.most.q);
-    }
-
     /// Returns the q-axis current within the limits, A.
     pub fn clamp_torque(&mut self, i_q: f32) -> f32 {
         let (held, why) = self.now.clamp(i_q);
         self.why = why;
         held
     }
+}
+
+impl Coefficients {
+    /// Resets the limits at a start.
+    pub(super) fn start_limits(&self, limits: &mut Limits) {
+        let voltage = self.voltage_limit.start();
+        *limits = Limits {
+            voltage,
+            power_error: 0.0,
+            now: DcLinkLimits::default(),
+            why: Limiting::None,
+            ..*limits
+        };
+        limits.now.i_q = (-voltage.most.q, voltage.most.q);
+    }
 
     /// Updates the limits by the dc link, V, and the speed of the rotor, electrical turns per period, of an injection
     /// period, with the limit by the voltage, A.
-    pub fn step(
-        &mut self,
-        c: &Coefficients,
+    pub(super) fn limit_by_dc_link(
+        &self,
+        limits: &mut Limits,
         dc_link: f32,
         rotor_freq: f32,
         (by_voltage, why): (f32, Limiting),
     ) {
-        let hot = c.protection.i_q - self.thermal_reduction_a;
-        let most = if hot < by_voltage { (hot, self.thermal_reason) } else { (by_voltage, why) };
-        self.now = c.dc_link.step(&mut self.dc_link, dc_link, rotor_freq, most);
+        let hot = self.protection.i_q - limits.thermal_reduction_a;
+        let most = if hot < by_voltage { (hot, limits.thermal_reason) } else { (by_voltage, why) };
+        limits.now = self.dc_link.step(&mut limits.dc_link, dc_link, rotor_freq, most);
     }
-}
 
-impl Common {
     /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
     #[inline(never)] // inlined, 32 bytes more of control code
-    pub fn limit_power(&mut self, c: &Coefficients, magnetising: f32, drop: f32) {
-        if c.power != PowerLimit::NONE {
-            let Limits { power_error, now, .. } = &mut self.limits;
-            c.power.step(c, power_error, now, &self.seen, (magnetising, drop));
+    pub(super) fn limit_power(&self, k: &mut Common, magnetising: f32, drop: f32) {
+        if self.power != PowerLimit::NONE {
+            let Limits { power_error, now, .. } = &mut k.limits;
+            self.power.step(self, power_error, now, &k.seen, (magnetising, drop));
         }
     }
 
@@ -77,34 +78,34 @@ impl Common {
     ///
     /// # Errors
     /// The fault of a load that is too high. While the drive is off, motor and inverter cool and are not judged.
-    pub fn load(
-        &mut self,
-        c: &Coefficients,
+    pub(super) fn load(
+        &self,
+        k: &mut Common,
         measured: &Measured,
         is_energised: bool,
     ) -> Result<(), Fault> {
-        let square = if is_energised { self.seen.current.length_squared() } else { 0.0 };
-        let borne = c.thermal.step(&mut self.thermal, square);
-        self.judge_heat(c, measured);
+        let square = if is_energised { k.seen.current.length_squared() } else { 0.0 };
+        let borne = self.thermal.step(&mut k.thermal, square);
+        self.judge_heat(k, measured);
         if is_energised {
             borne
         } else {
-            c.dc_link.rest(&mut self.limits.dc_link, Thermal::EVERY);
+            self.dc_link.rest(&mut k.limits.dc_link, Thermal::EVERY);
             Ok(())
         }
     }
 
     /// Computes the reduction of the q-axis current by the temperature of heat sink, motor and inverter.
     #[inline(never)] // inlined in two places, 328 bytes more of control code
-    fn judge_heat(&mut self, c: &Coefficients, measured: &Measured) {
-        let Self { limits, thermal, references, .. } = self;
+    fn judge_heat(&self, k: &mut Common, measured: &Measured) {
+        let Common { limits, thermal, references, .. } = k;
         let heat_sink = measured.heat_sink.clamp(0.0, 1.0);
         let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
         let sensor = (1.0 - f32::from(limits.motor_hot) * (1.0 / 255.0), Limiting::Motor);
         let loads = if sensor.0 < loads.0 { sensor } else { loads };
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         (limits.thermal_reduction_a, limits.thermal_reason) = if share < 1.0 {
-            let (largest, i_d) = (c.protection.i_q, references.current.d);
+            let (largest, i_d) = (self.protection.i_q, references.current.d);
             let square = share * largest * largest - i_d * i_d;
             (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
         } else {

@@ -52,7 +52,8 @@ impl Drive {
         match &mut prepare.step {
             Preparation::Offsets(state) => {
                 let residual = prepare.carried.residual;
-                let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
+                let start = c.flying_start.as_ref().zip(residual);
+                let waits = start.is_some_and(|(start, flux)| start.waits(&flux, k.elapsed));
                 if !waits && let Some(offsets) = c.offsets.step(state, measured)? {
                     k.offsets = offsets;
                     // A residual flux of the run before would be short-circuited by the low sides. If the wiring was not checked
@@ -102,18 +103,18 @@ impl Drive {
             Start::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
             Start::Test(wanted) => self.enter(Phase::Test(StandstillTest::new(wanted, left))),
             Start::Field(goal) => {
-                let catches = prepare.job.catches(&self.c);
+                let catches = self.c.catches(&prepare.job).is_some();
                 // The field is large, so it is built in place.
                 self.enter(Phase::Field(Field::default()));
                 let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
                     return;
                 };
-                field.begin(c, goal, &left);
+                c.begin_field(field, goal, &left);
                 if catches {
                     field.hand_over.switch_carrier_off();
                     field.flux = FluxPhase::Search(CatchState::default());
                 } else {
-                    field.continue_at_standstill(c, k, encoder);
+                    c.continue_at_standstill(field, k, encoder);
                 }
             }
         }
@@ -125,7 +126,7 @@ impl Drive {
         let (c, k) = (&self.c, &mut self.kept);
         carried.residual = carried.residual.and_then(|residual| {
             let residual = residual.after(k.elapsed);
-            (job.catches(c) && residual.is_recent(c)).then_some(residual)
+            c.catches(&job).filter(|start| start.is_recent(&residual)).map(|_| residual)
         });
         carried.resistance.rest(k.elapsed as f32 * PERIOD_S);
         let boost = c.volts_per_hertz.map(|turning| turning.boost_a);
@@ -133,7 +134,7 @@ impl Drive {
             Start::Scalar { .. } => boost.unwrap_or(c.voltage_limit.i_d),
             Start::Field(_) | Start::Test(_) => c.voltage_limit.i_d,
         };
-        k.start(c, i_d, carried.inverter_drop);
+        c.start(k, i_d, carried.inverter_drop);
         if matches!(job, Start::Field(Goal::Learn)) {
             k.learned = None;
         }
@@ -145,22 +146,24 @@ impl Drive {
     }
 }
 
-impl Common {
+impl Coefficients {
     /// Resets all state that does not outlive a run.
-    fn start(&mut self, c: &Coefficients, i_d: f32, inverter_drop: f32) {
-        self.starts = self.starts.wrapping_add(1);
-        self.offsets = [0.0; 3];
-        self.seen = Telemetry { inverter_drop, ..Telemetry::still() };
-        self.rotor_count = 0;
-        self.limits.start(c);
-        self.no_torque(i_d, c.injection_axis);
+    fn start(&self, k: &mut Common, i_d: f32, inverter_drop: f32) {
+        k.starts = k.starts.wrapping_add(1);
+        k.offsets = [0.0; 3];
+        k.seen = Telemetry { inverter_drop, ..Telemetry::still() };
+        k.rotor_count = 0;
+        self.start_limits(&mut k.limits);
+        k.no_torque(i_d, self.injection_axis);
     }
 
     /// Whether the shaft is at rest, as far as the angle shows; NaN is not at rest.
-    pub fn is_at_standstill(&self, c: &Coefficients) -> bool {
-        self.seen.rotor_freq.abs() <= c.sequence.standing_freq
+    pub(super) fn is_at_standstill(&self, k: &Common) -> bool {
+        k.seen.rotor_freq.abs() <= self.sequence.standing_freq
     }
+}
 
+impl Common {
     /// Sets the references to this d-axis current, A, and no torque.
     pub fn no_torque(&mut self, i_d: f32, injection_axis: UnitVector) {
         let current = Dq::new(i_d, 0.0);

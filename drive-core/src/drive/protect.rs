@@ -36,9 +36,7 @@ impl Coefficients {
             Ok(())
         }
     }
-}
 
-impl Coefficients {
     /// Runs a period of a pulse train, short voltages without control. Returns `None` after its end.
     ///
     /// # Errors
@@ -57,16 +55,14 @@ impl Coefficients {
         let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
         Ok(Some(self.modulator.step(voltage, compensation, measured.dc_link).duties))
     }
-}
 
-impl Common {
     /// Returns the fault of a result that is not finite, if the settings or the references are not finite; `goal_is_finite`
     /// tells whether the references of the goal are.
     #[cold]
-    pub(super) fn not_finite(&self, c: &Coefficients, goal_is_finite: bool) -> Option<Fault> {
-        if !c.is_finite() {
+    pub(super) fn not_finite(&self, k: &Common, goal_is_finite: bool) -> Option<Fault> {
+        if !self.is_finite() {
             Some(Fault::NonFiniteSettings)
-        } else if !(self.references.current.is_finite() && goal_is_finite) {
+        } else if !(k.references.current.is_finite() && goal_is_finite) {
             Some(Fault::NonFiniteCommand)
         } else {
             None

@@ -71,7 +71,7 @@ impl Coefficients {
                 if self.source == AngleSource::Injection {
                     k.rotor_count = s.count_by_flux();
                 }
-                s.show(self, k);
+                self.show(s, k);
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {
@@ -85,7 +85,7 @@ impl Coefficients {
             }
             2 => {
                 if k.elapsed % Thermal::EVERY >= Thermal::EVERY - CARRIER_SAMPLES as u32 {
-                    k.load(self, step.measured, true)?;
+                    self.load(k, step.measured, true)?;
                 }
                 self.predict(s, step);
                 s.estimator.filter.reduce();
@@ -200,8 +200,8 @@ impl Coefficients {
     fn limit_torque(&self, s: &Field, k: &mut Common, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
         let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
-        k.limits.step(self, step.measured.dc_link, step.rotor_freq, (most.q, why));
-        k.limit_power(self, s.indirect.magnetising, s.inverter_drop.volts);
+        self.limit_by_dc_link(&mut k.limits, step.measured.dc_link, step.rotor_freq, (most.q, why));
+        self.limit_power(k, s.indirect.magnetising, s.inverter_drop.volts);
     }
 
     /// Whether there is an injection to be demodulated.

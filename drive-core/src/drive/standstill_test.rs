@@ -62,37 +62,39 @@ impl StandstillTest {
             TestSignal::Rest | TestSignal::Current { .. } => State::Exciting,
         }
     }
+}
 
-    /// Runs a step of the test.
+impl Coefficients {
+    /// Runs a step of a test of a motor at rest.
     #[cold]
-    pub fn step(
-        &mut self,
-        c: &Coefficients,
+    pub(super) fn step_test(
+        &self,
+        test: &mut StandstillTest,
         k: &mut Common,
         measured: &Measured,
     ) -> Result<[f32; 3], Fault> {
         let current = measured.current();
         let mut realised = AlphaBeta::ZERO;
         let mut duties = LOW_SIDES_ON;
-        match self.wanted {
+        match test.wanted {
             TestSignal::Pulses(pulses) => {
-                let duties = c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)?;
+                let duties = self.pulse(&WiringCheck::new(&pulses), &mut test.pulses, measured)?;
                 if duties.is_none() {
-                    self.trains = self.trains.wrapping_add(1);
-                    (self.control, self.wanted) = (Control::default(), TestSignal::Rest);
+                    test.trains = test.trains.wrapping_add(1);
+                    (test.control, test.wanted) = (Control::default(), TestSignal::Rest);
                     k.elapsed = 0;
                 }
                 return Ok(duties.unwrap_or(LOW_SIDES_ON));
             }
             TestSignal::Rest => {
-                LPF.step(&mut self.low_pass, current);
+                LPF.step(&mut test.low_pass, current);
             }
             TestSignal::Current { amperes, regulator, carrier, binary } => {
-                let s = &mut self.control;
+                let s = &mut test.control;
                 let Regulator { k_c, z_c, direct, filtered } = regulator;
                 let pi = Pi { k_c, z_c };
                 let reference = pi.filter(&mut s.reference, direct, amperes);
-                let behind = LPF.step(&mut self.low_pass, current);
+                let behind = LPF.step(&mut test.low_pass, current);
                 let seen = if filtered { behind } else { current };
                 let along = pi.step(&mut s.regulator, reference - seen.alpha);
                 let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
@@ -103,9 +105,9 @@ impl StandstillTest {
                 let factor = if binary { next_bit(&mut s.register) } else { cos };
                 let wanted = AlphaBeta::new(along, 0.0) + s.carrier * factor;
                 if !wanted.is_finite() {
-                    return Err(k.not_finite(c, true).unwrap_or(Fault::NonFiniteState));
+                    return Err(self.not_finite(k, true).unwrap_or(Fault::NonFiniteState));
                 }
-                let modulated = c.modulator.step(wanted, Abc::ZERO, measured.dc_link);
+                let modulated = self.modulator.step(wanted, Abc::ZERO, measured.dc_link);
                 if modulated.limited {
                     s.regulator.back_calculate(modulated.realised.alpha - wanted.alpha);
                 }

@@ -25,14 +25,14 @@ impl Drive {
                 }
                 scalar.stop = Some(scalar.stop == Some(true) || stop == Stop::Quick);
             }
-            (Phase::Field(field), _) => field.stop(&self.c, &mut self.kept, stop),
+            (Phase::Field(field), _) => self.c.stop_field(field, &mut self.kept, stop),
         }
     }
 }
 
-impl Field {
-    fn stop(&mut self, c: &Coefficients, k: &mut Common, stop: Stop) {
-        match (&mut self.goal, stop) {
+impl Coefficients {
+    fn stop_field(&self, s: &mut Field, k: &mut Common, stop: Stop) {
+        match (&mut s.goal, stop) {
             (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
             (Goal::Brake { quick }, Stop::Quick) => {
                 *quick = true;
@@ -40,25 +40,25 @@ impl Field {
             }
             _ => {}
         }
-        let regulates = self.regulates();
+        let regulates = s.regulates();
         let brakes = regulates && matches!(stop, Stop::Ramp | Stop::Quick);
         // The brake begins to close at once, and the drive holds the shaft until it has closed.
-        let holds = !brakes && self.has_torque() && k.brake > 0;
+        let holds = !brakes && s.has_torque() && k.brake > 0;
         if regulates && (brakes || holds) {
             // The speed loop takes over at the present speed and q-axis current.
-            let speed = k.seen.rotor_freq / c.freq_per_speed;
+            let speed = k.seen.rotor_freq / self.freq_per_speed;
             let (i_q, _) = k.limits.now.clamp(k.references.current.q);
-            c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
+            self.motion.take_over(&mut s.motion, k.rotor_count, speed, i_q);
         }
         // A torque that was commanded during the start has not been applied yet, and is cancelled.
-        if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
+        if !matches!(s.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             k.references.current.q = 0.0;
         }
-        self.goal = match (brakes, holds) {
+        s.goal = match (brakes, holds) {
             (true, _) => Goal::Brake { quick: stop == Stop::Quick },
             (_, true) => Goal::Hold { left: k.brake },
             _ => Goal::Release,
         };
-        self.enter(k, FluxPhase::ready());
+        s.enter(k, FluxPhase::ready());
     }
 }

@@ -51,18 +51,18 @@ impl Trust {
     }
 }
 
-impl Field {
+impl Coefficients {
     /// Returns the row of the present phase, `elapsed` periods after it began.
     #[rustfmt::skip] // A phase, a row.
-    pub(super) fn trust(&self, c: &Coefficients, elapsed: u32) -> Trust {
-        match (&self.flux, self.frame) {
+    pub(super) fn trust(&self, s: &Field, elapsed: u32) -> Trust {
+        match (&s.flux, s.frame) {
             // Flying start: the shaft is searched; below, it was found, and at first the injection alone, then also the observer
             // rotates the frame.
             (FluxPhase::Search(_), _) => Trust { source: Nothing, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             // There is neither current nor flux.
             (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
-            (FluxPhase::Build { from }, _) => match &c.flying_start {
-                Some(c) if elapsed.wrapping_sub(*from) < c.injection_only => Trust { source: Injection, rotates: true, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
+            (FluxPhase::Build { from }, _) => match &self.flying_start {
+                Some(start) if elapsed.wrapping_sub(*from) < start.injection_only => Trust { source: Injection, rotates: true, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
                 _ => Trust { source: Both, rotates: true, lock: Baseline, current: Wide, mean_voltage: true, resistance: false, measures_drop: false },
             },
             (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, rotates: false, lock: Baseline, current: Narrow, mean_voltage: false, resistance: false, measures_drop: true },

@@ -110,7 +110,7 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
     let per_period = 1.0 / (6000.0 * f64::from(settings().motor.tau_r()));
     for volts in [1.01, 2.0, 5.0, 20.0] {
         let residual = Residual::of(volts * flying_start.residual_v);
-        let waits = |elapsed| residual.waits(&c, elapsed);
+        let waits = |elapsed| flying_start.waits(&residual, elapsed);
         let decayed = (f64::from(volts).ln() / per_period) as u32;
         let ends = (0..100_000).find(|elapsed| !waits(*elapsed)).unwrap();
         assert!(
@@ -119,21 +119,22 @@ fn a_start_waits_for_the_decay_of_the_flux_and_forgets_it_thereafter() {
         );
         assert!(!waits(ends + 100) && (ends == 0 || waits(ends - 1)));
         // It makes no difference whether the time has passed before or after the start.
-        assert!(!residual.after(ends).waits(&c, 0) && residual.after(ends - 1).waits(&c, 0));
+        let waits = |residual: Residual| flying_start.waits(&residual, 0);
+        assert!(!waits(residual.after(ends)) && waits(residual.after(ends - 1)));
     }
     assert!(
-        !Residual::of(flying_start.residual_v).waits(&c, 0),
+        !flying_start.waits(&Residual::of(flying_start.residual_v), 0),
         "as much as is left is no reason to wait"
     );
     let residual = Residual::of(50.0);
-    assert!(residual.after(flying_start.flux_decay - 1).is_recent(&c));
-    assert!(!residual.after(flying_start.flux_decay).is_recent(&c));
+    assert!(flying_start.is_recent(&residual.after(flying_start.flux_decay - 1)));
+    assert!(!flying_start.is_recent(&residual.after(flying_start.flux_decay)));
     // This is the voltage of a flux of 0.5 V s at 50 Hz.
     let turning = Residual::turning(-50.0 / 6000.0, 0.5);
     let volts = core::f32::consts::TAU * 50.0 * 0.5;
-    assert!(turning.waits(&c, 0) && !turning.waits(&c, u32::MAX));
-    let same = Residual::of(volts);
-    assert!((0..50_000).all(|n| n % 500 != 0 || same.waits(&c, n) == turning.waits(&c, n)));
+    assert!(flying_start.waits(&turning, 0) && !flying_start.waits(&turning, u32::MAX));
+    let same = |n| [Residual::of(volts), turning].map(|flux| flying_start.waits(&flux, n));
+    assert!((0..50_000).step_by(500).map(same).all(|[one, other]| one == other));
 }
 
 /// Tests NaN in each place where the coefficients are checked.

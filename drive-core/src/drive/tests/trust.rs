@@ -66,7 +66,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
                 (_, Frame::LockedShaft) => "learning, and stopping from it",
                 (_, Frame::Encoder | Frame::Tracked) => "verifying, regulating, stopping",
             };
-            let row = row(&field.trust(&c, elapsed));
+            let row = row(&c.trust(&field, elapsed));
             match table.iter().find(|(known, _)| *known == name) {
                 Some((_, known)) => assert_eq!(*known, row, "{name}"),
                 None => table.push((name, row)),
