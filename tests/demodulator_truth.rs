@@ -4,7 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use crate::common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
-use drive_core::carrier::{CarrierPeriod, CarrierSample, Demodulate, Literal, Rectified};
+use drive_core::carrier::{CarrierPeriod, CarrierSample};
+use drive_core::printed::{Demodulate, Literal, Rectified};
 use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 

@@ -3,7 +3,7 @@
 
 use crate::common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::Command;
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_settings::{Settings, SettingsError};
 use hil_sim::config::plant_settings;
 use hil_sim::config::{Config, LoadMode};

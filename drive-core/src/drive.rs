@@ -41,6 +41,7 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::flux::observer::{Induced, ObserverState, Resistance};
+use crate::flux::{AngleLoop, DefaultLoop, FilterLoop};
 use crate::front_end::{FrontEnd, FrontEndState};
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Measured, Output, Sample};
@@ -89,12 +90,12 @@ pub use test_signal::{Regulator, TestReport, TestSignal};
 /// ```
 #[derive(Clone, Debug)]
 #[repr(C)]
-pub struct Drive {
-    c: Coefficients,
+pub struct Drive<L: AngleLoop = DefaultLoop> {
+    c: Coefficients<L>,
     /// Number of changes of `c`, wrapping.
     changes: u32,
     kept: Common,
-    phase: Phase,
+    phase: Phase<L::State>,
 }
 
 /// State that every phase uses or that outlives a run.
@@ -142,17 +143,17 @@ struct References {
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 #[repr(u32)] // a separate word, so that a state is not copied around a single byte
-enum Phase {
-    Off(CarryOver) = Drive::PHASES[0],
-    Fault(Fault, CarryOver) = Drive::PHASES[1],
+enum Phase<S> {
+    Off(CarryOver) = <Drive>::PHASES[0],
+    Fault(Fault, CarryOver) = <Drive>::PHASES[1],
     /// Preparation of one of the next three phases.
-    Prepare(Prepare) = Drive::PHASES[2],
+    Prepare(Prepare) = <Drive>::PHASES[2],
     /// A test signal to the motor at rest.
-    Test(StandstillTest) = Drive::PHASES[3],
+    Test(StandstillTest) = <Drive>::PHASES[3],
     /// V/f control.
-    Scalar(Scalar) = Drive::PHASES[4],
+    Scalar(Scalar) = <Drive>::PHASES[4],
     /// Current control in the flux frame.
-    Field(Field) = Drive::PHASES[5],
+    Field(Field<S>) = <Drive>::PHASES[5],
 }
 
 /// The work that a drive was started for.
@@ -193,7 +194,7 @@ impl Start {
 // address.
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
-struct Field {
+struct Field<S> {
     pub frame: Frame,
     pub low_pass: LpfState,
     pub indirect: IndirectState,
@@ -221,7 +222,7 @@ struct Field {
     /// Results of the run before. The residual flux is kept until the speed of the shaft is found.
     pub carried: CarryOver,
     /// Large, since it contains the state of the alternative demodulators.
-    pub estimator: EstimatorState,
+    pub estimator: EstimatorState<S>,
     /// Large during the search of a flying start.
     pub flux: FluxPhase,
     /// Asymmetry that was measured before there was current or flux, beyond the known asymmetry.
@@ -376,11 +377,11 @@ struct CarryOver {
     residual: Option<Residual>,
 }
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Position of the coefficients in a drive, bytes, for a check of its memory from outside. They
     /// change only when the count at [`Self::CHANGES`] changes.
     pub const COEFFICIENTS: Range<usize> =
-        offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients>();
+        offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients<L>>();
     /// Position in a drive of the count of these changes, a `u32`.
     pub const CHANGES: usize = offset_of!(Self, changes);
 
@@ -397,7 +398,7 @@ impl Drive {
     }
 
     /// Creates a drive that is off.
-    pub fn new(coefficients: Coefficients) -> Self {
+    pub fn new(coefficients: Coefficients<L>) -> Self {
         let phase = Phase::Off(CarryOver::default());
         let limits = Limits { motor_fault: coefficients.no_motor_reading(), ..Limits::default() };
         let kept = Common { seen: Telemetry::still(), limits, ..Common::default() };
@@ -454,12 +455,8 @@ impl Drive {
         self.kept.offsets
     }
 
-    /// Runs one PWM period from the ADCs to the timer: front end, [`step`](Self::step), front end.
-    ///
-    /// `put_out` gets the compare values as soon as they are known. Checks and slow tasks follow. If one of them switches the outputs
-    /// off, `put_out` is called again before the next period, so that the first values never act.
-    #[inline(never)] // inlined into the firmware's crate, it would be compiled for size: 350 cycles more in the median
-    pub fn period(
+    /// Runs one PWM period, see [`Drive::period`].
+    pub fn run_period(
         &mut self,
         front_end: &mut FrontEndState,
         sample: &Sample,
@@ -467,7 +464,7 @@ impl Drive {
     ) -> (Compare, Output) {
         let measured = self.c.front_end.measure(front_end, sample, self.kept.offsets);
         let regulated = matches!(self.phase, Phase::Field(_));
-        let output = self.step_with(&measured, put_out);
+        let output = self.run_step(&measured, put_out);
         let compare = self.c.front_end.put_out(front_end, &output);
         if !(regulated && compare.enabled) {
             put_out(compare);
@@ -475,16 +472,8 @@ impl Drive {
         (compare, output)
     }
 
-    /// Runs one PWM period, from the measurement at the instant `k T` to the duties of the period that begins at `(k + 1) T`.
-    ///
-    /// It never panics. Any error of the input or of the state becomes a latched fault, with the
-    /// outputs off in the same step.
-    pub fn step(&mut self, measured: &Measured) -> Output {
-        self.step_with(measured, &mut |_| {})
-    }
-
-    /// Runs one step and passes the compare values to `put_out` early, if the phase computes them early.
-    fn step_with(&mut self, measured: &Measured, put_out: &mut dyn FnMut(Compare)) -> Output {
+    /// Runs one step, see [`Drive::step`], and passes the compare values to `put_out` early, if the phase computes them early.
+    pub fn run_step(&mut self, measured: &Measured, put_out: &mut dyn FnMut(Compare)) -> Output {
         let checked = self.c.protect(measured);
         let result = match &mut self.phase {
             Phase::Field(field) => {
@@ -536,7 +525,7 @@ impl Drive {
 
     /// Continues in this phase.
     #[inline(always)] // writes the small phase only, not the memory that it shares
-    fn enter(&mut self, phase: Phase) {
+    fn enter(&mut self, phase: Phase<L::State>) {
         self.phase = phase;
         self.kept.elapsed = 0;
     }
@@ -577,3 +566,50 @@ impl Drive {
         }
     }
 }
+
+/// Functions of a drive with this loop that are compiled in this crate, at its level of optimisation. Compiled in the crate that calls
+/// them, as a generic function is, they would take over the level of that crate: with the firmware's, 350 cycles more in the median.
+macro_rules! compiled_here {
+    ($angle_loop:ty) => {
+        impl Drive<$angle_loop> {
+            /// Runs one PWM period from the ADCs to the timer: front end, [`step`](Self::step), front end.
+            ///
+            /// `put_out` gets the compare values as soon as they are known. Checks and slow tasks follow. If one of them switches the
+            /// outputs off, `put_out` is called again before the next period, so that the first values never act.
+            #[inline(never)]
+            pub fn period(
+                &mut self,
+                front_end: &mut FrontEndState,
+                sample: &Sample,
+                put_out: &mut dyn FnMut(Compare),
+            ) -> (Compare, Output) {
+                self.run_period(front_end, sample, put_out)
+            }
+
+            /// Runs one PWM period, from the measurement at the instant `k T` to the duties of the period that begins at `(k + 1) T`.
+            ///
+            /// It never panics. Any error of the input or of the state becomes a latched fault, with the
+            /// outputs off in the same step.
+            pub fn step(&mut self, measured: &Measured) -> Output {
+                self.run_step(measured, &mut |_| {})
+            }
+
+            /// Executes a command. Call it between two steps, not from within [`step`](Self::step).
+            ///
+            /// References are accepted from the start command on. A start sets them to zero, so that references
+            /// of an earlier run move nothing.
+            ///
+            /// # Errors
+            /// The reason of the refusal. A refused command changes nothing.
+            // It is not inlined, so that it stays in the flash.
+            #[inline(never)]
+            pub fn command(&mut self, command: &Command<$angle_loop>) -> Result<Accepted, Refused> {
+                self.execute(command)
+            }
+        }
+    };
+}
+
+compiled_here!(FilterLoop);
+#[cfg(feature = "printed")]
+compiled_here!(crate::printed::ComparedLoop);

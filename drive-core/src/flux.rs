@@ -12,11 +12,12 @@ pub(crate) mod volts_per_hertz;
 
 pub use angle_filter::AngleFilter;
 pub use catch::Path;
-pub use estimator::{AngleLoop, ConstantReference, Estimator, Reference};
+pub use estimator::{AngleLoop, DefaultLoop, Estimator, FilterLoop};
+pub use hand_over::Turning;
 pub use indirect::{Indirect, TAU_R_LIMITS};
 pub use observer::{Leakage, Observer};
 pub use schedule::GainSchedule;
-pub use tracker::{Tracker, TrackerState};
+pub use tracker::Axis;
 pub use volts_per_hertz::{VoltsPerHertz, VoltsPerHertzSettings};
 
 /// Source of the flux angle.

@@ -19,8 +19,9 @@
 //! | [`io`] | input and output of a step and of the front end |
 //! | [`math`], [`filter`] | vectors and frames; second-order sections |
 //! | [`current`] | PI, modulation, dead time and inverter voltage error |
-//! | [`carrier`] | the injected voltage and the demodulation of its current |
+//! | [`carrier`] | the injected voltage and the synchronous demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
+//! | [`printed`] | the loop of the dissertation, to compare with |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`], [`table`] | the result of a saliency self-commissioning with locked shaft, and its tables |
 //! | [`homing`] | finding a stop of the shaft |
@@ -58,6 +59,7 @@ mod line;
 pub mod math;
 mod motion;
 mod motor;
+pub mod printed;
 pub mod protect;
 mod supply;
 pub mod table;
@@ -69,7 +71,7 @@ pub use drive::{
 };
 pub use drive::{DcLimit, PowerLimit};
 pub use fault::Fault;
-pub use flux::AngleSource;
+pub use flux::{AngleLoop, AngleSource};
 pub use front_end::shunts::Shunts;
 pub use front_end::{FrontEnd, FrontEndState};
 pub use identify::learning::Learning;

@@ -96,7 +96,7 @@ impl Control {
             late: Hardware::empty(),
             over_current: Hardware::empty(),
             unreported: Hardware::empty(),
-            phase: Drive::PHASES[0],
+            phase: <Drive>::PHASES[0],
             began: 0,
             reported: None,
             report_left: 0,
@@ -122,17 +122,17 @@ pub fn constants() -> ([MemoryRange; 2], u32) {
     let drive = offset_of!(Control, drive);
     let references = offset_of!(Control, status);
     let constants = [
-        range(drive + Drive::COEFFICIENTS.start, Drive::COEFFICIENTS.len()),
+        range(drive + <Drive>::COEFFICIENTS.start, <Drive>::COEFFICIENTS.len()),
         range(references, size_of::<Control>() - references),
     ];
-    (constants, (control + drive + Drive::CHANGES) as u32)
+    (constants, (control + drive + <Drive>::CHANGES) as u32)
 }
 
 /// The word of the drive's phase in memory: one of [`Drive::PHASES`], unless a bit has flipped.
 fn phase(drive: &Drive) -> u32 {
     let drive = &raw const *drive;
     // SAFETY: a word within the drive. It is read as a plain number, not as the tag of an enum.
-    unsafe { drive.cast::<u32>().byte_add(Drive::PHASE).read_volatile() }
+    unsafe { drive.cast::<u32>().byte_add(<Drive>::PHASE).read_volatile() }
 }
 
 /// The interrupt's own memory.
@@ -246,7 +246,7 @@ impl Running {
             pwm.trip();
             return BROKEN.store(phase | 1, Ordering::Relaxed);
         }
-        let was_off = Drive::is_off_in(phase);
+        let was_off = <Drive>::is_off_in(phase);
         if dc_link.is_off() {
             if was_off {
                 dc_link.restore();
@@ -301,7 +301,7 @@ impl Running {
             )
             .is_some();
         self.phase = self::phase(drive);
-        let is_off = Drive::is_off_in(self.phase);
+        let is_off = <Drive>::is_off_in(self.phase);
         if is_off {
             // A stop at once does not wait for the next period.
             pwm.trip();

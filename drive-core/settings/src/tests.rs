@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::entry::{Change, Entry};
 use super::value::Value;
 use super::*;
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_core::{Abc, AlphaBeta, AngleSource, Line};
 
 #[test]

@@ -17,7 +17,7 @@ pub struct CarrierSample {
 impl CarrierSample {
     /// Returns the dm axis `e^(j (theta - 45°))`.
     #[cfg(feature = "printed")]
-    pub(super) fn dm_axis(&self) -> UnitVector {
+    pub(crate) fn dm_axis(&self) -> UnitVector {
         const HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
         self.axis.turned_by(UnitVector { cos: HALF, sin: -HALF })
     }

@@ -126,8 +126,8 @@ const LEAST: f32 = 5e-7;
 pub(crate) mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
-    use crate::carrier::demodulator::Demodulate;
     use crate::carrier::injection::{CARRIER_COS, CARRIER_SIN, CarrierPeriod};
+    use crate::printed::Demodulate;
     use crate::{AlphaBeta, Angle};
     use core::f64::consts::TAU;
 

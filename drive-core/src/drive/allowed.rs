@@ -33,7 +33,7 @@ impl Taken {
 ///
 /// # Errors
 /// The state or the latched fault that refuses the command.
-pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(), Refused> {
+pub(super) fn allowed<L>(command: &Command<L>, state: State, mode: Mode) -> Result<(), Refused> {
     let taken = match command {
         // In the states off and stopping these commands change nothing.
         Command::Stop(_) | Command::Clear | Command::MotorTemperature(_) => return Ok(()),

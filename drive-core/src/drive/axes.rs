@@ -3,7 +3,7 @@
 use core::f32::consts::TAU;
 
 use crate::filter::lpf_lag_samples;
-use crate::{Coefficients, UnitVector};
+use crate::{AngleLoop, Coefficients, UnitVector};
 
 /// Unit vectors relative to the flux at the sample, computed once an injection period.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +31,7 @@ impl Default for Axes {
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Turns the axes for a flux of frequency `freq`, turns per period: back by the delays of the measured
     /// currents, and ahead to the middle of the period in which the voltage acts. `silent` means that the
     /// injection is off and the current is not filtered.

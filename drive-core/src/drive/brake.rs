@@ -4,7 +4,7 @@
 //! The firmware opens the brake while the drive regulates, and closes it when the drive stops; see `src/strip.rs`.
 
 use super::{Common, Field, FluxPhase, Goal};
-use crate::{Coefficients, Dq, Fault};
+use crate::{AngleLoop, Coefficients, Dq, Fault};
 
 /// Longest time that a brake may need to close, s.
 pub const BRAKE_MAX_S: f32 = 5.0;
@@ -27,13 +27,13 @@ impl Common {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Returns the current while the torque is proven, A. The brake is closed, and the q-axis current must follow its reference.
     ///
     /// # Errors
     /// [`Fault::TorqueNotProven`].
     #[cold]
-    pub(super) fn prove(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+    pub(super) fn prove(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, Fault> {
         let wanted = PROOF_SHARE * self.protection.i_q;
         if k.elapsed >= PROOF {
             let missing = (wanted - k.seen.current.q).abs();

@@ -6,18 +6,20 @@ mod tests;
 use crate::carrier::Injection;
 use crate::carrier::at_start::AtStart;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, VoltageLimit};
-use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::flux::{DefaultLoop, Estimator, Indirect, Observer, Path, VoltsPerHertz};
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
     WiringCheck,
 };
-use crate::{Angle, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, Relay, UnitVector};
+use crate::{
+    Angle, AngleLoop, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, Relay, UnitVector,
+};
 
 /// Coefficients of the control step, designed outside the interrupt.
 // The order matters: the fields that every step uses come first and lie together; see the state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
-pub struct Coefficients {
+pub struct Coefficients<L = DefaultLoop> {
     /// Scales of the sensors and checks of their samples.
     pub front_end: FrontEnd,
     /// Limits that trip.
@@ -51,7 +53,7 @@ pub struct Coefficients {
     /// Times of a start and a stop.
     pub sequence: SequenceSteps,
     /// Estimator of the flux angle from the injection.
-    pub estimator: Estimator,
+    pub estimator: Estimator<L>,
     /// The back-EMF observer, if the angle does not come from the injection alone.
     pub observer: Option<Observer>,
     /// The watch on the noise of the sensors, if the angle comes from the injection.
@@ -102,7 +104,7 @@ pub struct Coefficients {
     pub power: PowerLimit,
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Returns the fault of a motor sensor that has given no reading.
     pub(crate) fn no_motor_reading(&self) -> Option<Fault> {
         self.motor_c.map(|_| Fault::MotorSensorUnread)

@@ -2,6 +2,7 @@
 
 use crate::drive::state::{Mode, State};
 use crate::drive::test_signal::TestSignal;
+use crate::flux::DefaultLoop;
 use crate::{Coefficients, Dq, Fault};
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
@@ -11,7 +12,7 @@ use crate::{Coefficients, Dq, Fault};
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Command {
+pub enum Command<L = DefaultLoop> {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock if the
     /// angle comes from the injection, then regulate as `Mode` says.
     Start(Mode),
@@ -65,7 +66,7 @@ pub enum Command {
     MotorTemperature(Result<f32, Fault>),
     /// Replace all settings. Only while off or in fault.
     #[cfg_attr(feature = "serde", serde(skip))]
-    Configure(Coefficients),
+    Configure(Coefficients<L>),
 }
 
 /// A way to stop.

@@ -8,22 +8,17 @@ use crate::drive::state::Mode;
 use crate::io::PERIOD_S;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::{Angle, AngleSource};
+use crate::{Angle, AngleLoop, AngleSource};
 
 /// Periods for which a jog continues: 0.5 s.
 const JOG: u32 = 3000;
 
-impl Drive {
-    /// Executes a command. Call it between two steps, not from within [`step`](Self::step).
-    ///
-    /// References are accepted from the start command on. A start sets them to zero, so that references
-    /// of an earlier run move nothing.
+impl<L: AngleLoop> Drive<L> {
+    /// Executes a command, see [`Drive::command`].
     ///
     /// # Errors
-    /// The reason of the refusal. A refused command changes nothing.
-    // It is not inlined, so that it stays in the flash.
-    #[inline(never)]
-    pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
+    /// See [`Drive::command`].
+    pub fn execute(&mut self, command: &Command<L>) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
         match *command {
             Command::Start(mode) => return self.start(Start::of_mode(mode)),

@@ -16,9 +16,9 @@ use crate::math::limited;
 use crate::motion::Target;
 use crate::protect::SaliencyCheck;
 use crate::protect::saliency_check::SaliencyCheckAction;
-use crate::{AlphaBeta, AngleSource, Coefficients, Compare, Dq, Fault, Measured};
+use crate::{AlphaBeta, AngleLoop, AngleSource, Coefficients, Compare, Dq, Fault, Measured};
 
-impl Field {
+impl<S> Field<S> {
     pub fn state(&self) -> State {
         match (&self.flux, &self.goal) {
             (_, Goal::Brake { .. }) => State::Braking,
@@ -43,7 +43,7 @@ impl Field {
     /// Returns the quantities that this run passes on to the next run.
     pub fn carry_over(&self) -> CarryOver {
         // Until the speed is found, only the residual flux of the run before is known.
-        let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
+        let turning = || Residual::turning(self.estimator.axis.rotor_freq, self.observer.flux);
         let residual = Some(self.carried.residual.unwrap_or_else(turning));
         // Until the flux is verified the shaft may rotate, and its voltage may have falsified the measurements.
         if !matches!(self.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
@@ -70,9 +70,9 @@ impl Field {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Begins without current, for this goal.
-    pub(super) fn begin_field(&self, s: &mut Field, goal: Goal, carried: &CarryOver) {
+    pub(super) fn begin_field(&self, s: &mut Field<L::State>, goal: Goal, carried: &CarryOver) {
         s.frame = match (self.source, goal) {
             (_, Goal::Learn) => Frame::LockedShaft,
             (AngleSource::Encoder, _) => Frame::Encoder,
@@ -98,7 +98,7 @@ impl Coefficients {
     /// The reason why the outputs are switched off: a fault, or the end of a stop.
     pub(super) fn step_field(
         &self,
-        s: &mut Field,
+        s: &mut Field<L::State>,
         k: &mut Common,
         measured: &Measured,
         put_out: &mut dyn FnMut(Compare),
@@ -143,7 +143,7 @@ impl Coefficients {
         if self.demodulate {
             let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
             self.estimator.observe(&mut s.estimator, &sample, flux.freq);
-            k.seen.delta_i = s.estimator.delta_i;
+            k.seen.delta_i = self.estimator.delta_i(&s.estimator);
         }
         let rest = measured_current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
@@ -163,10 +163,10 @@ impl Coefficients {
             let slip_freq = s.indirect.slip_freq;
             let turning = self.observe_fundamental(s, index, rest, phi);
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if trust.rotates && self.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+            if trust.rotates && !self.estimator.track(estimator, i_q, slip_freq, &turning) {
                 return Err(self.not_finite_in_field(s, k).unwrap_or(Fault::LostAngle).into());
             }
-            (reference, s.estimator.rotor_freq)
+            (reference, s.estimator.axis.rotor_freq)
         };
 
         // Current loop.
@@ -238,7 +238,7 @@ impl Coefficients {
 
     /// Measures the inverter voltage error, and with it the stator resistance.
     #[cold]
-    fn measure_drop(&self, s: &mut Field, elapsed: u32, sample: &DropSample) {
+    fn measure_drop(&self, s: &mut Field<L::State>, elapsed: u32, sample: &DropSample) {
         if let Some(ratio) = self.inverter_drop.step(&mut s.inverter_drop, elapsed, sample) {
             s.observer.resistance.take(ratio - 1.0);
             s.estimator.filter.start(s.observer.resistance.deviation);
@@ -246,7 +246,7 @@ impl Coefficients {
     }
 
     /// Copies the state of the demodulation, the checks and the position to the telemetry.
-    pub(super) fn show(&self, s: &Field, k: &mut Common) {
+    pub(super) fn show(&self, s: &Field<L::State>, k: &mut Common) {
         let (saliency, seen) = (s.estimator.saliency(), &mut k.seen);
         seen.saliency = saliency.q;
         seen.carrier_squared = saliency.carrier_squared;
@@ -260,7 +260,7 @@ impl Coefficients {
     ///
     /// # Errors
     /// The reason why the outputs are switched off.
-    fn advance(&self, s: &mut Field, k: &mut Common) -> Result<Dq, End> {
+    fn advance(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, End> {
         if !matches!(s.flux, FluxPhase::Ready(_) | FluxPhase::Learn(_)) {
             return self.find_flux(s, k);
         }
@@ -287,7 +287,7 @@ impl Coefficients {
 
     /// Returns the current while the flux is found, built up and verified, A.
     #[cold]
-    fn find_flux(&self, s: &mut Field, k: &mut Common) -> Result<Dq, End> {
+    fn find_flux(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, End> {
         Ok(match s.flux {
             FluxPhase::Search(_) => self.search_shaft(s, k)?,
             FluxPhase::Asymmetry(_) => self.measure_asymmetry(s, k)?,
@@ -300,7 +300,7 @@ impl Coefficients {
     }
 
     /// Returns the q-axis current of the speed or the position loop, A.
-    fn follow(&self, s: &mut Field, k: &mut Common) -> f32 {
+    fn follow(&self, s: &mut Field<L::State>, k: &mut Common) -> f32 {
         let mut range = k.limits.now.i_q;
         let goal = match &mut s.goal {
             Goal::Speed { speed, jog } => {
@@ -340,7 +340,12 @@ impl Coefficients {
 
     /// Continues with a shaft at rest: measures the asymmetry if that is useful, then builds up the flux.
     #[cold]
-    pub(super) fn continue_at_standstill(&self, s: &mut Field, k: &mut Common, encoder: u32) {
+    pub(super) fn continue_at_standstill(
+        &self,
+        s: &mut Field<L::State>,
+        k: &mut Common,
+        encoder: u32,
+    ) {
         let learns = s.frame == Frame::LockedShaft;
         if self.at_start.is_some_and(|at_start| learns || at_start.learned.is_some()) {
             s.carrier.set(AtStart::CARRIER_SHARE);
@@ -355,7 +360,7 @@ impl Coefficients {
     /// # Errors
     /// [`Fault::NothingLearned`] if the asymmetry is larger than a self-commissioning accepts.
     #[cold]
-    fn measure_asymmetry(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+    fn measure_asymmetry(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, Fault> {
         let (Some(at_start), FluxPhase::Asymmetry(state)) = (&self.at_start, &mut s.flux) else {
             return Ok(Dq::ZERO);
         };
@@ -380,7 +385,7 @@ impl Coefficients {
 
     /// Fixes the frame along phase a and builds up the flux there.
     #[cold]
-    pub(super) fn enter_hold(&self, s: &mut Field, k: &mut Common, encoder: u32) {
+    pub(super) fn enter_hold(&self, s: &mut Field<L::State>, k: &mut Common, encoder: u32) {
         (s.lock, s.inverter_drop) = Default::default();
         k.rotor_count = match self.source {
             AngleSource::Encoder => encoder,
@@ -399,7 +404,7 @@ impl Coefficients {
 
     /// Returns the current while the flux is built up and the saliency is checked, A.
     #[cold]
-    fn magnetise(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+    fn magnetise(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, Fault> {
         let level = self.inverter_drop.level(k.elapsed);
         let magnetising = Dq { d: level * k.references.current.d, q: 0.0 };
         let learns = s.frame == Frame::LockedShaft;
@@ -437,7 +442,7 @@ impl Coefficients {
 
     /// Returns the current while the lock is verified, A. The axis is tracked for a while without torque.
     #[cold]
-    fn verify(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+    fn verify(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<Dq, Fault> {
         if k.elapsed >= self.sequence.verify {
             if k.seen.rotor_freq.abs() > self.sequence.pushed_freq {
                 return Err(Fault::LostLock);
@@ -450,8 +455,8 @@ impl Coefficients {
 
     /// Returns the fault of a result that is not finite: settings, references or state, whichever is not finite.
     #[cold]
-    fn not_finite_in_field(&self, s: &Field, k: &Common) -> Option<Fault> {
-        let state = (!s.estimator.is_finite()).then_some(Fault::NonFiniteState);
+    fn not_finite_in_field(&self, s: &Field<L::State>, k: &Common) -> Option<Fault> {
+        let state = (!self.estimator.is_finite(&s.estimator)).then_some(Fault::NonFiniteState);
         self.not_finite(k, s.goal.is_finite()).or(state)
     }
 }

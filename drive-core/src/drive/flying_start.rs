@@ -9,7 +9,7 @@ use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::math::within;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::{Coefficients, Dq, Fault, FlyingStart, PERIOD_S};
+use crate::{AngleLoop, Coefficients, Dq, Fault, FlyingStart, PERIOD_S};
 
 /// Share of the search current that bypasses the reference filter. The faster the current rises, the larger is the flux that rotates with
 /// the rotor.
@@ -62,7 +62,7 @@ impl FlyingStart {
     }
 }
 
-impl Field {
+impl<S> Field<S> {
     /// Returns the fault to be reported for this one. While a rotating shaft is searched or magnetised, a wrong speed shows as
     /// an unexplained voltage or current, which is reported as a failed flying start.
     #[cold]
@@ -78,7 +78,7 @@ impl Field {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Returns the flying start with which this start begins. A drive that learns has a locked shaft.
     pub(super) fn catches(&self, start: &Start) -> Option<&FlyingStart> {
         let catches = matches!(start, Start::Field(goal) if goal.regulates());
@@ -90,7 +90,11 @@ impl Coefficients {
     /// # Errors
     /// [`Fault::NotCaught`] if the shaft rotates too fast.
     #[cold]
-    pub(super) fn search_shaft(&self, s: &mut Field, k: &mut Common) -> Result<Dq, Fault> {
+    pub(super) fn search_shaft(
+        &self,
+        s: &mut Field<L::State>,
+        k: &mut Common,
+    ) -> Result<Dq, Fault> {
         let (Some(start), FluxPhase::Search(search)) = (&self.flying_start, &mut s.flux) else {
             self.continue_at_standstill(s, k, 0);
             return Ok(Dq::ZERO);
@@ -135,7 +139,12 @@ impl Coefficients {
     /// # Errors
     /// [`Fault::NotCaught`] if no voltage shows the flux. In a frame that does not rotate with the rotor there is no flux.
     #[cold]
-    pub(super) fn build_flux(&self, s: &mut Field, k: &mut Common, n: u32) -> Result<Dq, Fault> {
+    pub(super) fn build_flux(
+        &self,
+        s: &mut Field<L::State>,
+        k: &mut Common,
+        n: u32,
+    ) -> Result<Dq, Fault> {
         let most = k.limits.voltage.most.d;
         let missing = most - self.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
         let (current, built) = self.flying_start.map_or((most, 0), |s| (s.current, s.build_up));
@@ -148,7 +157,7 @@ impl Coefficients {
                 s.lock = LockMonitorState::default();
             }
             // The loops continue from the present speed of the shaft.
-            let speed = s.estimator.rotor_freq / self.freq_per_speed;
+            let speed = s.estimator.axis.rotor_freq / self.freq_per_speed;
             self.motion.start(&mut s.motion, k.rotor_count);
             self.motion.take_over(&mut s.motion, k.rotor_count, speed, 0.0);
             s.enter(k, FluxPhase::ready());

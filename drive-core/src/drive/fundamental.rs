@@ -5,14 +5,14 @@ use core::f32::consts::TAU;
 use super::Field;
 use super::slow_tasks::StepResults;
 use crate::flux::hand_over::{Source, Turning};
-use crate::{AlphaBeta, Coefficients, UnitVector};
+use crate::{AlphaBeta, AngleLoop, Coefficients, UnitVector};
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Runs one period of the observer and returns the turn of the flux that it estimates. `current` is the measured current without
     /// the expected injection current, `phi` the axis of the flux at the sample.
     pub(super) fn observe_fundamental(
         &self,
-        s: &mut Field,
+        s: &mut Field<L::State>,
         index: usize,
         current: AlphaBeta,
         phi: UnitVector,
@@ -32,7 +32,7 @@ impl Coefficients {
 
     /// Whether the angle filter tracks the angle.
     #[inline(never)] // in the flash; inlined at both calls, 232 bytes more of control code
-    fn filter_tracks(&self, s: &Field, step: &StepResults) -> bool {
+    fn filter_tracks(&self, s: &Field<L::State>, step: &StepResults) -> bool {
         step.trust.rotates
             && self.injects(s)
             && !s.hand_over.leads
@@ -42,7 +42,7 @@ impl Coefficients {
     }
 
     /// Passes the speed that the observer has estimated in the injection period to the angle filter.
-    pub(super) fn see_speed(&self, s: &mut Field, step: &StepResults) {
+    pub(super) fn see_speed(&self, s: &mut Field<L::State>, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
         // If the resistance does not follow the filter, neither does the speed.
         let shows = step.trust.resistance && step.trust.source == Source::Both;
@@ -53,7 +53,7 @@ impl Coefficients {
     }
 
     /// Corrects the tracked angle, speed and resistance by the measurements of injection and observer.
-    pub(super) fn correct_angle(&self, s: &mut Field, step: &StepResults) {
+    pub(super) fn correct_angle(&self, s: &mut Field<L::State>, step: &StepResults) {
         let filters = self.filter_tracks(s, step);
         if !filters {
             s.estimator.filter.start(s.observer.resistance.deviation);
@@ -66,14 +66,14 @@ impl Coefficients {
     }
 
     /// Decides which source gives the angle.
-    pub(super) fn hand_over(&self, s: &mut Field, step: &StepResults) {
+    pub(super) fn hand_over(&self, s: &mut Field<L::State>, step: &StepResults) {
         if self.observer.is_some() && step.trust.observes() {
             s.hand_over.update(step.flux_freq, step.trust.source);
         }
     }
 
     /// Runs the slow part of the observer.
-    pub(super) fn update_observer(&self, s: &mut Field, step: &StepResults) {
+    pub(super) fn update_observer(&self, s: &mut Field<L::State>, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
         let leads = s.hand_over.leads;
         observer.update(&mut s.observer, step.rotor_freq);

@@ -3,9 +3,9 @@
 use super::{Common, Drive, End, Field, FluxPhase, Phase};
 use crate::identify::learning::{Learned, LearningSample, Start, Verdict};
 use crate::math::limited;
-use crate::{Angle, AngleSource, Coefficients, Fault};
+use crate::{Angle, AngleLoop, AngleSource, Coefficients, Fault};
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Returns the result of the last self-commissioning, accepted or not; none before the first has ended.
     pub fn learned(&self) -> Option<&Learned> {
         self.kept.learned.as_ref()
@@ -22,7 +22,7 @@ impl Drive {
     }
 
     pub(super) fn can_learn(&self) -> bool {
-        self.c.inject && self.c.demodulate && self.c.estimator.demodulator.tracks()
+        self.c.inject && self.c.demodulate && self.c.estimator.angle_loop.tracks()
     }
 
     /// Evaluates a self-commissioning that has measured all points. The outputs are off, and it takes a part of a
@@ -52,14 +52,18 @@ impl Drive {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Returns the q-axis current to regulate during self-commissioning, A, and turns the frame behind the flux.
     /// At the end an accepted result replaces the settings, and the drive stops.
     #[cold]
-    pub(super) fn learn(&self, s: &mut Field, k: &mut Common) -> Result<f32, End> {
+    pub(super) fn learn(&self, s: &mut Field<L::State>, k: &mut Common) -> Result<f32, End> {
         let FluxPhase::Learn(learning) = &mut s.flux else { return Ok(0.0) };
         let saliency = *s.estimator.saliency();
-        let signal = if self.learning.normalised { saliency.q } else { s.estimator.delta_i };
+        let signal = if self.learning.normalised {
+            saliency.q
+        } else {
+            self.estimator.delta_i(&s.estimator)
+        };
         let sample = LearningSample {
             signal,
             carrier_squared: saliency.carrier_squared,
@@ -82,7 +86,7 @@ impl Coefficients {
         if !learned.verdict.is_accepted() {
             return;
         }
-        self.estimator.take(learned);
+        self.estimator.angle_loop.take(learned);
         if let Some(observer) = &mut self.observer {
             observer.take(learned);
         }

@@ -5,7 +5,7 @@ use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::drive::coefficients::Coefficients;
 use crate::protect::thermal::Thermal;
-use crate::{Fault, Measured};
+use crate::{AngleLoop, Fault, Measured};
 
 /// Limits of the q-axis current. The heat of the brake resistor outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,7 +36,7 @@ impl Limits {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Resets the limits at a start.
     pub(super) fn start_limits(&self, limits: &mut Limits) {
         let voltage = self.voltage_limit.start();
@@ -114,7 +114,7 @@ impl Coefficients {
     }
 }
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Whether the dc link is charged: if there is a precharge relay, it has closed.
     pub(super) fn is_charged(&self) -> bool {
         self.c.relay.is_none() || self.kept.relay.closed

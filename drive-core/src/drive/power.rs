@@ -22,8 +22,8 @@
 use core::f32::consts::FRAC_2_PI;
 
 use super::{Coefficients, DcLimit, PowerLimit, Telemetry};
-use crate::PERIOD_S;
 use crate::dc_link::{DIVIDER, DcLinkLimits, Limiting};
+use crate::{AngleLoop, PERIOD_S};
 
 /// Share of the newest value in the error of the model.
 const ERROR_SHARE: f32 = DIVIDER as f32 * PERIOD_S / 0.03;
@@ -44,9 +44,9 @@ impl PowerLimit {
     /// current, A, and the inverter voltage error, V. `error` is the state.
     #[cold] // in the flash
     #[inline(never)]
-    pub fn step(
+    pub fn step<L: AngleLoop>(
         &self,
-        c: &Coefficients,
+        c: &Coefficients<L>,
         error: &mut f32,
         limits: &mut DcLinkLimits,
         seen: &Telemetry,

@@ -10,7 +10,7 @@ use crate::flux::catch::CatchState;
 use crate::io::LOW_SIDES_ON;
 use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
-use crate::{Coefficients, Dq, Fault, Measured, PERIOD_S, UnitVector};
+use crate::{AngleLoop, Coefficients, Dq, Fault, Measured, PERIOD_S, UnitVector};
 
 /// Periods from the command to switch the low sides on to the first sample with the low sides on, with a margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
@@ -43,7 +43,7 @@ impl Prepare {
     }
 }
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Runs a step of the preparation.
     #[cold]
     pub(super) fn prepare(&mut self, measured: &Measured) -> Result<Option<[f32; 3]>, Fault> {
@@ -146,7 +146,7 @@ impl Drive {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Resets all state that does not outlive a run.
     fn start(&self, k: &mut Common, i_d: f32, inverter_drop: f32) {
         k.starts = k.starts.wrapping_add(1);

@@ -1,12 +1,13 @@
 //! Checks of every step: the sample before it is used, and the state if a result is not finite.
 
 use super::Common;
+use crate::AngleLoop;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Measured};
 use crate::protect::wiring_check::{Pulse, WiringCheck, WiringCheckState};
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Checks a sample while the outputs are on or about to be switched on.
     ///
     /// # Errors

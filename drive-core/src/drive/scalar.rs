@@ -4,7 +4,7 @@ use super::{CarryOver, Common, End, Telemetry};
 use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
-use crate::{Abc, Coefficients, Fault, Limiting, Measured, PERIOD_S};
+use crate::{Abc, AngleLoop, Coefficients, Fault, Limiting, Measured, PERIOD_S};
 
 /// Frequency below which a motor that stops is switched off, turns per period.
 const STANDS: f32 = 0.2 * PERIOD_S;
@@ -30,7 +30,7 @@ impl Scalar {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Runs one period of V/f control. All protections of a sample are active, over-speed (by the frequency) and the thermal loads.
     ///
     /// # Errors

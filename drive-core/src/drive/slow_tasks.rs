@@ -25,7 +25,9 @@ use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::voltage_limit::{OperatingPoint, VoltageLimitState};
 use crate::protect::Thermal;
 use crate::protect::plausibility::{RotorFlux, Uncertainty};
-use crate::{AlphaBeta, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector};
+use crate::{
+    AlphaBeta, AngleLoop, AngleSource, Coefficients, Dq, Fault, Limiting, Measured, UnitVector,
+};
 
 /// Sample after which a command is executed. Its tasks and the command together take less time than the longest sample.
 pub(super) const COMMANDS_BEHIND: usize = 8;
@@ -52,14 +54,14 @@ pub(super) struct StepResults<'a> {
     pub trust: Trust,
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Runs the task of sample `index` of the injection period, which is counted with or without injection.
     ///
     /// # Errors
     /// The fault that a check finds.
     pub(super) fn run_slot(
         &self,
-        s: &mut Field,
+        s: &mut Field<L::State>,
         k: &mut Common,
         index: usize,
         step: &StepResults,
@@ -139,7 +141,12 @@ impl Coefficients {
     }
 
     /// Takes one of the six readings of the noise of the current sensors.
-    fn watch_noise(&self, s: &mut Field, look: usize, measured: &Measured) -> Result<(), Fault> {
+    fn watch_noise(
+        &self,
+        s: &mut Field<L::State>,
+        look: usize,
+        measured: &Measured,
+    ) -> Result<(), Fault> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.judges_noise()),
             None => Ok(()),
@@ -147,7 +154,7 @@ impl Coefficients {
     }
 
     /// Checks that both sensors follow a rotating current while there is no injection.
-    fn watch_travel(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+    fn watch_travel(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         let freq = if self.injects(s) { 0.0 } else { step.flux_freq };
         match &mut s.flux {
             FluxPhase::Ready(state) => self.travel_watch.step(state, &step.measured.phases, freq),
@@ -156,7 +163,7 @@ impl Coefficients {
     }
 
     /// Computes the rotor voltage for the next check of the current against the voltage.
-    fn predict(&self, s: &mut Field, step: &StepResults) {
+    fn predict(&self, s: &mut Field<L::State>, step: &StepResults) {
         // If the motor saturates, a weakened flux is larger than the current model says, and the observer measures it.
         let magnetising = match &self.observer {
             Some(observer) if step.trust.observes() => observer.magnetising(&s.observer),
@@ -173,7 +180,7 @@ impl Coefficients {
     }
 
     /// Limits the currents by the voltage of the dc link.
-    fn limit_voltage(&self, s: &Field, k: &mut Common, step: &StepResults) {
+    fn limit_voltage(&self, s: &Field<L::State>, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
@@ -190,14 +197,14 @@ impl Coefficients {
 
     /// Sets the d-axis current of the least loss.
     #[cold] // in the flash
-    fn minimise_loss(&self, s: &Field, k: &mut Common, step: &StepResults) {
+    fn minimise_loss(&self, s: &Field<L::State>, k: &mut Common, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.is_carrier_off();
         let i_d = &mut k.references.current.d;
         *i_d = self.voltage_limit.least_loss(*i_d, step.reference.q, carrier);
     }
 
     /// Limits the q-axis current by dc link, heat sink, motor and inverter.
-    fn limit_torque(&self, s: &Field, k: &mut Common, step: &StepResults) {
+    fn limit_torque(&self, s: &Field<L::State>, k: &mut Common, step: &StepResults) {
         let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
         let why = if by_voltage { Limiting::Voltage } else { Limiting::None };
         self.limit_by_dc_link(&mut k.limits, step.measured.dc_link, step.rotor_freq, (most.q, why));
@@ -205,12 +212,12 @@ impl Coefficients {
     }
 
     /// Whether there is an injection to be demodulated.
-    pub(super) fn injects(&self, s: &Field) -> bool {
+    pub(super) fn injects(&self, s: &Field<L::State>) -> bool {
         self.inject && s.hand_over.demodulates()
     }
 
     /// Checks the current against the voltage.
-    fn judge(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+    fn judge(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         let trust = &step.trust;
         if !trust.mean_voltage {
             // The inverter voltage error may also be unknown.
@@ -229,7 +236,7 @@ impl Coefficients {
 
     /// Checks that the tracked angle is the angle of the flux.
     #[inline(never)] // inlined, 56 bytes more of control code
-    fn check_lock(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+    fn check_lock(&self, s: &mut Field<L::State>, step: &StepResults) -> Result<(), Fault> {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
         let baseline = match step.trust.lock {
             Lock::Off => return Ok(()),
@@ -244,7 +251,11 @@ impl Coefficients {
     }
 
     /// Checks that both current sensors see the injection current.
-    fn check_both_channels(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+    fn check_both_channels(
+        &self,
+        s: &mut Field<L::State>,
+        step: &StepResults,
+    ) -> Result<(), Fault> {
         if !self.injects(s) {
             return Ok(());
         }
@@ -254,7 +265,11 @@ impl Coefficients {
     }
 
     /// Reduces the injection to the voltage that the fundamental leaves.
-    fn check_carrier_headroom(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
+    fn check_carrier_headroom(
+        &self,
+        s: &mut Field<L::State>,
+        step: &StepResults,
+    ) -> Result<(), Fault> {
         if !self.inject || s.hand_over.is_carrier_off() {
             return Ok(());
         }

@@ -14,7 +14,7 @@ use crate::io::LOW_SIDES_ON;
 use crate::math::{all_finite, limited};
 use crate::protect::WiringCheck;
 use crate::protect::wiring_check::WiringCheckState;
-use crate::{Abc, AlphaBeta, Coefficients, Dq, Fault, Measured};
+use crate::{Abc, AlphaBeta, AngleLoop, Coefficients, Dq, Fault, Measured};
 
 /// Control periods in which the injection rises to its amplitude: twenty injection periods.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
@@ -64,7 +64,7 @@ impl StandstillTest {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Runs a step of a test of a motor at rest.
     #[cold]
     pub(super) fn step_test(
@@ -124,7 +124,7 @@ impl Coefficients {
     }
 }
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Whether the measurements of the last step are to be passed to the `Collector`.
     pub fn is_testing(&self) -> bool {
         matches!(&self.phase, Phase::Test(test) if test.state() == State::Exciting)

@@ -3,8 +3,8 @@
 use crate::io::PERIOD_S;
 
 use super::{Common, Drive, End, Field, FluxPhase, Goal, Phase};
-use crate::Coefficients;
 use crate::drive::command::Stop;
+use crate::{AngleLoop, Coefficients};
 
 /// Longest time from a stop by [`Stop::Coast`] until the outputs are off, s. Together with the times of the contact, the main loop and the
 /// command it stays below the 200 ms that the manual states.
@@ -12,7 +12,7 @@ pub const COAST_S: f32 = 0.15;
 /// That time in control periods.
 pub(super) const COAST: u32 = (COAST_S / PERIOD_S + 0.5) as u32;
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     pub(super) fn stop(&mut self, stop: Stop) {
         match (&mut self.phase, stop) {
             (Phase::Off(_) | Phase::Fault(..), _) => {}
@@ -30,8 +30,8 @@ impl Drive {
     }
 }
 
-impl Coefficients {
-    fn stop_field(&self, s: &mut Field, k: &mut Common, stop: Stop) {
+impl<L: AngleLoop> Coefficients<L> {
+    fn stop_field(&self, s: &mut Field<L::State>, k: &mut Common, stop: Stop) {
         match (&mut s.goal, stop) {
             (Goal::Release | Goal::Hold { .. }, _) | (Goal::Brake { .. }, Stop::Ramp) => return,
             (Goal::Brake { quick }, Stop::Quick) => {

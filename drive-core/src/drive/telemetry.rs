@@ -3,7 +3,7 @@
 use core::mem::offset_of;
 
 use super::{Drive, Phase};
-use crate::{AlphaBeta, Angle, Dq};
+use crate::{AlphaBeta, Angle, AngleLoop, Dq};
 
 /// Measured, estimated and applied quantities of the last step, as 32-bit words in this order: a debugger reads them from
 /// memory.
@@ -66,7 +66,7 @@ pub struct TorqueLimits {
     pub voltage: f32,
 }
 
-impl Drive {
+impl<L: AngleLoop> Drive<L> {
     /// Position of the [telemetry](Self::telemetry) in a drive, bytes.
     pub const TELEMETRY: usize = offset_of!(Self, kept.seen);
 

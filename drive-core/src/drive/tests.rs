@@ -13,11 +13,12 @@ use crate::flux::AngleSource;
 use crate::generated;
 use crate::math::frames::{Abc, AlphaBeta};
 
-use crate::carrier::{CARRIER_SAMPLES, DemodulatorKind};
+use crate::carrier::CARRIER_SAMPLES;
 use crate::front_end::FrontEndState;
 use crate::io::{Compare, Hardware, Sample};
 use crate::line::Line;
 use crate::math::angle::{Angle, UnitVector};
+use crate::printed::{DemodulatorKind, PrintedState};
 use crate::settings::{IdentifiedPlant, Settings};
 use proptest::prelude::*;
 
@@ -136,7 +137,7 @@ fn running() -> (Drive, Load) {
 }
 
 /// Returns the part of a drive that regulates the current.
-fn field(drive: &mut Drive) -> &mut Field {
+fn field(drive: &mut Drive) -> &mut Field<PrintedState> {
     match &mut drive.phase {
         Phase::Field(field) => field,
         other => panic!("{other:?}"),
@@ -220,7 +221,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         (|d| d.c.front_end.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.kept.references.current.q = f32::NAN, Fault::NonFiniteCommand),
         (|d| field(d).current_loop.back_calculate(Dq::new(f32::NAN, 0.0)), Fault::NonFiniteState),
-        (|d| field(d).estimator.rotor_freq = f32::NAN, Fault::NonFiniteState),
+        (|d| field(d).estimator.axis.rotor_freq = f32::NAN, Fault::NonFiniteState),
         (
             |d| {
                 let nan = AlphaBeta::new(f32::NAN, 0.0);

@@ -6,8 +6,8 @@ use Lock::{Baseline, Off, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
 use super::{Field, FluxPhase, Frame};
-use crate::Coefficients;
 use crate::flux::hand_over::Source;
+use crate::{AngleLoop, Coefficients};
 
 /// Tolerance of the comparison of the measured current with the current that voltage and flux explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,10 +51,10 @@ impl Trust {
     }
 }
 
-impl Coefficients {
+impl<L: AngleLoop> Coefficients<L> {
     /// Returns the row of the present phase, `elapsed` periods after it began.
     #[rustfmt::skip] // A phase, a row.
-    pub(super) fn trust(&self, s: &Field, elapsed: u32) -> Trust {
+    pub(super) fn trust(&self, s: &Field<L::State>, elapsed: u32) -> Trust {
         match (&s.flux, s.frame) {
             // Flying start: the shaft is searched; below, it was found, and at first the injection alone, then also the observer
             // rotates the frame.

@@ -2,7 +2,7 @@
 
 pub use std::f64::consts::TAU;
 
-pub use drive_core::carrier::DemodulatorKind;
+pub use drive_core::printed::DemodulatorKind;
 pub use drive_core::{Accepted, AngleSource, Command, Drive, Fault, Mode, State, Stop};
 pub use drive_settings::value::Words;
 pub use drive_settings::{Flux, Settings};

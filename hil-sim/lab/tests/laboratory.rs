@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_3, TAU};
 
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_core::table::{Grid, POINTS, ReferenceTable};
 use drive_settings::Settings;
 use drive_settings::tuning::rule_3_8;

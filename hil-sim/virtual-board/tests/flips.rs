@@ -73,7 +73,7 @@ fn no_bit_of_what_decides_switches_a_gate_on() -> Result<()> {
         let board = &mut pair.board;
         let words = deciding(board);
         let word = board.cpu.word(words[0]).unwrap_or(0);
-        ensure!(Drive::PHASES.contains(&word), "{name}: {word:#x} is no phase");
+        ensure!(<Drive>::PHASES.contains(&word), "{name}: {word:#x} is no phase");
         for at in words {
             for bit in 0..32 {
                 flip(board, &kept, at, bit, LONG)?;
@@ -110,7 +110,7 @@ fn no_bit_of_what_decides_leads_to_another_phase() -> Result<()> {
                 board.run_periods(AFTER)?;
                 let phase = board.cpu.word(words[0]);
                 // (A word that is no phase ends the program.)
-                let is_on = phase.is_some_and(|phase| Drive::PHASES[2..].contains(&phase));
+                let is_on = phase.is_some_and(|phase| <Drive>::PHASES[2..].contains(&phase));
                 let is_off = !is_on && !board.gates().any_on();
                 ensure!(is_off || phase == goes_on, "{state}: {at:#x}, bit {bit}: {phase:x?}");
                 off += u32::from(is_off);

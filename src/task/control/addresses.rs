@@ -38,7 +38,7 @@ struct Table {
 unsafe impl Sync for Table {}
 
 /// Offset in the drive of its state, which follows the count of changes.
-const STATE: usize = Drive::CHANGES + size_of::<u32>();
+const STATE: usize = <Drive>::CHANGES + size_of::<u32>();
 
 /// The address at this offset in the drive.
 const fn in_drive(offset: usize) -> *const u8 {
@@ -56,10 +56,10 @@ const fn in_control(offset: usize) -> *const u8 {
 static INDUCTION_DRIVE_ADDRESSES: Table = Table {
     version: VERSION,
     control: (RUNNING.0.get().cast::<u8>().cast_const(), size_of::<Running>()),
-    coefficients: (in_drive(Drive::COEFFICIENTS.start), size_of::<Coefficients>()),
+    coefficients: (in_drive(<Drive>::COEFFICIENTS.start), size_of::<Coefficients>()),
     state: (in_drive(STATE), size_of::<Drive>() - STATE),
     commands: in_control(offset_of!(Control, commands)),
     command_waits: Mailbox::<Command>::FULL,
-    telemetry: in_drive(Drive::TELEMETRY),
-    phase: in_drive(Drive::PHASE),
+    telemetry: in_drive(<Drive>::TELEMETRY),
+    phase: in_drive(<Drive>::PHASE),
 };

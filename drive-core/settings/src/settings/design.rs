@@ -8,9 +8,10 @@ use core::f32::consts::TAU;
 
 use crate::settings::{CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, SpeedSource, TuningError};
-use drive_core::carrier::{AtStart, DemodulatorKind, Injection};
+use drive_core::carrier::{AtStart, Injection};
 use drive_core::current::{DeadTime, DqPi, InverterDrop, Modulator, Pi, VoltageLimit};
-use drive_core::flux::{Indirect, Leakage, Observer};
+use drive_core::flux::{AngleLoop, Indirect, Leakage, Observer};
+use drive_core::printed::DemodulatorKind;
 use drive_core::protect::{
     Body, LockMonitor, LockMonitorSettings, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck,
     Thermal, TravelWatch, WiringCheck, WiringSettings,
@@ -59,6 +60,14 @@ impl Settings {
     /// The first value outside its range, by name, with the range; or the reason why a design rule
     /// cannot be met.
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
+        self.build_for_loop()
+    }
+
+    /// As [`build`](Self::build), for a drive with any loop.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_for_loop<L: AngleLoop>(&self) -> Result<Coefficients<L>, SettingsError> {
         self.check()?;
         let m = &self.motor;
         let motor_plant = self.motor_plant()?;

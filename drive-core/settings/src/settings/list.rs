@@ -15,7 +15,7 @@ use super::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN, TRIP_OF_RANGE, TRIP_OF_R
 use super::numbers::{either_sign, or_rule};
 use super::value::Words;
 use super::{Carrier, CurrentSensors, Flux, PlantSource, SensorKind};
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
 use drive_core::{AngleSource, DcLimit, Line, Motor, PERIOD_S};
 

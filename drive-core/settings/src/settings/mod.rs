@@ -19,7 +19,7 @@ pub mod value;
 
 use self::value::{Words, words};
 use crate::tuning::TuningError;
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_core::{AngleSource, Line, PERIOD_S};
 
 pub use list::{

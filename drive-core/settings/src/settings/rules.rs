@@ -40,7 +40,7 @@ use super::list::RATED_A;
 use super::numbers::{TRIP_OF_RANGE, WITHIN, either_sign};
 use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
-use drive_core::carrier::DemodulatorKind;
+use drive_core::printed::DemodulatorKind;
 use drive_core::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{AngleSource, CONVERTER_CODES, FirstOrder, Line, Motor, PERIOD_S, SQRT_3};
 

@@ -317,7 +317,7 @@ fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
             if let Phase::Field(field) = &mut bench.drive.phase {
                 let now = matches!(field.flux, FluxPhase::Build { .. });
                 if now && !builds {
-                    let freq = field.estimator.rotor_freq;
+                    let freq = field.estimator.axis.rotor_freq;
                     field.estimator.preset_speed(freq + wrong_by * PERIOD_S);
                 }
                 builds = now;

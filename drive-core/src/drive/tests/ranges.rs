@@ -184,7 +184,7 @@ fn goals_that_are_no_numbers_are_found() {
 
 #[test]
 fn the_memory_check_covers_the_coefficients() {
-    assert_eq!(Drive::COEFFICIENTS.len(), size_of::<Coefficients>());
-    assert!(Drive::COEFFICIENTS.end <= size_of::<Drive>());
-    assert!(Drive::CHANGES + 4 <= size_of::<Drive>());
+    assert_eq!(<Drive>::COEFFICIENTS.len(), size_of::<Coefficients>());
+    assert!(<Drive>::COEFFICIENTS.end <= size_of::<Drive>());
+    assert!(<Drive>::CHANGES + 4 <= size_of::<Drive>());
 }

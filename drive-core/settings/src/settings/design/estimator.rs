@@ -5,10 +5,9 @@ use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 use num_complex::Complex64;
 
 use crate::settings::Settings;
-use drive_core::carrier::{Asymmetry, CARRIER_SAMPLES, DemodulatorKind};
-use drive_core::flux::{
-    AngleFilter, AngleLoop, ConstantReference, Estimator, GainSchedule, Reference, Tracker,
-};
+use drive_core::carrier::{Asymmetry, CARRIER_SAMPLES};
+use drive_core::flux::{AngleFilter, AngleLoop, Estimator, FilterLoop, GainSchedule};
+use drive_core::printed::PrintedSettings;
 use drive_core::{FirstOrder, PERIOD_S};
 
 /// Group delay of the band-pass at 600 Hz, samples, which is the lag of the envelope of the
@@ -51,45 +50,33 @@ impl Settings {
     /// Returns the estimator. `carrier_lag` is the delay, samples, from the injection axis to the
     /// sampled injection current; `carrier_v`, V, and `carrier_a`, A, are the amplitudes of the
     /// injected voltage and of that current.
-    pub(super) fn estimator(
+    pub(super) fn estimator<L: AngleLoop>(
         &self,
         lag_share: f32,
         carrier_lag: f32,
         speed_limit: f32,
         (carrier_v, carrier_a): (f32, f32),
-    ) -> Estimator {
-        let limit = 1.5 * speed_limit;
-        let inj = &self.injection;
-        let p = &inj.printed;
-        let some_v = if carrier_v > 0.0 { carrier_v } else { f32::INFINITY };
-        let angle_loop = if inj.demodulator == DemodulatorKind::Synchronous {
-            AngleLoop::Filter {
-                schedule: GainSchedule::new(&self.reference(), &self.slope()),
-                filter: self.angle_filter(carrier_a),
-                asymmetry: Asymmetry::default(),
-            }
-        } else {
-            AngleLoop::Pii {
-                reference: match p.learned {
-                    Some(table) => Reference::Learned(table),
-                    None => Reference::Constant(ConstantReference {
-                        full: p.reference_a,
-                        slope: p.reference_a / self.full_reference_iq_a(),
-                        from: self.full_reference_iq_a(),
-                    }),
-                },
-                tracker: Tracker::new(p.k_s, p.z_s, limit),
-            }
+    ) -> Estimator<L> {
+        let filter = FilterLoop {
+            schedule: GainSchedule::new(&self.reference(), &self.slope()),
+            filter: self.angle_filter(carrier_a),
+            asymmetry: Asymmetry::default(),
         };
-        Estimator {
-            demodulator: inj.demodulator,
+        let p = &self.injection.printed;
+        let some_v = if carrier_v > 0.0 { carrier_v } else { f32::INFINITY };
+        let printed = PrintedSettings {
+            demodulator: self.injection.demodulator,
             rms_samples: p.rms_samples,
             // A saliency s makes a current difference of sqrt2 I s and an impedance difference of 2 Z s, with Z = V/I.
             ampere_per_ohm: carrier_a * carrier_a / some_v * FRAC_1_SQRT_2,
-            angle_loop,
-            lag: lag_share * carrier_lag,
             band_pass_lag: lag_share * BPF_GROUP_DELAY,
-        }
+            reference_a: (p.reference_a, self.full_reference_iq_a()),
+            learned: p.learned,
+            k_s: p.k_s,
+            z_s: p.z_s,
+            limit: 1.5 * speed_limit,
+        };
+        Estimator { angle_loop: L::of(filter, &printed), lag: lag_share * carrier_lag }
     }
 
     /// Returns the variances of the angle filter, from motor, inverter and sensors, for an amplitude `carrier_a` of the injection

@@ -1,4 +1,11 @@
-//! Five demodulators that extract the saliency from the sampled current.
+//! The loop of the dissertation: four demodulators and the PII controller that turns the injection axis, to compare with.
+//!
+//! Everything but its [settings](PrintedSettings) needs the feature `printed`. A drive with it has both loops, and the setting
+//! `injection.demodulator` selects one: see [`ComparedLoop`].
+//!
+//! # Demodulators
+//!
+//! They extract the saliency from the sampled current, as the synchronous demodulation does.
 //!
 //! All rotate the current into the dm-qm frame, whose axes lie 45° to either side of the injection axis,
 //! and compare its two channels. With a saliency `s` (complex; its angle is twice the angle from the
@@ -30,72 +37,34 @@
 //! tracker's own corrections it acts as damping, on which the printed controller (z_s = 0.90) relies: with
 //! the rotation before the band-pass, the rectified chain loses the angle with that controller.
 
+mod kind;
+mod settings;
+
+pub use kind::DemodulatorKind;
+pub use settings::PrintedSettings;
+
 #[cfg(feature = "printed")]
-mod compared;
+mod chain;
+#[cfg(feature = "printed")]
+mod demodulator;
 #[cfg(feature = "printed")]
 mod envelope;
 #[cfg(feature = "printed")]
-mod printed;
+mod loops;
 #[cfg(feature = "printed")]
 mod rms_impedance;
+#[cfg(feature = "printed")]
+mod tracker;
 
 #[cfg(feature = "printed")]
 pub use {
-    compared::Demodulator,
+    chain::{Literal, Rectified},
+    demodulator::{Demodulate, Demodulator},
     envelope::Envelope,
-    printed::{Literal, Rectified},
+    loops::{ComparedLoop, PrintedState},
     rms_impedance::RmsImpedance,
+    tracker::Tracker,
 };
-
-#[cfg(not(feature = "printed"))]
-pub use absent::Demodulator;
-
-#[cfg(feature = "printed")]
-use crate::{carrier::CarrierSample, filter::BPF, filter::SosState, math::frames::DmQm};
-
-/// A demodulator with its state, which is at rest after [`Default`] or `new`.
-#[cfg(feature = "printed")]
-pub trait Demodulate {
-    /// Demodulates one sample; returns the demodulated signal.
-    fn step(&mut self, sample: &CarrierSample) -> f32;
-}
-
-/// Replaces the compared demodulators in a build without them.
-#[cfg(not(feature = "printed"))]
-mod absent {
-    use crate::carrier::{CarrierSample, DemodulatorKind};
-
-    /// Placeholder for the compared demodulators, which do not exist in this build.
-    #[derive(Clone, Copy, Debug, Default)]
-    pub struct Demodulator;
-
-    impl Demodulator {
-        /// Does nothing.
-        pub fn start(&mut self, _: DemodulatorKind, _: u8) {}
-
-        /// Whether the demodulator rotates the output of the band-pass.
-        pub fn rotates_output(&self) -> bool {
-            false
-        }
-
-        /// Returns no signal.
-        pub fn step(&mut self, _: &CarrierSample, _: f32) -> f32 {
-            0.0
-        }
-    }
-}
-
-/// State of the band-pass on the currents of the dm and qm channels.
-#[cfg(feature = "printed")]
-type RotatedBandPass = SosState<DmQm, 2>;
-
-/// Returns the injection currents of the dm and qm channels, A, filtered after the rotation as in
-/// Figure 9. In this order the filter delays the saliency but not the angle of the frame, and the
-/// speed of the frame does not appear.
-#[cfg(feature = "printed")]
-fn rotated_carrier(state: &mut RotatedBandPass, sample: &CarrierSample) -> DmQm {
-    BPF.step(state, sample.current.to_dm_qm(sample.dm_axis()))
-}
 
 #[cfg(all(test, feature = "printed"))]
 mod tests;

@@ -15,9 +15,9 @@
 //! an rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum
 //! of band-pass, rms filter, (n - 1)/2, and F3.
 
-use crate::carrier::DemodulatorKind;
-
-use super::{Demodulate, RotatedBandPass, rotated_carrier};
+use super::Demodulate;
+use super::DemodulatorKind;
+use super::demodulator::{RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
 use crate::filter::PP;
 use crate::filter::dissertation::PpState;

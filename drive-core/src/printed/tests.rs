@@ -4,6 +4,7 @@
 use core::f64::consts::{SQRT_2, TAU};
 
 use super::*;
+use crate::carrier::CarrierSample;
 use crate::carrier::injection::CarrierPeriod;
 use crate::carrier::synchronous::tests::InTurn;
 use crate::{AlphaBeta, Angle};
