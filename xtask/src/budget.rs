@@ -16,7 +16,6 @@ const FILE: &str = "xtask/budgets.toml";
 pub struct Budgets {
     pub lines: Lines,
     pub part: Vec<Part>,
-    pub bytes: Bytes,
     pub seconds: Seconds,
     pub cycles: Cycles,
 }
@@ -45,16 +44,6 @@ pub struct Seconds {
     pub test_module: f64,
     /// Time limit of each command, from a cold clone.
     pub commands: BTreeMap<String, u32>,
-}
-
-/// Memory of the image, bytes.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bytes {
-    pub control_code: u64,
-    pub flash_bank: u64,
-    pub stack: u64,
-    pub static_ram: u64,
 }
 
 /// Estimated cycles of the control interrupt.

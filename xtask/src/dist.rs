@@ -53,7 +53,7 @@ pub fn dist(options: &Dist) -> Result<()> {
         let target = toolchain::for_target()?;
         // The reference board comes last, because each build leaves its image at the same path.
         for board in image::boards()?.iter().rev() {
-            let elf = image::build_for(&target, board)?;
+            let elf = image::build_for(&target, board, image::FULL)?;
             for (from, to) in [("", "elf"), ("bin", "bin"), ("hex", "hex")] {
                 let to = folder.join("firmware").join(format!("{board}.{to}"));
                 copy_as(&elf.with_extension(from), &to)?;

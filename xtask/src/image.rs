@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
 
 use crate::toolchain::{self, Target};
 use crate::{paths, run, seal, sections, sources, stack};
@@ -18,6 +19,38 @@ pub const BOARDS: &str = "boards";
 /// The board whose image is built unless another is named.
 pub const REFERENCE: &str = "reference";
 
+/// The image that is built unless another is named, and all images: a file of `src/images` each.
+pub const FULL: &str = "full";
+pub const IMAGES: [&str; 2] = ["printed", FULL];
+
+/// A selection of the firmware's parts.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    /// Features of the package.
+    features: Vec<String>,
+    /// Its budgets.
+    pub bytes: Bytes,
+}
+
+/// Memory of an image, bytes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bytes {
+    pub control_code: u64,
+    pub flash_bank: u64,
+    pub stack: u64,
+    pub static_ram: u64,
+}
+
+/// Reads the file of an image.
+pub fn read(image: &str) -> Result<Image> {
+    let file = format!("src/images/{image}.toml");
+    let text = sources::read(&file);
+    let text = text.with_context(|| format!("no image {image}: one of {}", IMAGES.join(", ")))?;
+    toml::from_str(&text).context(file)
+}
+
 /// The names of the boards, which `src/boards.rs` lists.
 pub fn boards() -> Result<Vec<String>> {
     let source = sources::read("src/boards.rs")?;
@@ -28,21 +61,25 @@ pub fn boards() -> Result<Vec<String>> {
 
 /// Builds and checks the image of the reference board; returns its path.
 pub fn build() -> Result<PathBuf> {
-    build_for(&toolchain::for_target()?, REFERENCE)
+    build_for(&toolchain::for_target()?, REFERENCE, FULL)
 }
 
-/// Builds and checks the images of all boards; returns the path of the reference board's image.
+/// Builds and checks the images of all boards, and all images of the reference board; returns the path of its full image.
 pub fn build_all(target: &Target) -> Result<PathBuf> {
-    // The reference board comes last, because each build leaves its image at the same path.
+    // The full image of the reference board comes last, because each build leaves its image at the same path.
     for board in boards()?.iter().filter(|board| *board != REFERENCE) {
-        build_for(target, board)?;
+        build_for(target, board, FULL)?;
     }
-    build_for(target, REFERENCE)
+    for image in IMAGES.iter().filter(|image| **image != FULL) {
+        build_for(target, REFERENCE, image)?;
+    }
+    build_for(target, REFERENCE, FULL)
 }
 
-/// Builds and checks the image of a board. The path of the last image built is always the same; images of other boards
-/// than the reference are copied to `target/boards/NAME/`, and that path is returned.
-pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
+/// Builds and checks an image of a board. The path of the last image built is always the same; images of other boards
+/// than the reference are copied to `target/boards/BOARD/`, other images than the full one to `target/boards/IMAGE/`, and that path is
+/// returned.
+pub fn build_for(target: &Target, board: &str, image: &str) -> Result<PathBuf> {
     let known = boards()?;
     ensure!(
         known.iter().any(|name| name == board),
@@ -50,15 +87,19 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
         known.join(", ")
     );
     let mut command = target.cargo("build")?;
-    command.args(["--package", "induction-drive"]).env(BOARD, board);
-    run::step(&format!("firmware for {board}"), &mut command)?;
+    command.args(["--package", "induction-drive", "--no-default-features", "--features"]);
+    command.arg(read(image)?.features.join(",")).env(BOARD, board);
+    run::step(&format!("firmware for {board}, image {image}"), &mut command)?;
     let elf = target.image()?;
     check(&elf)?;
     seal::seal(&elf).context("the check sum of the image")?;
-    if board == REFERENCE {
-        return Ok(elf);
-    }
-    let copy = run::folder(format!("{BOARDS}/{board}"))?.join("induction-drive");
+    let name = match (board, image) {
+        (REFERENCE, FULL) => return Ok(elf),
+        (_, FULL) => board.to_owned(),
+        (REFERENCE, _) => image.to_owned(),
+        _ => format!("{board}-{image}"),
+    };
+    let copy = run::folder(format!("{BOARDS}/{name}"))?.join("induction-drive");
     for extension in ["", "map", "bin", "hex"] {
         fs::copy(elf.with_extension(extension), copy.with_extension(extension))
             .with_context(|| copy.display().to_string())?;
@@ -105,7 +146,7 @@ pub fn flash(board: Option<&str>, other_board: bool) -> Result<()> {
     let read = ["read", "--chip", CHIP, "b8", "0x08000000", "2048"];
     let page = page(&run::output("probe-rs", &read)?);
     let board = board_to_flash(board, &page, other_board)?;
-    let elf = build_for(&toolchain::for_target()?, &board)?;
+    let elf = build_for(&toolchain::for_target()?, &board, FULL)?;
     run::step("flash", run::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
 }
 

@@ -123,11 +123,14 @@ struct Which {
     /// Name of the board
     #[arg(long, value_name = "NAME", default_value = image::REFERENCE)]
     board: String,
+    /// Name of the image: a file of src/images. `--loop printed` selects the image with the loop of the dissertation
+    #[arg(long, alias = "loop", value_name = "NAME", default_value = image::FULL)]
+    image: String,
 }
 
 impl Which {
     fn image(&self) -> Result<PathBuf> {
-        image::build_for(&toolchain::for_target()?, &self.board)
+        image::build_for(&toolchain::for_target()?, &self.board, &self.image)
     }
 }
 
@@ -155,7 +158,7 @@ fn run(task: Task) -> Result<()> {
         Task::Bus => by_name::bus(&image::build()?),
         Task::Campaign { faults, which } => board::campaign(&which.image()?, &which.board, &faults),
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
-        Task::Size => size::report(&image::build()?),
+        Task::Size => size::report_all(),
         Task::Lines => lines::report(),
         Task::Rooms => rooms::check(),
         Task::Mutants { shard } => tools::mutants(&shard),
@@ -197,7 +200,8 @@ fn images() -> Result<()> {
     let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
     let mut lints = target.cargo("clippy")?;
     run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))?;
-    size::report(&image::build_all(&target)?)
+    let full = image::build_all(&target)?;
+    size::report(&full, image::FULL)
 }
 
 /// Runs the checks that `cargo test` leaves out, the quick ones first. All of them run, also when one fails.

@@ -6,18 +6,26 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::map::{self, Entry, Level};
-use crate::{budget, run, sources, stack};
+use crate::{image, run, sources, stack, toolchain};
 
 /// Part of the name of the trace's memory.
 const TRACE: &str = "TRACE_MEMORY";
 
+/// Builds all images of the reference board and prints their use of each memory; fails above a budget.
+pub fn report_all() -> Result<()> {
+    let target = toolchain::for_target()?;
+    image::IMAGES
+        .iter()
+        .try_for_each(|name| report(&image::build_for(&target, image::REFERENCE, name)?, name))
+}
+
 /// Prints the use of each memory by an image; fails above a budget.
-pub fn report(elf: &Path) -> Result<()> {
+pub fn report(elf: &Path, name: &str) -> Result<()> {
     let map = sources::read(elf.with_extension("map"))?;
     let sections = map::entries(&map, Level::Output);
     let regions = regions(&sources::read("memory.x")?);
 
-    println!("\n{:<8} {:>9} {:>9} {:>6}   sections", "memory", "used", "of", "");
+    println!("\nimage {name}\n{:<8} {:>9} {:>9} {:>6}   sections", "memory", "used", "of", "");
     for region in &regions {
         let inside = sections.iter().filter(|section| region.takes(section) && section.size > 0);
         let list: Vec<String> = inside.map(|s| format!("{} {}", s.name, s.size)).collect();
@@ -32,7 +40,7 @@ pub fn report(elf: &Path) -> Result<()> {
     let trace = sum(&map::entries(&map, Level::Symbol), |symbol| symbol.name.contains(TRACE));
     println!("code {code}, constants {constants}, static RAM {ram} with {trace} for the trace");
 
-    let budgets = budget::read()?.bytes;
+    let budgets = image::read(name)?.bytes;
     let bank = |bank: Region| sum(&sections, |section| bank.takes(section));
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
     run::limit("control code", named(&[".ccm"]), budgets.control_code, "bytes")?;

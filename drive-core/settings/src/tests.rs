@@ -273,6 +273,6 @@ fn a_word_without_code_is_refused_by_name() {
     settings.injection.demodulator = DemodulatorKind::Envelope;
     assert_eq!(settings.check_words(true), Ok(()));
     let error = settings.check_words(false).unwrap_err().to_string();
-    let text = "injection.demodulator = envelope: this image is built with synchronous alone";
+    let text = "injection.demodulator = envelope: this image is built with synchronous alone; `cargo firmware --loop printed` builds one with all";
     assert_eq!(error, text);
 }

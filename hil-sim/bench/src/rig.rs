@@ -4,9 +4,9 @@ use crate::config::{Config, LoadMode, built, check_model, open_phase, plant_sett
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
 use crate::stats::Stats;
-use drive_core::printed::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
+use drive_core::printed::DemodulatorKind;
 use drive_core::{
     Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
 };

@@ -23,6 +23,7 @@ mod modbus;
 mod motors;
 mod orders;
 mod preemption;
+mod printed;
 mod register_check;
 mod registers;
 mod rules;

@@ -114,7 +114,7 @@ words!(DemodulatorKind {
 /// Reasons why shunts below the low sides are sampled in one zero vector and at 6 kHz only, and why a demodulation is missing.
 const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
 const SLOW: &str = "shunts below the low sides settle too slowly for shorter pulses; set it to 6";
-const ABSENT: &str = "this image is built with synchronous alone";
+const ABSENT: &str = "this image is built with synchronous alone; `cargo firmware --loop printed` builds one with all";
 
 impl Scales {
     /// Returns the calibration of a current by its ADC counts from the calibration `line` of one conversion. With both zero vectors
