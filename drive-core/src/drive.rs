@@ -29,6 +29,7 @@ use core::hint::black_box;
 use core::mem::offset_of;
 use core::ops::Range;
 
+use crate::blocks::{Catch, Position, Vf};
 use crate::carrier::Asymmetry;
 use crate::carrier::at_start::AtStartState;
 use crate::carrier::injection::Carrier;
@@ -163,20 +164,22 @@ enum Start {
     Scalar {
         /// Speed reference, mechanical turns/s.
         speed: f32,
+        built: Vf,
     },
     Test(TestSignal),
 }
 
 impl Start {
-    pub fn of_mode(mode: Mode) -> Self {
-        match mode {
+    /// Returns the start in this mode; `None` in a build without it.
+    pub fn of_mode(mode: Mode) -> Option<Self> {
+        Some(match mode {
             Mode::Torque => Self::Field(Goal::Torque),
             Mode::Speed => Self::Field(Goal::SPEED),
-            Mode::Position => Self::Field(Goal::POSITION),
+            Mode::Position => Self::Field(Goal::position(Position::IN_BUILD?)),
             Mode::Learning => Self::Field(Goal::Learn),
-            Mode::VoltsPerHertz => Self::Scalar { speed: 0.0 },
+            Mode::VoltsPerHertz => Self::Scalar { speed: 0.0, built: Vf::IN_BUILD? },
             Mode::Commissioning => Self::Test(TestSignal::Rest),
-        }
+        })
     }
 
     pub fn mode(&self) -> Mode {
@@ -261,7 +264,7 @@ enum FluxPhase {
     /// The shaft is at rest. A residual flux decays, then the asymmetry of sensors and stator is measured.
     Asymmetry(AtStartState),
     /// The flux of a rotating rotor builds up from this period on.
-    Build { from: u32 },
+    Build { from: u32, _built: Catch },
     /// The frame is fixed along phase a until the flux is established; then the saliency is checked.
     #[default]
     Hold,
@@ -298,6 +301,7 @@ enum Goal {
         turns: Option<f32>,
         /// Instead of the position: a speed, mechanical turns/s, to press against a stop with at most this q-axis current, A.
         press: Option<(f32, f32)>,
+        _built: Position,
     },
     Learn,
     /// Brakes to rest.
@@ -333,14 +337,17 @@ impl Goal {
 
     /// Speed mode with speed 0.
     pub const SPEED: Self = Self::Speed { speed: 0.0, jog: 0 };
-    /// Position mode at the position where the drive is started.
-    pub const POSITION: Self = Self::Position { turns: None, press: None };
+
+    /// Returns the position mode at the position where the drive is started.
+    pub const fn position(built: Position) -> Self {
+        Self::Position { turns: None, press: None, _built: built }
+    }
 
     /// Whether the references of the goal are finite numbers.
     pub fn is_finite(&self) -> bool {
         match self {
             Self::Speed { speed, .. } => speed.is_finite(),
-            Self::Position { turns, press } => {
+            Self::Position { turns, press, .. } => {
                 turns.is_none_or(f32::is_finite) && press.is_none_or(|(speed, _)| speed.is_finite())
             }
             Self::Torque | Self::Learn => true,

@@ -19,6 +19,7 @@
 //! | [`io`] | input and output of a step and of the front end |
 //! | [`math`], [`filter`] | vectors and frames; second-order sections |
 //! | [`current`] | PI, modulation, dead time and inverter voltage error |
+//! | [`blocks`] | the optional blocks, each a cargo feature |
 //! | [`carrier`] | the injected voltage and the synchronous demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`printed`] | the loop of the dissertation, to compare with |
@@ -43,6 +44,7 @@
 //! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]
 
+pub mod blocks;
 pub mod carrier;
 pub mod current;
 mod dc_link;

@@ -204,6 +204,14 @@ fn images() -> Result<()> {
     size::report(&full, image::FULL)
 }
 
+/// Tests the control without its optional blocks, and with each of them alone.
+fn blocks() -> Result<()> {
+    ["", "flying-start", "position", "power-limit", "printed", "vf"].iter().try_for_each(|block| {
+        let tests = "test --package induction-drive-core --no-default-features --lib --features";
+        run::step(&format!("control with {block:?} alone"), run::cargo(tests).arg(block))
+    })
+}
+
 /// Runs the checks that `cargo test` leaves out, the quick ones first. All of them run, also when one fails.
 fn test() -> Result<()> {
     let mut steps = run::Steps::new();
@@ -216,6 +224,7 @@ fn test() -> Result<()> {
     let crates = "clippy --package induction-drive-core --package induction-drive-settings";
     let features = run::cargo(&format!("{crates} --all-features -- -D warnings"));
     steps.command("lints with all features", features);
+    steps.run("control with each block alone", blocks);
     let mut documentation = run::cargo("doc --workspace --no-deps");
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     steps.command("documentation", documentation);

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use crate::blocks::{Catch, Power};
 use crate::carrier::Injection;
 use crate::carrier::at_start::AtStart;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, VoltageLimit};
@@ -100,8 +101,8 @@ pub struct Coefficients<L = DefaultLoop> {
     pub travel_watch: TravelWatch,
     /// The measurement of the asymmetry at a start, if the synchronous demodulation tracks.
     pub at_start: Option<AtStart>,
-    /// Limits of dc current and power.
-    pub power: PowerLimit,
+    /// Limits of dc current and power, if there are any.
+    pub power: Option<PowerLimit>,
 }
 
 impl<L: AngleLoop> Coefficients<L> {
@@ -152,15 +153,12 @@ impl DcLimit {
 /// Limits of dc current and power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLimit {
+    /// See [`blocks`](crate::blocks).
+    pub built: Power,
     /// Limits of current and power from the link into motor and switches.
     pub motoring: DcLimit,
     /// Limits of current and power back into the link.
     pub generating: DcLimit,
-}
-
-impl PowerLimit {
-    /// No limits.
-    pub const NONE: Self = Self { motoring: DcLimit::NONE, generating: DcLimit::NONE };
 }
 
 /// Limits in the units of the control step.
@@ -199,6 +197,8 @@ pub struct SequenceSteps {
 /// Coefficients of the flying start, in control periods and A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlyingStart {
+    /// See [`blocks`](crate::blocks).
+    pub built: Catch,
     /// D-axis current of the speed search, A.
     pub current: f32,
     /// Periods in which the injection alone corrects the angle.

@@ -135,6 +135,9 @@ pub enum Refused {
     /// The precharge relay is open: the dc link is not charged yet, or too low.
     #[error("the precharge relay is open: the dc link is too low, or not steady yet")]
     NotCharged,
+    /// The build is without the block of this mode, see [`blocks`](crate::blocks).
+    #[error("this build is without this mode")]
+    NotBuilt,
     /// The settings do not want the rotor time constant tracked.
     #[error("track_rotor is off in the settings")]
     RotorNotTracked,

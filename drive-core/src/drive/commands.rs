@@ -21,7 +21,9 @@ impl<L: AngleLoop> Drive<L> {
     pub fn execute(&mut self, command: &Command<L>) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
         match *command {
-            Command::Start(mode) => return self.start(Start::of_mode(mode)),
+            Command::Start(mode) => {
+                return self.start(Start::of_mode(mode).ok_or(Refused::NotBuilt)?);
+            }
             Command::Relock => self.relock()?,
             Command::CheckWiring => self.kept.wiring_unchecked = true,
             Command::Brake(seconds) => {
@@ -73,7 +75,9 @@ impl<L: AngleLoop> Drive<L> {
                 self.hold_present_position();
                 if let Phase::Field(field) = &mut self.phase {
                     let origin = self.c.motion.shift_origin(&mut field.motion, here);
-                    field.goal = Goal::Position { turns: Some(0.0), press: None };
+                    if let Goal::Position { turns, press, .. } = &mut field.goal {
+                        (*turns, *press) = (Some(0.0), None);
+                    }
                     self.kept.home = (self.c.source == AngleSource::Encoder).then_some(origin);
                 }
             }
@@ -156,7 +160,7 @@ impl<L: AngleLoop> Drive<L> {
         finite(rpm)?;
         let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
         match &mut self.phase {
-            Phase::Prepare(Prepare { job: Start::Scalar { speed }, .. })
+            Phase::Prepare(Prepare { job: Start::Scalar { speed, .. }, .. })
             | Phase::Scalar(Scalar { speed, .. }) => *speed = taken / 60.0,
             _ => {
                 if let Some(Goal::Speed { speed, jog }) = self.goal() {
@@ -206,7 +210,7 @@ impl<L: AngleLoop> Drive<L> {
         k.no_torque(k.references.current.d, c.injection_axis);
         match &mut field.goal {
             goal @ Goal::Speed { .. } => *goal = Goal::SPEED,
-            goal @ Goal::Position { .. } => *goal = Goal::POSITION,
+            Goal::Position { turns, press, .. } => (*turns, *press) = (None, None),
             Goal::Torque | Goal::Learn => {}
             Goal::Brake { .. } | Goal::Hold { .. } | Goal::Release => {}
         }

@@ -291,7 +291,7 @@ impl<L: AngleLoop> Coefficients<L> {
         Ok(match s.flux {
             FluxPhase::Search(_) => self.search_shaft(s, k)?,
             FluxPhase::Asymmetry(_) => self.measure_asymmetry(s, k)?,
-            FluxPhase::Build { from } => self.build_flux(s, k, k.elapsed.wrapping_sub(from))?,
+            FluxPhase::Build { from, .. } => self.build_flux(s, k, k.elapsed.wrapping_sub(from))?,
             FluxPhase::Hold => self.magnetise(s, k)?,
             FluxPhase::Verify => self.verify(s, k)?,
             FluxPhase::Prove => self.prove(s, k)?,
@@ -317,7 +317,7 @@ impl<L: AngleLoop> Coefficients<L> {
                 range = (limited(range.0, *most), limited(range.1, *most));
                 Target::Speed(*speed)
             }
-            Goal::Position { turns, press: None } => Target::Position(turns.unwrap_or(0.0)),
+            Goal::Position { turns, press: None, .. } => Target::Position(turns.unwrap_or(0.0)),
             Goal::Brake { quick } => Target::Rest { quick: *quick },
             Goal::Hold { left } => {
                 *left = left.saturating_sub(1);

@@ -124,7 +124,7 @@ impl<L: AngleLoop> Coefficients<L> {
                     return Err(Fault::NotCaught);
                 }
                 s.carried.residual = None;
-                s.flux = FluxPhase::Build { from: k.elapsed };
+                s.flux = FluxPhase::Build { from: k.elapsed, _built: start.built };
                 s.estimator.preset_speed(freq);
                 s.indirect = IndirectState::default();
                 s.observer.start(self.observer.as_ref());

@@ -1,6 +1,6 @@
 //! The chain of limits of the q-axis current, with the reason of the active limit.
 
-use super::{Common, Drive, Phase, PowerLimit};
+use super::{Common, Drive, Phase};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::drive::coefficients::Coefficients;
@@ -67,9 +67,9 @@ impl<L: AngleLoop> Coefficients<L> {
     /// Narrows the limits by dc current and power; see [`PowerLimit::step`](crate::PowerLimit::step).
     #[inline(never)] // inlined, 32 bytes more of control code
     pub(super) fn limit_power(&self, k: &mut Common, magnetising: f32, drop: f32) {
-        if self.power != PowerLimit::NONE {
+        if let Some(power) = &self.power {
             let Limits { power_error, now, .. } = &mut k.limits;
-            self.power.step(self, power_error, now, &k.seen, (magnetising, drop));
+            power.step(self, power_error, now, &k.seen, (magnetising, drop));
         }
     }
 

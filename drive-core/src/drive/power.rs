@@ -84,5 +84,5 @@ impl PowerLimit {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "power-limit"))]
 mod tests;

@@ -100,19 +100,21 @@ impl<L: AngleLoop> Drive<L> {
         let Phase::Prepare(prepare) = &self.phase else { return };
         let left = prepare.carried;
         match prepare.job {
-            Start::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
+            Start::Scalar { speed, built } => {
+                self.enter(Phase::Scalar(Scalar::new(built, speed, left)));
+            }
             Start::Test(wanted) => self.enter(Phase::Test(StandstillTest::new(wanted, left))),
             Start::Field(goal) => {
-                let catches = self.c.catches(&prepare.job).is_some();
+                let catches = self.c.catches(&prepare.job).map(|start| start.built);
                 // The field is large, so it is built in place.
                 self.enter(Phase::Field(Field::default()));
                 let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
                     return;
                 };
                 c.begin_field(field, goal, &left);
-                if catches {
+                if let Some(start) = catches {
                     field.hand_over.switch_carrier_off();
-                    field.flux = FluxPhase::Search(CatchState::default());
+                    field.flux = FluxPhase::Search(CatchState::new(start));
                 } else {
                     c.continue_at_standstill(field, k, encoder);
                 }

@@ -1,6 +1,7 @@
 //! V/f control, without a model of the motor; see [`volts_per_hertz`](crate::flux::volts_per_hertz).
 
 use super::{CarryOver, Common, End, Telemetry};
+use crate::blocks::Vf;
 use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
@@ -12,6 +13,7 @@ const STANDS: f32 = 0.2 * PERIOD_S;
 /// A drive in V/f control.
 #[derive(Clone, Debug)]
 pub(super) struct Scalar {
+    _built: Vf,
     turning: VoltsPerHertzState,
     /// Speed reference, mechanical turns/s.
     pub speed: f32,
@@ -21,8 +23,8 @@ pub(super) struct Scalar {
 }
 
 impl Scalar {
-    pub fn new(speed: f32, carried: CarryOver) -> Self {
-        Self { turning: VoltsPerHertzState::default(), speed, stop: None, carried }
+    pub fn new(built: Vf, speed: f32, carried: CarryOver) -> Self {
+        Self { _built: built, turning: VoltsPerHertzState::default(), speed, stop: None, carried }
     }
 
     pub fn state(&self) -> State {

@@ -5,12 +5,12 @@ mod motor;
 mod protections;
 mod ranges;
 mod standstill_test;
+#[cfg(feature = "flying-start")]
 mod trust;
 
 use super::*;
 use crate::filter::dissertation::LPF;
 use crate::flux::AngleSource;
-use crate::generated;
 use crate::math::frames::{Abc, AlphaBeta};
 
 use crate::carrier::CARRIER_SAMPLES;
@@ -195,6 +195,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
     assert!(before < -0.9);
 }
 
+#[cfg_attr(not(feature = "flying-start"), ignore)]
 #[test]
 fn a_relock_is_for_a_sensorless_drive_that_runs() {
     let (mut encoder, _) = running();
@@ -299,6 +300,21 @@ fn one_period_of_ten_leaves_time_for_a_command() {
     assert!(first < CARRIER_SAMPLES && times.iter().copied().eq(expected), "{times:?}");
 }
 
+/// A build without a block refuses to start in its mode, with the reason.
+#[test]
+fn a_mode_that_is_left_out_is_refused() {
+    let built = [
+        (Mode::VoltsPerHertz, Vf::IN_BUILD.is_some()),
+        (Mode::Position, Position::IN_BUILD.is_some()),
+        (Mode::Torque, true),
+    ];
+    for (mode, built) in built {
+        let started = Drive::new(settings().build().unwrap()).command(&Command::Start(mode));
+        assert_eq!(started == Err(Refused::NotBuilt), !built, "{mode:?}: {started:?}");
+    }
+}
+
+#[cfg_attr(not(feature = "position"), ignore)]
 #[test]
 fn commands_are_taken_limited_or_refused() {
     let mut d = drive();

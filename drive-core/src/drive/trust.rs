@@ -61,7 +61,7 @@ impl<L: AngleLoop> Coefficients<L> {
             (FluxPhase::Search(_), _) => Trust { source: Nothing, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
             // There is neither current nor flux.
             (FluxPhase::Asymmetry(_), _) => Trust { source: Slip, rotates: false, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
-            (FluxPhase::Build { from }, _) => match &self.flying_start {
+            (FluxPhase::Build { from, .. }, _) => match &self.flying_start {
                 Some(start) if elapsed.wrapping_sub(*from) < start.injection_only => Trust { source: Injection, rotates: true, lock: Off, current: Check::Off, mean_voltage: false, resistance: false, measures_drop: false },
                 _ => Trust { source: Both, rotates: true, lock: Baseline, current: Wide, mean_voltage: true, resistance: false, measures_drop: false },
             },

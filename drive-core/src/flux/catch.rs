@@ -15,6 +15,7 @@
 
 use core::f32::consts::TAU;
 
+use crate::blocks::Catch;
 use crate::{Angle, Dq, Motor, PERIOD_S};
 
 /// Control periods per average.
@@ -40,31 +41,6 @@ struct Correlation {
     re: f32,
     im: f32,
     power: f32,
-}
-
-/// State of the search.
-#[derive(Clone, Copy, Debug)]
-pub struct CatchState {
-    /// Sum of e, V s, and sum of its values in the present average.
-    flux: Dq,
-    sum: Dq,
-    summed: u8,
-    kept: [Dq; KEPT],
-    count: usize,
-    correlations: [Correlation; 3],
-}
-
-impl Default for CatchState {
-    fn default() -> Self {
-        Self {
-            flux: Dq::ZERO,
-            sum: Dq::ZERO,
-            summed: 0,
-            kept: [Dq::ZERO; KEPT],
-            count: 0,
-            correlations: [Correlation::default(); 3],
-        }
-    }
 }
 
 /// Result of a step.
@@ -107,7 +83,33 @@ impl Path {
     }
 }
 
+/// State of the search.
+#[derive(Clone, Copy, Debug)]
+pub struct CatchState {
+    _built: Catch,
+    /// Sum of e, V s, and sum of its values in the present average.
+    flux: Dq,
+    sum: Dq,
+    summed: u8,
+    kept: [Dq; KEPT],
+    count: usize,
+    correlations: [Correlation; 3],
+}
+
 impl CatchState {
+    /// Begins a search.
+    pub fn new(built: Catch) -> Self {
+        Self {
+            _built: built,
+            flux: Dq::ZERO,
+            sum: Dq::ZERO,
+            summed: 0,
+            kept: [Dq::ZERO; KEPT],
+            count: 0,
+            correlations: [Correlation::default(); 3],
+        }
+    }
+
     /// Takes the voltage `e` of the rotor in period `elapsed` of the search, V s in a fixed frame. From [`FROM`] on
     /// the controller is proportional.
     pub fn step(&mut self, elapsed: u32, e: Dq) -> SearchResult {

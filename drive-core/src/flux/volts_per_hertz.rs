@@ -24,6 +24,7 @@
 //! In simulations of eight motors of 0.19 to 18.5 kW with the nameplate alone, half the rated speed was reached within 1 %
 //! of the rated speed without load, and within 3 % with 0.3 of the rated torque.
 
+use crate::blocks::Vf;
 use crate::math::{limited, within};
 use crate::{AlphaBeta, Angle, Dq, Fault, PERIOD_S, UnitVector};
 
@@ -121,6 +122,8 @@ pub struct VoltsPerHertzSettings {
 /// Coefficients of the V/f control. Frequencies are in electrical turns per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoltsPerHertz {
+    /// See [`blocks`](crate::blocks).
+    pub built: Vf,
     /// Voltage per frequency, V.
     volts: f32,
     /// Slip per q-axis current at full flux.
@@ -196,14 +199,15 @@ pub struct Turned {
 }
 
 impl VoltsPerHertz {
-    /// Creates the V/f control for a motor with these data, all greater than zero.
-    pub fn new(s: &VoltsPerHertzSettings) -> Self {
+    /// Creates the V/f control for a motor with these data, all greater than zero; `None` in a build without it.
+    pub fn new(s: &VoltsPerHertzSettings) -> Option<Self> {
         const TAU: f32 = core::f32::consts::TAU;
         let (rated, flux) = (s.rated_volts_per_hz / TAU, s.volts_per_hz / TAU);
         let steepest = s.frequency_hz / STEEPEST_S;
         let ramp = |hz_per_s: f32| limited(hz_per_s, steepest) * PERIOD_S * PERIOD_S;
         let slip_hz = s.slip_hz * 1.5 * s.pole_pairs * rated * rated / (flux * s.torque_nm);
-        Self {
+        Some(Self {
+            built: Vf::IN_BUILD?,
             volts: s.volts_per_hz / PERIOD_S,
             slip: s.slip_share * slip_hz * PERIOD_S,
             boost_a: s.boost_a,
@@ -218,7 +222,7 @@ impl VoltsPerHertz {
             quick_ramp: ramp(s.quick_hz_per_s),
             per_room: 1.0 / (LEAST_RAMP_SHARE * s.limit_a),
             recovery: s.frequency_hz * PERIOD_S * (PERIOD_S / RECOVERY_S),
-        }
+        })
     }
 
     /// Runs one period with the measured `current`, A.
@@ -388,6 +392,7 @@ mod tests {
     }
 
     /// A motor is stalled if it is at its limit below 4 Hz for two seconds, or for longer at more than a fifth of the time.
+    #[cfg_attr(not(feature = "vf"), ignore)]
     #[test]
     fn a_motor_at_its_limit_that_hardly_turns_stands() {
         let coefficients = coefficients();
@@ -412,6 +417,7 @@ mod tests {
     }
 
     /// The fault needs more than 0.4 of the current to rotate backwards for half a second, at 8 Hz or above without interruption.
+    #[cfg_attr(not(feature = "vf"), ignore)]
     #[test]
     fn a_current_that_turns_backwards_is_an_open_phase() {
         let coefficients = coefficients();

@@ -15,6 +15,7 @@ use super::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN, TRIP_OF_RANGE, TRIP_OF_R
 use super::numbers::{either_sign, or_rule};
 use super::value::Words;
 use super::{Carrier, CurrentSensors, Flux, PlantSource, SensorKind};
+use drive_core::blocks::Catch;
 use drive_core::printed::DemodulatorKind;
 use drive_core::table::{CarrierTable, ReferenceTable};
 use drive_core::{AngleSource, DcLimit, Line, Motor, PERIOD_S};
@@ -440,7 +441,7 @@ settings! {
         /// whether a start first looks for a rotating shaft (flying start)
         ///
         /// The search takes 0.25 s and is done without an encoder only.
-        catch: bool = true, 83: word();
+        catch: bool = Catch::IN_BUILD.is_some(), 83: word();
     }
 
     /// The choice of the flux; see `drive_core::current::voltage_limit`.

@@ -19,6 +19,7 @@ pub mod value;
 
 use self::value::{Words, words};
 use crate::tuning::TuningError;
+use drive_core::blocks::{Catch, Power};
 use drive_core::printed::DemodulatorKind;
 use drive_core::{AngleSource, Line, PERIOD_S};
 
@@ -114,6 +115,7 @@ words!(DemodulatorKind {
 /// Reasons why shunts below the low sides are sampled in one zero vector and at 6 kHz only, and why a demodulation is missing.
 const BLIND: &str = "shunts below the low sides see nothing in the upper zero vector; set it to no";
 const SLOW: &str = "shunts below the low sides settle too slowly for shorter pulses; set it to 6";
+const LEFT_OUT: &str = "this build is without this block";
 const ABSENT: &str = "this image is built with synchronous alone; `cargo firmware --loop printed` builds one with all";
 
 impl Scales {
@@ -148,6 +150,16 @@ impl Settings {
     pub(crate) fn check_words(&self, has_all: bool) -> Result<(), SettingsError> {
         if self.scales.both_zero_vectors && self.scales.sensors == CurrentSensors::LowSide {
             return Err(SettingsError::Word("scales.both_zero_vectors", true.word(), BLIND));
+        }
+        if self.sequence.catch && Catch::IN_BUILD.is_none() {
+            return Err(SettingsError::Word("sequence.catch", true.word(), LEFT_OUT));
+        }
+        if self.limits_power() && Power::IN_BUILD.is_none() {
+            return Err(SettingsError::Word(
+                "limits.motoring_w",
+                "or another limit of dc current and power",
+                LEFT_OUT,
+            ));
         }
         let carrier = self.inverter.carrier_khz;
         if carrier != Carrier::Khz6 && self.scales.sensors == CurrentSensors::LowSide {

@@ -7,6 +7,8 @@ use super::*;
 use crate::settings::Settings;
 use crate::{Dq, Motor};
 
+const BUILT: crate::blocks::Power = crate::blocks::Power::IN_BUILD.unwrap();
+
 const DC_LINK: f32 = 300.0;
 const MAGNETISING: f32 = 1.4;
 const ASKED: f32 = 50.0;
@@ -16,7 +18,7 @@ static COEFFICIENTS: LazyLock<Coefficients> =
 
 /// Returns the least and largest q-axis current at this speed, Hz electrical, if the model does not explain `error` W.
 fn limits(hz: f32, motoring: DcLimit, generating: DcLimit, error: f32) -> (f32, f32) {
-    let (c, limit) = (&*COEFFICIENTS, PowerLimit { motoring, generating });
+    let (c, limit) = (&*COEFFICIENTS, PowerLimit { built: BUILT, motoring, generating });
     let mut seen =
         Telemetry { dc_link: DC_LINK, rotor_freq: hz * PERIOD_S, ..Telemetry::default() };
     seen.current = Dq { d: MAGNETISING, q: 0.0 };
@@ -105,7 +107,7 @@ fn the_torque_comes_and_goes_smoothly() {
 #[test]
 fn ride_through_comes_first() {
     let c = Settings::default().build().unwrap();
-    let limit = PowerLimit { motoring: watts(100.0), generating: watts(0.0) };
+    let limit = PowerLimit { built: BUILT, motoring: watts(100.0), generating: watts(0.0) };
     let mut seen =
         Telemetry { dc_link: DC_LINK, rotor_freq: 50.0 * PERIOD_S, ..Telemetry::default() };
     seen.current.d = MAGNETISING;

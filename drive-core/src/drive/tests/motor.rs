@@ -3,6 +3,7 @@
 
 use num_complex::Complex64;
 
+#[cfg(all(feature = "flying-start", feature = "position", feature = "vf"))]
 mod allowed;
 mod stops;
 
@@ -177,6 +178,7 @@ impl Bench {
     }
 }
 
+#[cfg_attr(not(feature = "position"), ignore)]
 #[test]
 fn without_a_sensor_speed_and_position_are_those_of_the_rotor() {
     let mut bench = Bench::started(&motor_settings(AngleSource::Injection), Mode::Speed);
@@ -288,6 +290,7 @@ fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
 
 /// A frame that rotates several hertz faster or slower than the rotor has no flux. The whole back-EMF is missing, and the drive
 /// does not begin to regulate unless the frame is pulled in. A frame that is off by one hertz is pulled in.
+#[cfg_attr(not(feature = "flying-start"), ignore)]
 #[test]
 fn a_turning_shaft_of_which_the_speed_is_not_right_is_not_taken_for_caught() {
     let mut settings = motor_settings(AngleSource::Injection);

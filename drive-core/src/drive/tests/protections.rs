@@ -218,6 +218,7 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
 
 /// In each phase of the drive the load of the motor approaches the square of the current vector relative to its continuous current,
 /// with its time constant. Without outputs the load decays.
+#[cfg_attr(not(feature = "vf"), ignore)]
 #[test]
 fn the_load_of_the_motor_follows_the_current_in_every_phase() {
     let mut s = settings();

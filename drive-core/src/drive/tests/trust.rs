@@ -6,6 +6,8 @@ use crate::drive::trust::{Check, Lock, Trust};
 use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;
 
+const BUILT: crate::blocks::Catch = crate::blocks::Catch::IN_BUILD.unwrap();
+
 /// Returns a row of the table without its name.
 fn row(trust: &Trust) -> String {
     let source = match trust.source {
@@ -43,10 +45,10 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let c = settings.build().unwrap();
     let alone = c.flying_start.unwrap().injection_only;
     let phases = [
-        (FluxPhase::Search(CatchState::default()), 5),
+        (FluxPhase::Search(CatchState::new(BUILT)), 5),
         (FluxPhase::Asymmetry(AtStartState::new(false)), 5),
-        (FluxPhase::Build { from: 7 }, 7 + alone - 1),
-        (FluxPhase::Build { from: 7 }, 7 + alone),
+        (FluxPhase::Build { from: 7, _built: BUILT }, 7 + alone - 1),
+        (FluxPhase::Build { from: 7, _built: BUILT }, 7 + alone),
         (FluxPhase::Hold, 5),
         (FluxPhase::Verify, 5),
         (FluxPhase::ready(), 5),
@@ -76,7 +78,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let head = "| phase | angle by | frame | lock monitor | current against voltage | its mean | stator resistance |";
     let rows = table.iter().map(|(name, row)| format!("| {name} | {row}\n"));
     let rows = rows.collect::<String>();
-    generated::check(
+    crate::generated::check(
         "control-law.md",
         "trust",
         &format!("{head}\n|---|---|---|---|---|---|---|\n{rows}"),

@@ -1,6 +1,7 @@
 //! Coefficients of the flying start.
 
 use crate::settings::Settings;
+use drive_core::blocks::Catch;
 use drive_core::flux::Path;
 use drive_core::{FlyingStart, PERIOD_S, periods};
 
@@ -20,7 +21,9 @@ impl Settings {
         let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
         let current = f32::max(SEARCH_SHARE * self.current_limit_a(), i_d);
         let path = Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1]));
-        (self.uses_observer() && self.sequence.catch).then(|| FlyingStart {
+        let built = Catch::IN_BUILD.filter(|_| self.uses_observer() && self.sequence.catch)?;
+        Some(FlyingStart {
+            built,
             current,
             injection_only: periods(INJECTION_ONLY_S),
             build_up: periods(BUILD_UP_S),

@@ -2,6 +2,7 @@
 
 use crate::settings::Settings;
 use crate::settings::numbers::{HIGH_OF_TRIP, LOW_OF_TRIP, MARGIN};
+use drive_core::blocks::Power;
 use drive_core::{ChopperSettings, DcLimit, DcLinkSettings, PowerLimit, Relay, periods};
 
 /// Highest trip voltage of the dc link, relative to the maximum operating voltage.
@@ -47,13 +48,23 @@ impl Settings {
         1.5 * self.motor.r_s * self.i_d() * self.i_d()
     }
 
-    /// Returns the limits of dc current and power.
-    pub(crate) fn power_limit(&self) -> PowerLimit {
+    /// Returns the limits of dc current and power, if there are any.
+    pub(crate) fn power_limit(&self) -> Option<PowerLimit> {
+        let [motoring, generating] = self.dc_limits();
+        let built = Power::IN_BUILD.filter(|_| self.limits_power())?;
+        Some(PowerLimit { built, motoring, generating })
+    }
+
+    /// Whether dc current or power are limited.
+    pub(in crate::settings) fn limits_power(&self) -> bool {
+        self.dc_limits() != [DcLimit::NONE; 2]
+    }
+
+    /// Returns the limits motoring and generating.
+    fn dc_limits(&self) -> [DcLimit; 2] {
         let s = &self.limits;
-        PowerLimit {
-            motoring: DcLimit { current_a: s.dc_motoring_a, power_w: s.motoring_w },
-            generating: DcLimit { current_a: s.dc_generating_a, power_w: s.generating_w },
-        }
+        [(s.dc_motoring_a, s.motoring_w), (s.dc_generating_a, s.generating_w)]
+            .map(|(current_a, power_w)| DcLimit { current_a, power_w })
     }
 
     /// Returns the precharge relay, which opens at the trip voltage.

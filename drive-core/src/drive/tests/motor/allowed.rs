@@ -203,7 +203,7 @@ fn every_command_is_taken_or_refused_in_every_state() {
     let states: HashSet<_> = seen.iter().map(|(state, _)| state).collect();
     let modes: HashSet<_> = seen.iter().map(|(_, mode)| mode).collect();
     assert_eq!((states.len(), modes.len()), (17, MODES.len()));
-    generated::check("control-law.md", "commands", &table);
+    crate::generated::check("control-law.md", "commands", &table);
 }
 
 /// Checks the other table: the state after a stop, a clear, a start and a relock, and after a fault.
@@ -245,7 +245,7 @@ fn every_event_leads_to_the_state_of_the_table() {
     let head =
         "| state | `stop` | `stop ramp` | `stop quick` | `stop now` | `clear` | `relock` | fault |";
     let rows = table.iter().map(|(name, row)| format!("| {name} | {row} |\n")).collect::<String>();
-    generated::check(
+    crate::generated::check(
         "control-law.md",
         "events",
         &format!("{head}\n|---|---|---|---|---|---|---|---|\n{rows}"),

@@ -6,6 +6,7 @@ use super::*;
 /// error due to the unknown load (0.3 Nm are 240 rpm/s on the inertia). The q-axis current jumps by no more than the current
 /// of the ramp, and the outputs are switched off with the shaft at rest. A torque that was commanded while the drive starts is
 /// not applied by a stop.
+#[cfg_attr(not(feature = "flying-start"), ignore)]
 #[test]
 fn a_stop_before_the_run_puts_out_no_torque() {
     for state in [State::FlyingStart, State::Magnetising, State::Verifying] {
@@ -22,6 +23,7 @@ fn a_stop_before_the_run_puts_out_no_torque() {
     }
 }
 
+#[cfg_attr(not(feature = "position"), ignore)]
 #[test]
 fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
     for source in [AngleSource::Encoder, AngleSource::Injection] {
