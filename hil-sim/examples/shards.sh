@@ -1,10 +1,10 @@
 #!/bin/sh
-# Runs an experiment in shards, on this machine or on many, and merges them.
+# Runs an experiment in shards, on this machine or on many, and then prints the whole.
 #
 #     sh hil-sim/examples/shards.sh COUNT FOLDER EXPERIMENT [OPTIONS]
 #
-# COUNT shards; FOLDER gets their JSON objects, the runs as they finish, and in the end whole.json. Called again with the same
-# arguments it does what is missing. Each shard uses all cores of its machine. Options with spaces are not passed on.
+# COUNT shards; FOLDER/runs gets the runs as they finish, and FOLDER/whole.json in the end the JSON object. Called again
+# with the same arguments it does what is missing. Each shard uses all cores of its machine. Options with spaces are not passed on.
 #
 # HOSTS   machines, as `parallel --sshlogin` takes them: `alpha,beta,:`, where `:` is this one, the default. Each has this
 #         folder under the same path, with the program built from the same sources.
@@ -18,7 +18,7 @@ sim=${SIM:-$PWD/target/release/hil-sim}
 mkdir -p "$folder"
 
 if command -v parallel > /dev/null; then
-    # Not `.json`: parallel would wrap what the program prints.
+    # Not `.jsonl`: parallel would wrap what the program prints.
     seq "$count" | parallel --will-cite --jobs 1 --sshlogin "${HOSTS:-:}" --workdir "$PWD" \
         --halt soon,fail=1 --results "$folder/{}.shard" \
         "$sim" run "$@" --quiet --shard "{}/$count" --resume "$folder/runs/" > /dev/null
@@ -28,4 +28,5 @@ else
         "$folder" '{}' "$sim" run "$@" --quiet --shard "{}/$count" --resume "$folder/runs/"
 fi
 
-seq -f "$folder/%g.shard" "$count" | xargs "$sim" merge > "$folder/whole.json"
+seq "$count" | xargs -I '{}' cp "$folder/{}.shard" "$folder/runs/{}.jsonl"
+"$sim" run "$@" --quiet --json --resume "$folder/runs/" > "$folder/whole.json"

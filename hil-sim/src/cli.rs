@@ -2,7 +2,6 @@
 #![deny(clippy::use_debug)]
 
 mod lists;
-mod merge;
 mod part;
 mod report;
 mod run;
@@ -63,21 +62,6 @@ enum Command {
     },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run(Request),
-    /// Merge the shards of a run: print the JSON object of the whole run
-    ///
-    /// The shards are the outputs of `run NAME --shard I/N`, in any order. Exit code 2 if one is missing, present
-    /// twice, torn, or from another run.
-    Merge {
-        /// Files with the shards
-        #[arg(required = true)]
-        files: Vec<PathBuf>,
-        /// Folder of the page [default: no page]
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
-        /// Folder of CSV files, one per figure and one per table [default: none]
-        #[arg(long, value_name = "DIR")]
-        csv: Option<PathBuf>,
-    },
     /// Run all experiments into one page
     ///
     /// The page and standard error name an experiment that is refused; the others still run.
@@ -160,7 +144,6 @@ pub fn main() -> ExitCode {
             lists::keys(prefix.as_deref(), toml, &input).and_then(say)
         }
         Some(Command::Run(request)) => run::run(&request),
-        Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
         Some(Command::Report { of, input, out }) => report::report(of, &input, &out),
         Some(Command::IdentifyTrace { trace, input, output }) => {
             run::identify_trace(&trace, &input, &output)

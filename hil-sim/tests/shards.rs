@@ -1,4 +1,4 @@
-//! Statistics on many machines: shards that merge to the whole, byte for byte; continued runs; refusals.
+//! Statistics on many machines: shards that give the whole, byte for byte; continued runs; refusals.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
@@ -46,20 +46,15 @@ fn run(folder: &Path, name: &str, options: &[&str], more: &[&str]) -> Vec<u8> {
     output.stdout
 }
 
-/// Writes the shards of a run and returns their names.
-fn shards(folder: &Path, arguments: &[&str], count: usize) -> Vec<String> {
-    let one = |index: usize| {
-        let (name, shard) = (format!("{index}.json"), format!("{index}/{count}"));
-        let output = hil_sim(folder, &[arguments, &["--shard", &shard]].concat());
+/// Writes shards of a run to files in `runs/`.
+fn shards(folder: &Path, arguments: &[&str], indices: &[usize], count: usize) {
+    std::fs::create_dir_all(folder.join("runs")).unwrap();
+    for index in indices {
+        let output =
+            hil_sim(folder, &[arguments, &["--shard", &format!("{index}/{count}")]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-        std::fs::write(folder.join(&name), output.stdout).unwrap();
-        name
-    };
-    (1..=count).map(one).collect()
-}
-
-fn merge(folder: &Path, names: &[&str]) -> std::process::Output {
-    hil_sim(folder, &[&["merge"], names].concat())
+        std::fs::write(folder.join(format!("runs/{index}.jsonl")), output.stdout).unwrap();
+    }
 }
 
 #[test]
@@ -79,40 +74,36 @@ fn is_long(name: &str) -> bool {
     ["smallest-slope", "foreign-motors"].contains(&name)
 }
 
-/// Merges three shards in another order and compares them with one run: percentiles, tables, figures and all.
-fn merged_shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
+/// Does two of three shards, in another order, and compares the whole that continues them with one run: percentiles,
+/// tables, figures and all.
+fn shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
     for (name, options) in SMALL.into_iter().filter(|(name, _)| which(name)) {
         let folder = folder(&format!("shards-{name}"));
         let whole = run(&folder, name, options, &["--json", "--seed", "5"]);
         let arguments = [&["run", name, "-q", "--seed", "5"], options].concat();
-        shards(&folder, &arguments, 3);
-        let merged = merge(&folder, &["3.json", "1.json", "2.json"]);
-        assert_eq!(text(&merged.stdout), text(&whole), "{name}");
+        shards(&folder, &arguments, &[3, 1], 3);
+        let joined = hil_sim(&folder, &[&arguments[..], &["--json", "--resume", "runs/"]].concat());
+        assert_eq!(text(&joined.stdout), text(&whole), "{name}");
     }
 }
 
 #[test]
-fn merged_shards_are_the_whole_run_byte_for_byte() {
-    merged_shards_are_the_whole_run(|name| !is_long(name));
-    // A single shard, of an experiment that takes little time.
-    let folder = folder("shards-one");
-    let whole = run(&folder, "monte-carlo", &MONTE_CARLO[2..6], &["--json"]);
-    let one = shards(&folder, MONTE_CARLO, 1);
-    assert_eq!(text(&merge(&folder, &[&one[0]]).stdout), text(&whole));
+fn shards_are_the_whole_run_byte_for_byte() {
+    shards_are_the_whole_run(|name| !is_long(name));
 }
 
 #[test]
 #[ignore = "cargo xtask prove long-tests"]
-fn merged_shards_of_the_long_experiments_are_the_whole_run() {
-    merged_shards_are_the_whole_run(is_long);
+fn shards_of_the_long_experiments_are_the_whole_run() {
+    shards_are_the_whole_run(is_long);
 }
 
 #[test]
 fn the_shards_of_a_run_have_its_runs_and_their_seeds() {
     let folder = folder("shards-seeds");
-    shards(&folder, MONTE_CARLO, 4);
-    let seeds = |name: &str| {
-        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+    shards(&folder, MONTE_CARLO, &[1, 4], 4);
+    let seeds = |shard: &str| {
+        let text = std::fs::read_to_string(folder.join(format!("runs/{shard}.jsonl"))).unwrap();
         let pair = |line: &str| {
             let run: serde_json::Value = serde_json::from_str(line).unwrap();
             (run["run"].as_u64().unwrap(), run["record"]["case"]["seed"].as_u64().unwrap())
@@ -120,63 +111,35 @@ fn the_shards_of_a_run_have_its_runs_and_their_seeds() {
         // After the head.
         text.lines().skip(1).map(pair).collect::<Vec<_>>()
     };
-    assert_eq!(seeds("1.json"), [(0, 1_000_003), (4, 1_000_007)]);
-    assert_eq!(seeds("4.json"), [(3, 1_000_006)]);
+    assert_eq!(seeds("1"), [(0, 1_000_003), (4, 1_000_007)]);
+    assert_eq!(seeds("4"), [(3, 1_000_006)]);
 }
 
+/// The file of another shard is refused by its name, and left as it is, if it belongs to another run.
 #[test]
 fn shards_that_do_not_belong_together_are_refused_by_name() {
     let folder = folder("shards-refused");
-    shards(&folder, MONTE_CARLO, 3);
-    let write = |name: &str, change: &dyn Fn(String) -> String| {
-        let text = std::fs::read_to_string(folder.join("2.json")).unwrap();
-        std::fs::write(folder.join(name), change(text)).unwrap();
-    };
-    let other = |name: &str, arguments: &[&str]| {
-        let output = hil_sim(&folder, &[MONTE_CARLO, &["--shard", "2/3"], arguments].concat());
-        std::fs::write(folder.join(name), output.stdout).unwrap();
-    };
-    other("seed.json", &["--seed", "2"]);
-    other("setting.json", &["--set", "motor.r_s=6"]);
-    other("runs.json", &["--set", "runs=7"]);
-    let machines = ["run", "machines", "-q", "--seconds", "0.1", "--shard", "1/3"];
-    std::fs::write(folder.join("machines.json"), hil_sim(&folder, &machines).stdout).unwrap();
+    shards(&folder, MONTE_CARLO, &[2], 3);
+    let path = folder.join("runs/2.jsonl");
+    let kept = std::fs::read_to_string(&path).unwrap();
     let version = format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION"));
-    write("version.json", &|text| text.replace(&version, "\"version\":\"0.0.7\""));
-    write("sources.json", &|text| text.replace("\"sources\":\"", "\"sources\":\"0"));
-    write("torn.json", &|text| text[..text.len() - 9].to_owned());
-    write("less.json", &|text| {
-        text.lines().filter(|line| !line.contains("\"run\":1,")).map(|l| format!("{l}\n")).collect()
-    });
-    write("more.json", &|text| text.replace("\"run\":4", "\"run\":5"));
-    write("many.json", &|text| text.replacen("\"runs\":6}\n", "\"runs\":1000000000000000}\n", 1));
-    let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat());
-    std::fs::write(folder.join("whole.json"), whole.stdout).unwrap();
-    let cases: [(&[&str], &[&str]); 15] = [
-        (&["1.json", "3.json"], &["1 of 3 shards are missing: 2/3"]),
-        (&["1.json"], &["2 of 3 shards are missing: 2/3, 3/3"]),
-        (&["1.json", "2.json", "1.json"], &["1.json", "shard 1/3 is in 1.json already"]),
-        (&["1.json", "seed.json", "3.json"], &["seed.json", "as 1.json", "seed is 2, there 1"]),
-        (&["1.json", "setting.json"], &["setting.json", "motor.r_s is 6, there not set"]),
-        (&["1.json", "runs.json"], &["runs.json", "runs is 7, there 6"]),
-        (&["1.json", "machines.json"], &["experiment is machines, there monte-carlo"]),
-        (&["1.json", "version.json"], &["version.json", "version is 0.0.7"]),
-        (&["version.json"], &["not made by this program", "version is 0.0.7"]),
-        (&["1.json", "sources.json"], &["sources.json", "sources is 0"]),
-        (&["1.json", "torn.json"], &["torn.json", "line 3 is torn"]),
-        (&["1.json", "less.json"], &["less.json", "shard 2/3 has not its runs 1"]),
-        (&["many.json"], &["many.json", "shard 2/3 has not its runs 7, 10, 13,"]),
-        (&["1.json", "more.json"], &["more.json, line 3", "no record of a run of this shard"]),
-        (&["whole.json"], &["whole.json, line 1", "not the head of a shard"]),
-    ];
-    for (names, parts) in cases {
-        let output = merge(&folder, names);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{names:?}: {message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{names:?}: {message}");
-        assert!(output.stdout.is_empty(), "{names:?}");
-    }
-    let output = merge(&folder, &["3.json", "2.json", "1.json"]);
+    let refused = |text: &str, more: &[&str], part: &str| {
+        std::fs::write(&path, text).unwrap();
+        let output =
+            hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs/"], more].concat());
+        let message = self::text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("2.jsonl") && message.contains(part), "{part}: {message}");
+        assert!(output.stdout.is_empty() && std::fs::read_to_string(&path).unwrap() == text);
+    };
+    refused(&kept, &["--set", "motor.r_s=6"], "motor.r_s is 6, there not set");
+    refused(&kept, &["--set", "runs=7"], "runs is 7, there 6");
+    refused(&kept.replace(&version, "\"version\":\"0.0.7\""), &[], "there 0.0.7");
+    refused(&kept.replace("\"sources\":\"", "\"sources\":\"0"), &[], "there 0");
+    refused(&kept.replace("\"run\":4", "\"run\":6"), &[], "no record of this run");
+    // A torn line is no refusal: its run is done again.
+    std::fs::write(&path, &kept[..kept.len() - 9]).unwrap();
+    let output = hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs/"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
 }
 
@@ -195,13 +158,13 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
         (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
         (
             &["run", "monte-carlo", "--shard", "3/2"],
-            "allowed: env, or I/N with N from 1 to 100000 and I from 1 to N",
+            "allowed: I/N with N from 1 to 100000 and I from 1 to N",
         ),
         (
             &["run", "monte-carlo", "--shard", "1/2", "--out", "page"],
             "'--shard <I/N>' cannot be used with '--out <DIR>'",
         ),
-        (&["merge"], "<FILES>..."),
+        (&["run", "monte-carlo", "--shard", "1/2", "--json"], "cannot be used with '--json'"),
     ];
     for (arguments, part) in cases {
         let output = hil_sim(&folder, arguments);
@@ -280,7 +243,7 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
     let tools = folder.join("tools");
     std::fs::create_dir_all(&tools).unwrap();
     let all = std::env::var_os("PATH").unwrap_or_default();
-    for tool in ["sh", "mkdir", "seq", "xargs"] {
+    for tool in ["sh", "mkdir", "seq", "xargs", "cp"] {
         let place =
             std::env::split_paths(&all).map(|dir| dir.join(tool)).find(|path| path.is_file());
         std::os::unix::fs::symlink(place.expect(tool), tools.join(tool)).unwrap();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli_common::{folder, hil_sim, text};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest matching beginning applies.
-const ELSEWHERE: [(&str, &str); 38] = [
+const ELSEWHERE: [(&str, &str); 37] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -37,7 +37,6 @@ const ELSEWHERE: [(&str, &str); 38] = [
     ("cargo sim run commission --set runs", "a file of results/; minutes"),
     ("cargo sim run foreign-motors", "a file of results/; minutes"),
     ("cargo sim run full-range", "a file of results/; minutes"),
-    ("cargo sim merge", "the files are the reader's; a test merges shards"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),

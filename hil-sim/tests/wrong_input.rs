@@ -191,7 +191,8 @@ fn endless_times_and_files_are_refused_by_name() {
     }
     let part = "[[part]]\nseconds = 2000\nspeed_rpm = 1\n";
     std::fs::write(folder.join("long.toml"), part.repeat(2)).unwrap();
-    for name in ["zero.toml", "zero.json"] {
+    std::fs::create_dir(folder.join("runs")).unwrap();
+    for name in ["zero.toml", "zero.json", "runs/zero.jsonl"] {
         std::os::unix::fs::symlink("/dev/zero", folder.join(name)).unwrap();
     }
     for (line, parts) in [
@@ -205,7 +206,7 @@ fn endless_times_and_files_are_refused_by_name() {
         ("run torque-steps --motor zero.json", ["zero.json", "longer than 16 MiB", "right file"]),
         ("run zero.toml", ["zero.toml", "longer than 16 MiB", "right file"]),
         ("passport --from /dev/zero", ["/dev/zero", "longer than 16 MiB", "right file"]),
-        ("merge /dev/zero", ["/dev/zero", "longer than 256 MiB", "right file"]),
+        ("run battery --resume runs/", ["runs/zero.jsonl", "longer than 256 MiB", "right file"]),
     ] {
         let output = hil_sim(&folder, &line.split(' ').collect::<Vec<_>>());
         let message = text(&output.stderr);

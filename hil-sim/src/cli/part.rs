@@ -8,12 +8,11 @@ use crate::shards::{self, Header, Journal, Shard};
 /// Selection of the runs, and the place where they are stored.
 #[derive(Args, Default)]
 pub struct Part {
-    /// Do only every Nth run, starting with the Ith, and print them for `merge`; `env`: the runs of this job in a job
-    /// array of Slurm, Kubernetes or AWS Batch
-    #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "csv"])]
+    /// Do only every Nth run, starting with the Ith, and print them in the form of a file for --resume
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "csv", "json"])]
     shard: Option<Shard>,
     /// Keep every finished run in this file, or in its own file in this folder, and do not repeat the runs that are
-    /// there
+    /// there: those of all shards whose files are in the folder count
     #[arg(long, value_name = "PATH")]
     resume: Option<PathBuf>,
     /// Write a CSV file with a row for each run: its random values and its results
@@ -22,12 +21,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// Whether only a part of the runs is done.
-    pub fn is_shard(&self) -> bool {
-        self.shard.is_some()
-    }
-
-    /// Runs the experiment. Prints a shard, or returns the outcome.
+    /// Runs the experiment. Prints the runs of a shard, or returns the outcome of all.
     ///
     /// # Errors
     /// The errors of the experiment; with options of this part, as [`experiments::statistical`], [`Journal::open`] and
@@ -44,17 +38,17 @@ impl Part {
         let statistical = experiments::statistical(experiment.name)?;
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         let all = (statistical.runs)(context)?;
-        let header = Header::new(experiment.name, context.config, context.seed, shard, all)?;
-        let open = |path: &PathBuf| Journal::open(&Journal::place(path, &header), &header);
+        let header = Header::new(experiment.name, context.config, context.seed, all)?;
+        let open = |path: &PathBuf| Journal::open(path, shard, &header);
         let journal = self.resume.as_ref().map(open).transpose()?;
         if let Some(journal) = &journal {
-            note(journal, &header, quiet);
+            note(journal, all, quiet);
         }
-        let runs = shards::runs(statistical, context, &header, journal.as_ref())?;
+        let runs = shards::runs(statistical, context, shard.numbers(all), journal.as_ref())?;
         if let Some(path) = &self.rows {
             report::write_whole(path, &report::of_table(&shards::rows(&runs))?)?;
         }
-        if self.is_shard() {
+        if self.shard.is_some() {
             say(shards::text(&header, &runs)?)?;
             return Ok(None);
         }
@@ -64,13 +58,13 @@ impl Part {
 }
 
 /// Prints the state of a journal on standard error. A torn line is reported even in quiet mode.
-fn note(journal: &Journal, header: &Header, quiet: bool) {
+fn note(journal: &Journal, all: usize, quiet: bool) {
     let path = message(journal.path.display());
     if let Some(line) = journal.torn {
         eprintln!("note: {path}, line {line}, was torn; its run is done again");
     }
-    let (done, all) = (journal.runs.len(), header.shard.numbers(header.runs).count());
+    let done = journal.runs.len();
     if done > 0 && !quiet {
-        eprintln!("note: {done} of {all} runs are in {path}");
+        eprintln!("note: {done} of {all} runs are stored already");
     }
 }

@@ -151,9 +151,7 @@ pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
 /// As [`made`]; [`Error::Lost`] after everything is written.
 pub fn run(request: &Request) -> Result<(), Error> {
     let (objects, lost) = made(request)?;
-    if !request.part.is_shard() {
-        print(&objects, &request.output)?;
-    }
+    print(&objects, &request.output)?;
     lost
 }
 

@@ -2,11 +2,10 @@
 
 use serde_json::Value as Json;
 
-use super::Shard;
 use crate::outcome::{Origin, SCHEMA_VERSION};
 use crate::prelude::*;
 
-/// Origin of the records of a shard.
+/// Origin of the records of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Version of the JSON form.
@@ -21,61 +20,37 @@ pub struct Header {
     pub seed: u64,
     /// The changed settings.
     pub settings: BTreeMap<String, Json>,
-    /// The shard.
-    pub shard: Shard,
     /// Number of runs of all shards.
     pub runs: usize,
 }
 
 impl Header {
-    /// Makes the header of a shard of an experiment with `runs` runs in all.
+    /// Makes the header of an experiment with `runs` runs in all.
     ///
     /// # Errors
     /// [`Error::Internal`] if the settings do not give the configuration again.
-    pub fn new(
-        experiment: &str,
-        config: &Config,
-        seed: u64,
-        shard: Shard,
-        runs: usize,
-    ) -> Result<Self, Error> {
-        let header = Self {
+    pub fn new(experiment: &str, config: &Config, seed: u64, runs: usize) -> Result<Self, Error> {
+        let changes = config.changes();
+        if Config::load(None, None, &changes)? != *config {
+            let settings = changes.join(", ");
+            return Err(Error::Internal(format!("the configuration is more than {settings}")));
+        }
+        Ok(Self {
             schema_version: SCHEMA_VERSION,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             sources: env!("HIL_SIM_SOURCES").to_owned(),
             experiment: experiment.to_owned(),
             seed,
-            settings: Origin::new(seed, &config.changes()).typed_settings().collect(),
-            shard,
+            settings: Origin::new(seed, &changes).typed_settings().collect(),
             runs,
-        };
-        if header.config()? != *config {
-            let settings = config.changes().join(", ");
-            return Err(Error::Internal(format!("the configuration is more than {settings}")));
-        }
-        Ok(header)
+        })
     }
 
-    /// Returns the configuration that the settings describe.
-    ///
-    /// # Errors
-    /// As [`Config::set`].
-    pub fn config(&self) -> Result<Config, Error> {
-        let mut config = Config::default();
-        // A key of the bench may set a key of the drive, which comes later in the list.
-        let listed: Vec<String> = Key::all().chain(Key::after()).map(Key::assigned_name).collect();
-        let place = |name: &String| listed.iter().position(|known| known == name);
-        let mut settings: Vec<_> = self.settings.iter().collect();
-        settings.sort_by_key(|(name, _)| place(name));
-        for (name, value) in settings {
-            config.set(name, &setting(value))?;
-        }
-        Ok(config)
-    }
-
-    /// Whether there is such a run, and it belongs to the shard.
-    pub fn has(&self, run: &super::Run) -> bool {
-        run.run < self.runs && self.shard.has(run.run)
+    /// Whether a file begins with the head of a run of this experiment with this seed.
+    pub fn is_of(&self, file: &[u8]) -> bool {
+        let head = file.split(|&byte| byte == b'\n').next();
+        let head = head.and_then(|line| serde_json::from_slice::<Self>(line).ok());
+        head.is_some_and(|head| head.experiment == self.experiment && head.seed == self.seed)
     }
 
     /// Returns the first difference between two headers whose runs do not belong together, `NAME is ..., there ...`.
@@ -89,28 +64,16 @@ impl Header {
         ];
         let keys = self.settings.keys().chain(there.settings.keys());
         let text = |header: &Self, key: &String| match header.settings.get(key) {
-            Some(value) => setting(value).to_string(),
+            Some(Json::String(text)) => text.clone(),
+            Some(value) => value.to_string(),
             None => "not set".to_owned(),
         };
         let settings = keys.map(|key| (key.as_str(), text(self, key), text(there, key)));
-        let rest = [
-            ("the number of runs", self.runs.to_string(), there.runs.to_string()),
-            ("the number of shards", self.shard.count.to_string(), there.shard.count.to_string()),
-        ];
-        let mut all = fields.into_iter().chain(settings).chain(rest);
+        let runs = ("the number of runs", self.runs.to_string(), there.runs.to_string());
+        let mut all = fields.into_iter().chain(settings).chain([runs]);
         all.find(|(_, here, there)| here != there)
             .map(|(name, here, there)| [name, &here, &there].map(cut))
             .map(|[name, here, there]| format!("{name} is {here}, there {there}"))
-    }
-}
-
-/// Converts a setting to a value of a configuration.
-fn setting(value: &Json) -> Value {
-    match value {
-        Json::Number(number) => number.as_f64().map_or(Value::Unset, Value::Number),
-        Json::Bool(on) => Value::Switch(*on),
-        Json::String(text) => Value::from_text(text),
-        other => Value::Word(other.to_string()),
     }
 }
 
@@ -120,29 +83,29 @@ mod tests {
 
     fn header(assignments: &[&str], seed: u64) -> Header {
         let config = Config::load(None, None, assignments).unwrap();
-        Header::new("monte-carlo", &config, seed, Shard::WHOLE, 8).unwrap()
+        Header::new("monte-carlo", &config, seed, 8).unwrap()
     }
 
-    /// `drive.motor.r_s` sorts before `motor.r_s`, which sets both, and `measurement.*` sets the scales of the drive.
+    /// `drive.motor.r_s` is set beside `motor.r_s`, which sets both, and `measurement.*` sets the scales of the drive.
     #[test]
-    fn settings_give_the_configuration_again_in_any_order() {
-        let set = [
-            "motor.r_s=6.1",
-            "drive.motor.r_s=0.1",
-            "measurement.range_a=10",
-            "scales.current_a.gain=0.003",
-            "runs=8",
-            "prepare.learn=yes",
-            "load.mode=speed",
-            "motor.l_ls=1.25e-6",
-        ];
-        let text = serde_json::to_string(&header(&set, 1)).unwrap();
-        let back: Header = serde_json::from_str(&text).unwrap();
-        assert_eq!(back.config().unwrap(), Config::load(None, None, &set).unwrap(), "{text}");
+    fn settings_describe_the_whole_configuration() {
+        header(
+            &[
+                "motor.r_s=6.1",
+                "drive.motor.r_s=0.1",
+                "measurement.range_a=10",
+                "scales.current_a.gain=0.003",
+                "runs=8",
+                "prepare.learn=yes",
+                "load.mode=speed",
+                "motor.l_ls=1.25e-6",
+            ],
+            1,
+        );
         let motors = crate::config::motors::Motor::all().into_iter();
         for name in motors.map(|motor| motor.name) {
             let config = Config::of_motor(Some(&name)).unwrap();
-            Header::new("machines", &config, 1, Shard::WHOLE, 8).unwrap();
+            Header::new("machines", &config, 1, 8).unwrap();
         }
     }
 
