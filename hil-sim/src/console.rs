@@ -1,10 +1,9 @@
 //! `cargo sim console`: talks to a drive at a serial port, of a board or a pseudo-terminal of the virtual board.
 //!
-//! Lines that begin with `!` are commands of this program ([`own`]); all others go to the drive. The protocol is in
-//! [`answer`] (the lines that answer a command), [`catalogue`] (commands and settings, for the completion),
-//! [`transfer`] (backup and restore) and [`trace`] (plots). [`link`] moves lines, `editor` edits them.
+//! Lines that begin with `!` are commands of this program ([`own`]); all others go to the drive. [`link`] moves lines,
+//! `editor` edits them; further, [`catalogue`] has commands and settings, for the completion, [`transfer`] backup and
+//! restore, and [`trace`] plots.
 
-pub mod answer;
 pub mod catalogue;
 mod editor;
 pub mod link;

@@ -1,11 +1,11 @@
 //! `cargo sim passport`: the [passport](crate::config::passport) of a motor, from the answers to `commission` and `learn` at the console.
 
+use drive_stream::client::split_tag;
 use serde_json::Value;
 
 use crate::config::Value::Number;
 use crate::config::motors::NEEDED;
 use crate::config::passport::{Measured, Passport, SCHEMA};
-use crate::console::answer::split_tag;
 use crate::first_light::interruptible;
 use crate::first_light::wire::{Port, Wire as _};
 use crate::prelude::*;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use drive_web::{loops, talk};
 use hil_sim::console::link::{Answer, Link, LinkError};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::shared::{Ask, Shared};
 
@@ -18,6 +18,8 @@ const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
 const ALIVE_S: f64 = 0.4;
 /// Time from one attempt to open the port to the next.
 const RETRY: Duration = Duration::from_secs(1);
+/// Layout of a frame that the page understands.
+const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
 /// Longest line that the console takes.
 const LONGEST: usize = 120;
 
@@ -121,12 +123,28 @@ fn show_status(shared: &Shared, status: &str) {
     shared.tell(json!({ "status": status }));
 }
 
+/// Returns the reason why the page does not fit a drive that answers `describe stream` with this error, or with these objects.
+fn misfit(error: Option<&str>, described: &[Value]) -> Option<String> {
+    match error {
+        Some(error) => Some(format!(
+            "This firmware is older than the page: it has no live curves ({error}). Everything else works as far as the firmware \
+             knows it. To update it: cargo xtask flash."
+        )),
+        None if described.iter().any(|object| object["frame"] == json!(LAYOUT)) => None,
+        None => Some(
+            "This firmware sends its curves in a layout that the page does not know. To update the page: git pull.".to_owned(),
+        ),
+    }
+}
+
 /// Tells the page which drive this is, and whether this program understands it.
 fn hello(shared: &Shared, link: &mut Link) {
     let mut ask = |line: &str| link.ask(line, |_| ());
     match (ask("version"), ask("describe stream")) {
         (Ok(version), Ok(described)) => {
-            shared.tell(talk::hello(version.lines.last(), &described.lines));
+            let objects = talk::objects(&described.lines);
+            let misfit = misfit(described.error(), &objects);
+            shared.tell(talk::hello(version.lines.last(), &objects, misfit));
         }
         (Err(why), _) | (_, Err(why)) => {
             shared.tell(json!({ "gone": format!("the drive does not answer: {why}") }));

@@ -13,10 +13,17 @@
 //! `0x00` are text; a `0x00` begins a frame, which the next `0x00` ends. If the bytes between two `0x00` are not a whole frame, they are
 //! discarded as damaged, and the second `0x00` begins the next frame. So a receiver that begins to listen in the middle of a frame, or
 //! has lost a `0x00`, is in step again within two frames.
+//!
+//! The feature `client` adds a client of the console, which needs memory on the heap.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+#[cfg(feature = "client")]
+extern crate alloc;
+
+#[cfg(feature = "client")]
+pub mod client;
 mod frame;
 mod splitter;
 

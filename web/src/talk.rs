@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::fmt;
 
 use drive_core::State;
-use drive_stream::{Frame, MOST_SIGNALS, Piece, Splitter};
+use drive_stream::client::{Client, Event};
+use drive_stream::{Frame, MOST_SIGNALS};
 use induction_drive::console::handle::Firmware as _;
 use serde_json::{Value, json};
 
@@ -13,27 +14,17 @@ use crate::loops;
 
 /// Time from one question about the drive's state to the next, ms.
 const STATUS_MS: u32 = 200;
-/// Layout of a frame that the page understands.
-const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
 
-/// The greeting of the page, from the answers to `version` and `describe stream`: the identity of the drive, and whether the page fits
-/// it.
-pub fn hello(version: Option<&String>, described: &[String]) -> Value {
-    let objects: Vec<Value> =
-        described.iter().filter_map(|line| serde_json::from_str(line).ok()).collect();
+/// The objects of an answer in JSON Lines.
+pub fn objects(lines: &[String]) -> Vec<Value> {
+    lines.iter().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// The greeting of the page: the identity of the drive from the answers to `version` and `describe stream`, and why the page does not
+/// fit it. The drive in the page itself always fits.
+pub fn hello(version: Option<&String>, described: &[Value], misfit: Option<String>) -> Value {
     let signals: Vec<&Value> =
-        objects.iter().filter(|object| object["signal"].is_string()).collect();
-    let error = described.last().filter(|line| line.starts_with("error:"));
-    let fits = objects.iter().any(|object| object["frame"] == json!(LAYOUT));
-    let misfit = match error {
-        Some(error) => Some(format!(
-            "This firmware is older than the page: it has no live curves ({error}). Everything else works as far as the firmware \
-             knows it. To update it: cargo xtask flash."
-        )),
-        None => (!fits).then(|| {
-            "This firmware sends its curves in a layout that the page does not know. To update the page: git pull.".to_owned()
-        }),
-    };
+        described.iter().filter(|object| object["signal"].is_string()).collect();
     let program = env!("CARGO_PKG_VERSION");
     json!({ "hello": { "version": version, "program": program, "signals": signals, "misfit": misfit } })
 }
@@ -92,38 +83,34 @@ enum By {
 pub struct Talk {
     /// The board.
     pub board: HostBoard,
-    /// Questions, of which the first has been sent. The next field holds the lines of its answer so far.
+    client: Client,
+    /// Questions; the client awaits the answer to the first. The next field holds the lines of that answer so far.
     asks: VecDeque<(By, String)>,
     lines: Vec<String>,
-    /// Number of the last question that was sent. The next field says whether it is still unanswered.
-    tag: u32,
-    awaited: bool,
-    splitter: Splitter,
-    line: Vec<u8>,
     /// Messages for the page.
     texts: Vec<Value>,
     frames: Frames,
     since_status_ms: u32,
-    /// Whether the drive is before or in its first self-commissioning.
+    /// Whether the drive is before or in its first self-commissioning, and whether it has left the state off.
     begins: bool,
+    has_begun: bool,
 }
 
 impl Talk {
     /// A conversation with a board that has just been powered up.
     pub fn new(mut board: HostBoard) -> Self {
-        board.write(b"@0 baud 2000000\n");
+        let mut client = Client::default();
+        board.write(client.send("baud 2000000").as_bytes());
         Self {
             board,
+            client,
             asks: VecDeque::from([(By::Hello, "describe stream".to_owned())]),
             lines: Vec::new(),
-            tag: 0,
-            awaited: false,
-            splitter: Splitter::new(),
-            line: Vec::new(),
             texts: Vec::new(),
             frames: Frames::default(),
             since_status_ms: 0,
             begins: false,
+            has_begun: false,
         }
     }
 
@@ -147,11 +134,7 @@ impl Talk {
     pub fn stop(&mut self) {
         self.begins = false;
         self.texts.push(json!({ "stopped": "by the page" }));
-        self.board.write(b"@0 stop\n");
-        // The stop has cut a list short, whose end does not come.
-        if self.awaited {
-            self.answered(vec!["error: cut short by the stop".to_owned()]);
-        }
+        self.board.write(self.client.send("stop").as_bytes());
     }
 
     /// Whether the simulation should run as fast as possible, because the drive is in a phase that is not worth waiting for.
@@ -165,55 +148,43 @@ impl Talk {
     pub fn advance(&mut self, ms: u32) {
         for _ in 0..ms {
             self.since_status_ms += 1;
-            if !self.awaited {
+            if !self.client.is_waiting() {
                 if self.asks.is_empty() && self.since_status_ms >= STATUS_MS {
                     self.asks.push_back((By::Status, "status".to_owned()));
                     self.since_status_ms = 0;
                 }
                 if let Some((_, line)) = self.asks.front() {
-                    self.tag = self.tag % 0xffff + 1;
-                    self.awaited = true;
-                    self.board.write(format!("@{:x} {line}\n", self.tag).as_bytes());
+                    self.board.write(self.client.ask(line).as_bytes());
                 }
             }
             self.board.millisecond();
+            let is_off = self.board.machine.drive().is_off();
+            self.begins &= !(is_off && self.has_begun);
+            self.has_begun |= !is_off;
             for byte in self.board.read() {
-                match self.splitter.push(byte) {
-                    Piece::Text(b'\n') => {
-                        let line = std::mem::take(&mut self.line);
-                        self.hear(String::from_utf8_lossy(&line).trim_end());
+                match self.client.push(byte) {
+                    Some(Event::Frame(frame)) => self.frames.push(frame),
+                    Some(Event::Line(line)) => self.lines.push(line),
+                    Some(Event::Last(line)) => self.answered(line),
+                    Some(Event::Cut(line)) => {
+                        self.show(&line);
+                        self.answered("error: cut short by the stop".to_owned());
                     }
-                    Piece::Text(byte) => self.line.push(byte),
-                    Piece::Frame(frame) => self.frames.push(Some(frame)),
-                    Piece::Damaged => self.frames.push(None),
-                    Piece::Nothing => {}
+                    Some(Event::Unasked(line)) => self.show(&line),
+                    None => {}
                 }
             }
         }
     }
 
-    fn hear(&mut self, line: &str) {
-        if line.starts_with("* ") {
-            self.begins &=
-                !["* off", "* fault", "* stopped"].iter().any(|end| line.starts_with(end));
-            self.texts.push(json!({ "line": line }));
-            return;
-        }
-        match line.strip_prefix('@').and_then(|rest| rest.split_once(' ')) {
-            None => self.lines.push(line.to_owned()),
-            Some((tag, rest)) if self.awaited && tag == format!("{:x}", self.tag) => {
-                let mut lines = std::mem::take(&mut self.lines);
-                lines.push(rest.to_owned());
-                self.answered(lines);
-            }
-            // The answer to a stop, or to a question that a stop has cut short.
-            Some((_, rest)) => self.texts.push(json!({ "line": rest })),
-        }
+    fn show(&mut self, line: &str) {
+        self.texts.push(json!({ "line": line }));
     }
 
-    fn answered(&mut self, lines: Vec<String>) {
-        self.awaited = false;
-        self.lines.clear();
+    /// Handles the last line of an answer.
+    fn answered(&mut self, last: String) {
+        self.lines.push(last);
+        let lines = std::mem::take(&mut self.lines);
         let Some((by, line)) = self.asks.pop_front() else { return };
         match by {
             By::Page(number) => {
@@ -226,7 +197,7 @@ impl Talk {
             By::Status => self.texts.push(json!({ "status": lines.last() })),
             By::Hello => {
                 let version = fmt::from_fn(|f| self.board.machine.version(f)).to_string();
-                self.texts.push(hello(Some(&version), &lines));
+                self.texts.push(hello(Some(&version), &objects(&lines), None));
             }
         }
     }

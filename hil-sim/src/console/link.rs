@@ -1,23 +1,20 @@
-//! Moves lines between this program and the drive. A thread reads; its lines go to the request that awaits an answer,
-//! or are shown at once. Each request has its own tag, which distinguishes its answer from other lines
-//! ([`super::answer`]). Frames of a stream between the lines are passed on separately.
+//! A port to the drive, and a thread that reads it: answers go to the request that awaits them, other lines are shown
+//! at once, and the frames of a stream are passed on separately. The protocol is that of [`drive_stream::client`].
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use drive_stream::{Frame, Piece, Splitter};
+use drive_stream::Frame;
+use drive_stream::client::{Client, Event, is_error};
 
-use super::answer::{self, Meaning, is_error};
 use super::trace::Trace;
 
 /// Longest wait for the next line of an answer: computing a setting takes seconds, on a virtual board at a fraction of real time.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Longest wait for a line of a trace, which is recorded before anything is sent.
 const PATIENCE_WITH_TRACE: Duration = Duration::from_secs(600);
-/// Longest line that is assembled.
-const LONGEST: usize = 4096;
 
 /// Reasons for a missing answer.
 #[derive(Debug, thiserror::Error)]
@@ -55,11 +52,12 @@ impl Answer {
     }
 }
 
-/// Destinations of the lines from the drive.
+/// Destinations of the drive's lines and frames.
 struct Route {
-    /// The command that awaits them.
-    asked: Option<Sender<String>>,
-    /// Otherwise the person.
+    client: Client,
+    /// The command that awaits an answer.
+    asked: Option<Sender<Event>>,
+    /// The person, who gets the other lines.
     show: Box<dyn FnMut(&str) + Send>,
     frames: Box<dyn FnMut(Option<Frame>) + Send>,
     trace: Trace,
@@ -67,53 +65,43 @@ struct Route {
 }
 
 impl Route {
-    fn line(&mut self, line: String) {
-        self.trace.push(&line);
-        match &self.asked {
-            Some(asked) => drop(asked.send(line)),
-            None => self.unawaited(&line),
+    fn take(&mut self, event: Event) {
+        match event {
+            Event::Frame(frame) => return (self.frames)(frame),
+            Event::Unasked(line) => {
+                self.trace.push(&line);
+                return (self.show)(&line);
+            }
+            Event::Cut(ref line) => (self.show)(line),
+            Event::Line(ref line) => self.trace.push(line),
+            Event::Last(_) => {}
         }
-    }
-
-    /// Shows a line that no command awaits, without its tag.
-    fn unawaited(&mut self, line: &str) {
-        (self.show)(answer::split_tag(line).map_or(line, |(_, rest)| rest));
+        self.asked.as_ref().map(|asked| asked.send(event));
     }
 }
 
-/// The direction to the drive.
-type Port = Arc<Mutex<Outgoing>>;
-
-struct Outgoing {
-    port: Box<dyn Write + Send>,
-    /// Tag of the last request.
-    tag: u32,
+/// Both directions of a connection.
+struct Wire {
+    port: Mutex<Box<dyn Write + Send>>,
+    route: Mutex<Route>,
 }
 
-impl Outgoing {
-    /// Sends a request and returns its tag. An empty line is a sign of life, which has no answer and interrupts nothing.
-    fn send(&mut self, request: &str) -> std::io::Result<u32> {
-        let line = if request.is_empty() {
-            String::new()
-        } else {
-            self.tag = self.tag.wrapping_add(1);
-            answer::tagged(self.tag, request)
-        };
-        self.port.write_all(format!("{line}\n").as_bytes())?;
-        self.port.flush()?;
-        Ok(self.tag)
+impl Wire {
+    /// Sends the line that the client makes; lines leave in the order of their tags.
+    fn send(&self, line: impl FnOnce(&mut Route) -> String) -> Result<(), LinkError> {
+        let mut port = locked(&self.port);
+        let line = line(&mut locked(&self.route));
+        let sent = port.write_all(line.as_bytes()).and_then(|()| port.flush());
+        sent.map_err(|_| LinkError::Closed)
     }
 }
 
 /// A connection to a drive.
-pub struct Link {
-    port: Port,
-    route: Arc<Mutex<Route>>,
-}
+pub struct Link(Arc<Wire>);
 
 /// Sends urgent lines, without waiting for an answer that is awaited.
 #[derive(Clone)]
-pub struct Urgent(Port);
+pub struct Urgent(Arc<Wire>);
 
 impl Urgent {
     /// Sends a line at once. Its answer is shown, unless a list is being answered: then the line cuts the list short.
@@ -121,7 +109,7 @@ impl Urgent {
     /// # Errors
     /// The port is closed.
     pub fn send(&self, line: &str) -> Result<(), LinkError> {
-        locked(&self.0).send(line).map(drop).map_err(|_| LinkError::Closed)
+        self.0.send(|route| route.client.send(line))
     }
 }
 
@@ -142,29 +130,29 @@ impl Link {
         show: impl FnMut(&str) + Send + 'static,
         frames: impl FnMut(Option<Frame>) + Send + 'static,
     ) -> Self {
+        let (client, trace) = (Client::default(), Trace::default());
         let (show, frames) = (Box::new(show), Box::new(frames));
-        let route = Route { asked: None, show, frames, trace: Trace::default(), closed: false };
-        let route = Arc::new(Mutex::new(route));
-        let to = route.clone();
-        std::thread::spawn(move || read_lines(reader, &to));
-        let port = Arc::new(Mutex::new(Outgoing { port: Box::new(port), tag: 0 }));
-        Self { port, route }
+        let route = Route { client, asked: None, show, frames, trace, closed: false };
+        let wire = Arc::new(Wire { port: Mutex::new(Box::new(port)), route: Mutex::new(route) });
+        let to = wire.clone();
+        std::thread::spawn(move || read(reader, &to.route));
+        Self(wire)
     }
 
     /// Returns a sender for urgent lines.
     pub fn urgent(&self) -> Urgent {
-        Urgent(self.port.clone())
+        Urgent(self.0.clone())
     }
 
     /// Whether the port is closed.
     pub fn is_closed(&self) -> bool {
-        locked(&self.route).closed
+        locked(&self.0.route).closed
     }
 
     /// Ends a line that may have begun on the drive's side, and ignores its answer.
     pub fn begin(&mut self) {
         // A closed port is detected by the first command.
-        let _ = locked(&self.port).send("");
+        let _ = self.urgent().send("");
         std::thread::sleep(Duration::from_millis(100));
     }
 
@@ -172,75 +160,59 @@ impl Link {
     ///
     /// # Errors
     /// There is no complete answer.
-    pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
-        let (send, lines) = channel();
-        {
-            let mut route = locked(&self.route);
-            if route.closed {
-                return Err(LinkError::Closed);
-            }
+    pub fn ask(&mut self, command: &str, show: impl FnMut(&str)) -> Result<Answer, LinkError> {
+        let (send, events) = channel();
+        if self.is_closed() {
+            return Err(LinkError::Closed);
+        }
+        let sent = self.0.send(|route| {
             route.asked = Some(send);
-        }
-        let sent = locked(&self.port).send(command);
-        let answer = match sent {
-            Ok(tag) => self.hear(command, tag, &lines, &mut show),
-            Err(_) => Err(LinkError::Closed),
-        };
-        let mut route = locked(&self.route);
+            route.client.ask(command)
+        });
+        let answer = sent.and_then(|()| hear(command, &events, show));
+        let mut route = locked(&self.0.route);
         route.asked = None;
-        lines.try_iter().for_each(|line| route.unawaited(&line));
+        route.client.give_up();
         answer
-    }
-
-    fn hear(
-        &self,
-        command: &str,
-        tag: u32,
-        lines: &Receiver<String>,
-        show: &mut impl FnMut(&str),
-    ) -> Result<Answer, LinkError> {
-        let mut answer = Answer::default();
-        // A trace is recorded before anything is sent.
-        let is_trace = command.split_whitespace().next() == Some("trace");
-        let patience = if is_trace { PATIENCE_WITH_TRACE } else { PATIENCE };
-        loop {
-            let line = lines.recv_timeout(patience).map_err(|why| match why {
-                RecvTimeoutError::Timeout => {
-                    LinkError::Silence(command.to_owned(), patience.as_secs())
-                }
-                RecvTimeoutError::Disconnected => LinkError::Closed,
-            })?;
-            match answer::meaning(tag, command, &line) {
-                Meaning::Echo => {}
-                Meaning::Unasked => (locked(&self.route).show)(&line),
-                Meaning::Older(rest) => (locked(&self.route).show)(rest),
-                Meaning::Younger(rest) => {
-                    (locked(&self.route).show)(rest);
-                    return Err(LinkError::Cut(command.to_owned()));
-                }
-                Meaning::Answer => {
-                    show(&line);
-                    answer.lines.push(line);
-                }
-                Meaning::Last(rest) => {
-                    show(rest);
-                    answer.lines.push(rest.to_owned());
-                    return Ok(answer);
-                }
-            }
-        }
     }
 
     /// Returns the last trace that the drive has printed.
     pub fn last_trace(&self) -> Option<Trace> {
-        Some(locked(&self.route).trace.clone()).filter(|trace| trace.records() > 0)
+        Some(locked(&self.0.route).trace.clone()).filter(|trace| trace.records() > 0)
+    }
+}
+
+/// Receives the answer to a command.
+fn hear(
+    command: &str,
+    events: &Receiver<Event>,
+    mut show: impl FnMut(&str),
+) -> Result<Answer, LinkError> {
+    let mut answer = Answer::default();
+    // A trace is recorded before anything is sent.
+    let is_trace = command.split_whitespace().next() == Some("trace");
+    let patience = if is_trace { PATIENCE_WITH_TRACE } else { PATIENCE };
+    loop {
+        let event = events.recv_timeout(patience).map_err(|why| match why {
+            RecvTimeoutError::Timeout => LinkError::Silence(command.to_owned(), patience.as_secs()),
+            RecvTimeoutError::Disconnected => LinkError::Closed,
+        })?;
+        let is_last = matches!(event, Event::Last(_));
+        let (Event::Line(line) | Event::Last(line)) = event else {
+            return Err(LinkError::Cut(command.to_owned()));
+        };
+        show(&line);
+        answer.lines.push(line);
+        if is_last {
+            return Ok(answer);
+        }
     }
 }
 
 /// Ends the reading thread, and with it closes the port, within the time limit of a read.
 impl Drop for Link {
     fn drop(&mut self) {
-        locked(&self.route).closed = true;
+        locked(&self.0.route).closed = true;
     }
 }
 
@@ -249,28 +221,16 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
-    let (mut buffer, mut line, mut splitter) = ([0; 1024], Vec::new(), Splitter::new());
+fn read(mut reader: impl Read, route: &Mutex<Route>) {
+    let mut buffer = [0; 1024];
     while !locked(route).closed {
         match reader.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => {
+                let mut route = locked(route);
                 for byte in &buffer[..read] {
-                    match splitter.push(*byte) {
-                        Piece::Nothing => {}
-                        Piece::Frame(frame) => (locked(route).frames)(Some(frame)),
-                        Piece::Damaged => (locked(route).frames)(None),
-                        Piece::Text(byte)
-                            if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST =>
-                        {
-                            line.push(byte);
-                        }
-                        Piece::Text(_) => {
-                            let text = readable(&std::mem::take(&mut line));
-                            if !text.is_empty() {
-                                locked(route).line(text);
-                            }
-                        }
+                    if let Some(event) = route.client.push(*byte) {
+                        route.take(event);
                     }
                 }
             }
@@ -283,22 +243,6 @@ fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
     let mut route = locked(route);
     route.closed = true;
     route.asked = None;
-}
-
-/// Returns the text of a line without the sequences that move the cursor of a terminal.
-fn readable(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    let mut shown = String::new();
-    let mut rest = text.chars();
-    while let Some(c) = rest.next() {
-        match c {
-            // ESC [ parameters letter
-            '\x1b' => drop(rest.by_ref().find(|c| c.is_ascii_alphabetic())),
-            c if c.is_control() => {}
-            c => shown.push(c),
-        }
-    }
-    shown.trim_end().to_owned()
 }
 
 #[cfg(test)]
@@ -370,11 +314,5 @@ mod tests {
             assert_eq!(link.ask("help", |_| ()).unwrap().lines, ["off: y", "ok", "ok"]);
         });
         assert_eq!(shown, ["ok", "ok"]);
-    }
-
-    #[test]
-    fn sequences_of_a_terminal_are_no_text() {
-        assert_eq!(readable(b"\x1b[Kstatus \x07"), "status");
-        assert_eq!(readable("25 °C".as_bytes()), "25 °C");
     }
 }

@@ -12,9 +12,9 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, ensure};
 use drive_core::Sample;
 use drive_settings::find;
+use drive_stream::client::{Client, Event};
 use hil_sim::Error;
 use hil_sim::config::LoadMode;
-use hil_sim::console::answer::{Meaning, meaning, tagged};
 use hil_sim::console::link::{Answer, LinkError};
 use hil_sim::first_light::Options as Light;
 use hil_sim::first_light::evidence::{Evidence, Record, SCHEMA, Verdict};
@@ -66,8 +66,7 @@ struct Bench {
     stage: &'static PowerStage,
     board: Board,
     defect: Defect,
-    tag: u32,
-    partial: String,
+    client: Client,
     unasked: Vec<String>,
     sent: Vec<String>,
     log: String,
@@ -106,8 +105,7 @@ impl Lab {
             stage,
             board,
             defect,
-            tag: 0,
-            partial: String::new(),
+            client: Client::default(),
             unasked: Vec::new(),
             sent: Vec::new(),
             log: String::new(),
@@ -164,13 +162,16 @@ impl Bench {
         Ok(())
     }
 
-    /// Returns the lines that came since the last call.
-    fn lines(&mut self) -> Vec<String> {
-        self.partial += &self.board.take_console();
-        let rest = self.partial.rfind('\n').map_or(0, |at| at + 1);
-        let rest = self.partial.split_off(rest);
-        let lines = std::mem::replace(&mut self.partial, rest);
-        lines.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+    /// Keeps the lines that answer nothing; returns what belongs to the awaited answer.
+    fn hear(&mut self) -> Vec<Event> {
+        let mut events = Vec::new();
+        for event in self.board.take_console().bytes().filter_map(|byte| self.client.push(byte)) {
+            match event {
+                Event::Unasked(line) => self.unasked.push(line),
+                event => events.push(event),
+            }
+        }
+        events
     }
 
     /// Runs until the greeting after a reset.
@@ -179,8 +180,7 @@ impl Bench {
         for _ in 0..80 {
             self.run(0.1)?;
             self.on_in_reset |= self.board.gates().any_on();
-            let lines = self.lines();
-            self.unasked.extend(lines);
+            self.hear();
             if self.unasked.iter().any(|line| line.contains("last run: ")) {
                 self.run(0.3)?;
                 self.log = self.board.take_log()?.join("\n");
@@ -196,26 +196,19 @@ impl Bench {
         }
         println!("{line}");
         self.sent.push(line.to_owned());
-        (self.tag, self.pulses) = (self.tag + 1, false);
-        self.board.type_line(&tagged(self.tag, line));
+        self.pulses = false;
+        self.board.send(self.client.ask(line).as_bytes());
         let (mut answer, mut silence) = (Answer::default(), 0.0);
         while silence < PATIENCE_S {
             self.run(0.02).unwrap();
             silence += 0.02;
-            let mut ended = false;
-            for said in self.lines() {
+            for event in self.hear() {
                 silence = 0.0;
-                match meaning(self.tag, line, &said) {
-                    _ if ended => self.unasked.push(said),
-                    Meaning::Answer => answer.lines.push(said),
-                    Meaning::Last(rest) => {
-                        answer.lines.push(rest.to_owned());
-                        ended = true;
-                    }
-                    _ => self.unasked.push(said),
+                if let Event::Line(line) | Event::Last(line) = event {
+                    answer.lines.push(line);
                 }
             }
-            if ended {
+            if !self.client.is_waiting() {
                 return Ok(answer);
             }
         }
@@ -452,8 +445,7 @@ impl Wire for Lab {
 
     fn unasked(&mut self) -> Vec<String> {
         let mut bench = self.bench();
-        let lines = bench.lines();
-        bench.unasked.extend(lines);
+        bench.hear();
         std::mem::take(&mut bench.unasked)
     }
 

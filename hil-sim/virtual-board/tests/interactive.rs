@@ -8,8 +8,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use crate::common::program::{command, folder};
+use drive_stream::client::UNASKED;
 use hil_sim::Config;
-use hil_sim::console::answer::is_unasked;
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::Link;
 use hil_sim::console::session::{Flow, Session};
@@ -69,7 +69,7 @@ impl Talk {
         self.port.write_all(b"\n").unwrap();
         // An announcement may come first.
         let mut line = self.next();
-        while is_unasked(&line) {
+        while line.starts_with(UNASKED) {
             line = self.next();
         }
         line.trim_end().to_owned()
@@ -128,8 +128,7 @@ fn mean_within(series: &[(f64, f64)], from: f64, to: f64) -> f64 {
 /// The host recognises the unsolicited lines of the firmware.
 #[test]
 fn host_and_firmware_mark_announcements_alike() {
-    assert!(is_unasked(&format!("{}running: torque", induction_drive::console::line::UNASKED)));
-    assert!(!is_unasked("ok"));
+    assert_eq!(UNASKED, induction_drive::console::line::UNASKED);
 }
 
 /// The session of the README, in real time, through the pseudo-terminal.

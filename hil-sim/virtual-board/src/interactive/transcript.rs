@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hil_sim::console::answer::split_tag;
+use drive_stream::client::split_tag;
 use induction_drive::console::line::UNASKED;
 
 /// Origin of a line, in the order of the marks before it.
