@@ -34,8 +34,7 @@ fn check_of(wiring: Wiring, config: &Config, seed: u64) -> (State, f64) {
     }
     drive.command(&Command::CheckWiring).unwrap();
     drive.command(&Command::Start(Mode::Torque)).unwrap();
-    let (mut pending, mut front_end) = (Compare::OFF, FrontEndState::default());
-    let mut peak = 0.0_f64;
+    let (mut front_end, mut peak) = (FrontEndState::default(), 0.0_f64);
     for _ in 0..6000 {
         let mut sample = plant.sample();
         let zero = |line: drive_core::Line| (-2.0 * line.offset / line.gain) as u16;
@@ -52,12 +51,8 @@ fn check_of(wiring: Wiring, config: &Config, seed: u64) -> (State, f64) {
             }
             _ => {}
         }
-        let (compare, _) = drive.period(&mut front_end, &sample, &mut |_| {});
-        if !compare.enabled {
-            pending = Compare::OFF;
-        }
-        plant.advance(&exchanged(wiring, pending), 1.0 / 6000.0);
-        pending = compare;
+        let (compare, output) = drive.period(&mut front_end, &sample, &mut |_| {});
+        plant.period(&exchanged(wiring, compare), &output);
         if drive.state() == State::CheckingWiring {
             peak = plant.phase_currents().iter().fold(peak, |p, i| p.max(i.abs()));
         }
@@ -123,7 +118,6 @@ fn the_right_wiring_is_accepted_over_motors_and_seeds() {
             }
         }
     }
-    println!("largest current {largest:.3} A");
     assert!(largest < BOUND_A && largest > 0.1, "{largest} A");
 }
 

@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
 use drive_commission::Commissioning;
-use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
 use drive_core::{
     Accepted, Coefficients, Command, Compare, Drive, FrontEndState, Hardware, Sample, State,
@@ -31,8 +30,6 @@ pub struct Machine {
     pub plant: Plant,
     drive: Drive,
     front_end: FrontEndState,
-    /// Compare values computed in the last period, which are applied in this one.
-    pending: Compare,
     sample: Sample,
     periods: u32,
     /// Periods from one record of the stream to the next, 0 for none; records that were not fetched.
@@ -64,7 +61,6 @@ impl Machine {
             plant,
             drive,
             front_end: FrontEndState::default(),
-            pending: Compare::OFF,
             sample: Sample::default(),
             periods: 0,
             streamed: (0, VecDeque::new()),
@@ -96,14 +92,7 @@ impl Machine {
         self.sample = self.plant.sample();
         let before = self.drive.state();
         let (compare, output) = self.drive.period(&mut self.front_end, &self.sample, &mut |_| {});
-        if !compare.enabled {
-            // Off is immediate, not at the end of the period.
-            self.pending = Compare::OFF;
-        }
-        self.plant.set_chopper(output.chopper.into());
-        self.plant.set_relay(output.relay);
-        self.plant.advance(&self.pending, PERIOD_S.into());
-        self.pending = compare;
+        self.plant.period(&compare, &output);
         self.periods = self.periods.wrapping_add(1);
         let (current, Compare { a, b, c, .. }) = (self.plant.current(), compare);
         let duties = u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32;

@@ -4,11 +4,10 @@ use crate::config::{Config, LoadMode, built, check_model, open_phase, plant_sett
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
 use crate::stats::Stats;
-use drive_core::io::PERIOD_S;
 use drive_core::learned::Learned;
 use drive_core::printed::DemodulatorKind;
 use drive_core::{
-    Accepted, AngleSource, Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
+    Accepted, AngleSource, Command, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
 };
 use drive_settings::Settings;
 use std::f64::consts::TAU;
@@ -30,8 +29,6 @@ pub struct Rig {
     pub drive: Drive,
     /// State of the firmware's interface around the drive.
     pub front_end: FrontEndState,
-    /// Compare values on their way: computed in the last period, in force in the present one.
-    pending: Compare,
     periods: u64,
     /// Duration of the last saliency self-commissioning, s, to a second.
     pub learning_s: f64,
@@ -96,7 +93,7 @@ impl Rig {
     /// Connects a drive that is off to a motor at rest, both made by the caller.
     pub fn of(plant: Plant, drive: Drive) -> Self {
         let front_end = FrontEndState::default();
-        Self { plant, drive, front_end, pending: Compare::OFF, periods: 0, learning_s: 0.0 }
+        Self { plant, drive, front_end, periods: 0, learning_s: 0.0 }
     }
 
     /// Makes the bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency first
@@ -187,19 +184,11 @@ impl Rig {
     }
 
     /// Runs one PWM period in which the drive gets `sample` instead of the sample of the plant. This is all that the
-    /// control interrupt of the firmware does with a drive. No other code does it: every experiment runs its drive
-    /// here.
+    /// control interrupt of the firmware does with a drive. Every experiment runs its drive here.
     #[inline(never)] // compiled once, not in every crate that runs a rig
     pub fn step_with(&mut self, sample: &Sample) {
         let (compare, output) = self.drive.period(&mut self.front_end, sample, &mut |_| {});
-        if !compare.enabled {
-            // The outputs go off at once, not at the end of the period.
-            self.pending = Compare::OFF;
-        }
-        self.plant.set_chopper(output.chopper.into());
-        self.plant.set_relay(output.relay);
-        self.plant.advance(&self.pending, f64::from(PERIOD_S));
-        self.pending = compare;
+        self.plant.period(&compare, &output);
         self.periods += 1;
     }
 

@@ -1,20 +1,16 @@
 //! The plant that the drive is connected to: motor, shaft, inverter, sensors and encoder, in `f64`.
 //!
-//! One call of [`Plant::advance`] is one PWM period. The caller keeps the delay convention of [`drive_core::io`]: the
-//! output computed from the sample at `k T` takes effect at `(k + 1) T`, except that outputs switch off at once:
+//! One call of [`Plant::period`] is one PWM period of a drive, with the delay convention of [`drive_core::io`]:
 //!
 //! ```no_run
-//! use drive_core::Compare;
+//! use drive_core::{Compare, Output, Sample};
 //! use motor_plant::{Plant, PlantSettings};
-//! # fn step(_: &drive_core::Sample) -> Compare { Compare::OFF }
+//! # fn control(_: &Sample) -> (Compare, Output) { (Compare::OFF, Output::default()) }
 //!
 //! let mut plant = Plant::new(&PlantSettings::DEFAULT, 1)?;
-//! let mut applied = Compare::OFF;
 //! for _ in 0..6000 {
-//!     let next = step(&plant.sample());
-//!     applied.enabled &= next.enabled;
-//!     plant.advance(&applied, 1.0 / 6000.0);
-//!     applied = next;
+//!     let (compare, output) = control(&plant.sample());
+//!     plant.period(&compare, &output);
 //! }
 //! # Ok::<(), motor_plant::PlantError>(())
 //! ```
@@ -44,7 +40,8 @@ mod terminals;
 mod warming;
 
 use dc_link::DcLink;
-use drive_core::{Compare, Hardware, Sample};
+use drive_core::io::PERIOD_S;
+use drive_core::{Compare, Hardware, Output, Sample};
 use motor::{Motor, whichever};
 use period::Around;
 use rand::SeedableRng;
@@ -107,6 +104,8 @@ pub struct Plant {
     rng: Xoshiro256PlusPlus,
     applied: Complex,
     hardware: Hardware,
+    /// Compare values on their way: computed in the last period, in force in the present one.
+    pending: Compare,
 }
 
 impl Plant {
@@ -147,6 +146,7 @@ impl Plant {
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             applied: Complex::ZERO,
             hardware: Hardware::empty(),
+            pending: Compare::OFF,
         })
     }
 
@@ -165,6 +165,18 @@ impl Plant {
             encoder: self.encoder.count(),
             hardware: std::mem::take(&mut self.hardware),
         }
+    }
+
+    /// Advances by one control period with the outputs that a drive computed from the sample at its beginning: the
+    /// compare values take effect a period later, except that outputs switch off at once.
+    pub fn period(&mut self, compare: &Compare, output: &Output) {
+        if !compare.enabled {
+            self.pending = Compare::OFF;
+        }
+        self.set_chopper(output.chopper.into());
+        self.set_relay(output.relay);
+        let acting = std::mem::replace(&mut self.pending, *compare);
+        self.advance(&acting, PERIOD_S.into());
     }
 
     /// Advances by one PWM period of `period_s` seconds with these compare values, which the caller has delayed.
