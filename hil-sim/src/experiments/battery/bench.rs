@@ -1,6 +1,7 @@
 //! A drive and a plant in a run of the stress test, with the quantities that are observed.
 
-use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
+use super::kind::{nominal_limit_a, torque_nm};
+use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Refused, Trial};
 use crate::plant::{Complex, Plant};
 use crate::prelude::*;
 
@@ -11,6 +12,8 @@ const FLUX_OFF: (f64, f64) = (0.5, 2.0);
 /// Longest interruption over which a state is regarded as continuing, s: an angle that runs through is right now and then.
 const GAP_S: f64 = 0.1;
 
+/// Longest start, s.
+pub const LONGEST_START_S: f64 = 30.0;
 /// Number of periods between two recorded moments: 5 ms.
 const TRACE_EVERY: u64 = 30;
 
@@ -151,6 +154,27 @@ impl Bench {
             }
         }
         self.rig.drive.state()
+    }
+
+    /// Starts, and waits until the drive regulates.
+    ///
+    /// # Errors
+    /// The reason why it does not.
+    pub fn start(&mut self, mode: Mode) -> Result<(), Refused> {
+        let started = self.rig.command(&Command::Start(mode));
+        started.map_err(|why| Refused::Otherwise(why.to_string()))?;
+        match self.wait(LONGEST_START_S) {
+            state if state.regulates() => Ok(()),
+            State::Fault(fault) => Err(Refused::Start(fault.code())),
+            other => Err(Refused::Otherwise(format!("the drive is {other}"))),
+        }
+    }
+
+    /// Returns the mean torque minus that of the accepted q-axis current, A, in the direction of the current and
+    /// relative to the torque at the nominal limit.
+    pub fn torque_error(&self, config: &Config, i_q: f64) -> f64 {
+        let error = (self.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
+        error / torque_nm(config, nominal_limit_a(config))
     }
 
     /// Commands a q-axis current, A peak; returns the current that the drive accepts, which may be limited.

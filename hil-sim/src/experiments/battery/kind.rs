@@ -182,6 +182,17 @@ pub enum Shaft {
     Free,
 }
 
+impl Shaft {
+    /// Returns the load at the beginning, and the quantity that the drive regulates.
+    pub fn at_rest(self) -> (Load, Mode) {
+        match self {
+            Self::Locked => (Load::Locked, Mode::Torque),
+            Self::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
+            Self::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
+        }
+    }
+}
+
 impl Kind {
     /// Describes the kind in words.
     pub fn name(self) -> String {

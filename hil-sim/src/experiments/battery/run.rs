@@ -1,8 +1,8 @@
 //! One run of the stress test.
 
 use super::bench::Bench;
-use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit, torque_nm};
-use super::trial::{Refused, Trial};
+use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, share_of_limit};
+use super::trial::Trial;
 use crate::prelude::*;
 
 /// Time after the first reference that the statistics of the error exclude, s: the angle settles.
@@ -11,8 +11,7 @@ const SETTLING_S: f64 = 0.5;
 const PACE_S: f64 = 0.01;
 /// Acceleration of the dynamometer, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
-/// Longest start and longest saliency self-commissioning, s.
-pub const LONGEST_START_S: f64 = 30.0;
+/// Longest saliency self-commissioning, s.
 const LONGEST_LEARNING_S: f64 = 1000.0;
 
 /// Runs the saliency self-commissioning of a drive with the shaft locked; returns the drive, off, or the number of the
@@ -40,25 +39,16 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
     let mut random = seeded(seed);
     let parts = kind.parts(&mut random);
     let nominal = nominal_limit_a(config);
-    let (load, mode) = match kind.shaft() {
-        Shaft::Locked => (Load::Locked, Mode::Torque),
-        Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
-        Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
-    };
+    let (load, mode) = kind.shaft().at_rest();
     let mut bench = Bench::new(config, drive, load, seed)?;
     bench.trial.kind = Some(kind);
     let references = parts.iter().map(|part| part.reference.1);
     let drawn = if mode == Mode::Speed { &mut bench.trial.rpm } else { &mut bench.trial.i_q };
     *drawn = references.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
     bench.trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
-    bench.rig.command(&Command::Start(mode))?;
-    match bench.wait(LONGEST_START_S) {
-        state if state.regulates() => {}
-        State::Fault(fault) => {
-            bench.trial.refused = Some(Refused::Start(fault.code()));
-            return Ok(bench.finish(true).0);
-        }
-        other => return Err(Error::Internal(format!("after a start the drive is {other}"))),
+    if let Err(refused) = bench.start(mode) {
+        bench.trial.refused = Some(refused);
+        return Ok(bench.finish(true).0);
     }
     let mut still = bring_up(&mut bench, kind.shaft(), config)?;
     if still {
@@ -66,10 +56,7 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
         let taken = follow(&mut bench, mode, config, &parts)?;
         still = taken.is_some();
         let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
-        bench.trial.torque_error = constant.map(|i_q| {
-            let error = (bench.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
-            error / torque_nm(config, nominal)
-        });
+        bench.trial.torque_error = constant.map(|i_q| bench.torque_error(config, i_q));
     }
     Ok(bench.finish(still).0)
 }
@@ -77,12 +64,12 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
 /// Makes a bench whose drive regulates torque while a dynamometer holds this speed, rpm; none if the drive did not reach that state.
 ///
 /// # Errors
-/// If the plant is refused, or the drive refuses to start.
+/// If the plant is refused.
 pub fn held(config: &Config, drive: &Drive, rpm: f64, seed: u64) -> Result<Option<Bench>, Error> {
-    let mut bench = Bench::new(config, drive, Load::Speed { speed: 0.0 }, seed)?;
-    bench.rig.command(&Command::Start(Mode::Torque))?;
-    let regulates =
-        bench.wait(LONGEST_START_S).regulates() && bring_up(&mut bench, Shaft::Held(rpm), config)?;
+    let shaft = Shaft::Held(rpm);
+    let (load, mode) = shaft.at_rest();
+    let mut bench = Bench::new(config, drive, load, seed)?;
+    let regulates = bench.start(mode).is_ok() && bring_up(&mut bench, shaft, config)?;
     Ok(regulates.then_some(bench))
 }
 
@@ -151,6 +138,7 @@ pub fn follow(
 #[cfg(test)]
 mod tests {
     use super::super::disturbed::Asymmetry;
+    use super::super::kind::torque_nm;
     use super::*;
 
     /// A lower limit is visible in every run, and the torque is judged by the accepted command. With 0.5 A for any
@@ -199,8 +187,7 @@ mod tests {
             let load = Load::Speed { speed: 0.0 };
             let mut bench = Bench::new(&config, &drive, load, seed).unwrap();
             bench.trace = Some(Vec::new());
-            bench.rig.command(&Command::Start(Mode::Torque)).unwrap();
-            assert_eq!(bench.wait(LONGEST_START_S), State::Torque);
+            bench.start(Mode::Torque).unwrap();
             let started = bench.time();
             assert!(follow(&mut bench, Mode::Torque, &config, &parts).unwrap().is_some(), "{seed}");
             // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.

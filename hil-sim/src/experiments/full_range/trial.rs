@@ -3,7 +3,7 @@
 use super::case::Case;
 use crate::experiments::battery::{
     Bench, LONGEST_START_S, LoadTorque, Moment, Part, Refused, Shaft, Trial, bring_up, follow,
-    nominal_limit_a, torque_nm,
+    nominal_limit_a,
 };
 use crate::prelude::*;
 
@@ -108,9 +108,7 @@ impl<'a> Run<'a> {
         let sign = sign(&mut random);
         let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
         let off_s = random.random_range(OFF_S.0..=OFF_S.1);
-        let held = case.shaft(rpm) != Shaft::Free;
-        let load = if held { Load::Speed { speed: 0.0 } } else { Load::Free { torque: 0.0 } };
-        let mut bench = Bench::new(config, drive, load, seed)?;
+        let mut bench = Bench::new(config, drive, case.shaft(rpm).at_rest().0, seed)?;
         bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
         bench.trace = traced.then(Vec::new);
@@ -146,11 +144,8 @@ impl<'a> Run<'a> {
         match self.case.kind {
             RangeKind::Constant | RangeKind::WrongParameters => {
                 self.counted(0.5, &[Part::constant(i_q, 3.5)])?;
-                let nm = |a: f64| torque_nm(self.config, a);
                 let taken = f64::from(self.bench.rig.drive.telemetry().reference.q);
-                let error = self.bench.torque.mean() - nm(taken);
-                let share = error * i_q.signum() / nm(nominal_limit_a(self.config));
-                self.bench.trial.torque_error = Some(share);
+                self.bench.trial.torque_error = Some(self.bench.torque_error(self.config, taken));
                 Ok(())
             }
             RangeKind::Reversals => {
@@ -189,18 +184,12 @@ impl<'a> Run<'a> {
     }
 
     fn mode(&self) -> Mode {
-        if self.case.shaft(self.rpm) == Shaft::Free { Mode::Speed } else { Mode::Torque }
+        self.case.shaft(self.rpm).at_rest().1
     }
 
     /// Starts, and waits until the drive regulates.
     fn start(&mut self) -> Result<(), End> {
-        let started = self.bench.rig.command(&Command::Start(self.mode()));
-        started.map_err(|why| End::Refused(Refused::Otherwise(why.to_string())))?;
-        match self.bench.wait(LONGEST_START_S) {
-            state if state.regulates() => Ok(()),
-            State::Fault(fault) => Err(End::Refused(Refused::Start(fault.code()))),
-            other => Err(End::Refused(Refused::Otherwise(format!("the drive is {other}")))),
-        }
+        self.bench.start(self.mode()).map_err(End::Refused)
     }
 
     /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
