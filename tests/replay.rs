@@ -1,6 +1,6 @@
 //! Recorded samples and requests, replayed through the host drive, give unchanged outputs and estimates.
 //!
-//! [`board`] has two runs of the image, [`scenes`] runs of the simulated bench that lead through the other states.
+//! [`board`] has two runs of the image, [`scenes`] runs of the simulated bench that lead through the other states; [`player`] plays both.
 //!
 //! If a change is meant to leave the control as it is, these hashes stay as they are. If a change alters the control on purpose, the
 //! hashes change too, and its commit names the cause.

@@ -16,72 +16,41 @@
 
 use std::fs;
 
-use drive_core::{Command, Compare, Drive, FrontEndState, Sample};
-use induction_drive::console::grammar::{self, Request};
-use induction_drive::desk::order::Order;
+use drive_core::{Drive, Sample};
 use induction_drive::settings::FirmwareSettings;
 
-use super::player::{BLOCK, Fnv};
+use super::player::{BLOCK, Fnv, play};
+use super::recorded;
 
 /// Hashes of the compare values, one for every [`BLOCK`] interrupts, and the number of interrupts.
 fn replay(name: &str) -> (Vec<u64>, usize) {
-    let path = format!("{}/tests/recorded/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = recorded(name);
     let samples = fs::read(format!("{path}.samples")).unwrap();
     let orders = fs::read_to_string(format!("{path}.orders")).unwrap();
-    let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
-    let mut settings = FirmwareSettings::of_the_board();
-    // The recorded board had not learned.
-    settings.drive.injection.synchronous.allow_unlearned = true;
-    let mut drive = Drive::new(settings.build().unwrap());
-    let mut front_end = FrontEndState::default();
-
-    let mut compares = Vec::new();
-    for (n, bytes) in samples.chunks_exact(12).enumerate() {
+    let sample = |bytes: &[u8]| {
         let code = |at| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let sample = Sample {
+        Sample {
             current_a: code(0),
             current_b: code(2),
             dc_link: code(4),
             heat_sink: code(6),
             encoder: u32::from_le_bytes(bytes[8..].try_into().unwrap()),
             ..Sample::default()
-        };
-        let mut last = None;
-        let (compare, _) =
-            drive.period(&mut front_end, &sample, &mut |compare| last = Some(compare));
-        assert_eq!(last, Some(compare), "{n}");
-        compares.push(compare);
-        if let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
-            order(&mut drive, &mut settings, line);
         }
-    }
-    assert_eq!(orders.next(), None, "an order that was not reached");
-    (compares.chunks(BLOCK).map(hash).collect(), compares.len())
-}
-
-/// Gives a request that the board's drive accepted.
-fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
-    let request = if line == "check wiring" { None } else { Some(grammar::parse(line).unwrap()) };
-    let taken = match request {
-        None => drive.command(&Command::CheckWiring),
-        Some(Request::Order(Order::Start(mode))) => drive.command(&Command::Start(mode)),
-        Some(Request::Order(Order::Stop(stop))) => drive.command(&Command::Stop(stop)),
-        Some(Request::Order(Order::Torque(i_q))) => drive.command(&Command::Torque(i_q)),
-        Some(Request::Order(Order::Position(turns))) => drive.command(&Command::Position(turns)),
-        Some(Request::Set(values)) => {
-            values.iter().for_each(|(key, value)| key.set(settings, *value));
-            drive.command(&Command::Configure(settings.build().unwrap()))
-        }
-        Some(other) => panic!("{other:?} is no order to the drive"),
     };
-    assert!(taken.is_ok(), "{line}: {taken:?}");
-}
-
-/// FNV-1a of the compare values.
-fn hash(compares: &[Compare]) -> u64 {
-    let mut hash = Fnv::default();
-    compares.iter().for_each(|compare| hash.compare(compare));
-    hash.0
+    let samples: Vec<Sample> = samples.chunks_exact(12).map(sample).collect();
+    let mut settings = FirmwareSettings::of_the_board();
+    // The recorded board had not learned.
+    settings.drive.injection.synchronous.allow_unlearned = true;
+    let drive = Drive::new(settings.build().unwrap());
+    let mut hashes: Vec<Fnv> = Vec::new();
+    play(drive, &settings, &samples, &orders, 1, |n, compare, _, _| {
+        if n.is_multiple_of(BLOCK) {
+            hashes.push(Fnv::default());
+        }
+        hashes.last_mut().unwrap().compare(compare);
+    });
+    (hashes.iter().map(|hash| hash.0).collect(), samples.len())
 }
 
 #[test]

@@ -4,9 +4,9 @@ use std::fmt;
 
 use drive_commission::{Collector, Commissioning, Next, Step};
 use drive_core::{Command, Compare, Drive, FrontEndState, Mode, Output, Sample, Stop, Telemetry};
-use drive_settings::Settings;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::order::Order;
+use induction_drive::settings::FirmwareSettings;
 
 use super::scenes::Scene;
 
@@ -80,9 +80,9 @@ impl Hashes {
     }
 }
 
-/// Requests and commissioning around a drive; the bench of a recording and its replay share them.
+/// Requests and commissioning around a drive; a recording and its replay share them.
 pub struct Player {
-    settings: Settings,
+    settings: FirmwareSettings,
     commissioning: Option<Commissioning>,
     sums: Collector,
     periods: usize,
@@ -91,10 +91,9 @@ pub struct Player {
 }
 
 impl Player {
-    pub fn new(settings: &Settings) -> Self {
-        let settings = *settings;
+    pub fn new(settings: &FirmwareSettings) -> Self {
         Self {
-            settings,
+            settings: *settings,
             commissioning: None,
             sums: Collector::default(),
             periods: 0,
@@ -113,15 +112,15 @@ impl Player {
             "origin" => Command::Home(number()),
             "magnetising" => Command::Magnetising(number()),
             "commission" => {
-                let mut commissioning = Commissioning::new(&self.settings);
+                let mut commissioning = Commissioning::new(&self.settings.drive);
                 commissioning.start(Step::Nameplate, Step::CurrentLoop);
                 self.commissioning = Some(commissioning);
                 return;
             }
             "accept" => {
                 let commissioning = self.commissioning.take().unwrap();
-                self.settings = commissioning.settings(&self.settings);
-                Command::Configure(self.settings.build().unwrap())
+                self.settings.drive = commissioning.settings(&self.settings.drive);
+                Command::Configure(self.settings.drive.build().unwrap())
             }
             _ => match grammar::parse(line).unwrap() {
                 Request::Order(Order::Start(mode)) => Command::Start(mode),
@@ -133,6 +132,11 @@ impl Player {
                 Request::Order(Order::Speed(rpm)) => Command::Speed(rpm),
                 Request::Order(Order::Jog(rpm)) => Command::Jog(rpm),
                 Request::Order(Order::Position(turns)) => Command::Position(turns),
+                Request::Set(values) => {
+                    values.iter().for_each(|(key, value)| key.set(&mut self.settings, *value));
+                    // With the dead time that the board's timer can have.
+                    Command::Configure(self.settings.build().unwrap())
+                }
                 other => panic!("{other:?} is no order to the drive"),
             },
         };
@@ -171,26 +175,45 @@ impl Player {
     }
 }
 
-/// Gives a drive with the settings of the scene these samples and requests; returns the drive, and the hashes of each block.
-pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Hashes>) {
-    let (mut drive, mut front_end) = (scene.drive(), FrontEndState::default());
-    let mut player = Player::new(&scene.config().drive);
+/// Gives a drive these samples and requests, and passes the outputs of each period on; returns the drive. The requests to the bench came
+/// before the period of their number, those to the board after it.
+pub fn play(
+    mut drive: Drive,
+    settings: &FirmwareSettings,
+    samples: &[Sample],
+    orders: &str,
+    after: usize,
+    mut take: impl FnMut(usize, &Compare, &Output, &Drive),
+) -> Drive {
+    let (mut front_end, mut player) = (FrontEndState::default(), Player::new(settings));
     let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
-    let mut hashes = Vec::new();
     for (n, sample) in samples.iter().enumerate() {
-        while let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
+        while let Some((_, line)) =
+            orders.next_if(|(number, _)| number.parse() == Ok(n.wrapping_sub(after)))
+        {
             player.order(&mut drive, line);
         }
         let mut last = None;
         let (compare, output) =
             drive.period(&mut front_end, sample, &mut |compare| last = Some(compare));
         assert_eq!(last, Some(compare), "{n}");
-        if n.is_multiple_of(BLOCK) {
-            hashes.push(Hashes::default());
-        }
-        hashes.last_mut().unwrap().push(&compare, &output, &drive);
+        take(n, &compare, &output, &drive);
         player.end_period(&mut drive);
     }
     assert_eq!(orders.next(), None, "an order that was not reached");
+    drive
+}
+
+/// Replays a scene; returns the drive, and the hashes of each block.
+pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Hashes>) {
+    let mut hashes = Vec::new();
+    let take = |n: usize, compare: &Compare, output: &Output, drive: &Drive| {
+        if n.is_multiple_of(BLOCK) {
+            hashes.push(Hashes::default());
+        }
+        hashes.last_mut().unwrap().push(compare, output, drive);
+    };
+    let settings = scene.firmware_settings();
+    let drive = play(scene.drive(), &settings, samples, orders, 0, take);
     (drive, hashes)
 }
