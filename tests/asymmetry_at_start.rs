@@ -40,7 +40,6 @@ fn a_start_measures_what_has_changed_since_the_learning() {
     ] {
         for i_q in [2.5, -2.5] {
             let error = mean_error(&changes, i_q);
-            println!("{changes:?}, {i_q} A: {error:.1} degrees");
             assert!(error.abs() < 4.0, "{changes:?}, {i_q} A: {error}");
         }
     }

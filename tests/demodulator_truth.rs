@@ -69,11 +69,6 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
         // Slope at 90°: sqrt2 * 0.01 * i_q.
         let slope = (at(-FRAC_PI_2 + h) - at(-FRAC_PI_2 - h)) / (2.0 * h);
         let ratio = slope.abs() / (SQRT_2 * 0.01 * iq);
-        println!(
-            "iq {iq}: {:.3} mA, zero {:.2} deg, slope x{ratio:.4}",
-            here * 1e3,
-            zero.to_degrees()
-        );
         assert!((ratio - 1.0).abs() < 0.01, "iq {iq}: slope {slope}");
     }
 }
@@ -87,7 +82,6 @@ fn the_printed_chain_does_not_see_the_injection() {
         delta_i(&mut rig, Literal::default(), -FRAC_PI_2)
     };
     let difference = out(50.0) - out(0.0);
-    println!("in the motor {:.3} uA", difference * 1e6);
     assert!(difference.abs() < 10e-6, "{difference} A");
 
     // 0.7 A along d, 1 A along q, flux at rest, 0.26 A of injection current along theta = phi + 90°.
@@ -103,7 +97,6 @@ fn the_printed_chain_does_not_see_the_injection() {
         sum / 600.0
     };
     let difference = given(0.26) - given(0.0);
-    println!("given {:.4} uA", difference * 1e6);
     assert!(difference.abs() < 1e-6, "{difference} A");
 }
 
@@ -158,7 +151,6 @@ fn the_bias_of_the_rectified_chain_is_the_delay_of_the_band_pass() {
         let slip = iq / 0.7 * 1.1 / 0.2047 / RATE_HZ;
         let undelayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2) * 1e3;
         let delayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2 + 8.83 * slip) * 1e3;
-        println!("iq {iq}: {undelayed:.2} mA, from the delayed axis {delayed:.2} mA");
         // An independent study found 2.84 mA per ampere with the injection delayed by 1.5 samples.
         let expected = 2.84 * iq * 8.83 / (8.83 + 1.5);
         assert!((undelayed - expected).abs() < 0.05 * expected, "iq {iq}: {undelayed} mA");

@@ -32,7 +32,6 @@ fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
 fn flux_angle_and_torque_from_standstill_to_1440_rpm() {
     for rpm in [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0] {
         let (error, torque) = measure(rpm, false);
-        println!("{rpm:6} rpm: angle {error:.3} deg, torque {:.2} %", torque * 100.0);
         assert!(error <= 0.5, "{rpm} rpm: flux angle error {error} deg");
         assert!(torque <= 0.02, "{rpm} rpm: torque off by {torque}");
     }
@@ -44,7 +43,6 @@ fn without_the_delay_compensation_the_angle_is_wrong_as_predicted() {
     // for the filter alone; the larger errors are the group delay of 1.53 samples times the speed.
     for (rpm, low, high) in [(0.0, 0.0, 0.4), (300.0, 0.8, 1.6), (1440.0, 4.0, 5.4)] {
         let (error, _) = measure(rpm, true);
-        println!("{rpm:6} rpm: {error:.3} deg");
         assert!((low..=high).contains(&error), "{rpm} rpm: {error} deg");
     }
 }

@@ -46,7 +46,6 @@ fn all_but_the_literal_chain_see_the_saliency() {
         rig.wait(0.1);
         let slope = (signal(&mut rig) - here) / 5f64.to_radians();
         let without = signal(&mut demodulating(name, &[&ISOTROPIC], 1.5));
-        println!("{name}: {here:.5}, slope {slope:.4}, without saliency {without:.5}");
         assert!(here > 0.0 && slope > 0.0, "{name}: {here} {slope}");
         let share = (without / here).abs();
         if name == "literal" {
@@ -78,7 +77,6 @@ fn the_carrier_lies_where_the_method_wants_it() {
             rig.step();
         }
         let [along, across] = parts.map(|p| p[0].hypot(p[1]));
-        println!("{name}: along the flux {along:.4} A, across {across:.4} A");
         let (with, without) =
             if name == "rms-impedance" { (along, across) } else { (across, along) };
         // 50 V over 194 ohm; 3 degrees of 0.26 A.
@@ -131,7 +129,6 @@ fn all_but_the_literal_chain_track() {
         let (config, drive) = retuned(name, gain);
         let demodulator = drive.injection.demodulator;
         for (rpm, (rms, worst)) in [0, 150].into_iter().zip(tracked(&drive, &config)) {
-            println!("{name}, {rpm} rpm: {rms:.2} deg rms, {worst:.2} deg");
             if demodulator == DemodulatorKind::Literal {
                 assert!(worst > 45.0, "the literal chain held the angle: {worst} deg");
             } else {
@@ -168,7 +165,6 @@ fn without_torque_the_retuned_rectified_chain_does_not_follow_the_shaft() {
             rig.command(&Command::Torque(1.5)).unwrap();
             rig.wait(1.0);
             let (rms, worst) = error(&mut rig);
-            println!("{name}, seed {seed}: {without:.2} deg without torque; {rms:.2} {worst:.2}");
             if *name == "rectified" {
                 assert!(without > 45.0, "seed {seed}: {without}");
                 lost += u32::from(worst > 45.0);

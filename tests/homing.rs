@@ -76,9 +76,6 @@ fn the_stop_becomes_position_0() {
             rig.command(&Command::Position(-rpm.signum())).unwrap();
             rig.wait(4.0);
             let there = turns(&mut rig) - stop + f64::from(rpm.signum());
-            println!(
-                "{source} {heavier:?} {rpm} rpm {i_q} A: {wrong:.4} turns, a turn away {there:.4}"
-            );
             assert!(wrong.abs() < accuracy, "{wrong}");
             // The position without an encoder drifts by about 3 degrees during the motion.
             assert!(there.abs() < accuracy + 0.013, "{there}");
@@ -108,7 +105,6 @@ fn position_0_outlives_a_stop_with_the_encoder() {
         rig.start(Mode::Position).unwrap();
         rig.wait(1.0);
         let (after, says) = (turns(&mut rig), f64::from(rig.drive.telemetry().turns));
-        println!("{source}: {before:.4} {after:.4}, {says:.4}");
         assert!((after - before).abs() < moved, "{before} {after}");
         assert!((says - if keeps { -1.0 } else { 0.0 }).abs() < 0.01, "{says}");
     }

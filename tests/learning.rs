@@ -125,7 +125,6 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
             rig.wait(1.5); // until the flux has decayed
         }
         let rms: f64 = (squares / count).sqrt();
-        println!("seed {seed}: {rms:.2} rms, {largest:.2} largest");
         assert!(rms <= 2.5 && largest <= 9.0, "{rms} {largest}");
     }
 }

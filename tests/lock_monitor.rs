@@ -31,7 +31,6 @@ fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
 fn without_the_monitor_a_false_lock_stays() {
     let blind = ["runs=6", "injection.monitor=false", "observer.enabled=false"];
     let outcome = run("lock-monitor", &blind, 32);
-    println!("{:?}", outcome.metrics);
     let missed = ["p120", "m120", "180"].map(|n| outcome.metrics.get(&format!("not_in_time_{n}")));
     assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");
 }
@@ -94,7 +93,6 @@ fn a_carrier_that_does_not_fit_is_made_smaller_and_the_angle_stays_right() {
     let mut rig = regulating(&low, 6, 2.5, 1.0);
     let worst = worst(&mut rig);
     let share = rig.drive.telemetry().carrier_share;
-    println!("share {share}, worst {worst}");
     assert_eq!(rig.drive.state(), State::Torque);
     assert!(share < 1.0 && share > 0.8, "{share}");
     assert!(worst < 12.0, "{worst}");

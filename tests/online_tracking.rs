@@ -45,10 +45,6 @@ fn with_the_encoder_the_angle_stays_right_while_the_rotor_warms_up() {
         for seed in [1, 2] {
             let case = WarmingCase { speed_rpm, iq_a, ..CASE };
             let (error, count, angle) = end(&run(&config, &case, seed).unwrap());
-            println!(
-                "{speed_rpm} rpm {iq_a} A, {residual}: {:.1} %, {angle:.2} deg",
-                100.0 * error
-            );
             assert!(error < 0.07 && count == 30 && angle < 1.8, "{error} {count} {angle}");
             let left = WarmingCase { used: false, ..case };
             let (_, _, untracked) = end(&run(&config, &left, seed).unwrap());
@@ -147,7 +143,6 @@ fn a_torque_that_changes_does_not_mislead() {
         for profile in [&slow[..], &small[..]] {
             let (errors, used) = over(profile, speed_rpm, r_r, residual);
             let worst = errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
-            println!("{speed_rpm} rpm, r_r x {r_r}: {} estimates, {worst:.3}", errors.len());
             // Measured are 5.8 % at standstill with 0.5 A.
             assert!(errors.len() > 25 && worst < 0.07 && used.abs() < 0.07, "{worst} {used}");
         }

@@ -97,7 +97,6 @@ fn the_dc_current_is_within_three_percent_of_its_limits() {
                 let error = seen.mean_a / limit - 1.0;
                 let beyond =
                     if motors { stepped.most_a - motoring } else { -stepped.least_a - generating };
-                println!("{changes:?} {rpm} {i_q}: {error:.4}, step {beyond:.3} A, {seen:?}");
                 assert_eq!(rig.drive.state(), State::Torque, "{changes:?} {rpm}");
                 assert!(
                     error.abs() < 0.03 && seen.limited > 0.99,
@@ -128,7 +127,6 @@ fn the_power_is_held_over_all_speeds() {
                 let seen = watch(&mut rig, 0.06);
                 let watts = (311.0 * seen.least_a, 311.0 * seen.most_a);
                 let case = format!("{i_q} A, {:.0} rpm: {watts:?} W, {:.2} A", at(step), seen.i_q);
-                println!("{case}");
                 assert_eq!(rig.drive.state(), State::Torque, "{case}");
                 assert!(watts.0 > -58.0 && watts.1 < 165.0, "{case}");
                 assert!(seen.i_q * f64::from(i_q) > 0.0, "{case}");

@@ -43,7 +43,6 @@ fn starts(seeds: u64) {
             let parts: Vec<_> = (0..cores).map(|core| scope.spawn(move || count(core))).collect();
             parts.into_iter().map(|part| part.join().unwrap()).sum()
         });
-        println!("{share} of the expected saliency: {accepted} of {seeds} starts accepted");
         assert_eq!(accepted as u64, if starts { seeds } else { 0 }, "{share}");
     }
 }

@@ -30,7 +30,6 @@ fn a_step_arrives_without_an_encoder() {
             angle = angle.max(p.angle_error_deg.abs());
         });
         let error = degrees(&rig) - origin - turns * 360.0;
-        println!("{turns} turns: {error:.1} off, furthest {furthest:.1}, angle {angle:.1} deg");
         // Error of the slip while the motor accelerates: noise of the angle, integrated.
         assert!(error.abs() < 35.0, "{turns} turns: {error} degrees off");
         assert!(furthest < turns.abs() * 360.0 + 40.0, "{turns}: {furthest}");
@@ -47,7 +46,6 @@ fn a_minute_at_rest_costs_a_few_degrees() {
     let before = degrees(&rig);
     rig.wait(60.0);
     let drift = degrees(&rig) - before;
-    println!("{drift:.2} degrees in a minute");
     assert!(drift.abs() < 25.0, "{drift}");
 }
 
@@ -78,9 +76,6 @@ fn under_load_the_drift_is_the_error_of_the_slip() {
     let (wrong, i_q) = drift(1.1, 6);
     let t_r = 0.2047 / believed;
     let expected = -0.1 * i_q / 0.7 / t_r * 10.0 / 2.0 * 360.0 / TAU;
-    println!(
-        "{known:.1} deg in 10 s with the resistance known, {wrong:.1} with +10 %: {expected:.1}"
-    );
     // Noise walks by 10 degrees, a bias of 0.3 degrees causes 25.
     assert!(known.abs() < 45.0, "{known}");
     assert!((wrong / expected - 1.0).abs() < 0.25, "{wrong} against {expected}");

@@ -43,9 +43,6 @@ fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
             // The ramp of 300 rpm/s, and a second to settle.
             let (.., on_the_way) = watch(&mut rig, rpm, (rpm - before).abs() / 300.0 + 1.0);
             let (mean, most, angle) = watch(&mut rig, rpm, 0.5);
-            println!(
-                "{rpm} rpm: mean {mean:.2}, largest {most:.2} rpm; {on_the_way:.1}, {angle:.1} deg"
-            );
             // Without a load there is no slip error: only noise remains.
             assert!(mean.abs() < 2.0 && most < 6.0, "{rpm} rpm: {mean} {most}");
             assert!(on_the_way < 14.0 && angle < 11.0, "{rpm} rpm: {on_the_way} {angle}");
@@ -66,7 +63,6 @@ fn a_load_step_is_carried() {
         // The zero of the controller, at a quarter of the crossover, causes a tail of half a second.
         watch(&mut rig, rpm, 1.0);
         let (mean, ..) = watch(&mut rig, rpm, 1.0);
-        println!("{rpm} rpm: dip {dip:.1} rpm, then {mean:.2}; angle {angle:.1} deg");
         // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop responds with its crossover of 1.4 Hz.
         assert!((10.0..70.0).contains(&dip), "{rpm}: {dip}");
         assert!(mean.abs() < 4.0, "{rpm}: {mean}");
@@ -88,7 +84,6 @@ fn the_inertia_need_not_be_known_well() {
         rig.command(&Command::Speed(150.0)).unwrap();
         let (.., angle) = watch(&mut rig, 150.0, 2.0);
         let (mean, most, _) = watch(&mut rig, 150.0, 1.0);
-        println!("x{factor}: {mean:.2} {most:.2} rpm, {angle:.1} deg");
         assert!(
             mean.abs() < 3.0 && most < 15.0 && angle < 15.0,
             "x{factor}: {mean} {most} {angle}"
@@ -107,9 +102,8 @@ fn a_blocked_shaft_is_survived() {
     let i_q = rig.drive.telemetry().reference.q;
     assert!(i_q > 2.9 && angle < 15.0, "{i_q} A, {angle} deg");
     rig.set_load(Load::Free { torque: 0.0 }).unwrap();
-    let (_, most, _) = watch(&mut rig, 100.0, 2.0);
+    rig.wait(2.0);
     let (mean, ..) = watch(&mut rig, 100.0, 1.0);
-    println!("blocked: {angle:.1} deg; let go: within {most:.1} rpm, then {mean:.2}");
     assert!(mean.abs() < 3.0, "{mean}");
     assert_eq!(rig.drive.state(), State::Speed);
 }
@@ -162,9 +156,6 @@ fn the_speed_falls_no_further_than_with_an_encoder() {
     for (seed, margin, most) in [(1, 60.0, 1.7), (2, 45.0, 1.0)] {
         let [(dip, area, angle), (encoder, ..)] =
             ["injection", "encoder"].map(|source| step(seed, source, margin));
-        println!(
-            "{margin} degrees: {dip:.0} rpm, {encoder:.0} with an encoder, {area:.2} %s, {angle:.1} degrees"
-        );
         assert!(
             dip < 1.3 * encoder && area < most && angle < 7.0,
             "{dip} {encoder} {area} {angle}"
@@ -188,7 +179,6 @@ fn a_start_on_a_turning_shaft_does_not_brake_it() {
         rig.command(&Command::Speed(rpm as f32)).unwrap();
         let mut slowest = f64::INFINITY;
         rig.run(2.0, |p| slowest = slowest.min(p.speed_rpm / rpm));
-        println!("{rpm} rpm: slowest {slowest:.3} of it");
         assert!(slowest > 0.85, "{rpm} rpm: {slowest}");
         assert_eq!(rig.drive.state(), State::Speed);
     }

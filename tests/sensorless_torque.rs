@@ -96,11 +96,9 @@ fn a_tenth_of_the_saliency_gives_tens_of_degrees() {
     let weak = ["saliency.a_psi=-0.0035"];
     let outcome = run("torque-steps", &all(&[&IDEAL, &RECTIFIED, &AS_PRINTED, &weak]), 1);
     let mean = outcome.metrics.get("angle_error_mean_deg").unwrap();
-    println!("mean error {mean}");
     assert!((20.0..60.0).contains(&mean), "{mean}");
     let levels: Vec<f64> =
         outcome.steps.unwrap().iter().map(|step| step.angle_error_mean_deg).collect();
-    println!("levels {levels:.1?}");
     assert!(levels.windows(2).all(|pair| pair[1] > pair[0] + 2.0), "{levels:?}");
     assert!(levels[0] < 16.0 && levels[levels.len() - 1] > 35.0, "{levels:?}");
 }
@@ -130,7 +128,6 @@ fn torque_is_linear_in_the_current_and_does_not_drift() {
             torque.push(t / n);
             angle.push(a / n);
         }
-        println!("{i_q} A: {torque:.4?} Nm, {angle:.2?} degrees");
         for a in &angle {
             assert!((a - angle[0]).abs() <= 1.3, "{i_q} A: {a}");
         }
@@ -142,7 +139,6 @@ fn torque_is_linear_in_the_current_and_does_not_drift() {
         [(0.5, 0.05), (1.0, 0.05), (2.0, 0.05), (3.0, 0.08), (-1.0, 0.05), (-3.0, 0.08)]
     {
         let ratio = per_ampere(i_q) / ideal;
-        println!("{i_q} A: {ratio:.4}");
         assert!((ratio - 1.0).abs() <= most, "{i_q} A: {ratio}");
     }
 }

@@ -38,7 +38,6 @@ fn ramp_and_quick_stop_bring_the_shaft_to_rest_and_coast_does_not() {
         for (mode, rpm) in [(Mode::Speed, 300.0), (Mode::Speed, -240.0), (Mode::Torque, 300.0)] {
             let run = |stop| stopped(&changes, mode, rpm, stop);
             let [ramp, quick, coast] = [Stop::Ramp, Stop::Quick, Stop::Coast].map(run);
-            println!("{changes:?} {mode:?} {rpm}: {ramp:.2?} {quick:.2?} {coast:.2?} s, rpm");
             let takes = rpm.abs() / 300.0;
             assert!((takes..takes + 0.7).contains(&ramp.0), "{ramp:?}");
             assert!((takes / 3.0..takes / 2.6 + 0.7).contains(&quick.0), "{quick:?}");
@@ -62,7 +61,6 @@ fn the_dc_link_holds_a_quick_stop_back() {
         "drive.motor.inertia=0.03",
     ];
     let (takes, rpm) = stopped(&changes, Mode::Speed, 1500.0, Stop::Quick);
-    println!("{takes:.2} s, {rpm:.1} rpm");
     // The torque of 3 A alone would take 4.8 s with this inertia.
     assert!(takes > 4.0 && rpm.abs() < 12.0, "{takes} s, {rpm} rpm");
 }
@@ -81,7 +79,6 @@ fn an_s_ramp_rounds_speed_and_stop() {
     rig.run(2.0, |p| speeds.push(p.speed_rpm));
     assert_eq!(rig.drive.state(), State::Off);
     let at = |t: f64| speeds[(t * 6000.0) as usize];
-    println!("{:.1} {:.1} {:.1} {:.1}", at(0.5), at(1.0), at(1.6), at(3.0));
     // a t^2/(2 s) while the acceleration rises, and the same at the other end; 8 rpm are 30 ms of lag at 300 rpm/s.
     for (t, expected) in
         [(0.5, 75.0), (0.75, 150.0), (1.0, 225.0), (2.4, 300.0), (3.0, 225.0), (3.5, 75.0)]

@@ -49,7 +49,6 @@ fn the_torque_falls_back_to_what_is_carried_for_ever() {
             let changes = [a.as_str(), s.as_str(), source, "load.mode=locked"];
             let body = (carried, tau_s, why);
             let (load, current, limited) = settles(&changes, body, 3.0 + 4.0 * tau_s);
-            println!("{a} {s} {source}: load {load:.3}, {current:.3} A, limits {limited}");
             assert!(load <= 1.1, "{load}");
             assert!((current / carried - 1.0).abs() < 0.03, "{current} A");
             // The load of the fastest body swings with the noise of the current.

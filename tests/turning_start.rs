@@ -46,11 +46,6 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
             }
             rig.wait(0.01);
             let (state, more) = (rig.drive.state(), rig.drive.stator_resistance().unwrap());
-            println!(
-                "{rpm} rpm after {pause} s: resistance {:.2} %, {:.2} % before",
-                100.0 * more,
-                100.0 * before
-            );
             assert_eq!(state, State::Torque);
             // The filter begins with a deviation of 30 %: noise of the first injection periods moves it by up to 3.8 % here.
             assert!((more - before).abs() < 0.06, "{more}");
@@ -76,7 +71,6 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
         let mut largest = 0.0_f64;
         rig.wait(0.5);
         rig.run(1.5, |p| largest = largest.max(p.angle_error_deg.abs()));
-        println!("{plant} {rpm} rpm: {}, {largest:.1} degrees", rig.drive.state());
         assert_eq!(rig.drive.state(), State::Torque);
         assert!(largest < 15.0, "{largest}");
     }

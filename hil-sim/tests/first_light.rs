@@ -256,12 +256,10 @@ fn contributed_evidence_is_whole_and_its_trace_is_that_of_its_motor() {
             continue;
         }
         let errors = replayed(&evidence, [1.0, 1.0]);
-        println!("{path:?}: rms, largest {errors:.4?}");
         assert!(errors[0] < 0.05 && errors[1] < 0.15, "{path:?}: {errors:?}");
         // The bounds distinguish another motor from this one.
         for factors in [[1.3, 1.0], [0.7, 1.0]] {
             let wrong = replayed(&evidence, factors);
-            println!("{factors:?}: {wrong:.4?}");
             assert!(wrong[0] > 0.05, "{path:?} {factors:?}: {wrong:?}");
         }
     }

@@ -32,7 +32,6 @@ fn all(machine: Parameters, noise: Noise, seed: u64, trials: u64) -> Vec<Errors>
 fn t1_tables() {
     let entries = entries(&HALF);
     assert_eq!(entries.len(), 186);
-    println!("within a factor 2: {:.3}", share(&entries));
     assert!(share(&entries) >= 0.55, "{}", share(&entries));
     for e in &entries {
         if e.model == "B" && e.case.period > 0 && ["tau_r", "l_s"].contains(&e.parameter) {
@@ -119,7 +118,6 @@ fn t1_orderings() {
 #[test]
 fn t2_the_machine_by_ratios_that_do_not_depend_on_the_noise() {
     for ratio in hil_sim::identification::ratios::all() {
-        println!("{ratio:.3?}");
         // |h_0b / h_1b|, (1 - f_11) / 2 and the error of tau_r by Model B, PX within 13, 3 and 10 %.
         let (px, rbv) = (ratio.px / ratio.printed, ratio.rbv / ratio.printed);
         let (near, far) = match ratio.quantity {

@@ -11,7 +11,6 @@ fn through_the_drive_the_plant_is_that_of_the_motor() {
         // saliency of 3.5 % along the flux remains; on q the saliency of the current, 7 % at 2 A.
         for (key, k_bound) in [("steps", 0.05), ("d", 0.05), ("q", 0.15)] {
             let (k, p) = (metric(&format!("{key}_k_a_per_v")), metric(&format!("{key}_p")));
-            println!("{key}: {k} {p}");
             assert!((k / 0.003_205_2 - 1.0).abs() < k_bound, "{key}: k = {k}");
             assert!((p - 0.980_053).abs() < 0.006, "{key}: p = {p}");
             assert!(metric(&format!("{key}_left_rms_a")) < 0.012);

@@ -22,7 +22,6 @@ fn at_rest(assignments: &[(&str, &str)], i_d: f64) -> (f64, f64) {
 }
 
 fn close(found: f64, printed: f64, tolerance: f64, what: &str) {
-    println!("{what}: {found:.4}, printed {printed}");
     assert!((found - printed).abs() <= tolerance, "{what}: {found}, printed {printed}");
 }
 
@@ -184,7 +183,6 @@ fn the_axis_of_the_teeth_can_be_turned() {
     // atan(L' i_q/(L_m i_d)) = 9 degrees, because the injection moves the air-gap flux as well.
     let lead = |gap: &str| -zero(&[("iron.teeth_gap", gap)], 1.0);
     let (half, whole) = (lead("0.5"), lead("0.999999"));
-    println!("half way {half}°, the whole way {whole}°");
     assert!(whole > 9.0 && half > 2.0 && half < whole, "{half} of {whole}");
 }
 

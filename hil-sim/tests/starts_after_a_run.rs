@@ -112,7 +112,6 @@ fn a_start_that_measures_no_resistance_keeps_what_was_measured() {
             let deviation = rig.drive.stator_resistance().expect("an observer") - before;
             largest = largest.max(deviation.abs());
         }
-        println!("seed {seed}: {:.1} %", 100.0 * largest);
         assert_eq!(rig.drive.state(), State::Speed, "seed {seed}");
         assert!(largest < 0.12, "seed {seed}: {largest}");
     }
@@ -136,7 +135,6 @@ fn a_start_on_a_rotating_shaft_finds_a_resistance_that_has_changed() {
         let (mut sum, mut count) = (0.0, 0.0);
         rig.run(0.6, |point| (sum, count) = (sum + point.angle_error_deg.powi(2), count + 1.0));
         let (rms, found) = ((sum / count).sqrt(), rig.drive.stator_resistance());
-        println!("{rpm} rpm: {rms:.2} degrees rms, {found:?}");
         assert!(rms < 3.5 && found > Some(0.1), "{rpm}: {rms}, {found:?}");
     }
 }

@@ -57,7 +57,6 @@ fn the_page_prints_the_torque_limits() {
             word(&on_a),
             cells.join(" | ")
         );
-        println!("{row}");
         table += &(row + "\n");
         if name == "dissertation" {
             let (_, high) = limit(name, &["sequence.flux=high"]);

@@ -186,7 +186,6 @@ fn the_loss_of_the_saliency_is_told(seed: u64) {
     // Under torque it is detected at once, before the angle is wrong.
     for (mode, reference, load) in [("torque", 2.0, "locked"), ("speed", 150.0, "free 0.4")] {
         let (off, largest) = until_off(&mut running(seed, mode, reference, load), 1000);
-        println!("{seed}, {mode}, {load}: {off:?} ms, {largest:.0} deg");
         assert!(off.is_some_and(|ms| ms <= 50) && largest < 20.0, "{off:?}, {largest}");
     }
     // If the shaft is held at rest against a load, it slips away first.

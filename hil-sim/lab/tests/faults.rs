@@ -212,6 +212,5 @@ fn any_bits_leave_it_finite_and_it_comes_back() {
         rls.step(single(v), single(i));
     }
     let error = f64::from(rls.latest()[0].im) / H - machine.delta(H).g1.im / H;
-    println!("{error} rad/s after 1 s");
     assert!(rls.is_valid() && error.abs() < 0.1, "{error}");
 }

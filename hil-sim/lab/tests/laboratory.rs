@@ -72,7 +72,6 @@ fn the_leak_turns_with_the_current_and_the_flux_does_not() {
     let [held, slow] = gains(DemodulatorKind::Synchronous, 2.0);
     let cos_2_gamma = (4.0 - 0.49) / (4.0 + 0.49);
     let fast = 2.0 * (0.035 + 0.036 * 4.49_f64.sqrt() * cos_2_gamma);
-    println!("held {held} of {fast}, slow {slow} of 0.07");
     assert!((held / fast - 1.0).abs() < 0.2, "{held} {fast}");
     assert!((slow / 0.07 - 1.0).abs() < 0.25, "{slow}");
 }

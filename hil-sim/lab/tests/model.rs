@@ -137,7 +137,6 @@ fn a2_least_squares_on_clean_data_is_exact_and_complex_equals_real() {
                 let complex = complex.delta.current_voltage().array();
                 let worst = std::iter::zip(complex, real).map(|(c, r)| (c - r).abs());
                 let worst = worst.fold(0.0, f64::max);
-                println!("{} {h} {signal:?} {worst:.1e}", machine.omega_m);
                 assert!(worst < 1e-12, "{machine:?} {h} {signal:?}: {worst:e}");
             }
         }
@@ -182,7 +181,6 @@ fn a3_model_d_is_the_exact_inverse() {
         {
             let errors = percent(&model_d(&coefficients.delta(), h), &machine);
             let worst = errors.iter().fold(0.0f64, |worst, e| worst.max(1e-2 * e.abs()));
-            println!("{} {h}: {worst:.1e}", machine.omega_m);
             assert!(worst < bound, "{machine:?} {h}: {worst:e}");
         }
         let r_s = dc_resistance(&machine.delta(h));
@@ -211,7 +209,6 @@ fn a4_model_b_inverts_equation_32_and_c_takes_the_minus_root() {
         let [plus, minus] = time_constant_roots(u, fd, h).unwrap();
         let tau_r = model_c(&delta, h).tau_r.unwrap();
         assert!((tau_r / minus - 1.0).abs() < 1e-12);
-        println!("{} {h}: {} h", omega_m, plus / h);
         assert!((plus / h - 0.5).abs() < 0.1, "{}", plus / h);
     }
 }

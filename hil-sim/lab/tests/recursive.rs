@@ -209,12 +209,6 @@ fn r2_the_plain_recursion_fails() {
                 lost[1] = lost[1].or(Some(n));
             }
         }
-        println!(
-            "{} {speed}: P lost its sign at {lost:?}, {} {}",
-            signal.name(),
-            single.is_finite(),
-            double.is_finite()
-        );
         assert!(lost[0].is_some_and(|n| n < RATE), "f32 must fail: {lost:?}");
         assert!(lost[1].is_some_and(|n| n < 3 * RATE), "f64 must fail, later: {lost:?}");
     }

@@ -36,7 +36,6 @@ fn s1_speed_below_half_a_percent_and_better_than_c_on_every_parameter() {
         for speed in [375.0, 61.0] {
             for h in PERIODS {
                 let sums = errors(Parameters::PX.at(speed), signal, h);
-                println!("{signal:?} {speed} {h} C {:.2?} S {:.2?}", sums[0], sums[1]);
                 for (mean, sum) in means.iter_mut().flatten().zip(sums.iter().flatten()) {
                     *mean += sum / 12.0;
                 }
@@ -46,7 +45,6 @@ fn s1_speed_below_half_a_percent_and_better_than_c_on_every_parameter() {
             }
         }
     }
-    println!("C {:.2?} S {:.2?}", means[0], means[1]);
     for (c, s) in means[0].iter().zip(means[1]) {
         assert!(s < *c, "{means:?}");
     }
@@ -105,7 +103,6 @@ fn clean_data_give_the_machine_and_standstill_is_no_exception() {
         let trial = Trial::printed(machine, Signal::Schroeder, 100e-6, Noise::NONE);
         let regression = trial.run(1, 0).regression().expect("excited");
         let fit = model_s(&regression, 100e-6).expect("converges").parameters;
-        println!("{fit:?}");
         for (found, truth) in fit.array()[..4].iter().zip(machine.array()) {
             assert!((found / truth - 1.0).abs() < 1e-6, "{fit:?}");
         }

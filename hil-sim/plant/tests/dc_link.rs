@@ -67,7 +67,6 @@ fn no_energy_is_lost_or_made_between_shaft_and_capacitor() {
             highest = highest.max(plant.dc_link());
         }
         let (found, spent) = (stored(&plant, &s), first - expected);
-        println!("{spent:.2} J spent, {:.4} J missing, highest {highest:.0} V", found - expected);
         // The sums use the trapezoidal rule at the PWM rate: 0.1 % of the energy that flows.
         near(found - expected, 0.0, 0.001 * spent);
         let last = plant.dc_link();

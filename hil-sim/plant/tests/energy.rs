@@ -77,11 +77,9 @@ fn no_term_makes_energy() {
         let r = family(name);
         assert!(!r.conservative() && ALL.conservative());
         let (lost, fed) = missing(&r, 16);
-        println!("{name}, teeth on the rotor flux: {lost:.4} of {fed:.2} J");
         assert!(lost.abs() > 1e-4 * fed && lost.abs() < 0.05 * fed, "{lost} of {fed} J");
     }
     let (lost, fed) = missing(&family("gl"), 16);
-    println!("leakages that saturate to half: {lost:e} of {fed:.2} J");
     assert!(lost.abs() < 1e-5 * fed, "{lost} of {fed} J");
 }
 
@@ -119,7 +117,6 @@ fn a_linear_motor_is_the_equivalent_circuit() {
         let turned = x.current() * Complex::cis(-TAU * hz * f64::from(steps) * h);
         let (i, torque) = circuit(&iron, v, hz, slip);
         let found = motor.machine.torque(x);
-        println!("{turned} for {i} A, {found} for {torque} Nm");
         assert!((turned - i).norm() < 1e-4 * i.norm(), "{turned} for {i} A");
         assert!((found / torque - 1.0).abs() < 1e-4, "{found} for {torque} Nm");
     }
@@ -150,7 +147,6 @@ fn a_linear_motor_has_no_saliency() {
     let saliency = (across - along).norm() / (across + along).norm();
     let sigma_ls = M.lls + M.lm - M.lm * M.lm / (M.lm + M.llr);
     let found = along.im / (TAU * 600.0);
-    println!("{found} for {sigma_ls} H, saliency {saliency:e}");
     assert!(saliency < 1e-12, "{saliency:e}");
     // The tolerance covers the staircase of 400 steps a cycle and the rest of the transient.
     assert!((found / sigma_ls - 1.0).abs() < 1e-3, "{found} for {sigma_ls} H");
@@ -187,7 +183,6 @@ fn linear_iron_is_model_a_without_saliency() {
         let b = run(&PlantSettings { iron, inverter, substeps: 8, ..textbook }, 1500);
         // With the outputs off, the last currents are exactly zero in both.
         assert_eq!(a.last(), b.last());
-        println!("switched {switched}: {:e} A", worst(&a, &b));
         assert!(worst(&a, &b) < 2e-6, "{:e} A", worst(&a, &b));
     }
 }
@@ -210,7 +205,6 @@ fn two_steps_a_period_are_enough() {
         };
         let exact = on(64);
         let errors = [2, 4, 8].map(|substeps| worst(&on(substeps), &exact));
-        println!("2, 4, 8 steps: {errors:?} A from 64");
         // An error of fourth order leaves 1/256; with a missing rate it is of first order and leaves a quarter.
         assert!(errors[0] < 5e-5 && errors[2] < 0.02 * errors[0], "{errors:?}");
     }

@@ -35,7 +35,6 @@ fn averaged_and_switched_agree_on_the_mean_voltage() {
     ] {
         let (i, v) = settled(averaged, d);
         let (i_switched, v_switched) = settled(switched, d);
-        println!("{d:?}: {i:.4} A {v:.5} V, switched {i_switched:.4} A {v_switched:.5} V");
         assert!(phases(i).iter().all(|i| i.abs() > 0.1), "{i}: phases well off zero");
         // The edges are the same, and all currents keep their sign through the ripple: only rounding remains.
         assert!((v - v_switched).norm() < 1e-6, "{d:?}: {v} against {v_switched}");
@@ -139,7 +138,6 @@ fn two_substeps_are_enough() {
     let fine = PlantSettings { substeps: 24, ..coarse };
     let worst = worst_difference(&coarse, &fine);
     let one = worst_difference(&PlantSettings { substeps: 1, ..coarse }, &fine);
-    println!("against 24 substeps: {worst:.1e} A with 2, {one:.1e} A with 1");
     // The difference is far below the ADC's 2.2 mA. It comes from a kink that is crossed slightly off the predicted
     // instant, and from the fifth order of 5570 rad/s (the slope of the smoothed sign) times T/2.
     assert!(worst < 1e-5, "{worst:e} A");
@@ -153,7 +151,6 @@ fn averaged_and_switched_currents_stay_together() {
     let mut switched = averaged;
     switched.inverter.switched = true;
     let worst = worst_difference(&averaged, &switched);
-    println!("averaged and switched: {worst:.1e} A apart at most");
     // When a current passes zero the two differ by up to the dead-time error, because its sign then depends on the
     // ripple, which the average does not contain.
     assert!(worst < 0.1, "{worst} A");

@@ -94,7 +94,6 @@ fn agrees_with_the_matrix_exponential() {
         assert!(fine < 1e-10, "{rpm} rpm, 16 substeps: {fine:e}");
         // With the default of two substeps the error is 8^4 = 4096 times as large.
         let coarse = worst_error(rpm, 2);
-        println!("{rpm} rpm: {fine:.1e} with 16 substeps, {coarse:.1e} with 2");
         assert!(coarse < 5e-8, "{rpm} rpm, 2 substeps: {coarse:e}");
     }
 }
@@ -173,7 +172,6 @@ fn energy_balances_over_a_start() {
     let stored = 0.75 * ((x.i.conj() * stator_flux).re + (i_r.conj() * x.psi).re);
     let kinetic = 0.5 * shaft.inertia * motor.state.speed.powi(2);
     let error = (delivered - stored - kinetic) / kinetic;
-    println!("{delivered:.6} J delivered, {stored:.6} stored, {kinetic:.6} kinetic: {error:.1e}");
     // The error of the trapezoidal rule is (300 rad/s * 3.3 us)^2/12 = 8e-8 of the power, which is several times the
     // power that becomes kinetic.
     assert!(motor.state.speed > 30.0 && error.abs() < 1e-6, "{error:e}");

@@ -130,7 +130,6 @@ fn outputs_off_is_a_bridge_of_diodes() {
             worst = worst.max(worst_against_soft_diodes(&mut plant, 200));
         }
     }
-    println!("ideal and soft diodes: {worst:.1e} A apart at most");
     // The soft diodes carry up to 1 mA in each phase when the ideal ones carry none, and switch correspondingly later.
     assert!(worst < 3e-3, "{worst} A");
 }

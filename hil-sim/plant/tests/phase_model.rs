@@ -131,11 +131,6 @@ fn agrees_with_the_six_phase_equations() {
         let torque = reference.torque(&i, reference.angle);
         torque_error = torque_error.max((motor.machine.torque(x) - torque).abs());
     }
-    println!(
-        "up to {largest:.1} A, {:.1} rad/s: errors {i_error:.1e} A, {psi_error:.1e} Wb, \
-         {speed_error:.1e} rad/s, {torque_error:.1e} N m",
-        motor.state.speed
-    );
     assert!(motor.state.speed > 20.0, "it should have started: {}", motor.state.speed);
     // The midpoint rule has a phase error of (w h)^2/24 per radian of an oscillation. With w = 130 rad/s in the
     // rotating windings and h = 4 us that is 1e-8; over 40 rad and at 11 A, 5e-6 A. The 600 Hz of 0.26 A and the

@@ -52,7 +52,6 @@ fn textbook_machine_has_its_impedance_at_600_hz() {
     let rotor = j_omega * 0.0276 + 1.1;
     let z = j_omega * 0.0276 + 5.4 + magnetising * rotor / (magnetising + rotor);
     let expected = 50.0 / z;
-    println!("{:.4} A, expected {:.4} A", along.norm(), expected.norm());
     // The staircase of 50 steps a cycle has sinc(1/50) = 0.99934 of the fundamental.
     assert!((along / expected - 1.0).norm() < 2e-3, "{along} instead of {expected}");
     assert!((along.norm() - 0.258).abs() < 1e-3, "{} A", along.norm());
@@ -95,7 +94,6 @@ fn chi_is_the_resistive_saliency_of_eq_3_8() {
     // Halfway between the axes: half of rr (Lm/Lr)^2 against Omega sigma Ls, in quadrature.
     let omega_sigma_ls = TAU * FREQUENCY * (0.2047 - 0.1771 * 0.1771 / 0.2047);
     let expected = 0.5 * 1.1 * (0.1771f64 / 0.2047).powi(2) / omega_sigma_ls;
-    println!("quadrature {quadrature:.5}, expected {expected:.5}");
     // The split at 60 Hz rotates it by atan(60/600) = 6 degrees and reduces it by 1 %.
     assert!((quadrature.im.abs() / expected - 1.0).abs() < 0.03, "{quadrature}");
     assert!(quadrature.re.abs() < 0.15 * expected, "{quadrature}");
