@@ -1,7 +1,7 @@
 //! Procedure: the sensors drift after the self-commissioning. The next start measures by how much they differ, so that torque at
 //! standstill has the right angle.
 
-use crate::common::{Rig, config};
+use crate::common::{Rig, angle_error, config};
 use drive_core::{Command, Fault, Mode, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Load, Plant};
@@ -23,10 +23,9 @@ fn mean_error(changes: &[&str], i_q: f32) -> f64 {
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(i_q)).unwrap();
     rig.wait(2.0);
-    let (mut sum, mut points) = (0.0, 0.0);
-    rig.run(1.0, |point| (sum, points) = (sum + point.angle_error_deg, points + 1.0));
+    let error = angle_error(&mut rig, 1.0);
     assert_eq!(rig.drive.state(), State::Torque, "{changes:?}");
-    sum / points
+    error.mean()
 }
 
 /// If it is not measured, a gain that is 2 % higher stops the drive by fault 26.

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
-use crate::common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
+use crate::common::{IDEAL, ISOTROPIC, all, angle_error, beside_encoder, config, regulating};
 use drive_core::carrier::{CarrierPeriod, CarrierSample};
 use drive_core::printed::{Demodulate, Literal, Rectified};
 use drive_core::{AlphaBeta, Angle};
@@ -165,8 +165,7 @@ fn the_printed_chain_cannot_track() {
     let changes = ["injection.demodulator=literal", "limits.unexplained_v=300"];
     let config = config(&all(&[&IDEAL, &changes]));
     let mut rig = regulating(&config, 1, 1.0, 0.5);
-    let mut worst = 0.0_f64;
-    rig.run(3.0, |p| worst = worst.max(p.angle_error_deg.abs()));
+    let worst = angle_error(&mut rig, 3.0).largest();
     // A chain that tracks stays within 13 degrees.
     assert!(worst > 30.0, "{worst} deg: the printed chain held the angle");
 }

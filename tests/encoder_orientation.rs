@@ -3,7 +3,7 @@
 
 use crate::common::{IDEAL, ISOTROPIC, all, config, regulating_with};
 use hil_sim::config::plant_settings;
-use hil_sim::stats::Stats;
+use hil_sim::rig::Point;
 
 /// Largest flux angle error (degrees) and largest relative torque error at one speed.
 fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
@@ -16,12 +16,9 @@ fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
     let (mut worst, mut torque_error) = (0.0_f64, 0.0_f64);
     for i_q in [-2.0, 1.0, 2.0] {
         let mut rig = regulating_with(&plant_settings(&config), &drive, 1, i_q, 1.0);
-        let (mut error, mut ratio) = (Stats::default(), Stats::default());
-        rig.run(0.2, |p| {
-            error.push(p.angle_error_deg);
-            // Factor 3/2 P (Lm/Lr) psi i_q.
-            ratio.push(p.torque / (p.torque_per_flux_ampere * p.flux * f64::from(i_q)));
-        });
+        // Factor 3/2 P (Lm/Lr) psi i_q.
+        let ideal = |p: &Point| p.torque_per_flux_ampere * p.flux * f64::from(i_q);
+        let [error, ratio] = rig.stats(0.2, |p| [p.angle_error_deg, p.torque / ideal(p)]);
         worst = worst.max(error.largest());
         torque_error = torque_error.max((ratio.mean() - 1.0).abs());
     }

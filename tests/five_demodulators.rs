@@ -1,7 +1,7 @@
 //! Procedure: five demodulations on one motor. The tests compare their signals, the axes of their injection, and their tracking without a
 //! position sensor.
 
-use crate::common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
+use crate::common::{ISOTROPIC, all, angle_error, beside_encoder, config, regulating_with};
 use drive_core::Command;
 use drive_core::printed::DemodulatorKind;
 use drive_settings::{Settings, SettingsError};
@@ -9,7 +9,7 @@ use hil_sim::config::plant_settings;
 use hil_sim::config::{Config, LoadMode};
 use hil_sim::experiments::learning;
 use hil_sim::plant::{Load, PlantSettings};
-use hil_sim::rig::{RATE_HZ, Rig};
+use hil_sim::rig::Rig;
 
 /// Name, and the ratio of its signal to the rectified chain's, by the gains of the filters and of the detector.
 const ALL: [(&str, f64); 5] = [
@@ -30,9 +30,8 @@ fn demodulating(name: &str, parts: &[&[&'static str]], iq: f32) -> Rig {
 
 /// Mean signal over half a second.
 fn signal(rig: &mut Rig) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    rig.run(0.5, |p| (sum, count) = (sum + p.signal(), count + 1.0));
-    sum / count
+    let [signal] = rig.stats(0.5, |p| [p.signal()]);
+    signal.mean()
 }
 
 /// The literal chain gives the same signal without saliency. The others give next to nothing, and respond to a rotation of the axis in
@@ -112,12 +111,8 @@ fn bring_to(rig: &mut Rig, rpm: f64) {
 
 /// Rms and largest angle error of a second, degrees.
 fn error(rig: &mut Rig) -> (f64, f64) {
-    let (mut squares, mut worst) = (0.0, 0.0_f64);
-    rig.run(1.0, |p| {
-        squares += p.angle_error_deg.powi(2);
-        worst = worst.max(p.angle_error_deg.abs());
-    });
-    ((squares / RATE_HZ).sqrt(), worst)
+    let error = angle_error(rig, 1.0);
+    (error.rms(), error.largest())
 }
 
 /// Each chain has a learned saliency offset and, except for the synchronous one, the same PII controller: 2.5° rms and 9° (the limits for

@@ -1,12 +1,13 @@
 //! Procedure: the drive learns the saliency of its motor with the shaft locked, then drives it.
 
-use crate::common::{all, config, run};
+use crate::common::{all, angle_error, config, run};
 use drive_core::learned::Learned;
 use drive_core::table::ReferenceTable;
 use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::experiments::learning;
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
+use hil_sim::stats::Stats;
 
 fn learned(changes: &[&str], seed: u64) -> Learned {
     let learned = learning::learned(&config(changes), seed).unwrap();
@@ -111,20 +112,16 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
     for seed in 1..=2 {
         let mut rig = Rig::from_config(&config(&changes), seed).unwrap();
         rig.learn().unwrap();
-        let (mut squares, mut count, mut largest) = (0.0, 0.0, 0.0_f64);
+        let mut error = Stats::default();
         for i_q in [1.0, 2.0, 3.0, -0.75, -1.5, -2.5] {
             rig.start(Mode::Torque).unwrap();
             rig.command(&Command::Torque(i_q)).unwrap();
             rig.wait(1.0);
-            rig.run(1.0, |p| {
-                squares += p.angle_error_deg.powi(2);
-                count += 1.0;
-                largest = largest.max(p.angle_error_deg.abs());
-            });
+            error.add(&angle_error(&mut rig, 1.0));
             rig.command(&Command::Stop(Stop::Coast)).unwrap();
             rig.wait(1.5); // until the flux has decayed
         }
-        let rms: f64 = (squares / count).sqrt();
+        let (rms, largest) = (error.rms(), error.largest());
         assert!(rms <= 2.5 && largest <= 9.0, "{rms} {largest}");
     }
 }

@@ -1,8 +1,7 @@
 //! Procedure: throw the sensorless drive off its flux, and check that it detects this; check that it does not stop a healthy one.
 
-use crate::common::{config, regulating, run};
+use crate::common::{angle_error, config, regulating, run};
 use drive_core::{Command, Fault, Mode, State};
-use hil_sim::rig::Rig;
 
 /// A part of the runs of `cargo sim run lock-monitor --set runs=1000`.
 #[test]
@@ -35,13 +34,6 @@ fn without_the_monitor_a_false_lock_stays() {
     assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");
 }
 
-/// Largest angle error of the next second, degrees.
-fn worst(rig: &mut Rig) -> f64 {
-    let mut worst = 0.0_f64;
-    rig.run(1.0, |p| worst = worst.max(p.angle_error_deg.abs()));
-    worst
-}
-
 #[test]
 fn a_lost_lock_is_found_again_after_a_clear_and_a_start() {
     for (seed, i_q) in [(1, 1.0), (2, -2.0), (3, 0.5)] {
@@ -53,7 +45,7 @@ fn a_lost_lock_is_found_again_after_a_clear_and_a_start() {
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(i_q)).unwrap();
         rig.wait(0.5);
-        let worst = worst(&mut rig);
+        let worst = angle_error(&mut rig, 1.0).largest();
         assert!(worst < 12.0, "seed {seed}: {worst}");
     }
 }
@@ -81,7 +73,7 @@ fn a_relock_on_request_goes_on_without_torque() {
         assert!(deviation.abs() < 0.05, "seed {seed}: {deviation}");
         rig.command(&Command::Torque(i_q)).unwrap();
         rig.wait(0.5);
-        let worst = worst(&mut rig);
+        let worst = angle_error(&mut rig, 1.0).largest();
         assert!(worst < 12.0, "seed {seed}: {worst}");
     }
 }
@@ -91,7 +83,7 @@ fn a_relock_on_request_goes_on_without_torque() {
 fn a_carrier_that_does_not_fit_is_made_smaller_and_the_angle_stays_right() {
     let low = config(&["inverter.vdc=203", "injection.amplitude_v=103"]);
     let mut rig = regulating(&low, 6, 2.5, 1.0);
-    let worst = worst(&mut rig);
+    let worst = angle_error(&mut rig, 1.0).largest();
     let share = rig.drive.telemetry().carrier_share;
     assert_eq!(rig.drive.state(), State::Torque);
     assert!(share < 1.0 && share > 0.8, "{share}");

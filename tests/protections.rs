@@ -1,7 +1,7 @@
 //! Procedure: break a sensor while the motor runs. The drive must switch off before the current in any phase leaves the range of the
 //! sensors, and must not switch off without reason.
 
-use crate::common::{config, regulating};
+use crate::common::{angle_error, config, regulating};
 use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::plant::{Channel, CurrentFault, EncoderFault, Load};
 use hil_sim::rig::Rig;
@@ -122,7 +122,6 @@ fn a_cleared_drive_works_again() {
     rig.start(Mode::Torque).unwrap();
     rig.command(&Command::Torque(1.5)).unwrap();
     rig.wait(0.5);
-    let mut worst = 0.0_f64;
-    rig.run(0.5, |p| worst = worst.max(p.angle_error_deg.abs()));
+    let worst = angle_error(&mut rig, 0.5).largest();
     assert!(worst < 16.0, "{worst}");
 }

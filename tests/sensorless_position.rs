@@ -24,15 +24,12 @@ fn a_step_arrives_without_an_encoder() {
         let mut rig = started(&config(&["load.mode=free"]), seed);
         let origin = degrees(&rig);
         rig.command(&Command::Position(turns as f32)).unwrap();
-        let (mut furthest, mut angle) = (0.0_f64, 0.0_f64);
-        rig.run(5.0, |p| {
-            furthest = furthest.max(p.turns.abs() * 360.0);
-            angle = angle.max(p.angle_error_deg.abs());
-        });
+        let [way, angle] =
+            rig.stats(5.0, |p| [p.turns * 360.0, p.angle_error_deg]).map(|of| of.largest());
         let error = degrees(&rig) - origin - turns * 360.0;
         // Error of the slip while the motor accelerates: noise of the angle, integrated.
         assert!(error.abs() < 35.0, "{turns} turns: {error} degrees off");
-        assert!(furthest < turns.abs() * 360.0 + 40.0, "{turns}: {furthest}");
+        assert!(way < turns.abs() * 360.0 + 40.0, "{turns}: {way}");
         assert!(angle < 14.0, "{turns}: {angle}");
         assert_eq!(rig.drive.state(), State::Position);
     }
@@ -65,12 +62,8 @@ fn under_load_the_drift_is_the_error_of_the_slip() {
         rig.set_load(Load::Free { torque: 0.3 }).unwrap();
         rig.wait(2.0);
         let before = degrees(&rig);
-        let (mut i_q, mut n) = (0.0, 0.0);
-        rig.run(10.0, |p| {
-            i_q += p.iq;
-            n += 1.0;
-        });
-        (degrees(&rig) - before, i_q / n)
+        let [i_q] = rig.stats(10.0, |p| [p.iq]);
+        (degrees(&rig) - before, i_q.mean())
     };
     let (known, _) = drift(1.0, 5);
     let (wrong, i_q) = drift(1.1, 6);

@@ -21,14 +21,8 @@ const FREE: &str = "load.mode=free";
 
 /// Mean and largest deviation of the true speed, rpm, and the largest angle error, degrees.
 fn watch(rig: &mut Rig, rpm: f64, seconds: f64) -> (f64, f64, f64) {
-    let (mut sum, mut most, mut angle, mut n) = (0.0, 0.0_f64, 0.0_f64, 0.0);
-    rig.run(seconds, |p| {
-        sum += p.speed_rpm - rpm;
-        most = most.max((p.speed_rpm - rpm).abs());
-        angle = angle.max(p.angle_error_deg.abs());
-        n += 1.0;
-    });
-    (sum / n, most, angle)
+    let [speed, angle] = rig.stats(seconds, |p| [p.speed_rpm - rpm, p.angle_error_deg]);
+    (speed.mean(), speed.largest(), angle.largest())
 }
 
 #[test]

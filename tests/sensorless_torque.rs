@@ -119,14 +119,9 @@ fn torque_is_linear_in_the_current_and_does_not_drift() {
         let mut rig = crate::common::regulating(&config(&[]), 31, i_q, 1.5);
         let (mut torque, mut angle) = (vec![], vec![]);
         for _ in 0..4 {
-            let (mut t, mut a, mut n) = (0.0, 0.0, 0.0);
-            rig.run(2.0, |p| {
-                t += p.torque;
-                a += p.angle_error_deg;
-                n += 1.0;
-            });
-            torque.push(t / n);
-            angle.push(a / n);
+            let [t, a] = rig.stats(2.0, |p| [p.torque, p.angle_error_deg]);
+            torque.push(t.mean());
+            angle.push(a.mean());
         }
         for a in &angle {
             assert!((a - angle[0]).abs() <= 1.3, "{i_q} A: {a}");

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::common::angle_error;
 use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::Config;
 use hil_sim::experiments::{self, full_range::for_the_range};
@@ -68,9 +69,8 @@ fn on_iron_a_start_on_a_turning_shaft_is_not_taken_for_a_lost_lock() {
         rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).unwrap();
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(torque)).unwrap();
-        let mut largest = 0.0_f64;
         rig.wait(0.5);
-        rig.run(1.5, |p| largest = largest.max(p.angle_error_deg.abs()));
+        let largest = angle_error(&mut rig, 1.5).largest();
         assert_eq!(rig.drive.state(), State::Torque);
         assert!(largest < 15.0, "{largest}");
     }

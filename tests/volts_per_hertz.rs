@@ -34,11 +34,8 @@ fn turning(config: &Config, rpm: f64, seed: u64) -> Rig {
 
 /// Mean speed, rpm, and largest current, A, over a second.
 fn seen(rig: &mut Rig) -> (f64, f64) {
-    let (mut sum, mut n, mut peak) = (0.0, 0.0, 0.0_f64);
-    rig.run(1.0, |p| {
-        (sum, n, peak) = (sum + p.speed_rpm, n + 1.0, peak.max(p.current));
-    });
-    (sum / n, peak)
+    let [speed, current] = rig.stats(1.0, |p| [p.speed_rpm, p.current]);
+    (speed.mean(), current.largest())
 }
 
 /// Half the rated speed, with and without a third of the rated torque, in both directions. Without load the slip is caused by friction;

@@ -5,6 +5,7 @@ use drive_settings::Settings;
 pub use hil_sim::config::plant_settings;
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::Rig;
+use hil_sim::stats::Stats;
 use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
@@ -43,6 +44,12 @@ pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
 /// A drive that regulates torque by the encoder, with the shaft locked and the injection running beside it.
 pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     Rig::oriented(config, seed, i_q.into(), settle).unwrap()
+}
+
+/// Statistics of the angle error in the next seconds, degrees.
+pub fn angle_error(rig: &mut Rig, seconds: f64) -> Stats {
+    let [error] = rig.stats(seconds, |p| [p.angle_error_deg]);
+    error
 }
 
 /// A drive that regulates torque, from settings.
