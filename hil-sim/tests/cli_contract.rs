@@ -107,40 +107,6 @@ fn a_lost_run_names_its_fault_and_prints_no_nan() {
 }
 
 #[test]
-fn user_errors_say_what_is_allowed_and_write_nothing() {
-    let folder = folder("errors");
-    std::fs::write(folder.join("bad.toml"), "[motor]\nrs = \"5.4\"\n").unwrap();
-    std::fs::write(folder.join("broken.toml"), "[motor\n").unwrap();
-    let cases: [(&[&str], &[&str]); 11] = [
-        (&["run", "filter"], &["`filter`", "did you mean `filters`?"]),
-        (
-            &["run", "filters", "--set", "motor.r_x=5"],
-            &["`motor.r_x`", "did you mean `motor.r_r`?"],
-        ),
-        (&["run", "filters", "--set", "motor.r_s=-1"], &["motor.r_s = -1", "0.0001 to 1000 ohm"]),
-        (
-            &["run", "filters", "--set", "motor.r_s=inf"],
-            &["motor.r_s = inf", "not a finite number"],
-        ),
-        (&["run", "filters", "--set", "load.mode=sideways"], &["sideways", "locked, free, speed"]),
-        (&["run", "filters", "--set", "motor.rs"], &["KEY=VALUE"]),
-        (&["run", "filters", "--seconds", "-1"], &["seconds = -1", "0.001 to 3600 s"]),
-        (&["run", "filters", "--seed", "-1"], &["--seed"]),
-        (&["run", "filters", "--config", "bad.toml"], &["motor.r_s = 5.4", "not a number"]),
-        (&["run", "filters", "--config", "broken.toml"], &["broken.toml", "line 1"]),
-        (&["report", "--config", "missing.toml"], &["missing.toml"]),
-    ];
-    for (arguments, expected) in cases {
-        let output = hil_sim(&folder, arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        assert!(expected.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
-        assert!(output.stdout.is_empty(), "{arguments:?}");
-    }
-    assert_eq!(files(&folder).len(), 2, "no output folder: {:?}", files(&folder));
-}
-
-#[test]
 fn a_page_that_cannot_be_written_is_a_failure_of_its_own() {
     let folder = folder("unwritable");
     std::fs::write(folder.join("taken"), "a file").unwrap();

@@ -1,53 +1,9 @@
-//! Every command that a document shows either runs, or is in a list with the reason why it does not.
+//! Every command that a document shows either runs, or is in `shown_commands.txt` with the reason why it does not.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::cli_common::{folder, hil_sim, text};
-
-/// Commands that are not run here, by their beginning, and the reason. The longest matching beginning applies.
-const ELSEWHERE: [(&str, &str); 37] = [
-    ("cargo xtask test", "runs this"),
-    ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
-    ("cargo xtask flash", "needs a board"),
-    ("cargo xtask campaign", "`cargo xtask test` injects a twentieth"),
-    ("cargo firmware", "`cargo xtask test` builds it"),
-    ("cargo install probe-rs-tools", "needs a board"),
-    ("cargo bench", "measures; minutes"),
-    ("cargo test", "`cargo xtask test` runs all tests"),
-    ("cargo clippy", "`cargo xtask test` runs it"),
-    ("cargo fmt", "`cargo xtask test` checks the format"),
-    ("cargo run -p induction-drive-core", "compiled by `cargo xtask test`; run by a person"),
-    ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
-    ("cargo sim console", "needs a port; its protocol is tested"),
-    ("cargo sim update", "needs a port; a test of the virtual board updates it"),
-    ("cargo sim passport", "needs a port; a test makes one from the console"),
-    ("cargo sim first-light", "needs a port; a test of the virtual board walks through it"),
-    ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
-    ("cargo sim completion", "prints a script"),
-    ("cargo sim run NAME", "a placeholder"),
-    ("cargo sim run GROUP", "a placeholder"),
-    ("cargo sim run lock-monitor --set runs", "long proof"),
-    ("cargo sim run monte-carlo --set runs=1000", "long proof"),
-    ("cargo sim run machines --set", "long proof"),
-    (
-        "cargo sim run battery --plant r --set flux_level=high --set sequence.flux=high --set prepare.learn=yes --set battery.runs=dragged",
-        "long; fails for the runs with undetected errors",
-    ),
-    ("cargo sim run commission --set runs", "a file of results/; minutes"),
-    ("cargo sim run foreign-motors", "a file of results/; minutes"),
-    ("cargo sim run full-range", "a file of results/; minutes"),
-    ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
-    ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
-    ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
-    ("cargo sim run FILE.toml", "a placeholder"),
-    ("cargo sim run profile --input", "a test runs it with the file of the examples"),
-    ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
-    ("cargo sim run measured-start --input", "a file of the reader's; a test runs it with a start"),
-    ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
-    ("cargo flash", "named to be avoided"),
-    ("cargo build", "named to be avoided: `cargo firmware` puts the check sum in"),
-];
 
 /// Documents whose Rust code is compiled and run: doctests of the control crates and `motor-plant`, a test of `hil-sim`.
 const RUST: [&str; 5] = [
@@ -115,13 +71,16 @@ fn commands_of_the_documents_run() {
     assert!(wrong.is_empty() && ran > 20, "{ran} ran\n{}", wrong.join("\n"));
 }
 
-fn elsewhere(command: &str) -> Option<&'static (&'static str, &'static str)> {
+/// Returns the beginning of the command in the list of those that are not run, and the reason.
+fn elsewhere(command: &str) -> Option<(&'static str, &'static str)> {
     let fits = |begin: &str| {
         command
             .strip_prefix(begin)
             .is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric()))
     };
-    ELSEWHERE.iter().filter(|(begin, _)| fits(begin)).max_by_key(|(begin, _)| begin.len())
+    let lines = include_str!("shown_commands.txt").lines().filter(|line| !line.starts_with('#'));
+    let known = lines.filter_map(|line| line.split_once(" => "));
+    known.filter(|(begin, _)| fits(begin)).max_by_key(|(begin, _)| begin.len())
 }
 
 /// Returns the commands of a document: lines of code blocks and inline code that begin with `cargo`.
