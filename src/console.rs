@@ -10,7 +10,6 @@ mod announce;
 mod answer;
 pub mod grammar;
 pub mod handle;
-pub mod help;
 pub mod line;
 mod list;
 mod number;

@@ -68,8 +68,8 @@ fn words() -> Vec<&'static str> {
     let signals = SIGNALS.iter().map(|signal| signal.name);
     let others = "encoder injection learning again yes no synchronous rectified motor auto on above fault now check 00000000";
     let others = others.split(' ');
-    let words: Vec<_> =
-        COMMANDS.split(' ').chain(settings).chain(levels).chain(others).chain(signals).collect();
+    let words = COMMANDS.iter().copied();
+    let words: Vec<_> = words.chain(settings).chain(levels).chain(others).chain(signals).collect();
     assert!(words.len() <= 256, "{} words", words.len());
     words
 }

@@ -9,8 +9,8 @@ use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
 use super::Console;
+use super::grammar::{HELP, HELP_END};
 use super::handle::Firmware;
-use super::help::HELP;
 use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
@@ -65,7 +65,10 @@ impl Console {
             next
         };
         let written = match kind {
-            ListKind::Help => HELP.get(line).map(|text| say(text, next + 1)),
+            ListKind::Help => match HELP.get(line) {
+                Some((usage, text)) => Some(say(&format_args!("{usage:<24}  {text}"), next + 1)),
+                None => (line == HELP.len()).then(|| say(&HELP_END, next + 1)),
+            },
             ListKind::Settings(prefix) => setting_from(line, prefix)
                 .map(|(key, next)| say(&Setting::new(key, desk.settings()), next)),
             ListKind::Describe(prefix) => setting_from(line, prefix)

@@ -15,7 +15,7 @@ mod torque;
 mod typing;
 mod wrong;
 
-use super::help::HELP;
+use super::grammar::HELP;
 use super::*;
 use crate::boards;
 use crate::front::Front;

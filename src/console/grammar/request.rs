@@ -67,6 +67,12 @@ pub enum Request {
     Version,
 }
 
+impl From<Order> for Request {
+    fn from(order: Order) -> Self {
+        Self::Order(order)
+    }
+}
+
 /// Level of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {

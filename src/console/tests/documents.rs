@@ -2,8 +2,7 @@
 
 use std::fs;
 
-use super::grammar::parse;
-use super::help::HELP;
+use super::grammar::{HELP, parse};
 use crate::generated;
 
 /// A typed line follows `> ` in a block `console`.
@@ -28,10 +27,8 @@ fn every_line_of_the_pages_is_understood() {
 #[test]
 fn the_manual_lists_the_commands() {
     let mut table = "| command | effect |\n|---|---|\n".to_owned();
-    let (_, commands) = HELP.split_last().unwrap();
-    for line in commands {
-        let (usage, meaning) = line.split_once("  ").unwrap();
-        table += &format!("| `{}` | {} |\n", usage.replace('|', "\\|"), meaning.trim());
+    for (usage, meaning) in HELP {
+        table += &format!("| `{}` | {meaning} |\n", usage.trim_end().replace('|', "\\|"));
     }
     generated::check("console.md", "commands", &table);
 }

@@ -5,7 +5,7 @@ use crate::settings::staging::UNCONFIRMED;
 fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let mut talk = Talk::new();
     let help = talk.say("help\n");
-    assert_eq!((help.len(), help.last().unwrap().as_str()), (HELP.len() + 1, "ok"));
+    assert_eq!((help.len(), help.last().unwrap().as_str()), (HELP.len() + 2, "ok"));
     let all = talk.say("get\n");
     assert_eq!(all.len(), keys::COUNT + 1);
     let motor = talk.say("get motor\n");

@@ -12,7 +12,7 @@ use drive_settings::value::Words;
 
 use super::bus::Both;
 use super::*;
-use crate::console::grammar::COMMANDS;
+use crate::console::grammar::{COMMANDS, NUMBERS};
 use crate::desk::handle::DriveHandle as _;
 use crate::generated;
 use crate::link::trace::{self, SIGNALS, Sampled};
@@ -53,8 +53,7 @@ fn declared() -> Vec<Given> {
     ] {
         all.push(given("fault", why.code(), text));
     }
-    let commands = (1..).zip(COMMANDS.split(' ')).filter(|(_, word)| *word != "-");
-    all.extend(commands.map(|(n, word)| given("command", n, word)));
+    all.extend(NUMBERS.iter().zip(COMMANDS).map(|(n, word)| given("command", n, word)));
     all
 }
 

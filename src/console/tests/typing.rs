@@ -40,5 +40,5 @@ fn the_case_of_a_command_does_not_matter() {
     assert_eq!(talk.ask("REVERT"), "ok: 1 staged values dropped");
     assert_eq!(talk.ask("\x1b[A\tVersion"), "version");
     assert_eq!(talk.say("?\n"), talk.say("help\n"));
-    assert_eq!(talk.say("h\n").len(), HELP.len() + 1);
+    assert_eq!(talk.say("h\n").len(), HELP.len() + 2);
 }
