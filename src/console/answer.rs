@@ -4,9 +4,8 @@ use core::fmt;
 
 use drive_core::State;
 
-use super::grammar::Request;
+use super::grammar::{ListKind, Request};
 use super::handle::Firmware;
-use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
 use crate::desk::order::Reply;
@@ -24,14 +23,12 @@ impl Console {
         match request {
             Request::Order(order) => self.reply(&desk.order(Commander::Console, order, drive)),
             Request::Set(values) => self.reply(&desk.set(Commander::Console, &values, drive)),
-            Request::Help => self.begin(ListKind::Help),
+            Request::List(kind) => self.begin(kind),
             Request::Status => self.status(desk, drive),
             Request::Get(key) => {
                 let setting = reply::Setting::new(key, desk.settings());
                 self.out.answer(format_args!("{setting}; {}", key.help()));
             }
-            Request::List(prefix) => self.begin(ListKind::Settings(prefix)),
-            Request::Describe(prefix) => self.begin(ListKind::Describe(prefix)),
             Request::Backup => match desk.nothing_staged() {
                 Ok(()) => self.begin(ListKind::Backup),
                 Err(why) => self.error(&why),
@@ -46,7 +43,6 @@ impl Console {
             },
             Request::Restored(check) => self.restored(check, desk, drive),
             Request::Faults(fault) => self.faults(fault, drive),
-            Request::History => self.begin(ListKind::History),
             Request::Trace(plan) => self.trace(plan, desk, drive),
             Request::ShowTrace if drive.tracing() => self.error(&TRACING),
             Request::ShowTrace if self.traced.is_none() => self.error(&"no trace was recorded"),
@@ -62,7 +58,6 @@ impl Console {
                 self.stop_stream(drive);
                 self.stream_state();
             }
-            Request::Signals => self.begin(ListKind::Signals),
             Request::Baud(baud) => {
                 self.stop_stream(drive);
                 self.wire.wanted = baud;
@@ -72,7 +67,6 @@ impl Console {
                 drive.set_log_level(level);
                 self.ok();
             }
-            Request::Board => self.begin(ListKind::Board),
             Request::Version => {
                 let version = fmt::from_fn(|f| drive.version(f));
                 self.out.answer(format_args!("{version}"));

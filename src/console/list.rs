@@ -2,14 +2,13 @@
 
 use core::fmt;
 
-use drive_core::Fault;
 use drive_core::io::PERIOD_S;
 use drive_settings::Settings;
 use drive_settings::entry::Change;
 use drive_settings::value::Value;
 
 use super::Console;
-use super::grammar::{HELP, HELP_END};
+use super::grammar::{HELP, HELP_END, ListKind};
 use super::handle::Firmware;
 use super::number::Significant;
 use super::reply::{self, Description, Setting};
@@ -25,23 +24,6 @@ pub(super) struct List {
     pub kind: ListKind,
     /// Number of the next line, or of the next setting to look at.
     pub next: u16,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum ListKind {
-    Help,
-    /// The settings whose names begin with this text.
-    Settings(&'static str),
-    /// The same settings as JSON.
-    Describe(&'static str),
-    Backup,
-    Board,
-    Learned,
-    Fault(Fault),
-    History,
-    Trace,
-    /// The signals and the layout of a frame.
-    Signals,
 }
 
 /// Significant digits of a trace.

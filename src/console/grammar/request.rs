@@ -21,16 +21,12 @@ pub enum Request {
     Order(Order),
     /// Stage settings.
     Set(Assignments),
-    /// List all commands.
-    Help,
+    /// A reply of many lines.
+    List(ListKind),
     /// Show the state of the drive.
     Status,
     /// Show one setting.
     Get(Key),
-    /// List the settings whose names begin so.
-    List(&'static str),
-    /// List them as JSON.
-    Describe(&'static str),
     /// List the lines that restore settings and learned values.
     Backup,
     /// List the result of the last self-commissioning.
@@ -41,8 +37,6 @@ pub enum Request {
     Restored(u32),
     /// Show the latched fault and the last reset, or the text of a fault.
     Faults(Option<Fault>),
-    /// Show operating hours, starts and the last faults.
-    History,
     /// Record a trace.
     Trace(Plan),
     /// Print the last trace.
@@ -55,14 +49,10 @@ pub enum Request {
     StreamState,
     /// End the stream.
     EndStream,
-    /// List the signals and the layout of a frame as JSON.
-    Signals,
     /// Set the bits per second of the port.
     Baud(u32),
     /// Set how much is logged.
     Log(Level),
-    /// Show the board with its assumptions.
-    Board,
     /// Show the version of the firmware.
     Version,
 }
@@ -71,6 +61,37 @@ impl From<Order> for Request {
     fn from(order: Order) -> Self {
         Self::Order(order)
     }
+}
+
+impl From<ListKind> for Request {
+    fn from(kind: ListKind) -> Self {
+        Self::List(kind)
+    }
+}
+
+/// Kind of a list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ListKind {
+    /// All commands.
+    Help,
+    /// The settings whose names begin with this text.
+    Settings(&'static str),
+    /// The same settings as JSON.
+    Describe(&'static str),
+    /// The lines that restore settings and learned values.
+    Backup,
+    /// The board with its assumptions.
+    Board,
+    /// The result of the last self-commissioning.
+    Learned,
+    /// Causes and cure of a fault.
+    Fault(Fault),
+    /// Operating hours, starts and the last faults.
+    History,
+    /// The last trace.
+    Trace,
+    /// The signals and the layout of a frame.
+    Signals,
 }
 
 /// Level of the log.

@@ -31,8 +31,8 @@ fn commands_are_understood() {
     let two = ["i_q_a", "turns"];
     let now = Trigger::Now;
     let table = [
-        ("help", Request::Help),
-        ("?", Request::Help),
+        ("help", Request::List(ListKind::Help)),
+        ("?", Request::List(ListKind::Help)),
         ("  status\t", Request::Status),
         ("start", Request::Order(Order::Start(Mode::Torque))),
         ("start position", Request::Order(Order::Start(Mode::Position))),
@@ -55,10 +55,10 @@ fn commands_are_understood() {
         ),
         ("angle encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("set angle_source encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
-        ("get", Request::List("")),
-        ("get motor", Request::List("motor")),
+        ("get", Request::List(ListKind::Settings(""))),
+        ("get motor", Request::List(ListKind::Settings("motor"))),
         ("get motor.r_s", Request::Get(keys::find("motor.r_s").unwrap())),
-        ("describe limits.", Request::Describe("limits.")),
+        ("describe limits.", Request::List(ListKind::Describe("limits."))),
         ("set motor.r_s 5.5", assigned(&[("motor.r_s", Value::Number(5.5))])),
         (
             "set limits.trip_a auto motor.pole_pairs 3",
