@@ -27,12 +27,12 @@ impl Front {
         Self { desk, console, bus: Bus::default(), strip: Strip::default() }
     }
 
-    /// Runs one pass of the main loop. It takes seconds if controllers are designed; meanwhile the port `line` answers by itself.
-    /// `now_ms` wraps.
+    /// Runs one pass of the main loop. It takes seconds if controllers are designed; meanwhile the port `line` of the bus,
+    /// which a board may lack, answers by itself. `now_ms` wraps.
     pub fn pass(
         &mut self,
         port: &mut impl Port,
-        line: &mut impl modbus::Port,
+        mut line: Option<&mut impl modbus::Port>,
         wires: &mut impl strip::Port,
         drive: &mut impl Firmware,
         now_ms: u32,
@@ -42,12 +42,12 @@ impl Front {
         let [.., motor] = wires.codes();
         desk.read_motor(motor, drive, now_ms);
         console.poll(port, desk, drive, now_ms);
-        bus.serve(line, desk, drive, now_ms);
+        line.iter_mut().for_each(|line| bus.serve(*line, desk, drive, now_ms));
         strip.serve(wires, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {
-            line.set_busy(true);
+            line.iter_mut().for_each(|line| line.set_busy(true));
             desk.run_pending(drive, now_ms);
-            line.set_busy(false);
+            line.iter_mut().for_each(|line| line.set_busy(false));
         } else {
             desk.watch_silence(drive, now_ms);
         }

@@ -48,7 +48,7 @@ fn run(board: task::bring_up::Board) -> ! {
     front.console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        front.pass(&mut port, &mut line, &mut wires, supervisor, now_ms);
+        front.pass(&mut port, line.as_mut(), &mut wires, supervisor, now_ms);
         supervisor.feed_watchdog();
         // Sleeps until an interrupt. The sleep is at the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

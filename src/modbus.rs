@@ -35,22 +35,3 @@ pub trait Port {
     /// out.
     fn take_stop(&mut self) -> Option<Written>;
 }
-
-/// A board may have no bus.
-impl<P: Port> Port for Option<P> {
-    fn set_line(&mut self, settings: &Settings) {
-        self.iter_mut().for_each(|port| port.set_line(settings));
-    }
-    fn receive(&mut self) -> Option<Frame> {
-        self.as_mut().and_then(P::receive)
-    }
-    fn send(&mut self, frame: &Frame) {
-        self.iter_mut().for_each(|port| port.send(frame));
-    }
-    fn set_busy(&mut self, busy: bool) {
-        self.iter_mut().for_each(|port| port.set_busy(busy));
-    }
-    fn take_stop(&mut self) -> Option<Written> {
-        self.as_mut().and_then(P::take_stop)
-    }
-}

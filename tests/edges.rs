@@ -77,7 +77,7 @@ impl Stand {
             self.now_ms += 1;
             swap(&mut self.drive.drive, &mut self.rig.drive);
             let Self { front, port, bus, strip, drive, now_ms, .. } = self;
-            front.pass(port, bus, strip, drive, *now_ms);
+            front.pass(port, Some(bus), strip, drive, *now_ms);
             swap(&mut self.drive.drive, &mut self.rig.drive);
             for _ in 0..6 {
                 if self.hardware.is_empty() {

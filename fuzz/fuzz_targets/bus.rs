@@ -90,7 +90,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         let own = |front: &Front| front.desk.settings().in_force().bus.own();
         let before = own(&front);
-        front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
         port.received.clear();
         for answer in bus.iter_mut().flat_map(|bus| bus.answers.drain(..)) {
             assert!((5..=256).contains(&answer.len()), "{answer:?}");
@@ -101,13 +101,13 @@ fuzz_target!(|bytes: &[u8]| {
     }
     // After any input: no side sends anything from here on.
     while !port.sent.is_empty() || front.desk.is_busy() {
-        front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
     }
     let patience = front.desk.settings().in_force().command.timeout_s;
     if front.desk.commander() == Commander::Bus && patience < 3.0 {
         for _ in 0..100 {
             now_ms = now_ms.wrapping_add(100);
-            front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
+            front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
         }
         let state = drive.drive.state();
         let rests = matches!(state, State::Off | State::Stopping | State::Fault(_));

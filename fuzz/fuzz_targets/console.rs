@@ -41,7 +41,7 @@ fuzz_target!(|bytes: &[u8]| {
             0xfe => {
                 drive.drive.step(&Measured { dc_link: 311.0, ..Measured::default() });
             }
-            0xff => front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms),
+            0xff => front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms),
             _ => port.sent.push_back(byte),
         }
     }
@@ -53,7 +53,7 @@ fuzz_target!(|bytes: &[u8]| {
     while !port.sent.is_empty() || polls < 200 {
         polls = if port.sent.is_empty() { polls + 1 } else { 0 };
         now_ms = now_ms.wrapping_add(1);
-        front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
     }
     let mut lines = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);

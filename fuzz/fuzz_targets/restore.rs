@@ -52,7 +52,7 @@ fuzz_target!(|bytes: &[u8]| {
     while quiet < 20 {
         quiet = if port.sent.is_empty() && !front.desk.is_busy() { quiet + 1 } else { 0 };
         now_ms += 1;
-        front.pass(&mut port, &mut bus, &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
     }
     let answers = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     let answers: Vec<_> =

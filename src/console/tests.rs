@@ -44,6 +44,8 @@ struct Talk {
     drive: FakeDrive,
     port: FakePort,
     strip: FakeStrip,
+    /// The port of the bus, on a board that has one.
+    bus: Option<FakeBus>,
     now_ms: u32,
 }
 
@@ -63,14 +65,14 @@ impl Talk {
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
             strip: FakeStrip::default(),
+            bus: None,
             now_ms: 0,
         }
     }
 
     fn poll(&mut self) {
-        let mut no_line = None::<FakeBus>;
-        let Self { front, port, strip, drive, now_ms } = self;
-        front.pass(port, &mut no_line, strip, drive, *now_ms);
+        let Self { front, port, strip, bus, drive, now_ms } = self;
+        front.pass(port, bus.as_mut(), strip, drive, *now_ms);
     }
 
     /// Sends bytes and returns the replies, until the console has nothing more to say.

@@ -197,7 +197,7 @@ impl HostBoard {
         for _ in 0..PASSES {
             (0..PERIODS).for_each(|_| self.machine.period());
             let (port, drive) = (&mut self.wires, &mut self.machine);
-            self.front.pass(port, &mut None::<NoBus>, &mut self.contacts, drive, self.now_ms);
+            self.front.pass(port, None::<&mut NoBus>, &mut self.contacts, drive, self.now_ms);
         }
         self.now_ms = self.now_ms.wrapping_add(1);
         if self.machine.resets {

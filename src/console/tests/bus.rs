@@ -7,15 +7,14 @@ use crate::settings::bus::{Baud, Format};
 /// A console with a bus; the bus commands if `lines` say so.
 pub(super) struct Both {
     pub talk: Talk,
-    bus: FakeBus,
 }
 
 impl Both {
     fn new(lines: &str) -> Self {
-        let mut talk = Talk::new();
+        let mut talk = Talk { bus: Some(FakeBus::default()), ..Talk::new() };
         talk.say(lines);
         talk.drive.commands.clear();
-        Self { talk, bus: FakeBus::default() }
+        Self { talk }
     }
 
     pub fn by_bus() -> Self {
@@ -23,17 +22,22 @@ impl Both {
     }
 
     fn serve(&mut self) {
-        let Talk { front, drive, now_ms, .. } = &mut self.talk;
-        front.bus.serve(&mut self.bus, &mut front.desk, drive, *now_ms);
+        let Talk { front, drive, bus, now_ms, .. } = &mut self.talk;
+        front.bus.serve(bus.as_mut().unwrap(), &mut front.desk, drive, *now_ms);
+    }
+
+    /// The port of the bus.
+    fn port(&mut self) -> &mut FakeBus {
+        self.talk.bus.as_mut().unwrap()
     }
 
     /// The answer to a request: without address and checksum.
     pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         let body = [&[1], pdu].concat();
         let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
-        self.bus.asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+        self.port().asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
         self.serve();
-        let answer = self.bus.answers.pop_front().expect("an answer");
+        let answer = self.port().answers.pop_front().expect("an answer");
         answer[1..answer.len() - 2].to_vec()
     }
 
@@ -84,12 +88,11 @@ fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
 #[test]
 fn the_bus_commands_with_frequencies() {
     let mut both = Both::by_bus();
-    assert_eq!(both.bus.line, None);
     for line in ["start", "torque 1", "speed 1", "position 1", "relock", "learn", "commission"] {
         assert!(both.talk.ask(line).starts_with("error: the bus commands"), "{line}");
     }
     assert_eq!(both.read(0x6041) & 0x26f, 0x221, "ready to switch on, remote");
-    assert_eq!(both.bus.line, Some((Baud::B19200, Format::Even)));
+    assert_eq!(both.port().line, Some((Baud::B19200, Format::Even)));
     // The frequency first, as grblHAL does; then a run, which is repeated.
     assert_eq!((both.write(0x2001, 250), both.write(0x2000, 18)), (0, 0));
     both.serve();
@@ -198,12 +201,14 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     assert_eq!((both.write(0x2000, 1), both.ask(&[3, 0x21, 1, 0, 1])), (6, vec![0x83, 6]));
     // Requests received meanwhile are not answered: the master has given them up.
     let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
-    both.bus.asked.push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
+    both.port()
+        .asked
+        .push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
     let Talk { front, drive, .. } = &mut both.talk;
     front.desk.run_pending(drive, 0);
     both.serve();
     assert_eq!(both.talk.say(""), [""; 0]);
-    assert!(both.bus.asked.is_empty() && both.bus.answers.is_empty());
+    assert!(both.port().asked.is_empty() && both.port().answers.is_empty());
     let started = &both.talk.drive.commands[1..];
     assert_eq!(started, [Command::Start(Mode::Speed), Command::Speed(90.0)]);
     // Refused while the drive runs. While it is off: dropped, set to `auto` again, and saved.
@@ -337,10 +342,10 @@ proptest! {
         for (function, rest) in frames {
             let body = [&[1, function % 20], &rest[..rest.len().min(250)]].concat();
             let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
-            both.bus.asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+            both.port().asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
             both.serve();
         }
-        both.bus.answers.clear();
+        both.port().answers.clear();
         prop_assert!(by_bus || both.talk.drive.drive.state() == State::Off);
         prop_assert_eq!(both.write(0x2000, 1), 0);
     }
