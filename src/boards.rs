@@ -21,7 +21,6 @@ use drive_core::Line;
 use drive_settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_settings::{Carrier, Flux, Ntc};
 
-use crate::terminals::{ANALOG, TERMINALS};
 use pin::Pin;
 
 /// All boards.
@@ -224,8 +223,8 @@ pub struct Board {
     pub analog_only: &'static [Pin],
     /// The port of the field bus, on pins that the power stage leaves free; `None` for a board without a bus.
     pub bus: Option<Rs485>,
-    /// The terminal strip, on pins that the power stage leaves free.
-    pub strip: Strip,
+    /// The terminals, on pins that the power stage leaves free.
+    pub terminals: Terminals,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
 }
@@ -241,13 +240,25 @@ pub struct Rs485 {
     pub driver: Pin,
 }
 
+/// The terminals by name: first the analog ones, then the contacts, then the outputs.
+#[rustfmt::skip]
+pub const TERMINALS: [&str; 13] = [
+    "REFERENCE", "REFERENCE2", "MOTOR SENSOR",
+    "ENABLE", "START", "STOP", "REVERSE", "RESET", "PRESET1", "PRESET2",
+    "RUN", "FAULT", "BRAKE",
+];
+/// Number of analog terminals, and of contacts.
+pub const ANALOG: usize = 3;
+/// See [`ANALOG`].
+pub const CONTACTS: usize = 7;
+
 /// A pin for each of the [`TERMINALS`] that a board has.
 pub type TerminalPins = [Option<Pin>; TERMINALS.len()];
 
-/// The terminal strip. Contacts are behind opto-couplers or filters; the chip pulls an open contact to the level opposite to a closed
+/// The terminals of a board. Contacts are behind opto-couplers or filters; the chip pulls an open contact to the level opposite to a closed
 /// one. Active outputs are high. They need external pull-downs: they float in reset.
 #[derive(Clone, Copy, Debug)]
-pub struct Strip {
+pub struct Terminals {
     /// Pins in the order of [`TERMINALS`]; analog ones are at ADC3 or ADC4.
     pub pins: TerminalPins,
     /// The level at a closed contact.
@@ -256,8 +267,8 @@ pub struct Strip {
     pub full_v: f32,
 }
 
-impl Strip {
-    /// A board without a strip.
+impl Terminals {
+    /// A board without terminals.
     pub const NONE: Self = Self::of([None; TERMINALS.len()]);
 
     /// Contacts to ground, and 150 ohm for the current loop.
@@ -282,7 +293,7 @@ impl Board {
 
     /// Whether the pin belongs to a signal of the board.
     const fn uses(&self, pin: Pin) -> bool {
-        self.uses_beside_terminals(pin) || pin.is_one_of(&self.strip.pins)
+        self.uses_beside_terminals(pin) || pin.is_one_of(&self.terminals.pins)
     }
 
     const fn uses_beside_terminals(&self, pin: Pin) -> bool {
@@ -350,8 +361,8 @@ const fn check(board: &Board) {
     }
     let mut i = 0;
     while i < TERMINALS.len() {
-        if let Some(pin) = board.strip.pins[i] {
-            let others = board.strip.pins.split_at(i + 1).1;
+        if let Some(pin) = board.terminals.pins[i] {
+            let others = board.terminals.pins.split_at(i + 1).1;
             let free = !board.uses_beside_terminals(pin) && !pin.is_one_of(others);
             assert!(free, "a terminal has the pin of another signal");
             assert!(i >= ANALOG || pin.adc34().is_some(), "a terminal has no ADC");

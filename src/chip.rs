@@ -14,7 +14,6 @@ pub mod serial;
 pub mod sleep;
 pub mod start;
 pub mod stop;
-pub mod terminals;
 pub mod time;
 pub mod watchdog;
 pub mod window;

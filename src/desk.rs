@@ -1,7 +1,7 @@
 //! The command arbiter: decides who commands, which settings are staged, which task runs, and which events to report. It exchanges typed
 //! values, neither text nor bytes.
 //!
-//! Its interfaces are console ([`crate::console`]), field bus ([`crate::modbus`]) and terminal strip ([`crate::strip`]). They turn lines,
+//! Its interfaces are console ([`crate::console`]), field bus ([`crate::modbus`]) and terminals ([`crate::terminals`]). They turn lines,
 //! registers and wires into an [`Order`] (a request), and a [`Reply`] or a [`Refusal`] into text and exceptions. Checks, limits and the
 //! commander's time-out are the same for all.
 
@@ -16,13 +16,13 @@ mod tests;
 use drive_commission::Step;
 use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
 use drive_core::learned::Learned;
-use drive_core::{Accepted, Command, Fault, Mode, Refused, State, Stop};
+use drive_core::{Accepted, Command, Mode, Refused, State, Stop};
 use drive_settings::entry::Change;
 
+use crate::ModuleState;
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::{BUS_SILENT_S, Commander};
 use crate::settings::staging::{Applied, Assignments, Staging, guarded};
-use crate::terminals::{Lost, Wires};
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
 use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
@@ -31,8 +31,6 @@ use stage_faults::StageFaults;
 
 /// Time from the answer to a reset, ms: the transmit queue empties in 39.
 const REBOOT_MS: u32 = 100;
-/// Time between two readings of the motor's temperature sensor, ms.
-const MOTOR_MS: u32 = 100;
 
 /// The answer to a request.
 pub type Answer = Result<Reply, Refusal>;
@@ -89,17 +87,11 @@ pub struct Desk {
     /// A homing, and the result of the last one until it is announced.
     homing: Option<Homing>,
     homed: Option<Result<(), Failure>>,
-    /// The last refusal of bus or strip, and its source if it is still to be announced.
+    /// The last refusal of bus or terminals, and its source if it is still to be announced.
     refusal: Option<Refusal>,
     refused: Option<Commander>,
-    /// Closed wires of the terminal strip, and its contacts when they were last read.
-    pub(crate) wires: Wires,
-    pub(crate) contacts: Wires,
-    /// Reason why the strip's reference was lost, until that is cleared.
-    pub(crate) lost: Option<Lost>,
-    /// Last reading of the motor's temperature sensor, °C, and its time.
-    motor: Option<Result<f32, Fault>>,
-    motor_ms: u32,
+    /// State of the modules that the arbiter and the console look at.
+    pub(crate) modules: ModuleState,
 }
 
 impl Desk {
@@ -129,11 +121,7 @@ impl Desk {
             homed: None,
             refusal: None,
             refused: None,
-            wires: Wires::default(),
-            contacts: Wires::default(),
-            lost: None,
-            motor: None,
-            motor_ms: 0,
+            modules: ModuleState::default(),
         }
     }
 
@@ -164,28 +152,17 @@ impl Desk {
         core::mem::replace(seen, self.designs) != self.designs
     }
 
-    /// The last refusal of bus or strip.
+    /// The last refusal of bus or terminals.
     pub fn refusal(&self) -> Option<&Refusal> {
         self.refusal.as_ref()
     }
 
-    /// Notes a refusal of bus or strip. If a master repeats a refused request, the refusal is announced once.
+    /// Notes a refusal of bus or terminals. If a master repeats a refused request, the refusal is announced once.
     pub fn note_refusal(&mut self, from: Commander, why: Refusal) {
-        if from == Commander::Strip || self.refusal.as_ref() != Some(&why) {
+        if from == Commander::Terminals || self.refusal.as_ref() != Some(&why) {
             self.refused = Some(from);
         }
         self.refusal = Some(why);
-    }
-
-    /// The stop by which the terminal strip keeps the drive from running, for every commander.
-    pub fn interlock(&self) -> Option<Stop> {
-        self.settings.in_force().strip.interlock(self.wires)
-    }
-
-    /// Latches that the strip's reference was lost, and announces it.
-    pub fn lose_reference(&mut self, why: Lost) {
-        self.lost = Some(why);
-        self.note_refusal(Commander::Strip, Refusal::Reference(why));
     }
 
     /// The commander by the staged settings, which a start puts in force.
@@ -226,28 +203,9 @@ impl Desk {
         }
     }
 
-    /// Tells the drive the reading of the motor's temperature sensor, from ADC counts of 12 bits. `None` if the board has no input for
-    /// it, or its ADC gives no result. `now_ms` wraps.
-    pub fn read_motor(&mut self, code: Option<u16>, drive: &mut impl DriveHandle, now_ms: u32) {
-        if now_ms.wrapping_sub(self.motor_ms) < MOTOR_MS {
-            return;
-        }
-        self.motor = self.settings.in_force().drive.motor_sensor.celsius(code);
-        self.motor_ms = now_ms;
-        if let Some(reading) = self.motor {
-            // The command is accepted in every state; if there is no answer, the control does not run.
-            let _ = drive.command(Command::MotorTemperature(reading));
-        }
-    }
-
     /// The speed of the shaft.
     pub fn shaft(&self) -> &Shaft {
         &self.shaft
-    }
-
-    /// The last reading of the motor's temperature sensor, °C.
-    pub fn motor(&self) -> Option<Result<f32, Fault>> {
-        self.motor
     }
 
     /// Stops the drive if the commander is silent for too long. Called at the end of each pass of the main loop, so that lines received
@@ -323,14 +281,14 @@ impl Desk {
     /// Carries out a request, or accepts it as a task ([`Reply::Designing`]).
     ///
     /// # Errors
-    /// The reason why nothing has changed. A refusal of bus or strip is announced.
+    /// The reason why nothing has changed. A refusal of bus or terminals is announced.
     pub fn order(&mut self, from: Commander, order: Order, drive: &mut impl DriveHandle) -> Answer {
         let answer = if order.is_for_the_commander(from) && self.commander() != from {
             Err(Refusal::Authority(self.commander()))
         } else {
             self.dispatch(from, order, drive)
         };
-        if let (Commander::Bus | Commander::Strip, Err(why)) = (from, &answer) {
+        if let (Commander::Bus | Commander::Terminals, Err(why)) = (from, &answer) {
             self.note_refusal(from, why.clone());
         }
         answer
@@ -413,7 +371,7 @@ impl Desk {
         let Some(status) = drive.status() else { return give(Command::Clear, "", drive) };
         let latched = self.stage.watch(&status, self.now_ms);
         self.stage.may_clear().map_err(Refusal::TooOften)?;
-        self.lost = None;
+        self.modules.lost = None;
         if latched {
             give(Command::Clear, "", drive)?;
             self.stage.cleared(&status);
@@ -622,11 +580,10 @@ impl Desk {
     /// every start.
     fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) -> Answer {
         self.not_held()?;
-        let strip = self.settings.in_force().strip;
-        if strip.brake || self.braked {
-            let brake_s = if strip.brake { strip.brake_s } else { 0.0 };
-            drive.command(Command::Brake(brake_s))?;
-            self.braked = strip.brake;
+        let brake_s = ModuleState::brake_s(self.settings.in_force());
+        if brake_s.is_some() || self.braked {
+            drive.command(Command::Brake(brake_s.unwrap_or(0.0)))?;
+            self.braked = brake_s.is_some();
         }
         if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
             return give(Command::Start(mode), "", drive);
@@ -638,11 +595,10 @@ impl Desk {
         Ok(Reply::WiringFirst)
     }
 
-    /// Passes if the terminal strip lets the drive run. A contact that has just opened does not let it run.
+    /// Passes if all modules let the drive run.
     fn not_held(&self) -> Result<(), Refusal> {
-        let closed = Wires(self.wires.0 & self.contacts.0);
-        let hold = self.settings.in_force().strip.interlock(closed);
-        hold.map_or(Ok(()), |stop| Err(Refusal::Held(stop)))
+        let hold = self.modules.hold(self.settings.in_force());
+        hold.map_or(Ok(()), |why| Err(Refusal::Held(why)))
     }
 
     /// Lets the drive measure its motor.

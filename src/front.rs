@@ -1,4 +1,4 @@
-//! The user interfaces of the firmware: command arbiter, console, field bus and terminal strip, and the order in which the main loop
+//! The user interfaces of the firmware: command arbiter, console, field bus and terminals, and the order in which the main loop
 //! serves them.
 
 use crate::console::Console;
@@ -6,7 +6,7 @@ use crate::console::handle::{Firmware, Port};
 use crate::desk::Desk;
 use crate::modbus::{self, bus::Bus};
 use crate::settings::FirmwareSettings;
-use crate::strip::{self, Strip};
+use crate::terminals::{self, Terminals};
 
 /// The command arbiter with its interfaces, see the head of the module.
 pub struct Front {
@@ -16,15 +16,15 @@ pub struct Front {
     pub console: Console,
     /// The field bus.
     pub bus: Bus,
-    /// The terminal strip.
-    pub strip: Strip,
+    /// The terminals.
+    pub terminals: Terminals,
 }
 
 impl Front {
     /// The interfaces of a drive with these settings.
     pub fn new(settings: FirmwareSettings) -> Self {
         let (desk, console) = (Desk::new(settings), Console::default());
-        Self { desk, console, bus: Bus::default(), strip: Strip::default() }
+        Self { desk, console, bus: Bus::default(), terminals: Terminals::default() }
     }
 
     /// Runs one pass of the main loop. It takes seconds if controllers are designed; meanwhile the port `line` of the bus,
@@ -33,17 +33,16 @@ impl Front {
         &mut self,
         port: &mut impl Port,
         mut line: Option<&mut impl modbus::Port>,
-        wires: &mut impl strip::Port,
+        contacts: &mut impl terminals::Port,
         drive: &mut impl Firmware,
         now_ms: u32,
     ) {
-        let Self { desk, console, bus, strip } = self;
+        let Self { desk, console, bus, terminals } = self;
         desk.poll_drive(drive, now_ms);
-        let [.., motor] = wires.codes();
-        desk.read_motor(motor, drive, now_ms);
+        terminals.read_motor(contacts, desk, drive, now_ms);
         console.poll(port, desk, drive, now_ms);
         line.iter_mut().for_each(|line| bus.serve(*line, desk, drive, now_ms));
-        strip.serve(wires, desk, drive, now_ms);
+        terminals.serve(contacts, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {
             line.iter_mut().for_each(|line| line.set_busy(true));
             desk.run_pending(drive, now_ms);

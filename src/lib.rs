@@ -18,8 +18,24 @@ pub mod monitor;
 pub mod rotor_tracking;
 pub mod settings;
 pub mod store;
-pub mod strip;
 pub mod terminals;
+
+use drive_settings::entry::Entry;
+use settings::{FirmwareSettings, own};
+
+/// The tables of the firmware's own settings, in the order in which they are shown.
+const OWN: [&[Entry<FirmwareSettings>]; 3] =
+    [&own::COMMAND, terminals::settings::ROWS, &own::OF_BOARD];
+
+/// Settings of the modules.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModuleSettings {
+    /// Settings of the terminals.
+    pub terminals: terminals::settings::Settings,
+}
+
+/// State of the modules that command arbiter and console look at: that of the terminals.
+pub type ModuleState = terminals::state::State;
 
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]

@@ -44,11 +44,11 @@ fn main() -> ! {
 #[cfg(target_os = "none")]
 #[inline(never)] // its stack replaces that of the start
 fn run(board: task::bring_up::Board) -> ! {
-    let task::bring_up::Board { front, mut port, mut line, mut wires, supervisor } = board;
+    let task::bring_up::Board { front, mut port, mut line, mut contacts, supervisor } = board;
     front.console.greet(supervisor);
     loop {
         let now_ms = supervisor.listen();
-        front.pass(&mut port, line.as_mut(), &mut wires, supervisor, now_ms);
+        front.pass(&mut port, line.as_mut(), &mut contacts, supervisor, now_ms);
         supervisor.feed_watchdog();
         // Sleeps until an interrupt. The sleep is at the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

@@ -3,9 +3,8 @@
 
 pub mod bus;
 pub mod keys;
-mod own;
+pub(crate) mod own;
 pub mod staging;
-pub mod strip;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +13,7 @@ use drive_core::learned::Learned;
 use drive_settings::value::Words as _;
 use drive_settings::{Inverter, Settings, SettingsError};
 
+use crate::ModuleSettings;
 use crate::board;
 use crate::boards::{Board, SELECTED};
 
@@ -31,8 +31,8 @@ pub struct FirmwareSettings {
     pub command: CommandSettings,
     /// Settings of the field bus.
     pub bus: bus::Settings,
-    /// Settings of the terminal strip.
-    pub strip: strip::Settings,
+    /// Settings of the modules.
+    pub modules: ModuleSettings,
     /// Whether a pin selects at a reset the program that starts: see [`board::boot_pin_counts`]. It is a state of the chip, which is not
     /// saved.
     pub boot_pin_counts: bool,
@@ -73,8 +73,8 @@ impl FirmwareSettings {
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
         let (command, bus) = (CommandSettings::default(), bus::Settings::default());
-        let strip = strip::Settings::default();
-        Self { board, drive, command, bus, strip, boot_pin_counts: true, learned: None }
+        let modules = ModuleSettings::default();
+        Self { board, drive, command, bus, modules, boot_pin_counts: true, learned: None }
     }
 
     /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option bytes

@@ -7,14 +7,14 @@ mod doubles;
 
 use std::mem::swap;
 
-use doubles::{FakeBus, FakeDrive, FakePort, FakeStrip};
+use doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals};
 use drive_core::{Drive, Hardware, Sample, State};
 use hil_sim::rig::Rig;
 use induction_drive::front::Front;
 use induction_drive::modbus::{self, slave};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
-use induction_drive::terminals::Wires;
+use induction_drive::terminals::Contacts;
 
 use crate::common::config;
 
@@ -33,7 +33,7 @@ struct Stand {
     drive: FakeDrive,
     port: FakePort,
     bus: FakeBus,
-    strip: FakeStrip,
+    terminals: FakeTerminals,
     rig: Rig,
     now_ms: u32,
     /// Hardware events that the drive sees in each period.
@@ -62,7 +62,7 @@ impl Stand {
             drive: FakeDrive::new(Drive::new(own.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
             bus: FakeBus::default(),
-            strip: FakeStrip { closed: Wires::ENABLE, ..FakeStrip::default() },
+            terminals: FakeTerminals { closed: Contacts::ENABLE, ..FakeTerminals::default() },
             rig,
             now_ms: 0,
             hardware: Hardware::empty(),
@@ -76,8 +76,8 @@ impl Stand {
         for _ in 0..ms {
             self.now_ms += 1;
             swap(&mut self.drive.drive, &mut self.rig.drive);
-            let Self { front, port, bus, strip, drive, now_ms, .. } = self;
-            front.pass(port, Some(bus), strip, drive, *now_ms);
+            let Self { front, port, bus, terminals, drive, now_ms, .. } = self;
+            front.pass(port, Some(bus), terminals, drive, *now_ms);
             swap(&mut self.drive.drive, &mut self.rig.drive);
             for _ in 0..6 {
                 if self.hardware.is_empty() {
@@ -153,7 +153,7 @@ impl Stand {
                 self.write(FREQUENCY, 2000);
                 self.write(COMMAND, RUN);
             }
-            _ => self.strip.closed = Wires(Wires::ENABLE.0 | Wires::START.0),
+            _ => self.terminals.closed = Contacts(Contacts::ENABLE.0 | Contacts::START.0),
         }
         self.wait(800);
         assert!(self.state().regulates(), "{:?}: {}", self.state(), self.port.received);
@@ -203,10 +203,10 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
         let start = "strip.enable=yes;strip.start=switch;strip.preset_1_rpm=1200;strip.presets=yes";
         let all = format!("bus.commands={from};{start};{silence};{setting}");
         let mut stand = Stand::new(shaft, &all);
-        stand.strip.closed = Wires(Wires::ENABLE.0 | 1 << 5);
+        stand.terminals.closed = Contacts(Contacts::ENABLE.0 | 1 << 5);
         stand.wait(200);
         if from == "strip" {
-            stand.strip.closed.0 |= Wires::START.0;
+            stand.terminals.closed.0 |= Contacts::START.0;
         }
         // Until the torque is reached, the commander is not silent.
         for n in 0..10 {
@@ -241,7 +241,7 @@ fn a_coasting_stop_is_off_within_200_ms_whatever_is_set() {
                 OFF_MS
             }
             "ENABLE" => {
-                stand.strip.closed = Wires(stand.strip.closed.0 & !Wires::ENABLE.0);
+                stand.terminals.closed = Contacts(stand.terminals.closed.0 & !Contacts::ENABLE.0);
                 OFF_MS
             }
             _ => 400 + OFF_MS,
@@ -268,7 +268,7 @@ fn a_stop_at_once_is_off_in_the_same_pass() {
             "disable voltage" => stand.write(CONTROL, 0),
             "base block" => stand.write(RESET, 4),
             _ => {
-                stand.strip.closed = Wires(0);
+                stand.terminals.closed = Contacts(0);
                 // Two readings distinguish an open wire from a disturbance.
                 stand.wait(1);
             }
@@ -364,7 +364,7 @@ fn a_stop_during_a_design_cancels_the_start() {
             }
             // The stop came before the port was told that the slave is busy.
             "late" => stand.send(&stop),
-            _ => stand.strip.closed = Wires(0),
+            _ => stand.terminals.closed = Contacts(0),
         }
         let starts = stand.drive.commands.len();
         for _ in 0..300 {
@@ -406,7 +406,7 @@ fn a_brake_opens_behind_the_torque_and_closes_before_it_ends() {
     stand.say("torque 1");
     let (mut proof, mut ms) = (0.0_f64, 0);
     while !stand.state().regulates() {
-        assert!(!stand.strip.outputs[2] && ms < 3000, "{:?}", stand.state());
+        assert!(!stand.terminals.outputs[2] && ms < 3000, "{:?}", stand.state());
         stand.wait(1);
         proof = proof.max(stand.rig.plant.torque());
         ms += 1;
@@ -414,24 +414,24 @@ fn a_brake_opens_behind_the_torque_and_closes_before_it_ends() {
     // A quarter of the largest torque, 1 Nm with the low flux.
     assert!((0.2..0.35).contains(&proof), "{proof} Nm");
     stand.wait(200);
-    assert!(stand.strip.outputs[2]);
+    assert!(stand.terminals.outputs[2]);
     stand.say("stop");
     stand.wait(5);
-    assert!(!stand.strip.outputs[2] && stand.state() == State::Stopping);
+    assert!(!stand.terminals.outputs[2] && stand.state() == State::Stopping);
     let took = 5 + stand.off_within(600).expect("it ends");
     assert!((300..=500).contains(&took), "{took} ms");
     for end in ["stop now", "break"] {
         let mut stand = Stand::new(&["load.mode=locked"], own);
         stand.say("start torque");
         stand.wait(1500);
-        assert!(stand.strip.outputs[2]);
+        assert!(stand.terminals.outputs[2]);
         if end == "break" {
             stand.hardware = Hardware::BREAK;
         } else {
             stand.say(end);
         }
         stand.wait(3);
-        assert!(stand.rig.drive.is_off() && !stand.strip.outputs[2], "{end}");
+        assert!(stand.rig.drive.is_off() && !stand.terminals.outputs[2], "{end}");
     }
 }
 
@@ -450,7 +450,7 @@ fn a_load_does_not_fall_before_the_brake_has_closed() {
     while !stand.rig.drive.is_off() {
         stand.wait(1);
         ms += 1;
-        if !stand.strip.outputs[2] && closed.is_none() {
+        if !stand.terminals.outputs[2] && closed.is_none() {
             closed = Some(ms);
         }
         assert!(ms < 3000);

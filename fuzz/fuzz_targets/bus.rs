@@ -7,9 +7,9 @@ use drive_core::{Measured, State};
 use induction_drive::front::Front;
 use induction_drive::modbus::Frame;
 use induction_drive::settings::bus::Commander;
-use induction_drive::terminals::Wires;
+use induction_drive::terminals::Contacts;
 use induction_drive_fuzz::START;
-use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeStrip};
+use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals};
 use libfuzzer_sys::fuzz_target;
 
 /// Registers with a meaning of their own.
@@ -32,7 +32,7 @@ fuzz_target!(|bytes: &[u8]| {
     let (mut settings, initial) = START.clone();
     settings.bus.commander = Commander::Bus;
     let (mut front, mut drive) = (Front::new(settings), FakeDrive::new(initial));
-    let (mut bus, mut strip) = (Some(FakeBus::default()), FakeStrip::default());
+    let (mut bus, mut terminals) = (Some(FakeBus::default()), FakeTerminals::default());
     let mut port = FakePort { room: usize::MAX, ..FakePort::default() };
     let (mut now_ms, mut at) = (0_u32, bytes.iter().copied());
     // At most 400 passes.
@@ -77,12 +77,12 @@ fuzz_target!(|bytes: &[u8]| {
                     drive.drive.step(&sample);
                 }
             }
-            8 => strip.closed = Wires(next()),
+            8 => terminals.closed = Contacts(next()),
             9 => {
                 let line = LINES.split('|').nth(usize::from(next()) % 10).unwrap_or_default();
                 port.sent.extend(line.bytes().chain([b'\n']));
             }
-            10 => strip.codes = [0, 1, 2].map(|n| (n != 1).then(|| u16::from(next()) << 4)),
+            10 => terminals.codes = [0, 1, 2].map(|n| (n != 1).then(|| u16::from(next()) << 4)),
             _ => {}
         }
         if let (Some(request), Some(bus)) = (request, &mut bus) {
@@ -90,7 +90,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         let own = |front: &Front| front.desk.settings().in_force().bus.own();
         let before = own(&front);
-        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
         port.received.clear();
         for answer in bus.iter_mut().flat_map(|bus| bus.answers.drain(..)) {
             assert!((5..=256).contains(&answer.len()), "{answer:?}");
@@ -101,13 +101,13 @@ fuzz_target!(|bytes: &[u8]| {
     }
     // After any input: no side sends anything from here on.
     while !port.sent.is_empty() || front.desk.is_busy() {
-        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
     }
     let patience = front.desk.settings().in_force().command.timeout_s;
     if front.desk.commander() == Commander::Bus && patience < 3.0 {
         for _ in 0..100 {
             now_ms = now_ms.wrapping_add(100);
-            front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
+            front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
         }
         let state = drive.drive.state();
         let rests = matches!(state, State::Off | State::Stopping | State::Fault(_));

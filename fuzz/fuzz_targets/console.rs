@@ -12,14 +12,14 @@ use induction_drive::front::Front;
 use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::keys;
 use induction_drive_fuzz::START;
-use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeStrip, found};
+use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals, found};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     let (settings, initial) = START.clone();
     let mut drive = FakeDrive::new(initial);
     let (mut front, mut bus) = (Front::new(settings), None::<FakeBus>);
-    let (mut port, mut strip) = (FakePort::default(), FakeStrip::default());
+    let (mut port, mut terminals) = (FakePort::default(), FakeTerminals::default());
     let mut now_ms = 0_u32;
     // Bytes above 0xf0 are not sent: they stand for a learned result, pauses, space, damage, and samples for the drive. The byte after
     // 0xf7 stands for a word, which the fuzzer does not find letter by letter.
@@ -41,7 +41,7 @@ fuzz_target!(|bytes: &[u8]| {
             0xfe => {
                 drive.drive.step(&Measured { dc_link: 311.0, ..Measured::default() });
             }
-            0xff => front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms),
+            0xff => front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms),
             _ => port.sent.push_back(byte),
         }
     }
@@ -53,7 +53,7 @@ fuzz_target!(|bytes: &[u8]| {
     while !port.sent.is_empty() || polls < 200 {
         polls = if port.sent.is_empty() { polls + 1 } else { 0 };
         now_ms = now_ms.wrapping_add(1);
-        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
     }
     let mut lines = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);

@@ -8,7 +8,7 @@ use drive_core::{Command, Measured, Mode};
 use induction_drive::console::line::UNASKED;
 use induction_drive::front::Front;
 use induction_drive::store::learned;
-use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeStrip, found};
+use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals, found};
 use induction_drive_fuzz::{START, is_designed, sum};
 use libfuzzer_sys::fuzz_target;
 
@@ -44,7 +44,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let asked = lines.lines().count();
     let (mut front, mut drive) = (Front::new(settings), FakeDrive::new(initial));
-    let (mut bus, mut strip) = (None::<FakeBus>, FakeStrip::default());
+    let (mut bus, mut terminals) = (None::<FakeBus>, FakeTerminals::default());
     let mut port = FakePort { room: usize::MAX, ..FakePort::default() };
     port.sent.extend(lines.bytes());
     // An answer may take some passes.
@@ -52,7 +52,7 @@ fuzz_target!(|bytes: &[u8]| {
     while quiet < 20 {
         quiet = if port.sent.is_empty() && !front.desk.is_busy() { quiet + 1 } else { 0 };
         now_ms += 1;
-        front.pass(&mut port, bus.as_mut(), &mut strip, &mut drive, now_ms);
+        front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
     }
     let answers = port.received.lines().filter(|line| !line.starts_with(UNASKED));
     let answers: Vec<_> =

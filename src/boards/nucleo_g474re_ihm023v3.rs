@@ -6,7 +6,7 @@
 use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Gates, Level, Terminals, assumed, morpho, read};
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -54,6 +54,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
-    strip: Strip::NONE,
+    terminals: Terminals::NONE,
     pulls: morpho::PULLS,
 };

@@ -8,7 +8,7 @@ use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
-use super::{Board, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Gates, Level, TerminalPins, Terminals, assumed, morpho, read};
 
 /// The NuttX port to this board, which has run motors: polarity, gain, sign and divider.
 const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
@@ -58,6 +58,6 @@ pub const BOARD: Board = Board {
     // Tied to the fault input (PA11, PB14) and to the low side of leg a (PB15).
     analog_only: &[pa(11), pb(14), pb(15)],
     bus: Some(morpho::BUS),
-    strip: Strip::of(TERMINALS),
+    terminals: Terminals::of(TERMINALS),
     pulls: morpho::PULLS,
 };

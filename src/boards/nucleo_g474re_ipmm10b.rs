@@ -6,7 +6,7 @@
 use drive_settings::{Carrier, Flux, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, Strip, assumed, morpho};
+use super::{Board, DcLinkLimits, Gates, Level, Terminals, assumed, morpho};
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -62,6 +62,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
-    strip: Strip::NONE,
+    terminals: Terminals::NONE,
     pulls: "10 kOhm to ground at all six driver inputs: those of the module are weak",
 };

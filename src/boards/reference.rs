@@ -6,7 +6,8 @@ use drive_settings::{Carrier, Flux};
 use super::converter::calibrated;
 use super::pin::{pa, pb, pc};
 use super::{
-    Analog, Board, Currents, DcLinkLimits, Gates, Level, Strip, TerminalPins, assumed, morpho, read,
+    Analog, Board, Currents, DcLinkLimits, Gates, Level, TerminalPins, Terminals, assumed, morpho,
+    read,
 };
 
 #[rustfmt::skip] // Two references and the motor's sensor, each at an ADC; contacts; outputs.
@@ -75,6 +76,6 @@ pub const BOARD: Board = Board {
     analog_only: &[],
     bus: Some(morpho::BUS),
     // PB4 and PB6 have the pull-downs of USB-C after a reset, PB8 selects the program that starts.
-    strip: Strip::of(TERMINALS),
+    terminals: Terminals::of(TERMINALS),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

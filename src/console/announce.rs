@@ -9,6 +9,7 @@ use drive_settings::value::Words as _;
 
 use super::Console;
 use super::handle::Firmware;
+use crate::ModuleState;
 use crate::commissioning;
 use crate::desk::Desk;
 use crate::desk::news::News;
@@ -56,7 +57,7 @@ impl Console {
             News::Fault(fault) => {
                 let likely = fault.causes().first().copied().unwrap_or_default();
                 let code = fault.code();
-                let brake = if desk.settings().in_force().strip.brake { HANGS } else { "" };
+                let brake = ModuleState::brake_s(desk.settings().in_force()).map_or("", |_| HANGS);
                 out.news(format_args!(
                     "fault {code}: {fault}; likely: {likely}; type 'clear'{brake}"
                 ));

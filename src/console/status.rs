@@ -13,14 +13,12 @@ use super::Console;
 use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
 use crate::desk::Desk;
-use crate::desk::order::Refusal;
 use crate::desk::shaft::Shaft;
 use crate::link::Status;
 use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
 use crate::settings::staging::guarded;
-use crate::terminals::Wires;
 
 impl Console {
     /// Answers with the status line.
@@ -38,14 +36,10 @@ impl Console {
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
-            if desk.wires != Wires::default() {
-                write!(f, "; closed:{}", desk.wires)?;
-            }
-            desk.interlock().map_or(Ok(()), |stop| write!(f, "; {}", Refusal::Held(stop)))?;
-            desk.lost.map_or(Ok(()), |lost| write!(f, "; the reference is lost, {lost}"))?;
+            desk.modules.status(desk.settings().in_force(), f)?;
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
             let settings = &desk.settings().in_force().drive;
-            temperatures(f, status.stator_resistance, rotor, desk.motor(), settings)?;
+            temperatures(f, status.stator_resistance, rotor, desk.modules.motor_c, settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
         self.out.answer(format_args!("{line}"));

@@ -9,7 +9,6 @@ mod numbers;
 mod passport;
 mod staging;
 mod stream;
-mod strip;
 mod tags;
 mod torque;
 mod typing;
@@ -23,7 +22,7 @@ use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;
-use doubles::{FakeBus, FakePort, FakeStrip};
+use doubles::{FakeBus, FakePort, FakeTerminals};
 /// Shared with the tests of command arbiter and store.
 pub(crate) use doubles::{FakeDrive, found};
 use drive_core::io::PERIOD_S;
@@ -39,18 +38,19 @@ fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Co
     drive.period(front_end, sample, &mut |_| {}).0
 }
 
-struct Talk {
-    front: Front,
-    drive: FakeDrive,
+/// A console with a drive behind it. Shared with the tests of the modules.
+pub(crate) struct Talk {
+    pub front: Front,
+    pub drive: FakeDrive,
     port: FakePort,
-    strip: FakeStrip,
+    pub terminals: FakeTerminals,
     /// The port of the bus, on a board that has one.
     bus: Option<FakeBus>,
-    now_ms: u32,
+    pub now_ms: u32,
 }
 
 impl Talk {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let mut settings = FirmwareSettings::of_the_board();
         settings.command.wiring_checked = true;
         settings.confirm_board();
@@ -64,19 +64,19 @@ impl Talk {
             front: Front::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
             port: FakePort { room: usize::MAX, ..FakePort::default() },
-            strip: FakeStrip::default(),
+            terminals: FakeTerminals::default(),
             bus: None,
             now_ms: 0,
         }
     }
 
-    fn poll(&mut self) {
-        let Self { front, port, strip, bus, drive, now_ms } = self;
-        front.pass(port, bus.as_mut(), strip, drive, *now_ms);
+    pub fn poll(&mut self) {
+        let Self { front, port, terminals, bus, drive, now_ms } = self;
+        front.pass(port, bus.as_mut(), terminals, drive, *now_ms);
     }
 
     /// Sends bytes and returns the replies, until the console has nothing more to say.
-    fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
+    pub fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
         self.port.sent.extend(bytes.as_ref());
         // An event at the end of a pass is told in the next pass.
         let mut silent = 0;
@@ -90,7 +90,7 @@ impl Talk {
     }
 
     /// Sends a line that has one reply beside unrequested lines.
-    fn ask(&mut self, line: &str) -> String {
+    pub fn ask(&mut self, line: &str) -> String {
         let mut replies = self.say(format!("{line}\n"));
         replies.retain(|reply| !reply.starts_with(line::UNASKED));
         assert_eq!(replies.len(), 1, "{replies:?}");
@@ -433,7 +433,7 @@ fn the_motor_sensor_is_read_and_shown() {
     let mut talk = Talk::with(settings);
     assert!(talk.ask("start").contains("fault 57 is present"));
     // 1385 ohm of 1385 + 4700.
-    talk.strip.codes[2] = Some(932);
+    talk.terminals.codes[2] = Some(932);
     talk.now_ms = 100;
     let status = talk.ask("status");
     assert!(status.contains("; motor 100 degC by its sensor"), "{status}");
@@ -443,7 +443,7 @@ fn the_motor_sensor_is_read_and_shown() {
     }
     assert_eq!(talk.drive.commands.len(), 2 + 9);
     for (code, fault) in [(Some(4095), "fault 54"), (Some(0), "fault 55"), (None, "fault 57")] {
-        talk.strip.codes[2] = code;
+        talk.terminals.codes[2] = code;
         talk.now_ms += 100;
         talk.poll();
         let refused = talk.ask("start");

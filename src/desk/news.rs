@@ -40,7 +40,7 @@ pub enum News {
     Homed(Result<(), Failure>),
     /// The drive was stopped because the commander was silent for this time, s; or the reason why it was not stopped.
     Stopped(Result<f32, CommandError>),
-    /// A request of bus or strip was refused: [`Desk::refusal`](super::Desk::refusal).
+    /// A request of bus or terminals was refused: [`Desk::refusal`](super::Desk::refusal).
     Refused(Commander),
 }
 

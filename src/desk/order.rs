@@ -12,7 +12,6 @@ use crate::settings::bus::Commander;
 use crate::settings::keys::Key;
 use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;
-use crate::terminals::Lost;
 
 /// A request.
 #[derive(Clone, Debug, PartialEq)]
@@ -198,9 +197,9 @@ pub enum Refusal {
     /// The bus repeats its run command after a stop from another source.
     #[error("the drive has stopped for another reason: write a stop first")]
     Ended,
-    /// The terminal strip does not let the drive run.
-    #[error("the terminal strip holds the drive: {} is open", HOLDS[usize::from(*.0 == Stop::Ramp)])]
-    Held(Stop),
+    /// A module does not let the drive run.
+    #[error("{0}")]
+    Held(&'static str),
     /// A stop came before the controllers for a start were designed.
     #[error("a stop came before the start")]
     Stopped,
@@ -209,9 +208,9 @@ pub enum Refusal {
         "three faults of the power stage within 10 s: find the short circuit or the wrong wire; `clear` works in {0} s"
     )]
     TooOften(u32),
-    /// The reference of the terminal strip was lost.
+    /// The reference of a module was lost.
     #[error("the reference is lost, {0}; close RESET or `clear`, then start anew")]
-    Reference(Lost),
+    Reference(&'static str),
 }
 
 /// Highest dc link voltage with ST's loader, V.
@@ -223,9 +222,6 @@ const AUTHORITY: [&str; 3] = [
     "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over",
     "the terminal strip commands: `stop` works here, `set bus.commands console` takes over",
 ];
-
-/// Terminals by the stop that an open wire causes.
-const HOLDS: [&str; 2] = ["ENABLE", "STOP"];
 
 impl Refusal {
     /// Number of the refusal in the register of the bus, and its meaning there. A number keeps its meaning.

@@ -2,7 +2,7 @@
 
 use drive_commission::Step;
 use drive_core::homing::Plan;
-use drive_core::{Drive, Hardware, Measured, Mode, Stop};
+use drive_core::{Drive, Fault, Hardware, Measured, Mode, Stop};
 use drive_settings::value::Value;
 
 use super::order::{Order, Refusal};
@@ -184,7 +184,7 @@ fn a_stop_between_two_reports_is_told_as_one() {
         (State::Exciting, [""; 4]),
         (State::Fault(Fault::Break), [""; 4]),
     ];
-    let commanders = [Commander::Console, Commander::Bus, Commander::Strip];
+    let commanders = [Commander::Console, Commander::Bus, Commander::Terminals];
     let sources = [None].into_iter().chain(commanders.map(Some));
     for (state, expected) in cases {
         for (by, expected) in sources.clone().zip(expected) {

@@ -353,12 +353,12 @@ fn the_manual_lists_the_refusals() {
             "`apply` or `revert` at the console",
         ),
         (
-            Refusal::Held(drive_core::Stop::Coast),
+            Refusal::Held(""),
             "the terminal strip holds the drive",
             "close ENABLE, and STOP where it is used",
         ),
         (
-            Refusal::Reference(crate::terminals::Lost::Low),
+            Refusal::Reference(""),
             "the strip's reference was lost",
             "RESET or `clear`, then a new start",
         ),

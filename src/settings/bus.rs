@@ -75,8 +75,8 @@ words! {
         Console = "console",
         /// The bus.
         Bus = "bus",
-        /// The terminal strip.
-        Strip = "strip",
+        /// The terminals.
+        Terminals = "strip",
     }
 }
 

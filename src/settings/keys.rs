@@ -9,15 +9,15 @@ use drive_settings::{SETTINGS, Settings, SettingsError};
 use super::FirmwareSettings;
 use super::bus::BUS_SILENT_S;
 pub use super::own::BOARD;
-use super::own::{OWN, TIMEOUT};
+use super::own::TIMEOUT;
 use crate::boards::Board;
-use crate::hash;
+use crate::{ModuleState, OWN, hash};
 
 /// Bits of `auto` in the flash: NaN, which no value of a setting is.
 const AUTO_BITS: u32 = 0x7fc0_0000;
 
 /// Number of settings.
-pub const COUNT: usize = SETTINGS.len() + OWN.len();
+pub const COUNT: usize = SETTINGS.len() + OWN[0].len() + OWN[1].len() + OWN[2].len();
 
 /// A setting of the firmware. Two are equal if they have the same name.
 #[derive(Clone, Copy)]
@@ -30,7 +30,13 @@ pub enum Key {
 
 /// All settings, in the order in which they are shown.
 pub fn all() -> impl Iterator<Item = Key> {
-    SETTINGS.iter().map(Key::Drive).chain(OWN.iter().map(Key::Own))
+    (0..).map_while(at)
+}
+
+/// The setting at a place in this order.
+fn at(place: usize) -> Option<Key> {
+    let own = || OWN.iter().copied().flatten().nth(place - SETTINGS.len()).map(Key::Own);
+    SETTINGS.get(place).map(Key::Drive).or_else(own)
 }
 
 /// The setting with this name.
@@ -165,8 +171,8 @@ impl Key {
     pub fn check(self, settings: &FirmwareSettings) -> Result<(), SettingsError> {
         let range = self.range(settings);
         with!(self, settings, |entry, s| entry.check_in(range, s))?;
-        // The words of the strip depend on the board and on each other.
-        if matches!(self, Self::Own(_)) { settings.strip.check(settings.board) } else { Ok(()) }
+        // The words of a module depend on the board and on each other.
+        if matches!(self, Self::Own(_)) { ModuleState::check(settings) } else { Ok(()) }
     }
 
     /// The value that a text stands for. [`check`](Self::check) checks its range.

@@ -1,5 +1,8 @@
 //! From reset to a running control interrupt.
 
+#[path = "../terminals/port.rs"]
+mod terminals;
+
 use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
@@ -15,9 +18,7 @@ use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
 use crate::chip::window::Window;
-use crate::chip::{
-    adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, terminals, time,
-};
+use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
 use crate::task::sources::Sources;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
@@ -44,8 +45,8 @@ pub struct Board<'a> {
     pub port: Port,
     /// The port of the field bus, if the board has one.
     pub line: Option<rs485::Port>,
-    /// The terminal strip, with the slow analog inputs.
-    pub wires: terminals::Port,
+    /// The terminals, with the slow analog inputs.
+    pub contacts: terminals::Port,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -108,7 +109,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
-    let wires = terminals::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
+    let contacts = terminals::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Made before the control runs, because these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
@@ -154,7 +155,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let drive = &settings.drive;
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
-    Ok(Board { front, port, line, wires, supervisor })
+    Ok(Board { front, port, line, contacts, supervisor })
 }
 
 /// Makes a value in its place, with a stack that shares memory with those of other functions.

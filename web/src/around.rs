@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use induction_drive::terminals::{ANALOG, CONTACTS, TERMINALS, Wires};
+use induction_drive::boards::{ANALOG, CONTACTS, TERMINALS};
+use induction_drive::terminals::Contacts;
 use motor_plant::{
     Channel, CurrentFault, Load, MachineSettings, Plant, PlantError, SaliencySettings,
 };
@@ -75,11 +76,11 @@ pub fn change(plant: &mut Plant, words: &str) -> Result<(), String> {
 ///
 /// # Errors
 /// The unknown name, and the names that exist.
-pub fn contacts(names: &str) -> Result<Wires, String> {
+pub fn contacts(names: &str) -> Result<Contacts, String> {
     let all = &TERMINALS[ANALOG..ANALOG + CONTACTS];
     let known: Vec<(&str, u8)> = all.iter().enumerate().map(|(n, name)| (*name, 1 << n)).collect();
-    names.split_whitespace().try_fold(Wires(0), |closed, name| {
-        Ok(Wires(closed.0 | named(&name.to_ascii_uppercase(), &known)?))
+    names.split_whitespace().try_fold(Contacts(0), |closed, name| {
+        Ok(Contacts(closed.0 | named(&name.to_ascii_uppercase(), &known)?))
     })
 }
 

@@ -7,13 +7,13 @@ use std::collections::VecDeque;
 use drive_core::{Line, State};
 use drive_settings::SettingsError;
 use induction_drive::board;
+use induction_drive::boards::ANALOG;
 use induction_drive::console::handle::Port;
 use induction_drive::front::Front;
 use induction_drive::modbus;
 use induction_drive::modbus::slave::Written;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::bus;
-use induction_drive::strip;
 use induction_drive::terminals;
 use motor_plant::{
     InverterSettings, Load, MeasurementSettings, MechanicsSettings, Plant, PlantSettings,
@@ -50,16 +50,16 @@ struct Wires {
     output: Vec<u8>,
 }
 
-/// The contacts of the terminal strip that are closed. Nothing is connected to its other terminals.
+/// The contacts that are closed. Nothing is connected to the other terminals.
 #[derive(Clone, Copy, Default)]
-struct Contacts(terminals::Wires);
+struct Contacts(terminals::Contacts);
 
-impl strip::Port for Contacts {
-    fn look(&mut self) -> terminals::Wires {
+impl terminals::Port for Contacts {
+    fn look(&mut self) -> terminals::Contacts {
         self.0
     }
-    fn codes(&self) -> [Option<u16>; terminals::ANALOG] {
-        [None; terminals::ANALOG]
+    fn codes(&self) -> [Option<u16>; ANALOG] {
+        [None; ANALOG]
     }
     fn show(&mut self, _: [bool; 3]) {}
 }

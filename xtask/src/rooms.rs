@@ -1,7 +1,8 @@
 //! `cargo xtask rooms`: checks that the modules of a crate do not refer to each other in a circle.
 //!
 //! A module refers to another by a path, an import, or a name that a third module re-exports; a name from the root of the crate counts
-//! for the module that defines it. References are compared between siblings: a reference from `a::b` to `c::d` is an arrow from `a` to
+//! for the module that defines it. A name that the root itself defines counts for none: in the firmware's library these are the table that
+//! ties modules and kernel. References are compared between siblings: a reference from `a::b` to `c::d` is an arrow from `a` to
 //! `c`. References between a module and its own children do not count.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

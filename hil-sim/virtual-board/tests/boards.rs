@@ -6,8 +6,7 @@ use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::config::LoadMode;
 use hil_sim::plant::Load;
-use induction_drive::boards::{self, Currents, Level};
-use induction_drive::terminals;
+use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level};
 use virtual_board::board::Debugger;
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, Sensors, channel};
@@ -78,8 +77,8 @@ fn the_firmware_and_the_power_stage_agree() {
         assert_eq!(board.heat_sink.adc2().map(usize::from), Some(channel::HEAT_SINK));
         let analog = board.analog_only.iter().map(|pin| (pin.port as usize, u32::from(pin.number)));
         assert_eq!(analog.collect::<Vec<_>>(), stage.analog_only, "{name}");
-        let (analog, others) = board.strip.pins.split_at(terminals::ANALOG);
-        let (contacts, outputs) = others.split_at(terminals::CONTACTS);
+        let (analog, others) = board.terminals.pins.split_at(ANALOG);
+        let (contacts, outputs) = others.split_at(CONTACTS);
         for (ours, theirs) in stage.terminals.into_iter().zip([contacts, outputs, analog]) {
             let theirs =
                 theirs.iter().map(|pin| pin.map_or("-".into(), |p| p.to_string()[1..].to_owned()));

@@ -25,8 +25,7 @@ use induction_drive::settings::bus::{self, Baud, Format};
 use induction_drive::settings::keys::Key;
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
-use induction_drive::strip;
-use induction_drive::terminals::Wires;
+use induction_drive::terminals::{self, Contacts};
 
 /// A drive without hardware.
 pub struct FakeDrive {
@@ -305,19 +304,19 @@ impl modbus::Port for FakeBus {
     }
 }
 
-/// The pins of the terminal strip.
+/// The pins of the terminals.
 #[derive(Default)]
-pub struct FakeStrip {
+pub struct FakeTerminals {
     /// Contacts that are closed.
-    pub closed: Wires,
+    pub closed: Contacts,
     /// ADC counts of reference, second reference, and motor sensor.
     pub codes: [Option<u16>; 3],
     /// Outputs that were set last.
     pub outputs: [bool; 3],
 }
 
-impl strip::Port for FakeStrip {
-    fn look(&mut self) -> Wires {
+impl terminals::Port for FakeTerminals {
+    fn look(&mut self) -> Contacts {
         self.closed
     }
     fn codes(&self) -> [Option<u16>; 3] {

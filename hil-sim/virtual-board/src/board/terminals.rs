@@ -1,7 +1,7 @@
 //! The terminal strip from outside: contacts, an analog reference, outputs.
 
 use anyhow::{Context, Result};
-use induction_drive::terminals::{ANALOG, TERMINALS};
+use induction_drive::boards::{ANALOG, TERMINALS};
 
 use super::Board;
 use crate::chip::pins::{self, Pin};

@@ -1,6 +1,6 @@
-//! Starts and stops by START, if the strip commands.
+//! Starts and stops by START, if the terminals command.
 
-use crate::settings::strip::Start;
+use crate::terminals::settings::Start;
 
 /// Number of readings, one per millisecond, for which the contact at START must have been open without a break, with the drive allowed to
 /// run, before its closing counts. So neither a switch that is closed at power-up nor one that bounces starts the drive.
@@ -9,7 +9,7 @@ pub const ARMED: u8 = 100;
 /// Inputs of the sequence beside START.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// The strip commands.
+    /// The terminals command.
     pub commands: bool,
     /// ENABLE or STOP keeps the drive from running.
     pub held: bool,
@@ -28,7 +28,7 @@ pub enum Act {
     Nothing,
     /// Start.
     Start,
-    /// Give the speed: the drive runs for the strip.
+    /// Give the speed: the drive runs for the terminals.
     Go,
     /// Stop.
     Stop,
@@ -40,7 +40,7 @@ pub struct Sequence {
     /// Consecutive readings at which the contact was open with the drive allowed to run, up to [`ARMED`]. There it stays until START is
     /// closed.
     open: u8,
-    /// Whether the drive runs for the strip.
+    /// Whether the drive runs for the terminals.
     runs: bool,
 }
 

@@ -1,11 +1,12 @@
-//! The settings of the terminal strip: functions of its wires. All are off by default.
+//! The settings of the terminals: functions of their contacts and outputs. All are off by default.
 
 use drive_core::Stop;
 use drive_settings::value::Words;
 use drive_settings::{SettingsError, words};
 
-use crate::boards::{Board, EXTRA_LOW_V};
-use crate::terminals::{TERMINALS, Wires};
+use crate::boards::{Board, EXTRA_LOW_V, TERMINALS};
+use crate::settings::own::settings;
+use crate::terminals::contacts::Contacts;
 
 words! {
     /// Whether ENABLE must be closed, and how opening it stops the drive, for every commander.
@@ -49,56 +50,21 @@ words! {
     }
 }
 
-/// Settings of the terminal strip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Whether ENABLE must be closed, for every commander.
-    pub enable: Enable,
-    /// Function of START and STOP.
-    pub start: Start,
-    /// Whether REVERSE is used.
-    pub reverse: bool,
-    /// Whether RESET is used.
-    pub reset: bool,
-    /// Whether PRESET1 and PRESET2 are used.
-    pub presets: bool,
-    /// The analog reference.
-    pub reference: Reference,
-    /// Whether the outputs run and fault are used.
-    pub outputs: bool,
-    /// Whether the output for the brake is used.
-    pub brake: bool,
-    /// Time that the brake needs to close, s.
-    pub brake_s: f32,
-    /// First preset speed, rpm.
-    pub preset_1_rpm: u16,
-    /// Second preset speed, rpm.
-    pub preset_2_rpm: u16,
-    /// Third preset speed, rpm.
-    pub preset_3_rpm: u16,
-    /// Speed at the full reference, rpm.
-    pub reference_rpm: u16,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            enable: Enable::No,
-            start: Start::Off,
-            reverse: false,
-            reset: false,
-            presets: false,
-            reference: Reference::Off,
-            outputs: false,
-            brake: false,
-            // Most spring-applied brakes close within this time.
-            brake_s: 0.2,
-            preset_1_rpm: 0,
-            preset_2_rpm: 0,
-            preset_3_rpm: 0,
-            reference_rpm: 0,
-        }
-    }
+settings! { [modules.terminals]
+    110: word(), "strip.enable", enable: Enable = Enable::No, "whether ENABLE must be closed; opening it takes the torque to zero, then switches off; now: off at once".guarded(Guard::Raise);
+    111: word(), "strip.start", start: Start = Start::Off, "a switch at START starts and stops, or a button at START starts and one at STOP stops";
+    112: word(), "strip.reverse", reverse: bool = false, "whether REVERSE, closed at a start, turns the other way";
+    113: word(), "strip.reset", reset: bool = false, "whether closing RESET clears a latched fault";
+    114: word(), "strip.presets", presets: bool = false, "whether PRESET1 and PRESET2 select a preset speed";
+    115: whole(), "strip.preset_1_rpm", preset_1_rpm: u16 = 0, "speed with PRESET1 closed".from_to(0.0, 24_000.0);
+    116: whole(), "strip.preset_2_rpm", preset_2_rpm: u16 = 0, "speed with PRESET2 closed".from_to(0.0, 24_000.0);
+    117: whole(), "strip.preset_3_rpm", preset_3_rpm: u16 = 0, "speed with both closed".from_to(0.0, 24_000.0);
+    118: word(), "strip.reference", reference: Reference = Reference::Off, "source of the speed while no preset is selected";
+    119: whole(), "strip.reference_rpm", reference_rpm: u16 = 0, "speed at 20 mA or 10 V".from_to(0.0, 24_000.0);
+    120: word(), "strip.outputs", outputs: bool = false, "whether the outputs RUN and FAULT are used";
+    121: word(), "strip.brake", brake: bool = false, "whether BRAKE opens a brake while the drive has torque, which each start proves".guarded(Guard::Keep);
+    // Most spring-applied brakes close within this time.
+    133: number("s"), "strip.brake_s", brake_s: f32 = 0.2, "closing time of the brake, for which a stop keeps the torque".from_to(0.01, 5.0).guarded(Guard::Keep);
 }
 
 /// If a switch is closed at power-up, only an ENABLE that is open then distinguishes it from a switch that is being closed.
@@ -108,14 +74,14 @@ const NO_LIVE_ZERO: &str =
     "it has no live zero: above 60 V the board needs a second input that agrees; 4-20ma has one";
 
 impl Settings {
-    /// The stop that keeps the drive from running with these wires closed; `None` if the drive may run.
-    pub fn interlock(&self, closed: Wires) -> Option<Stop> {
+    /// The stop that keeps the drive from running with these contacts closed; `None` if the drive may run.
+    pub fn interlock(&self, closed: Contacts) -> Option<Stop> {
         match self.enable {
-            Enable::Yes if !closed.has(Wires::ENABLE) => return Some(Stop::Coast),
-            Enable::Now if !closed.has(Wires::ENABLE) => return Some(Stop::Now),
+            Enable::Yes if !closed.has(Contacts::ENABLE) => return Some(Stop::Coast),
+            Enable::Now if !closed.has(Contacts::ENABLE) => return Some(Stop::Now),
             _ => {}
         }
-        (self.start == Start::Buttons && !closed.has(Wires::STOP)).then_some(Stop::Ramp)
+        (self.start == Start::Buttons && !closed.has(Contacts::STOP)).then_some(Stop::Ramp)
     }
 
     /// Checks that the board has the pins of the functions in use, and that the functions are safe there.
@@ -123,7 +89,7 @@ impl Settings {
     /// # Errors
     /// The first function that fails the check.
     pub fn check(&self, board: &Board) -> Result<(), SettingsError> {
-        let pins = TERMINALS.iter().zip(board.strip.pins);
+        let pins = TERMINALS.iter().zip(board.terminals.pins);
         let has = |name| pins.clone().any(|(terminal, pin)| *terminal == name && pin.is_some());
         let extra_low = board.dc_link_limits.operation.value <= EXTRA_LOW_V;
         let (start, reference) = (self.start, self.reference);

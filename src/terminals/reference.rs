@@ -1,10 +1,9 @@
 //! The analog reference: a share of the full speed, or the reason why it is lost.
 
 use crate::board::ADC_FULL_SCALE;
-use crate::boards::Strip;
 use crate::boards::converter::{CODES, REFERENCE_V};
-use crate::settings::strip::Reference;
-use crate::terminals::{ANALOG, Lost};
+use crate::boards::{ANALOG, Terminals};
+use crate::terminals::settings::Reference;
 
 /// Consecutive readings after which a reference counts as lost, one per millisecond; meanwhile the last speed is kept.
 pub const LOOKS: u8 = 20;
@@ -16,17 +15,45 @@ const AGREES: f32 = 0.03;
 /// ADC counts at the end of the range, where the ADC saturates.
 const RANGE_END: u16 = ADC_FULL_SCALE - 5;
 
+/// Reason why a reference counts as lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lost {
+    /// The ADC gives no result.
+    Silent,
+    /// Below 3.6 mA.
+    Low,
+    /// Above 21 mA.
+    High,
+    /// At the end of the ADC's range.
+    End,
+    /// Two inputs that should agree differ.
+    Differ,
+}
+
+impl Lost {
+    /// The reason in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Silent => "its ADC does not answer",
+            Self::Low => "below 3.6 mA: a broken wire, or no supply",
+            Self::High => "above 21 mA: a short circuit",
+            Self::End => "at the end of the ADC's range",
+            Self::Differ => "the two inputs differ by more than 0.3 V",
+        }
+    }
+}
+
 /// The share of the full speed, 0 to 1, from the ADC counts of the first and the second input.
 ///
 /// # Errors
 /// The reason why the reference is lost.
 pub fn share(
     kind: Reference,
-    strip: &Strip,
+    terminals: &Terminals,
     [first, second, _]: [Option<u16>; ANALOG],
 ) -> Result<f32, Lost> {
     // The share is 1 at 10 V and at 20 mA.
-    let of = |code: u16| f32::from(code) * (REFERENCE_V / f32::from(CODES)) / strip.full_v;
+    let of = |code: u16| f32::from(code) * (REFERENCE_V / f32::from(CODES)) / terminals.full_v;
     let code = first.ok_or(Lost::Silent)?;
     let share = of(code);
     if kind == Reference::Current {
@@ -38,7 +65,7 @@ pub fn share(
         };
     }
     // The lower of two references counts.
-    let other = match strip.pins[1] {
+    let other = match terminals.pins[1] {
         Some(_) => second.ok_or(Lost::Silent)?,
         None => code,
     };

@@ -1,4 +1,4 @@
-//! The pins of the terminal strip, and the slow analog inputs at ADC3 and ADC4.
+//! The pins of the terminals, and the slow analog inputs at ADC3 and ADC4.
 //!
 //! The main loop converts one of these inputs each millisecond, without an interrupt and without ADC1 and ADC2. A conversion long after
 //! the previous one may be wrong (ES0430, 2.7.7 and 2.7.8), so each is done twice, and the second result counts. All registers of a
@@ -8,22 +8,21 @@ use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
 
-use super::clocks::clock_on;
-use super::{StartError, adc, pins};
+use crate::chip::clocks::clock_on;
+use crate::chip::{StartError, adc, pins};
 use induction_drive::board;
 use induction_drive::boards::pin::Pin;
-use induction_drive::boards::{Level, SELECTED};
-use induction_drive::strip;
-use induction_drive::terminals::{ANALOG, CONTACTS, Wires};
+use induction_drive::boards::{ANALOG, CONTACTS, Level, SELECTED};
+use induction_drive::terminals::{self, Contacts};
 
 /// Pins of the analog inputs, of the contacts, and of the outputs.
-const INPUTS: &[Option<Pin>] = SELECTED.strip.pins.split_at(ANALOG).0;
-const OTHERS: &[Option<Pin>] = SELECTED.strip.pins.split_at(ANALOG).1;
+const INPUTS: &[Option<Pin>] = SELECTED.terminals.pins.split_at(ANALOG).0;
+const OTHERS: &[Option<Pin>] = SELECTED.terminals.pins.split_at(ANALOG).1;
 const CONTACT: &[Option<Pin>] = OTHERS.split_at(CONTACTS).0;
 const OUTPUTS: &[Option<Pin>] = OTHERS.split_at(CONTACTS).1;
-const CLOSED_AT: Level = SELECTED.strip.closed_at;
+const CLOSED_AT: Level = SELECTED.terminals.closed_at;
 
-/// The pins of the strip.
+/// The pins of the terminals.
 pub struct Port {
     three: pac::ADC3,
     four: pac::ADC4,
@@ -84,13 +83,13 @@ impl Port {
     }
 }
 
-impl strip::Port for Port {
-    fn look(&mut self) -> Wires {
+impl terminals::Port for Port {
+    fn look(&mut self) -> Contacts {
         self.convert();
         let high = CLOSED_AT == Level::High;
         let closed = |pin: &Option<Pin>| pin.is_some_and(|pin| pins::is_high(pin) == high);
         let inputs = CONTACT.iter().enumerate();
-        Wires(inputs.fold(0, |bits, (n, pin)| bits | u8::from(closed(pin)) << n))
+        Contacts(inputs.fold(0, |bits, (n, pin)| bits | u8::from(closed(pin)) << n))
     }
 
     fn codes(&self) -> [Option<u16>; ANALOG] {

@@ -1,6 +1,7 @@
-//! Turns bouncing contacts into wires that are closed or open.
+//! Turns bouncing contacts into contacts that are closed or open.
 
-use crate::terminals::{CONTACTS, Wires};
+use crate::boards::CONTACTS;
+use crate::terminals::contacts::Contacts;
 
 /// Consecutive readings, one per millisecond, for which an input must be closed to count as closed.
 pub const CLOSES: u8 = 20;
@@ -12,12 +13,12 @@ pub const OPENS: u8 = 2;
 #[derive(Debug, Default)]
 pub struct Debounce {
     counts: [u8; CONTACTS],
-    closed: Wires,
+    closed: Contacts,
 }
 
 impl Debounce {
-    /// The wires after another reading of the contacts. All are open at first.
-    pub fn look(&mut self, contacts: Wires) -> Wires {
+    /// The debounced contacts after another reading. All are open at first.
+    pub fn look(&mut self, contacts: Contacts) -> Contacts {
         for (n, count) in self.counts.iter_mut().enumerate() {
             let bit = 1 << n;
             *count = match contacts.0 & bit {

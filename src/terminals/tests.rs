@@ -1,18 +1,19 @@
-//! The wires compared with exhaustive tables and random contacts.
+//! The contacts compared with exhaustive tables and random contacts.
 
 use std::collections::BTreeSet;
 
 use drive_settings::value::Words as _;
 use proptest::prelude::*;
 
+mod panel;
+
 use super::debounce::{CLOSES, OPENS};
-use super::reference::share;
+use super::reference::{Lost, share};
 use super::sequence::ARMED;
+use super::settings::{Enable, Settings, Start};
 use super::*;
-use crate::boards::{ALL, Board};
+use crate::boards::{ALL, Board, CONTACTS, TERMINALS};
 use crate::generated;
-use crate::settings::strip::{Enable, Settings, Start};
-use crate::terminals::{CONTACTS, TERMINALS};
 
 fn code(full_v: f32, volts_of_ten: f32) -> u16 {
     (volts_of_ten * 0.1 * full_v / 3.3 * 4096.0).round() as u16
@@ -105,11 +106,11 @@ fn a_switch_that_bounces_for_long_is_no_edge() {
     }
 }
 
-/// All wires, with each use of ENABLE and START: whether the drive may run, and how it is stopped.
+/// All contacts, with each use of ENABLE and START: whether the drive may run, and how it is stopped.
 #[test]
 fn the_table_of_what_holds_the_drive() {
     for bits in 0..=u8::MAX >> 1 {
-        let closed = Wires(bits);
+        let closed = Contacts(bits);
         for (enable, start) in
             Enable::VALUES.iter().flat_map(|e| Start::VALUES.iter().map(move |s| (*e, *s)))
         {
@@ -132,7 +133,7 @@ proptest! {
     fn chatter_is_open(contacts in prop::collection::vec(0_u8..128, 1..400), every in 2_usize..11) {
         let mut debounce = Debounce::default();
         for (at, contact) in contacts.iter().enumerate() {
-            let closed = debounce.look(Wires(*contact));
+            let closed = debounce.look(Contacts(*contact));
             for bit in 0..CONTACTS {
                 let of = |n: usize| contacts[at - n] >> bit & 1 == 1;
                 let two_open = at >= 1 && !of(0) && !of(1);
@@ -146,7 +147,7 @@ proptest! {
         let mut debounce = Debounce::default();
         for at in 0..1000 {
             let contact = if at % every == 0 { 0 } else { 127 };
-            prop_assert_eq!(debounce.look(Wires(contact)), Wires(0));
+            prop_assert_eq!(debounce.look(Contacts(contact)), Contacts(0));
         }
     }
 }
@@ -154,15 +155,15 @@ proptest! {
 #[test]
 fn a_contact_closes_in_20_looks_and_opens_in_2() {
     let mut debounce = Debounce::default();
-    let closes = (1..).find(|_| debounce.look(Wires(127)) == Wires(127)).unwrap();
-    let opens = (1..).find(|_| debounce.look(Wires(0)) == Wires(0)).unwrap();
+    let closes = (1..).find(|_| debounce.look(Contacts(127)) == Contacts(127)).unwrap();
+    let opens = (1..).find(|_| debounce.look(Contacts(0)) == Contacts(0)).unwrap();
     assert_eq!((closes, opens), (CLOSES, OPENS));
 }
 
 #[test]
 fn references_in_and_out_of_range() {
     let pins = |second: bool| {
-        let mut pins = ALL[0].strip;
+        let mut pins = ALL[0].terminals;
         pins.pins[1] = pins.pins[1].filter(|_| second);
         pins
     };
@@ -231,7 +232,7 @@ fn what_a_board_cannot_do_is_refused_by_name() {
     let voltage = Settings { reference: Reference::Voltage, ..Settings::default() };
     assert_eq!(refused(voltage, ihm08m1), "");
     let mut high = *reference;
-    high.strip.pins[1] = None;
+    high.terminals.pins[1] = None;
     assert!(refused(voltage, &high).starts_with("strip.reference = 0-10v: it has no live zero"));
     let current = Settings { reference: Reference::Current, ..Settings::default() };
     assert_eq!(refused(current, &high), "");
@@ -242,13 +243,13 @@ fn what_a_board_cannot_do_is_refused_by_name() {
 fn the_manual_lists_the_terminals() {
     use std::fmt::Write;
     let mut text = String::from("| terminal |");
-    let with = || ALL.iter().filter(|board| board.strip.pins.iter().any(Option::is_some));
+    let with = || ALL.iter().filter(|board| board.terminals.pins.iter().any(Option::is_some));
     with().for_each(|board| write!(text, " {} |", board.name).unwrap());
     write!(text, "\n|---|{}\n", "---|".repeat(with().count())).unwrap();
     for (n, name) in TERMINALS.into_iter().enumerate() {
         write!(text, "| {name} |").unwrap();
         for board in with() {
-            let pin = board.strip.pins[n].map_or("-".into(), |pin| pin.to_string());
+            let pin = board.terminals.pins[n].map_or("-".into(), |pin| pin.to_string());
             write!(text, " {pin} |").unwrap();
         }
         text.push('\n');
