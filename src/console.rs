@@ -50,7 +50,7 @@ pub struct Console {
     /// Time of the last valid line; `None` restarts the time.
     line_ms: Option<u32>,
     /// Number of the arbiter's last design that was noticed.
-    designs: u32,
+    designs: u8,
     /// The last trace.
     traced: Option<Plan>,
     /// Whether the trace waits for its trigger.

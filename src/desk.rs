@@ -65,7 +65,7 @@ pub struct Desk {
     /// The result of the console's last task, until the console takes it.
     pub(crate) done: Option<Done>,
     /// Number of designs of the controllers, wrapping. A design takes seconds.
-    designs: u32,
+    designs: u8,
     announcer: Announcer,
     /// Faults of the power stage, whose clearing is limited.
     stage: StageFaults,
@@ -148,7 +148,7 @@ impl Desk {
     }
 
     /// Whether controllers were designed, which takes seconds, since the previous call with the same `seen`.
-    pub fn has_designed(&self, seen: &mut u32) -> bool {
+    pub fn has_designed(&self, seen: &mut u8) -> bool {
         core::mem::replace(seen, self.designs) != self.designs
     }
 

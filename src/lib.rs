@@ -1,4 +1,4 @@
-//! The hardware-independent part of the firmware: tested and fuzzed on a host, and linked into the image.
+//! The firmware without its control interrupt and its main loop. All but the registers of the chip is tested and fuzzed on a host.
 //!
 //! Start reading at `main.rs`.
 #![cfg_attr(not(test), no_std)]
@@ -7,6 +7,8 @@
 
 pub mod board;
 pub mod boards;
+#[cfg(target_os = "none")]
+pub mod chip;
 pub mod commissioning;
 pub mod console;
 pub mod desk;

@@ -20,8 +20,6 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-mod chip;
-#[cfg(target_os = "none")]
 mod task;
 
 /// Entry of the firmware, see the top of this file.
@@ -31,12 +29,12 @@ fn main() -> ! {
     use defmt_rtt as _; // the log goes to the debug probe
     use induction_drive::monitor::record::Reason;
 
-    chip::memory::paint_stack();
+    induction_drive::chip::memory::paint_stack();
     defmt::info!("induction-drive {}", task::supervisor::VERSION);
     let mut supervisor = core::mem::MaybeUninit::uninit();
     match task::bring_up::bring_up(&mut supervisor) {
         Ok(board) => run(board),
-        Err(_) => chip::stop::end(Reason::Panic, [line!(), 0, 0, 0]),
+        Err(_) => induction_drive::chip::stop::end(Reason::Panic, [line!(), 0, 0, 0]),
     }
 }
 
@@ -52,7 +50,7 @@ fn run(board: task::bring_up::Board) -> ! {
         supervisor.feed_watchdog();
         // Sleeps until an interrupt. The sleep is at the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.
-        chip::sleep::until_interrupt();
+        induction_drive::chip::sleep::until_interrupt();
     }
 }
 

@@ -2,10 +2,12 @@
 //!
 //! Data flow: [`Port`] reads the pins. [`Debounce`] turns them into closed [`Contacts`], once a millisecond.
 //! [`settings::Settings::interlock`] says whether they let the drive run. The [`Sequence`] turns START into starts and stops. A
-//! [reference](mod@reference) gives a speed. Nothing here waits. The file `port.rs` belongs to the image: it has the pins of the chip.
+//! [reference](mod@reference) gives a speed. Nothing here waits.
 
 mod contacts;
 pub mod debounce;
+#[cfg(target_os = "none")]
+pub mod port;
 pub mod reference;
 pub mod sequence;
 pub mod settings;
@@ -45,7 +47,7 @@ pub const BRAKE_RPM: f32 = 30.0;
 /// Time between two set-points to the drive, ms: each costs the main loop up to two.
 const REFERENCE_MS: u32 = 8;
 /// Time between two readings of the motor's temperature sensor, ms.
-const MOTOR_MS: u32 = 100;
+const MOTOR_MS: u16 = 100;
 
 /// The terminals, see the head of the module.
 #[derive(Default)]
@@ -61,23 +63,26 @@ pub struct Terminals {
     lost: u8,
     /// The speed that the drive was given last since its start, rpm.
     given: Option<i16>,
+    /// Time of the last reading of the motor's temperature sensor, ms, wrapping.
+    motor_ms: u16,
 }
 
 impl Terminals {
     /// Tells the drive the reading of the motor's temperature sensor. `now_ms` wraps.
     pub fn read_motor(
-        &self,
+        &mut self,
         port: &impl Port,
         desk: &mut Desk,
         drive: &mut impl DriveHandle,
         now_ms: u32,
     ) {
-        if now_ms.wrapping_sub(desk.modules.motor_ms) < MOTOR_MS {
+        if (now_ms as u16).wrapping_sub(self.motor_ms) < MOTOR_MS {
             return;
         }
+        self.motor_ms = now_ms as u16;
         let [.., code] = port.codes();
         let reading = desk.settings().in_force().drive.motor_sensor.celsius(code);
-        (desk.modules.motor_c, desk.modules.motor_ms) = (reading, now_ms);
+        desk.modules.motor_c = reading;
         if let Some(reading) = reading {
             // The command is accepted in every state; if there is no answer, the control does not run.
             let _ = drive.command(Command::MotorTemperature(reading));

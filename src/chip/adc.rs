@@ -13,8 +13,8 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
 use super::{StartError, pins};
-use induction_drive::board;
-use induction_drive::boards::{Currents, SELECTED};
+use crate::board;
+use crate::boards::{Currents, SELECTED};
 
 /// Events of the ADCs.
 #[derive(Clone, Copy)]

@@ -9,7 +9,7 @@ use stm32g4xx_hal::rcc::{
 use stm32g4xx_hal::time::RateExtU32;
 
 use super::StartError;
-use induction_drive::board;
+use crate::board;
 
 /// Source of the core's clock.
 #[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]

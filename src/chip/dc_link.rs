@@ -10,8 +10,8 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
 use super::{StartError, pins};
-use induction_drive::board;
-use induction_drive::boards::{Level, pin};
+use crate::board;
+use crate::boards::{Level, pin};
 
 /// Ticks of a control period with one pulse.
 const PERIOD: u16 = 2 * board::PWM_TOP;

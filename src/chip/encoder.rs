@@ -8,8 +8,8 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
 use super::{StartError, pins};
-use induction_drive::board;
-use induction_drive::boards::pin::{pa, pb};
+use crate::board;
+use crate::boards::pin::{pa, pb};
 
 /// The counter of the encoder.
 pub struct Encoder {

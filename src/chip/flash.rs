@@ -14,8 +14,8 @@ use cortex_m::asm;
 use stm32g4xx_hal::pac;
 
 use super::time;
-use induction_drive::board;
-use induction_drive::store::{Flash, FlashError};
+use crate::board;
+use crate::store::{Flash, FlashError};
 
 /// The pages of the settings.
 pub struct Pages {

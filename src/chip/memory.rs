@@ -5,7 +5,7 @@ use core::ptr;
 use cortex_m::peripheral::MPU;
 use cortex_m::register::msp;
 
-use induction_drive::monitor::memory_check::MemoryRange;
+use crate::monitor::memory_check::MemoryRange;
 
 unsafe extern "C" {
     static mut _stack_start: u32;

@@ -12,8 +12,8 @@ use stm32g4xx_hal::rcc::Rcc;
 use super::clocks::clock_on;
 use super::pwm::Pwm;
 use super::{StartError, pins};
-use induction_drive::board;
-use induction_drive::boards::{Level, SELECTED};
+use crate::board;
+use crate::boards::{Level, SELECTED};
 
 /// The comparator has tripped by a voltage at its pin.
 static PROVED: AtomicBool = AtomicBool::new(false);

@@ -3,8 +3,8 @@
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::gpioc::RegisterBlock;
 
-use induction_drive::boards::Level;
-use induction_drive::boards::pin::{Pin, Port};
+use crate::boards::Level;
+use crate::boards::pin::{Pin, Port};
 
 /// The registers of a port.
 fn registers(port: Port) -> &'static RegisterBlock {

@@ -11,8 +11,8 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
 use super::{StartError, dc_link, pins};
-use induction_drive::board;
-use induction_drive::boards::{Level, SELECTED, pin};
+use crate::board;
+use crate::boards::{Level, SELECTED, pin};
 
 /// UIF, BIF and SBIF of TIM1_SR.
 const EVENTS: u32 = 1 | 1 << 7 | 1 << 13;
@@ -188,6 +188,7 @@ impl Pwm {
     /// off, if the drive wants its outputs on although no start was taken: then its state has a flipped bit.
     ///
     /// Until the first compare values are taken over, the initial zeros apply: low sides on.
+    #[inline] // into the control interrupt
     pub fn apply(&mut self, compare: Compare) -> bool {
         if !compare.enabled {
             self.trip();
@@ -213,6 +214,7 @@ impl Pwm {
     }
 
     /// The events since the last call; clears them.
+    #[inline] // into the control interrupt
     pub fn take_events(&mut self) -> TimerEvents {
         let status = self.timer.sr().read();
         let (updated, broken) = (status.uif().bit(), status.bif().bit() || status.sbif().bit());
@@ -226,6 +228,7 @@ impl Pwm {
 
     /// Ticks since the counter, counting down, was at [`board::PWM_TOP`], or would have been if its top were there. Half a control period
     /// or more while it counts up.
+    #[inline] // into the control interrupt
     pub fn since_top(&self) -> u32 {
         let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {
@@ -236,6 +239,7 @@ impl Pwm {
     }
 
     /// Whether the timer has taken over compare values since the last call of [`take_events`](Self::take_events).
+    #[inline] // into the control interrupt
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()
     }

@@ -13,14 +13,14 @@ use stm32g4xx_hal::pac::{self, Interrupt};
 use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
+use crate::boards::pin::{Pin, USART3_RX, USART3_TX};
+use crate::boards::{Level, Rs485};
 use crate::chip::pins;
 use crate::chip::serial::PRIORITY;
-use induction_drive::boards::pin::{Pin, USART3_RX, USART3_TX};
-use induction_drive::boards::{Level, Rs485};
-use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
-use induction_drive::modbus::slave::{self, Written};
-use induction_drive::modbus::{self, Frame, bus};
-use induction_drive::settings::bus::{Baud, Format, Settings};
+use crate::link::mailbox::{Mailbox, Receiver, Sender};
+use crate::modbus::slave::{self, Written};
+use crate::modbus::{self, Frame, bus};
+use crate::settings::bus::{Baud, Format, Settings};
 
 /// The main loop's end of the port.
 pub struct Port {

@@ -13,10 +13,10 @@ use stm32g4xx_hal::rcc::Rcc;
 use stm32g4xx_hal::stm32::interrupt;
 
 use super::pins;
-use induction_drive::board;
-use induction_drive::boards::Level;
-use induction_drive::boards::pin::pa;
-use induction_drive::console::handle;
+use crate::board;
+use crate::boards::Level;
+use crate::boards::pin::pa;
+use crate::console::handle;
 
 type ReceiveQueue = Queue<u8, { board::SERIAL_RECEIVE }>;
 type TransmitQueue = Queue<u8, { board::SERIAL_TRANSMIT }>;

@@ -12,9 +12,9 @@
 
 use core::arch::global_asm;
 
-use induction_drive::board;
-use induction_drive::boards::SELECTED;
-use induction_drive::boards::identity::Identity;
+use crate::board;
+use crate::boards::SELECTED;
+use crate::boards::identity::Identity;
 
 // SAFETY: in the first page of the flash, between functions; nothing but tools reads it there.
 #[used]

@@ -12,9 +12,9 @@ use cortex_m_rt::exception;
 use defmt::Display2Format;
 use stm32g4xx_hal::pac;
 
+use crate::board;
 use crate::chip::{flash, pwm};
-use induction_drive::board;
-use induction_drive::monitor::record::{Reason, Record, WORDS};
+use crate::monitor::record::{Reason, Record, WORDS};
 
 /// Words of RAM that keep their contents over a reset.
 struct Kept<const N: usize>(UnsafeCell<MaybeUninit<[u32; N]>>);

@@ -8,7 +8,7 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::StartError;
 use super::clocks::clock_on;
-use induction_drive::board;
+use crate::board;
 
 /// Starts the counter.
 ///

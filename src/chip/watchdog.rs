@@ -3,7 +3,7 @@
 use cortex_m::asm;
 use stm32g4xx_hal::pac::{DBGMCU, IWDG};
 
-use induction_drive::board;
+use crate::board;
 
 /// Keys of IWDG_KR: start the watchdog, unlock its registers, reload it.
 const START: u16 = 0xcccc;

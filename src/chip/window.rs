@@ -6,7 +6,7 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::StartError;
 use super::clocks::clock_on;
-use induction_drive::board::{self, LONGEST_INTERRUPT_CYCLES};
+use crate::board::{self, LONGEST_INTERRUPT_CYCLES};
 
 /// Core cycles per count.
 const CLOCK: u32 = 4096;

@@ -63,7 +63,7 @@ pub struct Bus {
     /// The speed that the drive was given last since its start, rpm.
     given: Option<f32>,
     /// Number of the arbiter's last design that was noticed.
-    designs: u32,
+    designs: u8,
     /// Whether the last control word of CiA 402 has the fault-reset bit: only the change to it resets a fault.
     resets: bool,
     faults: FaultLog,

@@ -1,8 +1,5 @@
 //! From reset to a running control interrupt.
 
-#[path = "../terminals/port.rs"]
-mod terminals;
-
 use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
 
@@ -13,17 +10,19 @@ use drive_settings::SettingsError;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
-use crate::chip::StartError;
-use crate::chip::flash::Pages;
-use crate::chip::serial::Port;
-use crate::chip::watchdog::Watchdog;
-use crate::chip::window::Window;
-use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
 use crate::task::sources::Sources;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
+use induction_drive::chip::StartError;
+use induction_drive::chip::flash::Pages;
+use induction_drive::chip::serial::Port;
+use induction_drive::chip::watchdog::Watchdog;
+use induction_drive::chip::window::Window;
+use induction_drive::chip::{
+    adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time,
+};
 use induction_drive::commissioning::Session;
 use induction_drive::front::Front;
 use induction_drive::link::mailbox::Mailbox;
@@ -36,6 +35,7 @@ use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
 use induction_drive::store::history::History;
 use induction_drive::store::{Loaded, Saved};
+use induction_drive::terminals;
 
 /// The parts that the main loop works with.
 pub struct Board<'a> {
@@ -46,7 +46,7 @@ pub struct Board<'a> {
     /// The port of the field bus, if the board has one.
     pub line: Option<rs485::Port>,
     /// The terminals, with the slow analog inputs.
-    pub contacts: terminals::Port,
+    pub contacts: terminals::port::Port,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -109,14 +109,14 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let line = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
-    let contacts = terminals::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
+    let contacts = terminals::port::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Made before the control runs, because these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = singleton!(: MaybeUninit<Session> = MaybeUninit::uninit()).ok_or(TWICE)?;
     let commissioning = make(commissioning, || Session::new(&start.settings.drive));
     let window = Window::new(chip.WWDG, &mut rcc);
-    let link = || -> Result<ControlLink, StartError> {
+    let link = apart(|| -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
         clocked?;
         if !dual_bank {
@@ -136,7 +136,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
             return Err("too many unintended resets; switch the supply off and on");
         }
         start_control(coefficients, pwm, dc_link?, adc?, encoder?, window?, source)
-    }();
+    });
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
     }
@@ -156,6 +156,12 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let supervisor =
         Supervisor::new(supervisor, link, watchdog, chip, history, commissioning, drive);
     Ok(Board { front, port, line, contacts, supervisor })
+}
+
+/// Calls a function whose stack shares memory with those of other functions.
+#[inline(never)]
+fn apart<T>(call: impl FnOnce() -> T) -> T {
+    call()
 }
 
 /// Makes a value in its place, with a stack that shares memory with those of other functions.

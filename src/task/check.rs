@@ -5,8 +5,8 @@ use core::sync::atomic::Ordering;
 
 use cortex_m::singleton;
 
-use crate::chip::{memory, stop};
 use crate::task::control;
+use induction_drive::chip::{memory, stop};
 use induction_drive::monitor::memory_check::{CheckedMemory, MemoryCheck};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::register_check::{COUNT, RegisterCheck};

@@ -1,7 +1,7 @@
 //! The time of the main loop.
 
-use crate::chip::time;
 use induction_drive::board;
+use induction_drive::chip::time;
 
 /// Milliseconds from the time base, which wraps every 25 s; it must be updated more often.
 pub struct Clock {

@@ -2,9 +2,9 @@
 
 use core::sync::atomic::Ordering;
 
-use crate::chip::time;
-use crate::chip::watchdog::Watchdog;
 use crate::task::control;
+use induction_drive::chip::time;
+use induction_drive::chip::watchdog::Watchdog;
 use induction_drive::monitor::watchdog::FeedRule;
 
 /// The watchdog and the rule by which it is fed, if it runs.

@@ -3,8 +3,8 @@
 use defmt::Display2Format;
 use drive_core::State;
 
-use crate::chip::flash::Pages;
 use crate::task::guard::{Guard, extended};
+use induction_drive::chip::flash::Pages;
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
 

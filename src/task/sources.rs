@@ -5,10 +5,10 @@ use core::sync::atomic::Ordering;
 
 use drive_core::{Fault, Hardware};
 
-use crate::chip::clocks::Source;
-use crate::chip::{StartError, adc, time};
 use crate::task::control::{FAULTS_FROM_MAIN, WINDOW_ON};
 use induction_drive::board;
+use induction_drive::chip::clocks::Source;
+use induction_drive::chip::{StartError, adc, time};
 
 /// Time between two measurements, ms, and to one that repeats a suspicious result.
 const PAUSE_MS: [u32; 2] = [1000, 1];

@@ -8,12 +8,12 @@ use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
 
+use crate::board;
+use crate::boards::pin::Pin;
+use crate::boards::{ANALOG, CONTACTS, Level, SELECTED};
 use crate::chip::clocks::clock_on;
 use crate::chip::{StartError, adc, pins};
-use induction_drive::board;
-use induction_drive::boards::pin::Pin;
-use induction_drive::boards::{ANALOG, CONTACTS, Level, SELECTED};
-use induction_drive::terminals::{self, Contacts};
+use crate::terminals::{self, Contacts};
 
 /// Pins of the analog inputs, of the contacts, and of the outputs.
 const INPUTS: &[Option<Pin>] = SELECTED.terminals.pins.split_at(ANALOG).0;

@@ -20,8 +20,6 @@ pub struct State {
     pub lost: Option<Lost>,
     /// Last reading of the motor's temperature sensor, °C.
     pub motor_c: Option<Result<f32, Fault>>,
-    /// Time of this reading, ms, wrapping.
-    pub(super) motor_ms: u32,
 }
 
 impl State {
