@@ -9,7 +9,6 @@ pub mod memory;
 pub mod over_voltage;
 pub mod pins;
 pub mod pwm;
-pub mod rs485;
 pub mod serial;
 pub mod sleep;
 pub mod start;

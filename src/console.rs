@@ -26,7 +26,7 @@ use core::fmt;
 use crate::commissioning::News;
 use crate::desk::Desk;
 use crate::link::trace::Plan;
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 use crate::settings::staging::Applied;
 use grammar::ParseError;
 use handle::{Firmware, Port};

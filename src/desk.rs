@@ -8,6 +8,7 @@
 pub mod handle;
 pub mod news;
 pub mod order;
+pub mod power;
 pub mod shaft;
 mod stage_faults;
 #[cfg(test)]
@@ -21,8 +22,8 @@ use drive_settings::entry::Change;
 
 use crate::ModuleState;
 use crate::settings::FirmwareSettings;
-use crate::settings::bus::{BUS_SILENT_S, Commander};
 use crate::settings::staging::{Applied, Assignments, Staging, guarded};
+use crate::settings::{BUS_SILENT_S, Commander};
 use handle::{CommandError, DriveHandle};
 use news::{Announcer, News};
 use order::{LOADER_DC_LINK_V, Order, Refusal, Reply};
@@ -167,7 +168,7 @@ impl Desk {
 
     /// The commander by the staged settings, which a start puts in force.
     pub fn commander(&self) -> Commander {
-        self.settings.latest().bus.commander
+        self.settings.latest().command.commander
     }
 
     /// Notes a sign of life: if the commander is silent, the drive stops. `now_ms` wraps.

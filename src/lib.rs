@@ -26,12 +26,14 @@ use drive_settings::entry::Entry;
 use settings::{FirmwareSettings, own};
 
 /// The tables of the firmware's own settings, in the order in which they are shown.
-const OWN: [&[Entry<FirmwareSettings>]; 3] =
-    [&own::COMMAND, terminals::settings::ROWS, &own::OF_BOARD];
+const OWN: [&[Entry<FirmwareSettings>]; 4] =
+    [&own::COMMAND, modbus::settings::ROWS, terminals::settings::ROWS, &own::OF_BOARD];
 
 /// Settings of the modules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModuleSettings {
+    /// Settings of the field bus.
+    pub bus: modbus::settings::Settings,
     /// Settings of the terminals.
     pub terminals: terminals::settings::Settings,
 }

@@ -7,12 +7,15 @@ pub mod bus;
 pub mod cia402;
 pub mod faults;
 pub mod float;
+#[cfg(target_os = "none")]
+pub mod port;
 pub mod registers;
+pub mod settings;
 pub mod slave;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
-use crate::settings::bus::Settings;
+use settings::Settings;
 use slave::Written;
 
 /// Bytes of the longest frame (Modbus over serial line V1.02, 2.5.1).

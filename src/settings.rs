@@ -1,7 +1,6 @@
 //! The settings of the firmware: those of the drive, those of the firmware around it, and the values learned on the motor. [`keys`] lists
 //! them by name.
 
-pub mod bus;
 pub mod keys;
 pub(crate) mod own;
 pub mod staging;
@@ -10,8 +9,8 @@ mod tests;
 
 use drive_core::Coefficients;
 use drive_core::learned::Learned;
-use drive_settings::value::Words as _;
-use drive_settings::{Inverter, Settings, SettingsError};
+use drive_settings::value::Words;
+use drive_settings::{Inverter, Settings, SettingsError, words};
 
 use crate::ModuleSettings;
 use crate::board;
@@ -29,8 +28,6 @@ pub struct FirmwareSettings {
     pub drive: Settings,
     /// Settings of the firmware around the drive.
     pub command: CommandSettings,
-    /// Settings of the field bus.
-    pub bus: bus::Settings,
     /// Settings of the modules.
     pub modules: ModuleSettings,
     /// Whether a pin selects at a reset the program that starts: see [`board::boot_pin_counts`]. It is a state of the chip, which is not
@@ -40,6 +37,23 @@ pub struct FirmwareSettings {
     pub learned: Option<Learned>,
 }
 
+words! {
+    /// The source of starts and set-points. Anybody may stop the drive.
+    #[derive(Default)]
+    pub enum Commander {
+        /// The console.
+        #[default]
+        Console = "console",
+        /// The bus.
+        Bus = "bus",
+        /// The terminals.
+        Terminals = "strip",
+    }
+}
+
+/// Silence of a commanding bus after which the drive stops, s, unless `command.timeout_s` sets another time.
+pub const BUS_SILENT_S: f32 = 1.0;
+
 /// Settings for the handling of commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommandSettings {
@@ -47,6 +61,8 @@ pub struct CommandSettings {
     pub timeout_s: f32,
     /// Longest time in which the shaft coasts to rest, s.
     pub coasts_s: f32,
+    /// The source of starts and set-points.
+    pub commander: Commander,
     /// Whether a start has checked the wiring since the defaults were set.
     pub wiring_checked: bool,
     /// Whether the console sends typed characters back.
@@ -59,7 +75,15 @@ impl Default for CommandSettings {
     fn default() -> Self {
         // A small spindle coasts for half a minute.
         let coasts_s = 60.0;
-        Self { timeout_s: 0.0, coasts_s, wiring_checked: false, echo: false, confirmed: 0 }
+        let commander = Commander::Console;
+        Self {
+            timeout_s: 0.0,
+            coasts_s,
+            commander,
+            wiring_checked: false,
+            echo: false,
+            confirmed: 0,
+        }
     }
 }
 
@@ -72,9 +96,8 @@ impl FirmwareSettings {
     /// The defaults of any board.
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
-        let (command, bus) = (CommandSettings::default(), bus::Settings::default());
-        let modules = ModuleSettings::default();
-        Self { board, drive, command, bus, modules, boot_pin_counts: true, learned: None }
+        let (command, modules) = (CommandSettings::default(), ModuleSettings::default());
+        Self { board, drive, command, modules, boot_pin_counts: true, learned: None }
     }
 
     /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option bytes

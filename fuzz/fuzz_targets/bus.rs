@@ -6,7 +6,7 @@ use crc::{CRC_16_MODBUS, Crc};
 use drive_core::{Measured, State};
 use induction_drive::front::Front;
 use induction_drive::modbus::Frame;
-use induction_drive::settings::bus::Commander;
+use induction_drive::settings::Commander;
 use induction_drive::terminals::Contacts;
 use induction_drive_fuzz::START;
 use induction_drive_fuzz::doubles::{FakeBus, FakeDrive, FakePort, FakeTerminals};
@@ -30,7 +30,7 @@ fn whole(head: &[u8], register: u16, rest: &[u8]) -> Vec<u8> {
 
 fuzz_target!(|bytes: &[u8]| {
     let (mut settings, initial) = START.clone();
-    settings.bus.commander = Commander::Bus;
+    settings.command.commander = Commander::Bus;
     let (mut front, mut drive) = (Front::new(settings), FakeDrive::new(initial));
     let (mut bus, mut terminals) = (Some(FakeBus::default()), FakeTerminals::default());
     let mut port = FakePort { room: usize::MAX, ..FakePort::default() };
@@ -88,7 +88,7 @@ fuzz_target!(|bytes: &[u8]| {
         if let (Some(request), Some(bus)) = (request, &mut bus) {
             bus.asked.push_back(Frame::from_slice(&request).expect("a frame"));
         }
-        let own = |front: &Front| front.desk.settings().in_force().bus.own();
+        let own = |front: &Front| front.desk.settings().in_force().modules.bus.own();
         let before = own(&front);
         front.pass(&mut port, bus.as_mut(), &mut terminals, &mut drive, now_ms);
         port.received.clear();

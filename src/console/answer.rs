@@ -11,7 +11,7 @@ use super::{Console, reply};
 use crate::desk::order::Reply;
 use crate::desk::{Answer, Desk, may_stage};
 use crate::link::trace::{Plan, SIGNALS, Trigger};
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 use crate::settings::staging::UNCONFIRMED;
 
 /// Significant digits of a limited set-point.

@@ -13,9 +13,9 @@ use super::Console;
 use super::handle::Firmware;
 use crate::board::CYCLES_PER_US;
 use crate::desk::Desk;
+use crate::desk::power::Power;
 use crate::desk::shaft::Shaft;
 use crate::link::Status;
-use crate::modbus::cia402::{self, Power};
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
 use crate::settings::staging::guarded;
@@ -59,7 +59,7 @@ fn line(
     (used, size): (usize, usize),
 ) -> fmt::Result {
     let rpm = shaft.rpm(settings);
-    let power = Power::of(Some(s.state), cia402::bus_may_start(settings)).name();
+    let power = Power::of(Some(s.state), settings).name();
     let settings = &settings.drive;
     let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
     write!(f, "{}; {power}; ", s.state)?;

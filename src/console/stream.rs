@@ -15,7 +15,7 @@ use crate::desk::Desk;
 use crate::desk::shaft::Shaft;
 use crate::link::ring::Record;
 use crate::link::trace::{self, SIGNALS};
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 
 const _: () = assert!(trace::MOST == MOST_SIGNALS);
 

@@ -1,5 +1,4 @@
 mod announcements;
-mod bus;
 mod commission;
 mod documents;
 mod doubles;
@@ -22,9 +21,9 @@ use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys;
-use doubles::{FakeBus, FakePort, FakeTerminals};
 /// Shared with the tests of command arbiter and store.
-pub(crate) use doubles::{FakeDrive, found};
+pub(crate) use doubles::{FakeBus, FakeDrive, found};
+use doubles::{FakePort, FakeTerminals};
 use drive_core::io::PERIOD_S;
 use drive_core::learned::{Learned, Verdict};
 use drive_core::{
@@ -45,7 +44,7 @@ pub(crate) struct Talk {
     port: FakePort,
     pub terminals: FakeTerminals,
     /// The port of the bus, on a board that has one.
-    bus: Option<FakeBus>,
+    pub bus: Option<FakeBus>,
     pub now_ms: u32,
 }
 

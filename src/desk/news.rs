@@ -7,7 +7,7 @@ use drive_settings::Settings;
 use super::handle::CommandError;
 use crate::commissioning;
 use crate::link::Status;
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 
 /// Longest time between two progress reports of the self-commissioning, ms.
 const PROGRESS_MS: u32 = 5000;

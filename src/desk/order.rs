@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::handle::CommandError;
 use crate::boards::Board;
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 use crate::settings::keys::Key;
 use crate::settings::staging::{Applied, SetError};
 use crate::store::FlashError;

@@ -37,7 +37,7 @@ fn desk(situation: Situation, commander: Commander) -> (Desk, FakeDrive) {
     let mut settings = FirmwareSettings::of_the_board();
     settings.command.wiring_checked = true;
     settings.drive.angle_source = drive_core::AngleSource::Encoder;
-    settings.bus.commander = commander;
+    settings.command.commander = commander;
     if situation != Situation::NotConfirmed {
         settings.confirm_board();
     }

@@ -11,11 +11,12 @@ use super::cia402;
 use super::faults::FaultLog;
 use super::float::from_float;
 use super::registers::{COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, STAGED, View};
+use super::settings::Alive;
 use super::slave::{self, Registers, Words, Written};
 use crate::desk::Desk;
 use crate::desk::handle::DriveHandle;
 use crate::desk::order::{Order, Refusal};
-use crate::settings::bus::{Alive, Commander};
+use crate::settings::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST, SetError};
 
@@ -81,7 +82,7 @@ impl Bus {
         drive: &mut impl DriveHandle,
         now_ms: u32,
     ) {
-        let settings = desk.settings().in_force().bus;
+        let settings = desk.settings().in_force().modules.bus;
         port.set_line(&settings);
         while now_ms.wrapping_sub(self.second_ms) >= 1000 {
             self.second_ms = self.second_ms.wrapping_add(1000);

@@ -7,15 +7,16 @@ use drive_core::io::PERIOD_S;
 use drive_settings::value::Words as _;
 use modbus_core::Exception;
 
-use super::cia402::{self, Power};
+use super::cia402;
 use super::faults::{self, FaultLog};
 use super::float::to_float;
 use crate::desk::Desk;
 use crate::desk::order::Refusal;
+use crate::desk::power::Power;
 use crate::link::Status;
 use crate::link::trace::{SIGNALS as ALL_SIGNALS, Sampled, shown};
+use crate::settings::Commander;
 use crate::settings::FirmwareSettings;
-use crate::settings::bus::Commander;
 use crate::settings::keys;
 
 /// The command; see the manual.
@@ -137,7 +138,7 @@ pub static ROWS: [Row; 30] = rows! {
     0x5005: Word(|_| version(env!("CARGO_PKG_VERSION_PATCH"))), "", "its patch level";
     0x5006: Word(|v| board(v.settings)), "", "board, as `board` in the settings";
     0x5007: Double(|v| v.seconds), "s", "time since the start";
-    0x5009: Word(|v| v.settings.bus.commander.place() as u16), "", "who commands: 0 console, 1 bus, 2 terminal strip";
+    0x5009: Word(|v| v.settings.command.commander.place() as u16), "", "who commands: 0 console, 1 bus, 2 terminal strip";
     0x500a: Word(|v| v.settings.learned.is_some().into()), "", "1 if learned values are in force";
     0x500b: Word(|v| v.desk.refusal().map_or(0, Refusal::code)), "", "reason of the last refused write since the start, see below; 0 for none";
     0x603f: Word(|v| v.error_code()), "", "fault as in CiA 402: 0xFF00 plus its number, 0 for none";
@@ -266,7 +267,7 @@ impl View<'_> {
     }
 
     fn power(&self) -> Power {
-        Power::of(self.status.map(|status| status.state), cia402::bus_may_start(self.settings))
+        Power::of(self.status.map(|status| status.state), self.settings)
     }
 
     fn delta_status(&self) -> u16 {
@@ -277,7 +278,7 @@ impl View<'_> {
             _ => 0,
         };
         let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
-        let by_bus = if self.settings.bus.commander == Commander::Bus { BY_BUS } else { 0 };
+        let by_bus = if self.settings.command.commander == Commander::Bus { BY_BUS } else { 0 };
         let assumed = if self.speed_is_assumed() { SPEED_ASSUMED } else { 0 };
         state | reverse | by_bus | assumed
     }
@@ -291,7 +292,7 @@ impl View<'_> {
         if self.status.is_some() && self.dc_link() > self.settings.drive.dc_under_v() {
             word |= cia402::VOLTAGE_ENABLED;
         }
-        if self.settings.bus.commander == Commander::Bus {
+        if self.settings.command.commander == Commander::Bus {
             word |= cia402::REMOTE;
         }
         if self.speed_is_assumed() {

@@ -1,5 +1,7 @@
 //! The slave against frames of the specification and against random ones, and the manual against the table.
 
+pub(crate) mod beside_console;
+
 use std::fmt::Write as _;
 
 use drive_settings::value::Words as _;
@@ -10,14 +12,15 @@ use drive_settings::SettingsError;
 
 use super::Frame;
 use super::bus::is_stop;
-use super::cia402::Power;
 use super::registers::{FAULTS, ROWS, Shown};
+use super::settings::{Baud, Format};
 use super::slave::{self, Registers, Words};
 use crate::board::CLOCK_HZ;
 use crate::desk::handle::CommandError;
 use crate::desk::order::Refusal;
+use crate::desk::power::Power;
 use crate::generated;
-use crate::settings::bus::{Baud, Commander, Format};
+use crate::settings::Commander;
 use crate::settings::keys;
 use crate::settings::staging::SetError;
 use crate::store::FlashError;

@@ -6,10 +6,9 @@ use drive_settings::entry::{Change, Entry, Guard};
 use drive_settings::value::{Value, ValueError};
 use drive_settings::{SETTINGS, Settings, SettingsError};
 
-use super::FirmwareSettings;
-use super::bus::BUS_SILENT_S;
 pub use super::own::BOARD;
 use super::own::TIMEOUT;
+use super::{BUS_SILENT_S, FirmwareSettings};
 use crate::boards::Board;
 use crate::{ModuleState, OWN, hash};
 
@@ -17,7 +16,7 @@ use crate::{ModuleState, OWN, hash};
 const AUTO_BITS: u32 = 0x7fc0_0000;
 
 /// Number of settings.
-pub const COUNT: usize = SETTINGS.len() + OWN[0].len() + OWN[1].len() + OWN[2].len();
+pub const COUNT: usize = SETTINGS.len() + OWN[0].len() + OWN[1].len() + OWN[2].len() + OWN[3].len();
 
 /// A setting of the firmware. Two are equal if they have the same name.
 #[derive(Clone, Copy)]

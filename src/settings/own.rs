@@ -4,8 +4,7 @@ use drive_settings::entry;
 use drive_settings::entry::{Access, Change, Entry, Guard};
 use drive_settings::value::Words;
 
-use super::FirmwareSettings as Settings;
-use super::bus::{Alive, Baud, Commander, Format};
+use super::{Commander, FirmwareSettings as Settings};
 use crate::boards;
 
 /// Declares the settings of a module, with their defaults, and their rows in the table of settings. A row is `NUMBER: KIND, NAME,
@@ -41,16 +40,12 @@ pub const BOARD: &str = "board";
 
 /// The settings, in the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
-pub static COMMAND: [Entry<Settings>; 9] = [
+pub static COMMAND: [Entry<Settings>; 5] = [
     entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "time without a valid line after which the drive stops; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
     entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest").from_to(0.0, 3600.0).guarded(Guard::Raise),
     entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set").guarded(Guard::Keep),
     entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
-    entry!(104: word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
-    entry!(105: whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
-    entry!(106: word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
-    entry!(107: word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
-    entry!(131: word(), "bus.alive", [bus] alive: Alive, "requests that keep the master alive: commands, or any valid one").guarded(Guard::Lower),
+    entry!(104: word(), "bus.commands", [command] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
 ];
 
 /// The settings of the board, which come last.

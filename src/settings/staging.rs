@@ -9,9 +9,8 @@ use drive_settings::{Settings, SettingsError};
 use heapless::Vec;
 use thiserror::Error;
 
-use super::FirmwareSettings;
-use super::bus::Commander;
 use super::keys::{self, Key};
+use super::{Commander, FirmwareSettings};
 use crate::board;
 
 /// Most settings that are set at once.

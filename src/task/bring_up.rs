@@ -20,15 +20,14 @@ use induction_drive::chip::flash::Pages;
 use induction_drive::chip::serial::Port;
 use induction_drive::chip::watchdog::Watchdog;
 use induction_drive::chip::window::Window;
-use induction_drive::chip::{
-    adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time,
-};
+use induction_drive::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, stop, time};
 use induction_drive::commissioning::Session;
 use induction_drive::front::Front;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
+use induction_drive::modbus;
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict, WINDOW_CYCLES};
 use induction_drive::settings::FirmwareSettings;
@@ -44,7 +43,7 @@ pub struct Board<'a> {
     /// The serial port of the console.
     pub port: Port,
     /// The port of the field bus, if the board has one.
-    pub line: Option<rs485::Port>,
+    pub line: Option<modbus::port::Port>,
     /// The terminals, with the slow analog inputs.
     pub contacts: terminals::port::Port,
     /// The drive.
@@ -108,7 +107,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
     let line = SELECTED
         .bus
-        .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
+        .and_then(|wires| modbus::port::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let contacts = terminals::port::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Made before the control runs, because these are made with the interrupts masked.

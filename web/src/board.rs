@@ -13,7 +13,6 @@ use induction_drive::front::Front;
 use induction_drive::modbus;
 use induction_drive::modbus::slave::Written;
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::bus;
 use induction_drive::terminals;
 use motor_plant::{
     InverterSettings, Load, MeasurementSettings, MechanicsSettings, Plant, PlantSettings,
@@ -84,7 +83,7 @@ impl Port for Wires {
 enum NoBus {}
 
 impl modbus::Port for NoBus {
-    fn set_line(&mut self, _: &bus::Settings) {}
+    fn set_line(&mut self, _: &modbus::settings::Settings) {}
     fn receive(&mut self) -> Option<modbus::Frame> {
         None
     }

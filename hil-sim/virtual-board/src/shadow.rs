@@ -14,7 +14,7 @@ use induction_drive::console::grammar::{self, Request};
 use induction_drive::desk::handle::{CommandError, DriveHandle};
 use induction_drive::{
     commissioning::Session, desk::Desk, link::Status, link::ring::Record, rotor_tracking::Tracking,
-    settings::FirmwareSettings, settings::bus::Commander, settings::keys::Key, store::FlashError,
+    settings::Commander, settings::FirmwareSettings, settings::keys::Key, store::FlashError,
 };
 
 /// A drive with the settings of the board, and its own command arbiter.

@@ -18,10 +18,10 @@ use induction_drive::link::Status;
 use induction_drive::link::ring::Record;
 use induction_drive::link::trace::{self, Plan, Trigger};
 use induction_drive::modbus;
+use induction_drive::modbus::settings::{Baud, Format, Settings as BusSettings};
 use induction_drive::modbus::slave::Written;
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::bus::{self, Baud, Format};
 use induction_drive::settings::keys::Key;
 use induction_drive::store::FlashError;
 use induction_drive::store::history::History;
@@ -289,7 +289,7 @@ pub struct FakeBus {
 }
 
 impl modbus::Port for FakeBus {
-    fn set_line(&mut self, settings: &bus::Settings) {
+    fn set_line(&mut self, settings: &BusSettings) {
         self.line = Some((settings.baud, settings.format));
     }
     fn receive(&mut self) -> Option<modbus::Frame> {

@@ -10,7 +10,6 @@ use drive_settings::entry;
 use drive_settings::entry::{Access, Entry};
 use drive_settings::value::Words;
 
-use super::bus::Both;
 use super::*;
 use crate::console::grammar::{COMMANDS, NUMBERS};
 use crate::desk::handle::DriveHandle as _;
@@ -18,6 +17,7 @@ use crate::generated;
 use crate::link::trace::{self, SIGNALS, Sampled};
 use crate::modbus::float::to_float;
 use crate::modbus::registers::{self, ROWS};
+use crate::modbus::tests::beside_console::Both;
 use crate::monitor::record::Reason;
 use crate::settings::keys::Key;
 use crate::store::codec::Rejected;
@@ -196,7 +196,7 @@ fn inserted_and_renamed_settings_leave_the_others_where_they_are() {
         entry!(9: number("A"), "plate.current_a", [drive.nameplate] current_a: f32, ""),
         entry!(37: word(), "angle", [drive] angle_source: AngleSource, ""),
         entry!(101: number("s"), "command.silence_s", [command] timeout_s: f32, ""),
-        entry!(105: whole(), "bus.slave", [bus] address: u32, ""),
+        entry!(105: whole(), "bus.slave", [modules.bus] address: u32, ""),
     ];
     for entry in renamed {
         let place = many.iter().position(|key| key.id() == entry.id).unwrap();

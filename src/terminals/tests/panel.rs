@@ -5,7 +5,7 @@ use drive_core::{Command, Hardware, Measured, Mode, Stop};
 use super::super::Contacts;
 use crate::console::tests::Talk;
 use crate::front::Front;
-use crate::settings::bus::Commander;
+use crate::settings::Commander;
 
 const ALL_OPEN: Contacts = Contacts(0);
 

@@ -18,9 +18,9 @@ use crate::boards::{Level, Rs485};
 use crate::chip::pins;
 use crate::chip::serial::PRIORITY;
 use crate::link::mailbox::{Mailbox, Receiver, Sender};
+use crate::modbus::settings::{Baud, Format, Settings};
 use crate::modbus::slave::{self, Written};
 use crate::modbus::{self, Frame, bus};
-use crate::settings::bus::{Baud, Format, Settings};
 
 /// The main loop's end of the port.
 pub struct Port {

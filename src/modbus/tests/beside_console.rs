@@ -1,17 +1,22 @@
 //! The bus beside the console.
 
-use super::*;
-use crate::modbus::Frame;
-use crate::settings::bus::{Baud, Format};
+use drive_core::{Command, Hardware, Measured, Mode, State, Stop};
+use proptest::prelude::*;
+
+use super::super::Frame;
+use super::super::settings::{Baud, Format};
+use crate::console::tests::{FakeBus, Talk};
+use crate::settings::{FirmwareSettings, keys};
 
 /// A console with a bus; the bus commands if `lines` say so.
-pub(super) struct Both {
+pub(crate) struct Both {
     pub talk: Talk,
 }
 
 impl Both {
     fn new(lines: &str) -> Self {
-        let mut talk = Talk { bus: Some(FakeBus::default()), ..Talk::new() };
+        let mut talk = Talk::new();
+        talk.bus = Some(FakeBus::default());
         talk.say(lines);
         talk.drive.commands.clear();
         Self { talk }

@@ -4,6 +4,7 @@ use drive_settings::value::Words;
 use drive_settings::words;
 
 use crate::board::CLOCK_HZ;
+use crate::settings::own::settings;
 
 words! {
     /// Bits per second.
@@ -29,9 +30,6 @@ words! {
         TwoStops = "8n2",
     }
 }
-
-/// Silence of a commanding bus after which the drive stops, s, unless `command.timeout_s` sets another time.
-pub const BUS_SILENT_S: f32 = 1.0;
 
 /// Silence that ends a frame above 19 200 bit/s, us (Modbus over serial line V1.02, 2.5.1.1). Below, 3.5 characters.
 const SILENCE_US: u32 = 1750;
@@ -67,20 +65,6 @@ impl Format {
 }
 
 words! {
-    /// The source of starts and set-points. Anybody may stop the drive.
-    #[derive(Default)]
-    pub enum Commander {
-        /// The console.
-        #[default]
-        Console = "console",
-        /// The bus.
-        Bus = "bus",
-        /// The terminals.
-        Terminals = "strip",
-    }
-}
-
-words! {
     /// The requests that count as signs of life of the commanding master: valid ones to the address of the drive alone.
     #[derive(Default)]
     pub enum Alive {
@@ -92,19 +76,12 @@ words! {
     }
 }
 
-/// Settings of the bus.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Address of the drive, 1 to 247.
-    pub address: u32,
-    /// Bits per second.
-    pub baud: Baud,
-    /// Format of a byte.
-    pub format: Format,
-    /// The source of starts and set-points.
-    pub commander: Commander,
-    /// Requests that count as signs of life of the master.
-    pub alive: Alive,
+// Rate and parity are those that the specification recommends (Modbus over serial line V1.02, 2.4.2).
+settings! { [modules.bus]
+    105: whole(), "bus.address", address: u32 = 1, "address of the drive on the bus".from_to(1.0, 247.0);
+    106: word("bit/s"), "bus.baud", baud: Baud = Baud::B19200, "rate of the bus";
+    107: word(), "bus.parity", format: Format = Format::Even, "data bits, parity and stop bits of the bus";
+    131: word(), "bus.alive", alive: Alive = Alive::Writes, "requests that keep the master alive: commands, or any valid one".guarded(Guard::Lower);
 }
 
 impl Settings {
@@ -112,13 +89,5 @@ impl Settings {
     pub fn own(&self) -> u8 {
         // Always 1 to 247.
         self.address as u8
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        // Rate and parity that the specification recommends (Modbus over serial line V1.02, 2.4.2).
-        let (baud, format) = (Baud::B19200, Format::Even);
-        Self { address: 1, baud, format, commander: Commander::Console, alive: Alive::Writes }
     }
 }
