@@ -6,10 +6,8 @@ use drive_settings::Ntc;
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Currents, FaultInput, Level, Rs485, Shunts, Stated, assumed};
+use super::{Analog, Currents, FaultInput, Gates, Level, Rs485, Shunts, Stated, assumed};
 
-/// High sides.
-pub const HIGH: [Pin; 3] = [pa(8), pa(9), pa(10)];
 /// Low sides.
 pub const LOW: [Pin; 3] = [pa(7), pb(0), pb(1)];
 /// Phase currents.
@@ -24,6 +22,16 @@ pub const SHUNT_STEP: &str =
     "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
 /// Bench step of a thermistor.
 pub const NTC_STEP: &str = "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink";
+
+/// The high sides, which are on at this level.
+pub const fn high(on_at: Stated<Level>) -> Gates {
+    Gates { pins: [pa(8), pa(9), pa(10)], on_at }
+}
+
+/// The low sides, which are on at this level.
+pub const fn low(on_at: Stated<Level>) -> Gates {
+    Gates { pins: LOW, on_at }
+}
 
 /// A thermistor with this resistor in series. If the topology differs, the temperature is wrong or falls when it should rise.
 pub const fn ntc(divider_ohm: f32) -> Stated<Ntc> {

@@ -6,21 +6,18 @@
 use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, DcLinkLimits, Gates, Level, Terminals, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Level, Terminals, assumed, morpho, read};
 
 /// The board.
 pub const BOARD: Board = Board {
     name: "nucleo-g474re-ihm023v3",
     title: "NUCLEO-G474RE with X-NUCLEO-IHM09M1 and STEVAL-IHM023V3, 1 kW at 230 V (template)",
-    high: Gates { pins: morpho::HIGH, on_at: read(Level::High, "L6390 data sheet, HIN") },
+    high: morpho::high(read(Level::High, "L6390 data sheet, HIN")),
     // The data sheet of the driver says so; whether the adapter inverts is not known.
-    low: Gates {
-        pins: morpho::LOW,
-        on_at: assumed(
-            Level::Low,
-            "motor supply off: ground each low-side pin; the gate of that low side must go on",
-        ),
-    },
+    low: morpho::low(assumed(
+        Level::Low,
+        "motor supply off: ground each low-side pin; the gate of that low side must go on",
+    )),
     fault: morpho::FAULT,
     dead_time_s: assumed(
         2.0e-6,

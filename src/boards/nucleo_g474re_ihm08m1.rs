@@ -8,7 +8,7 @@ use drive_settings::{Carrier, Flux};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
-use super::{Board, DcLinkLimits, Gates, Level, TerminalPins, Terminals, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Level, TerminalPins, Terminals, assumed, morpho, read};
 
 /// The NuttX port to this board, which has run motors: polarity, gain, sign and divider.
 const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
@@ -24,8 +24,8 @@ const TERMINALS: TerminalPins = [
 pub const BOARD: Board = Board {
     name: "nucleo-g474re-ihm08m1",
     title: "NUCLEO-G474RE with X-NUCLEO-IHM08M1, supply 42 V",
-    high: Gates { pins: morpho::HIGH, on_at: read(Level::High, "L6398 data sheet, HIN") },
-    low: Gates { pins: morpho::LOW, on_at: read(Level::Low, NUTTX) },
+    high: morpho::high(read(Level::High, "L6398 data sheet, HIN")),
+    low: morpho::low(read(Level::Low, NUTTX)),
     fault: morpho::FAULT,
     // The driver adds 320 ns of its own.
     dead_time_s: assumed(

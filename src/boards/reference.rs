@@ -6,8 +6,7 @@ use drive_settings::{Carrier, Flux};
 use super::converter::calibrated;
 use super::pin::{pa, pb, pc};
 use super::{
-    Analog, Board, Currents, DcLinkLimits, Gates, Level, TerminalPins, Terminals, assumed, morpho,
-    read,
+    Analog, Board, Currents, DcLinkLimits, Level, TerminalPins, Terminals, assumed, morpho, read,
 };
 
 #[rustfmt::skip] // Two references and the motor's sensor, each at an ADC; contacts; outputs.
@@ -17,24 +16,21 @@ const TERMINALS: TerminalPins = [
     Some(pc(7)), Some(pc(9)), Some(pa(12)),
 ];
 
+/// The calibration lines of the current sensors.
+const LINES: &str = "dissertation, Eq. 3.5 and 3.4";
+
 /// The board.
 pub const BOARD: Board = Board {
     name: "reference",
     title: "NUCLEO-G474RE with the inverter and the current sensors of the dissertation",
-    high: Gates {
-        pins: morpho::HIGH,
-        on_at: assumed(
-            Level::High,
-            "power stage off: pull each high-side input up; its gate must go on",
-        ),
-    },
-    low: Gates {
-        pins: morpho::LOW,
-        on_at: assumed(
-            Level::High,
-            "power stage off: pull each low-side input up; its gate must go on",
-        ),
-    },
+    high: morpho::high(assumed(
+        Level::High,
+        "power stage off: pull each high-side input up; its gate must go on",
+    )),
+    low: morpho::low(assumed(
+        Level::High,
+        "power stage off: pull each low-side input up; its gate must go on",
+    )),
     fault: morpho::fault("ground the fault input: `status` must show the break"),
     // Both switches of a leg are off for this time at every change.
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
@@ -43,14 +39,8 @@ pub const BOARD: Board = Board {
     // Assumed: the dissertation names no switches; the heat sink shows whether they withstand the losses.
     carrier_max_khz: Carrier::Khz18,
     currents: Currents {
-        a: Analog {
-            pin: morpho::CURRENTS[0],
-            line: read(calibrated(Line::CHANNEL_A), "dissertation, Eq. 3.5 and 3.4"),
-        },
-        b: Analog {
-            pin: morpho::CURRENTS[1],
-            line: read(calibrated(Line::CHANNEL_B), "dissertation, Eq. 3.5 and 3.4"),
-        },
+        a: Analog { pin: morpho::CURRENTS[0], line: read(calibrated(Line::CHANNEL_A), LINES) },
+        b: Analog { pin: morpho::CURRENTS[1], line: read(calibrated(Line::CHANNEL_B), LINES) },
         shunts: None,
     },
     current_delay_s: read(30e-6, "dissertation, Figure 16: a filter of 5305 Hz"),
