@@ -111,7 +111,12 @@ fn step(word: &str) -> Result<Step, ParseError<'_>> {
 /// The setting with this name.
 fn setting(word: &str) -> Result<Key, ParseError<'_>> {
     let near = || nearest(word, keys::all().map(Key::name));
-    keys::find(word).ok_or_else(|| ParseError::Key { word, near: near() })
+    keys::find(word).ok_or_else(|| ParseError::Unknown {
+        what: "setting",
+        list: "get",
+        word,
+        near: near(),
+    })
 }
 
 /// The same beginning of a name, from the table.

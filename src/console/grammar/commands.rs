@@ -27,7 +27,7 @@ macro_rules! commands {
         pub(super) fn request<'a>(word: &'a str, $words: &mut Words<'a>) -> Result<Request, ParseError<'a>> {
             Ok(match word {
                 $($word => $request.into(),)+
-                word => return Err(ParseError::Command { word, near: nearest(word, COMMANDS.iter().copied()) }),
+                word => return Err(ParseError::Unknown { what: "command", list: "help", word, near: nearest(word, COMMANDS.iter().copied()) }),
             })
         }
     };

@@ -19,12 +19,16 @@ pub struct TagError;
 /// Reason why a line is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ParseError<'a> {
-    /// No such command.
-    #[error("no such command: {word}; {}`help` lists them", Meant(*.near))]
-    Command {
+    /// No such command or setting.
+    #[error("no such {what}: {word}; {}`{list}` lists them", Meant(*.near))]
+    Unknown {
+        /// The thing that the word names, and the command that lists all.
+        what: &'static str,
+        /// See `what`.
+        list: &'static str,
         /// The word.
         word: &'a str,
-        /// A command that is spelt like it.
+        /// A known word that is spelt like it.
         near: Option<&'static str>,
     },
     /// This word is missing.
@@ -80,14 +84,6 @@ pub enum ParseError<'a> {
         /// The word.
         word: &'a str,
         /// A signal that is spelt like it.
-        near: Option<&'static str>,
-    },
-    /// No such setting.
-    #[error("no such setting: {word}; {}`get` lists them", Meant(*.near))]
-    Key {
-        /// The word.
-        word: &'a str,
-        /// A setting that is spelt like it.
         near: Option<&'static str>,
     },
     /// Not a value of the setting.
