@@ -23,11 +23,11 @@ pub mod store;
 pub mod terminals;
 
 use drive_settings::entry::Entry;
-use settings::{FirmwareSettings, own};
+use settings::{FirmwareSettings, command, own};
 
 /// The tables of the firmware's own settings, in the order in which they are shown.
 const OWN: [&[Entry<FirmwareSettings>]; 4] =
-    [&own::COMMAND, modbus::settings::ROWS, terminals::settings::ROWS, &own::OF_BOARD];
+    [command::ROWS, modbus::settings::ROWS, terminals::settings::ROWS, &own::OF_BOARD];
 
 /// Settings of the modules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,7 @@
 //! The settings of the firmware: those of the drive, those of the firmware around it, and the values learned on the motor. [`keys`] lists
 //! them by name.
 
+pub mod command;
 pub mod keys;
 pub(crate) mod own;
 pub mod staging;
@@ -27,7 +28,9 @@ pub struct FirmwareSettings {
     /// Settings of the drive.
     pub drive: Settings,
     /// Settings of the firmware around the drive.
-    pub command: CommandSettings,
+    pub command: command::Settings,
+    /// The [confirmation](crate::boards::Board::confirmation) of the board whose bench steps were done; 0: none.
+    pub confirmed: u32,
     /// Settings of the modules.
     pub modules: ModuleSettings,
     /// Whether a pin selects at a reset the program that starts: see [`board::boot_pin_counts`]. It is a state of the chip, which is not
@@ -54,39 +57,6 @@ words! {
 /// Silence of a commanding bus after which the drive stops, s, unless `command.timeout_s` sets another time.
 pub const BUS_SILENT_S: f32 = 1.0;
 
-/// Settings for the handling of commands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CommandSettings {
-    /// Time without a valid line after which the drive is stopped, s; 0 disables the time-out.
-    pub timeout_s: f32,
-    /// Longest time in which the shaft coasts to rest, s.
-    pub coasts_s: f32,
-    /// The source of starts and set-points.
-    pub commander: Commander,
-    /// Whether a start has checked the wiring since the defaults were set.
-    pub wiring_checked: bool,
-    /// Whether the console sends typed characters back.
-    pub echo: bool,
-    /// The [confirmation](crate::boards::Board::confirmation) of the board whose bench steps were done; 0: none.
-    pub confirmed: u32,
-}
-
-impl Default for CommandSettings {
-    fn default() -> Self {
-        // A small spindle coasts for half a minute.
-        let coasts_s = 60.0;
-        let commander = Commander::Console;
-        Self {
-            timeout_s: 0.0,
-            coasts_s,
-            commander,
-            wiring_checked: false,
-            echo: false,
-            confirmed: 0,
-        }
-    }
-}
-
 impl FirmwareSettings {
     /// The defaults of the board that the firmware is built for.
     pub fn of_the_board() -> Self {
@@ -96,19 +66,19 @@ impl FirmwareSettings {
     /// The defaults of any board.
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
-        let (command, modules) = (CommandSettings::default(), ModuleSettings::default());
-        Self { board, drive, command, modules, boot_pin_counts: true, learned: None }
+        let (command, modules) = (command::Settings::default(), ModuleSettings::default());
+        Self { board, drive, command, confirmed: 0, modules, boot_pin_counts: true, learned: None }
     }
 
     /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option bytes
     /// as they are now.
     pub fn board_is_confirmed(&self) -> bool {
-        self.command.confirmed == self.confirmation()
+        self.confirmed == self.confirmation()
     }
 
     /// Notes that the bench steps of the board were done.
     pub fn confirm_board(&mut self) {
-        self.command.confirmed = self.confirmation();
+        self.confirmed = self.confirmation();
     }
 
     fn confirmation(&self) -> u32 {

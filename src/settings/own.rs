@@ -1,10 +1,9 @@
 //! The tables of the firmware's own settings, beside those of drive and modules.
 
 use drive_settings::entry;
-use drive_settings::entry::{Access, Change, Entry, Guard};
-use drive_settings::value::Words;
+use drive_settings::entry::{Access, Change, Entry};
 
-use super::{Commander, FirmwareSettings as Settings};
+use super::FirmwareSettings as Settings;
 use crate::boards;
 
 /// Declares the settings of a module, with their defaults, and their rows in the table of settings. A row is `NUMBER: KIND, NAME,
@@ -25,6 +24,7 @@ macro_rules! settings {
         /// Their rows, in the order in which they are shown.
         pub static ROWS: &[drive_settings::entry::Entry<$crate::settings::FirmwareSettings>] = {
             use drive_settings::entry::{Access, Entry, Guard};
+            use drive_settings::value::Words;
             use $crate::settings::FirmwareSettings as Settings;
             &[$(drive_settings::entry!($id: $kind($($unit)?), $name, $path $field: $type, $help)$(.$more($($with),+))*),+]
         };
@@ -38,16 +38,6 @@ pub const TIMEOUT: &str = "command.timeout_s";
 /// Name of the setting that identifies the board.
 pub const BOARD: &str = "board";
 
-/// The settings, in the order in which they are shown.
-#[rustfmt::skip] // One setting, one row.
-pub static COMMAND: [Entry<Settings>; 5] = [
-    entry!(101: number("s"), TIMEOUT, [command] timeout_s: f32, "time without a valid line after which the drive stops; 0: never").from_to(0.0, 3600.0).guarded(Guard::Lower),
-    entry!(132: number("s"), "stop.coasts_s", [command] coasts_s: f32, "longest time in which the shaft coasts to rest").from_to(0.0, 3600.0).guarded(Guard::Raise),
-    entry!(102: word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set").guarded(Guard::Keep),
-    entry!(103: word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
-    entry!(104: word(), "bus.commands", [command] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
-];
-
 /// The settings of the board, which come last.
 #[rustfmt::skip]
 pub static OF_BOARD: [Entry<Settings>; 2] = [
@@ -56,5 +46,5 @@ pub static OF_BOARD: [Entry<Settings>; 2] = [
         |s, place| s.board = boards::ALL[place % boards::ALL.len()],
         &boards::NAMES,
     ), "board that the firmware is built for").changed(Change::Board),
-    entry!(109: whole(), "board.confirmed", [command] confirmed: u32, "number of the confirmed board; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
+    entry!(109: whole(), "board.confirmed", [] confirmed: u32, "number of the confirmed board; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
 ];

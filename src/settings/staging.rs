@@ -188,7 +188,7 @@ impl Staging {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         let mut settings = FirmwareSettings::of(self.in_force.board);
         // These are properties of the hardware, not of the settings.
-        settings.command.confirmed = self.in_force.command.confirmed;
+        settings.confirmed = self.in_force.confirmed;
         settings.boot_pin_counts = self.in_force.boot_pin_counts;
         *staged = Staged { settings, learned: true };
         self.drop_if_same();
