@@ -11,6 +11,7 @@ pub mod pins;
 pub mod pwm;
 pub mod serial;
 pub mod sleep;
+pub mod stage;
 pub mod start;
 pub mod stop;
 pub mod time;

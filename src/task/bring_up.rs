@@ -18,6 +18,7 @@ use induction_drive::boards::SELECTED;
 use induction_drive::chip::StartError;
 use induction_drive::chip::flash::Pages;
 use induction_drive::chip::serial::Port;
+use induction_drive::chip::stage::Stage;
 use induction_drive::chip::watchdog::Watchdog;
 use induction_drive::chip::window::Window;
 use induction_drive::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, stop, time};
@@ -295,11 +296,7 @@ fn start_control(
     let drive = Drive::new(coefficients);
     control::Control {
         drive,
-        pwm,
-        dc_link,
-        adc,
-        encoder,
-        window,
+        stage: Stage::new(pwm, dc_link, adc, encoder, window),
         status: send_status,
         commands: receive_commands,
         answers: send_answers,

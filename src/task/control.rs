@@ -19,12 +19,7 @@ use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
 use induction_drive::board;
-use induction_drive::chip::adc::Adc;
-use induction_drive::chip::dc_link::DcLink;
-use induction_drive::chip::encoder::Encoder;
-use induction_drive::chip::pwm::Pwm;
-use induction_drive::chip::time;
-use induction_drive::chip::window::Window;
+use induction_drive::chip::stage::Stage;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::ring::Writer;
 use induction_drive::link::trace::{Recorder, Sampled};
@@ -36,16 +31,8 @@ use induction_drive::monitor::memory_check::MemoryRange;
 pub struct Control {
     /// The drive.
     pub drive: Drive,
-    /// The power stage.
-    pub pwm: Pwm,
-    /// Chopper and precharge relay.
-    pub dc_link: DcLink,
-    /// The ADCs.
-    pub adc: Adc,
-    /// The encoder.
-    pub encoder: Encoder,
-    /// The watchdog over this interrupt.
-    pub window: Window,
+    /// The peripherals.
+    pub stage: Stage,
     /// Reports to the main loop.
     pub status: Sender<'static, Status>,
     /// Commands to the drive.
@@ -91,14 +78,10 @@ impl Control {
         let running = Running {
             control: self,
             front_end: FrontEndState::default(),
-            periods: 0,
             worst_cycles: [0; 2],
             worst_latency: 0,
-            late: Hardware::empty(),
-            over_current: Hardware::empty(),
             unreported: Hardware::empty(),
             phase: <Drive>::PHASES[0],
-            began: 0,
             reported: None,
             report_left: 0,
             report_late: 0,
@@ -151,20 +134,13 @@ static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 struct Running {
     control: Control,
     front_end: FrontEndState,
-    periods: u32,
     /// Most cycles of periods without a command, and with one.
     worst_cycles: [u32; 2],
     worst_latency: u32,
-    /// Deadline miss of the last period.
-    late: Hardware,
-    /// Over-current at an analog watchdog since the last period.
-    over_current: Hardware,
     /// Events since the last report.
     unreported: Hardware,
     /// Word of the drive's phase at the end of the last period.
     phase: u32,
-    /// Time of the start of the last period.
-    began: u32,
     /// State in the last report.
     reported: Option<State>,
     /// Parts of a report that are still to be sent.
@@ -187,101 +163,33 @@ fn ADC1_2() {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control {
-            drive,
-            pwm,
-            dc_link,
-            adc,
-            encoder,
-            window,
-            commands,
-            answers,
-            trace,
-            signals,
-            ..
-        } = &mut self.control;
-
-        // Over-current comes first: the outputs go off before anything is computed. The analog watchdogs interrupt when the current is
-        // converted, before the sequence has ended.
-        let converters = adc.take_events();
-        if converters.over_current {
-            pwm.trip();
-            self.over_current = Hardware::ANALOG_WATCHDOG;
-        }
-        if !converters.ended {
-            return;
-        }
-
-        // The watchdog is fed at the beginning, where the interrupt comes at equal intervals; an interrupt that hangs does not feed it
-        // again.
+        let Control { drive, stage, commands, answers, trace, signals, .. } = &mut self.control;
         let told = FAULTS_FROM_MAIN.load(Ordering::Relaxed);
-        if told & WINDOW_ON != 0 {
-            window.feed();
-        }
-
-        // The timer counts down from the top, where the sampling ended and an update came, and was at the top one period before.
-        // Otherwise a period was skipped or came late.
-        let timer = pwm.take_events();
-        let since_top = pwm.since_top();
-        let now = time::now();
-        let since_last = now.wrapping_sub(core::mem::replace(&mut self.began, now));
-        // (The first period has waited for the interrupt to be enabled.)
-        if self.periods > 0
-            && (!timer.updated
-                || since_top > u32::from(board::PWM_TOP)
-                || since_last > 3 * u32::from(board::PWM_TOP))
-        {
-            self.late = Hardware::DEADLINE_MISS;
-        }
-        let mut hardware = self.late | self.over_current | Hardware::from_bits_truncate(told);
-        self.over_current = Hardware::empty();
-        if timer.pulled {
-            hardware |= Hardware::BREAK;
-        }
-        if !converters.complete {
-            hardware |= Hardware::CONVERTER_OVERRUN;
-        }
+        let (watched, told) = (told & WINDOW_ON != 0, Hardware::from_bits_truncate(told));
+        let Some(mut period) = stage.begin(watched, told) else { return };
         // Checked before any decision depends on it: if a bit of the phase has flipped, the state of the drive is unknown.
         let phase = phase(drive);
         if phase != self.phase {
-            pwm.trip();
+            stage.pwm.trip();
             return BROKEN.store(phase | 1, Ordering::Relaxed);
         }
         let was_off = <Drive>::is_off_in(phase);
-        if dc_link.is_off() {
-            if was_off {
-                dc_link.restore();
-            } else {
-                hardware |= Hardware::CHOPPER_OFF;
-            }
-        }
-        let read = adc.read();
-        let sample = Sample { encoder: encoder.count(), hardware, ..read };
+        let sample = stage.sample(&mut period, was_off);
 
         let put_out = &mut |compare| {
-            if !pwm.apply(compare) {
+            if !stage.pwm.apply(compare) {
                 BROKEN.store(phase, Ordering::Relaxed);
             }
         };
         let (_, output) = drive.period(&mut self.front_end, &sample, put_out);
 
-        // The timer was at its top again before all compare values were written.
-        self.late = Hardware::empty();
-        if pwm.updated() {
-            self.late = Hardware::DEADLINE_MISS;
-        }
-        let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
-        if self.periods > 0 && latency > self.worst_latency {
+        let (latency, missed) = stage.end(&period, was_off, &output);
+        if latency > self.worst_latency {
             self.worst_latency = latency;
         }
-        // With the outputs off a miss is harmless, and is only reported.
-        let missed = (hardware | self.late).contains(Hardware::DEADLINE_MISS);
-        if missed && !was_off {
-            pwm.trip();
+        if missed {
             MISSED.store(true, Ordering::Relaxed);
         }
-
-        dc_link.set(output.chopper, output.relay);
 
         // Commands are taken between two steps: a command acts from the next step on. There is space for the answer, because the main
         // loop takes the last one before it sends a command.
@@ -292,10 +200,10 @@ impl Running {
                 |command| {
                     // If a start is refused, the drive stays off, which disarms again.
                     if matches!(command, Command::Start(_) | Command::Test(_)) {
-                        pwm.arm();
+                        stage.pwm.arm();
                     }
                     answers.send_with(|answer| *answer = drive.command(command));
-                    adc.convert_both(drive.front_end().both_zero_vectors);
+                    stage.adc.convert_both(drive.front_end().both_zero_vectors);
                     // A command that was taken is never carried out again.
                     *command = Command::Stop(Stop::Now);
                 },
@@ -305,26 +213,26 @@ impl Running {
         let is_off = <Drive>::is_off_in(self.phase);
         if is_off {
             // A stop at once does not wait for the next period.
-            pwm.trip();
-            pwm.disarm();
+            stage.pwm.trip();
+            stage.pwm.disarm();
         }
         IS_OFF.store(is_off, Ordering::Relaxed);
         let state = drive.state();
-        let sampled = Sampled::new(&read, state, drive.limiting());
+        let sampled = Sampled::new(&sample, state, drive.limiting());
         let traced = trace.step(&sampled, drive.telemetry());
 
-        self.unreported |= hardware;
-        self.periods = self.periods.wrapping_add(1);
+        self.unreported |= period.hardware;
+        stage.periods = stage.periods.wrapping_add(1);
+        let periods = stage.periods;
         // A report is sent in two periods: its signals, then the rest. A part is not sent in the period of a command. It also waits, for
         // two periods at most, for a record of trace or stream, because each of these takes long enough.
-        let due =
-            self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        let due = self.reported != Some(state) || periods.is_multiple_of(board::PERIODS_PER_STATUS);
         if due && self.report_left == 0 {
             self.report_left = 2;
         }
         // A sample of the stream waits as well, while it is still distinguishable from the next one.
         let every = STREAM_DIVIDER.load(Ordering::Relaxed);
-        let since = self.periods.checked_rem(every);
+        let since = periods.checked_rem(every);
         self.stream_due |= since == Some(0);
         let hurries = every < 3 || since == Some(2);
         let streamed = self.stream_due && (hurries || !(commanded || traced));
@@ -338,13 +246,13 @@ impl Running {
         let observed = drive.tracks_rotor() || drive.is_testing() || commissioned;
         if observed || streamed || part == 2 {
             signals.write(|record| {
-                (record.period, record.sampled) = (self.periods, sampled);
+                (record.period, record.sampled) = (periods, sampled);
                 (record.observed, record.streamed) = (observed, streamed);
                 record.set(drive.telemetry());
             });
         }
-        adc.close();
-        PERIODS.store(self.periods, Ordering::Relaxed);
+        stage.adc.close();
+        PERIODS.store(periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;
         let worst = if commanded { with } else { without };
@@ -356,7 +264,7 @@ impl Running {
 
     /// Reports to the main loop. If the main loop is slow or hangs, this report is lost, but not its events.
     fn report(&mut self, state: State, sample: Sample, cycles: u32) {
-        let Control { drive, status, learned, .. } = &mut self.control;
+        let Control { drive, stage, status, learned, .. } = &mut self.control;
         if self.reported == Some(State::Learning)
             && let Some(result) = drive.learned()
         {
@@ -364,7 +272,7 @@ impl Running {
             learned.send(Some(*result));
         }
         let sent = status.send_with(|report| {
-            report.periods = self.periods;
+            report.periods = stage.periods;
             report.state = state;
             report.sample = sample;
             report.worst_cycles = self.worst_cycles;
