@@ -12,7 +12,7 @@ use core::str::SplitAsciiWhitespace;
 
 use drive_commission::Step;
 use drive_core::Fault;
-use drive_settings::value::{self, Words as _};
+use drive_settings::value::{self, Value, Words as _};
 
 use super::line::Tag;
 use super::suggest::nearest;
@@ -77,7 +77,7 @@ impl<'a> Words<'a> {
 
     fn number(&mut self, what: &'static str) -> Result<f32, ParseError<'a>> {
         let word = self.next(what)?;
-        value::number(word).ok_or(ParseError::Number { what, word })
+        value::number(word).ok_or(ParseError::Number(word, what))
     }
 }
 
@@ -121,27 +121,26 @@ fn setting(word: &str) -> Result<Key, ParseError<'_>> {
 
 /// The same beginning of a name, from the table.
 fn prefix(word: &str) -> Result<&'static str, ParseError<'_>> {
-    let beginning = keys::all().find_map(|key| {
-        let name = key.name();
-        name.starts_with(word).then(|| name.get(..word.len())).flatten()
-    });
+    let name = keys::all().map(Key::name).find(|name| name.starts_with(word));
+    let beginning = name.and_then(|name| name.get(..word.len()));
     beginning.map_or_else(|| setting(word).map(Key::name), Ok)
 }
 
 /// Settings and values by turns.
 fn assignments<'a>(words: &mut Words<'a>) -> Result<Assignments, ParseError<'a>> {
-    let mut all = Assignments::new();
-    let mut name = words.next("the setting")?;
-    loop {
-        let key = setting(name)?;
-        let word = words.next("the value")?;
-        let value = key.parse(word).map_err(|why| ParseError::Value { key, word, why })?;
-        all.push((key, value)).map_err(|_| ParseError::TooMany { what: "settings", most: MOST })?;
-        match words.optional() {
-            Some(next) => name = next,
-            None => return Ok(all),
-        }
+    let (mut all, mut next) = (Assignments::new(), Some(words.next("the setting")?));
+    while let Some(name) = next {
+        let assigned = assigned(setting(name)?, words.next("the value")?)?;
+        all.push(assigned).map_err(|_| ParseError::TooMany(MOST, "settings"))?;
+        next = words.optional();
     }
+    Ok(all)
+}
+
+/// A setting with the value that this word stands for.
+fn assigned(key: Key, word: &str) -> Result<(Key, Value), ParseError<'_>> {
+    let value = key.parse(word).map_err(|why| ParseError::Value { key, word, why })?;
+    Ok((key, value))
 }
 
 /// The fault with this number.

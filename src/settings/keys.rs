@@ -81,40 +81,35 @@ impl fmt::Debug for Key {
     }
 }
 
+/// Functions that return a property, the same for both kinds of entry: `NAME: TYPE = |entry| VALUE;`.
+macro_rules! properties {
+    ($($(#[$about:meta])+ $name:ident: $type:ty = |$entry:ident| $value:expr;)+) => {
+        $($(#[$about])+ pub fn $name(self) -> $type { with!(self, |$entry| $value) })+
+    };
+}
+
 impl Key {
-    /// Name at the console.
-    pub fn name(self) -> &'static str {
-        with!(self, |entry| entry.name)
-    }
-
-    /// Unit; empty if there is none.
-    pub fn unit(self) -> &'static str {
-        with!(self, |entry| entry.unit)
-    }
-
-    /// Meaning, one sentence without its full stop.
-    pub fn help(self) -> &'static str {
-        with!(self, |entry| entry.help)
-    }
-
-    /// Who may change it, and when.
-    pub fn change(self) -> Change {
-        with!(self, |entry| entry.change)
-    }
-
-    /// Whether learned values are valid for this value only.
-    pub fn learned(self) -> bool {
-        with!(self, |entry| entry.learned)
-    }
-
-    /// Whether the setting affects the safety of the power stage: it can be set only at the console, and must be confirmed.
-    pub fn hardware(self) -> bool {
-        with!(self, |entry| entry.hardware)
-    }
-
-    /// Whether the setting is protective: other sources than the console can only tighten it.
-    pub fn guards(self) -> bool {
-        with!(self, |entry| entry.guard != Guard::None)
+    properties! {
+        /// Name at the console.
+        name: &'static str = |entry| entry.name;
+        /// Unit; empty if there is none.
+        unit: &'static str = |entry| entry.unit;
+        /// Meaning, one sentence without its full stop.
+        help: &'static str = |entry| entry.help;
+        /// Who may change it, and when.
+        change: Change = |entry| entry.change;
+        /// Whether learned values are valid for this value only.
+        learned: bool = |entry| entry.learned;
+        /// Whether the setting affects the safety of the power stage: it can be set only at the console, and must be confirmed.
+        hardware: bool = |entry| entry.hardware;
+        /// Whether the setting is protective: other sources than the console can only tighten it.
+        guards: bool = |entry| entry.guard != Guard::None;
+        /// The words that may be set; empty for a number.
+        words: &'static [&'static str] = |entry| entry.words();
+        /// Whether the setting follows a rule unless it is set.
+        has_rule: bool = |entry| entry.has_rule();
+        /// Permanent number of the setting: in the flash, and for its registers on the bus.
+        id: u16 = |entry| entry.id;
     }
 
     /// The number in effect; for a word its place in the list. A time-out of 0 is the bus's own time-out.
@@ -133,16 +128,6 @@ impl Key {
     pub fn is_looser(self, settings: &FirmwareSettings, than: &FirmwareSettings) -> bool {
         let says_what_is_there = with!(self, |entry| entry.guard == Guard::Keep);
         !says_what_is_there && !self.holds(settings, self.level(than))
-    }
-
-    /// The words that may be set; empty for a number.
-    pub fn words(self) -> &'static [&'static str] {
-        with!(self, |entry| entry.words())
-    }
-
-    /// Whether the setting follows a rule unless it is set.
-    pub fn has_rule(self) -> bool {
-        with!(self, |entry| entry.has_rule())
     }
 
     /// The value.
@@ -185,11 +170,6 @@ impl Key {
     /// Sets a value from this key's [`parse`](Self::parse); a value of another type changes nothing.
     pub fn set(self, settings: &mut FirmwareSettings, value: Value) {
         with!(self, settings, |entry, s| entry.set(s, value))
-    }
-
-    /// Permanent number of the setting: in the flash, and for its registers on the bus.
-    pub fn id(self) -> u16 {
-        with!(self, |entry| entry.id)
     }
 
     /// The value as 32 bits for the flash: the bits of a number, the hash of a word.

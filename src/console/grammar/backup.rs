@@ -10,9 +10,8 @@ pub fn restore<'a>(index: &'a str, words: &mut Words<'a>) -> Result<Request, Par
     let index = whole("the index", index, 0, largest)?;
     let mut all = Vec::new();
     while let Some(word) = words.optional() {
-        let most = WORDS_IN_LINE;
         all.push(hexadecimal(word)?)
-            .map_err(|_| ParseError::TooMany { what: "words in a line", most })?;
+            .map_err(|_| ParseError::TooMany(WORDS_IN_LINE, "words in a line"))?;
     }
     if all.is_empty() {
         return Err(ParseError::Missing("a word"));

@@ -5,7 +5,9 @@ use drive_core::{Mode, Stop, homing};
 
 use super::backup::{hexadecimal, restore};
 use super::request::{LEVELS, ListKind, Request};
-use super::{ParseError, Words, assignments, fault, prefix, recording, setting, step, whole};
+use super::{
+    ParseError, Words, assigned, assignments, fault, prefix, recording, setting, step, whole,
+};
 use crate::board;
 use crate::boards;
 use crate::console::suggest::nearest;
@@ -51,7 +53,7 @@ const STOPS: [(&str, Order); 3] = [
 ];
 
 commands! { words;
-    1: "help", ["", "this list; also h and ?"] => ListKind::Help;
+    1: "help", ["", "this list; also h and ?"] => Request::List(ListKind::Help);
     2: "status", ["", "what the drive is doing"] => Request::Status;
     3: "start", ["[MODE]", "calibrate, magnetise, then regulate torque, speed or position; vf: turn a motor that is not identified"] => words.optional_of(Order::Start(Mode::Torque), "the mode", "torque speed position vf learning", &MODES)?;
     4: "commission", ["[STEP [STEP]]", "measure the motor at rest, from its nameplate: all steps, one, or from one to another; plant: shaft locked; inertia: shaft free"] => match words.optional().map(step).transpose()? {
@@ -71,19 +73,16 @@ commands! { words;
         i_q: words.number("the current, A")?,
         turns: words.number("the longest way, turns")?,
     });
-    14: "angle", ["encoder|injection", "where the flux angle comes from; the same as set angle_source"] => {
-        let (key, word) = (setting("angle_source")?, words.next("encoder or injection")?);
-        let value = key.parse(word).map_err(|why| ParseError::Value { key, word, why })?;
-        Request::Set([(key, value)].into_iter().collect())
-    };
+    14: "angle", ["encoder|injection", "where the flux angle comes from; the same as set angle_source"]
+        => Request::Set([assigned(setting("angle_source")?, words.next("encoder or injection")?)?].into_iter().collect());
     15: "get", ["[KEY|PREFIX]", "one setting with range and meaning, or all that begin so"] => match words.optional().map(|name| (name, keys::find(name))) {
         None => Request::List(ListKind::Settings("")),
         Some((_, Some(key))) => Request::Get(key),
         Some((name, None)) => Request::List(ListKind::Settings(prefix(name)?)),
     };
     16: "describe", ["[PREFIX]", "the settings as JSON, one a line"] => match words.optional() {
-        Some("stream") => ListKind::Signals,
-        word => ListKind::Describe(word.map_or(Ok(""), prefix)?),
+        Some("stream") => Request::List(ListKind::Signals),
+        word => Request::List(ListKind::Describe(word.map_or(Ok(""), prefix)?)),
     };
     17: "set", ["KEY VALUE ...", "stage values, several in a line; the drive must be off"] => Request::Set(assignments(words)?);
     18: "apply", ["", "put the staged values in force; start does so, too"] => Order::Apply;
@@ -97,7 +96,7 @@ commands! { words;
         Some(index) => restore(index, words)?,
     };
     24: "faults", ["[NUMBER]", "the latched fault with causes and cure, and what ended the last run"] => Request::Faults(words.optional().map(fault).transpose()?);
-    25: "history", ["", "hours with power and with current, starts, and the last faults"] => ListKind::History;
+    25: "history", ["", "hours with power and with current, starts, and the last faults"] => Request::List(ListKind::History);
     26: "clear", ["", "forget the latched fault"] => Order::Clear;
     27: "trace",
         ["N [DIVIDER] [NAME]", "record N periods, every DIVIDER-th, of the signals named; print as CSV"],
@@ -139,6 +138,6 @@ commands! { words;
     };
     34: "confirm", ["board", "the bench steps of the board are done: allow to start, and save"] => words.one_of("what to confirm", "board", &[("board", Order::Confirm)])?;
     35: "version", ["", "which firmware this is"] => Request::Version;
-    36: "h" => ListKind::Help;
-    37: "?" => ListKind::Help;
+    36: "h" => Request::List(ListKind::Help);
+    37: "?" => Request::List(ListKind::Help);
 }

@@ -20,7 +20,7 @@ pub struct TagError;
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ParseError<'a> {
     /// No such command or setting.
-    #[error("no such {what}: {word}; {}`{list}` lists them", Meant(*.near))]
+    #[error("no such {what}: {word}; {}`{list}` lists them", meant(*.near))]
     Unknown {
         /// The thing that the word names, and the command that lists all.
         what: &'static str,
@@ -38,21 +38,11 @@ pub enum ParseError<'a> {
     #[error("too many words, from `{0}` on")]
     TooMuch(&'a str),
     /// More items than allowed.
-    #[error("more than {most} {what}")]
-    TooMany {
-        /// The things that are counted.
-        what: &'static str,
-        /// Their largest number.
-        most: usize,
-    },
-    /// Not a finite number.
-    #[error("not a number: {word} ({what})")]
-    Number {
-        /// Meaning of the number, with its unit.
-        what: &'static str,
-        /// The word.
-        word: &'a str,
-    },
+    #[error("more than {0} {1}")]
+    TooMany(usize, &'static str),
+    /// The word is not a finite number with this meaning and unit.
+    #[error("not a number: {0} ({1})")]
+    Number(&'a str, &'static str),
     /// Not one of these words.
     #[error("{what} = {word}: not one of: {all}")]
     OneOf {
@@ -78,14 +68,9 @@ pub enum ParseError<'a> {
     /// Not eight hexadecimal digits.
     #[error("not eight hexadecimal digits: {0}")]
     Hexadecimal(&'a str),
-    /// No such signal.
-    #[error("no such signal: {word}; {}there are:{}", Meant(*.near), Signals)]
-    Signal {
-        /// The word.
-        word: &'a str,
-        /// A signal that is spelt like it.
-        near: Option<&'static str>,
-    },
+    /// No signal has this name; another is spelt like it.
+    #[error("no such signal: {0}; {near}there are:{all}", near = meant(*.1), all = signals())]
+    Signal(&'a str, Option<&'static str>),
     /// Not a value of the setting.
     #[error("{} = {word}: {why}", .key.name())]
     Value {
@@ -99,19 +84,11 @@ pub enum ParseError<'a> {
 }
 
 /// The word that may have been meant.
-struct Meant(Option<&'static str>);
-
-impl fmt::Display for Meant {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.map_or(Ok(()), |near| write!(f, "did you mean `{near}`? "))
-    }
+fn meant(near: Option<&'static str>) -> impl fmt::Display {
+    fmt::from_fn(move |f| near.map_or(Ok(()), |near| write!(f, "did you mean `{near}`? ")))
 }
 
 /// The names of all signals.
-struct Signals;
-
-impl fmt::Display for Signals {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        SIGNALS.iter().try_for_each(|signal| write!(f, " {}", signal.name))
-    }
+fn signals() -> impl fmt::Display {
+    fmt::from_fn(|f| SIGNALS.iter().try_for_each(|signal| write!(f, " {}", signal.name)))
 }

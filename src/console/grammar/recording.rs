@@ -24,7 +24,7 @@ pub(super) fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, 
             break;
         }
         if !plan.choice.add(signal(name)?) {
-            return Err(ParseError::TooMany { what: "signals", most: trace::MOST });
+            return Err(ParseError::TooMany(trace::MOST, "signals"));
         }
         next = words.optional();
     }
@@ -61,7 +61,7 @@ pub(super) fn stream<'a>(first: &'a str, words: &mut Words<'a>) -> Result<Stream
         } else if word.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
             rate = whole("the frames a second", word, 1, PWM_HZ as u16)?;
         } else if !choice.add(signal(word)?) {
-            return Err(ParseError::TooMany { what: "signals", most: trace::MOST });
+            return Err(ParseError::TooMany(trace::MOST, "signals"));
         }
         next = words.optional();
     }
@@ -77,7 +77,7 @@ const ALIVE_S: core::ops::RangeInclusive<f32> = 0.1..=10.0;
 
 fn signal(word: &str) -> Result<u8, ParseError<'_>> {
     let near = || nearest(word, SIGNALS.iter().map(|signal| signal.name));
-    trace::find(word).ok_or_else(|| ParseError::Signal { word, near: near() })
+    trace::find(word).ok_or_else(|| ParseError::Signal(word, near()))
 }
 
 fn trigger<'a>(words: &mut Words<'a>) -> Result<Trigger, ParseError<'a>> {

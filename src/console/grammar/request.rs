@@ -63,12 +63,6 @@ impl From<Order> for Request {
     }
 }
 
-impl From<ListKind> for Request {
-    fn from(kind: ListKind) -> Self {
-        Self::List(kind)
-    }
-}
-
 /// Kind of a list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ListKind {

@@ -1,5 +1,5 @@
 use drive_core::{Mode, Stop, homing};
-use drive_settings::value::{Value, ValueError};
+use drive_settings::value::ValueError;
 use proptest::prelude::*;
 
 use super::*;
@@ -152,7 +152,7 @@ fn what_is_half_wrong_is_refused_whole() {
     let near = parse("trace 5 sped_rpm").unwrap_err().to_string();
     assert!(near.contains("did you mean `speed_rpm`?"), "{near}");
     let many = "set motor.r_s 1".to_owned() + &" motor.r_s 1".repeat(MOST);
-    assert_eq!(parse(&many), Err(ParseError::TooMany { what: "settings", most: MOST }));
+    assert_eq!(parse(&many), Err(ParseError::TooMany(MOST, "settings")));
     let key = keys::find("motor.r_s").unwrap();
     let why = ValueError::Number;
     assert_eq!(parse("set motor.r_s x"), Err(ParseError::Value { key, word: "x", why }));
