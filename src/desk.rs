@@ -56,8 +56,9 @@ pub struct Desk {
     unsaved: bool,
     /// The board that the received lines belong to, if it is not this one.
     foreign: Option<&'static str>,
-    /// The board that the settings in the flash were saved on, if it is not this one.
-    saved_on: Option<&'static str>,
+    /// The board that the settings in the flash were saved on, if it is not this one. The gates stay unconnected until the user confirms
+    /// which of the two boards this is.
+    pub saved_on: Option<&'static str>,
     task: Option<Task>,
     /// [`WAITS`] while a task waits. It is a second condition, so that a flipped bit carries out no past request.
     waits: u32,
@@ -124,12 +125,6 @@ impl Desk {
             refused: None,
             modules: ModuleState::default(),
         }
-    }
-
-    /// Notes that the settings in the flash were saved on another board. The gates stay unconnected until the user confirms which of the
-    /// two boards this is.
-    pub fn saved_on(&mut self, theirs: &'static str) {
-        self.saved_on = Some(theirs);
     }
 
     /// The settings, in force and staged.
@@ -372,7 +367,7 @@ impl Desk {
         let Some(status) = drive.status() else { return give(Command::Clear, "", drive) };
         let latched = self.stage.watch(&status, self.now_ms);
         self.stage.may_clear().map_err(Refusal::TooOften)?;
-        self.modules.lost = None;
+        self.modules.clear();
         if latched {
             give(Command::Clear, "", drive)?;
             self.stage.cleared(&status);

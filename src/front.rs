@@ -4,7 +4,7 @@
 use crate::console::Console;
 use crate::console::handle::{Firmware, Port};
 use crate::desk::Desk;
-use crate::modbus::{self, bus::Bus};
+use crate::modbus::{self, Bus};
 use crate::settings::FirmwareSettings;
 use crate::terminals::{self, Terminals};
 

@@ -15,11 +15,21 @@ pub mod desk;
 pub mod front;
 mod hash;
 pub mod link;
-pub mod modbus;
 pub mod monitor;
 pub mod rotor_tracking;
 pub mod settings;
 pub mod store;
+
+// The modules that an image may leave out, by a feature each: the folder of a module, or the empty twin in it.
+#[cfg(feature = "bus")]
+pub mod modbus;
+#[cfg(not(feature = "bus"))]
+#[path = "modbus/without.rs"]
+pub mod modbus;
+#[cfg(feature = "terminals")]
+pub mod terminals;
+#[cfg(not(feature = "terminals"))]
+#[path = "terminals/without.rs"]
 pub mod terminals;
 
 use drive_settings::entry::Entry;
@@ -27,19 +37,19 @@ use settings::{FirmwareSettings, command, own};
 
 /// The tables of the firmware's own settings, in the order in which they are shown.
 const OWN: [&[Entry<FirmwareSettings>]; 4] =
-    [command::ROWS, modbus::settings::ROWS, terminals::settings::ROWS, &own::OF_BOARD];
+    [command::ROWS, modbus::ROWS, terminals::ROWS, &own::OF_BOARD];
 
 /// Settings of the modules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModuleSettings {
     /// Settings of the field bus.
-    pub bus: modbus::settings::Settings,
+    pub bus: modbus::Settings,
     /// Settings of the terminals.
-    pub terminals: terminals::settings::Settings,
+    pub terminals: terminals::Settings,
 }
 
 /// State of the modules that command arbiter and console look at: that of the terminals.
-pub type ModuleState = terminals::state::State;
+pub type ModuleState = terminals::Interlock;
 
 // The fuzz targets share a file of the tests, which names the library from outside.
 #[cfg(test)]

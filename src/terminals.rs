@@ -1,17 +1,16 @@
 //! The terminals: wires to a panel or a PLC as an interface of the command arbiter, beside console and field bus.
 //!
-//! Data flow: [`Port`] reads the pins. [`Debounce`] turns them into closed [`Contacts`], once a millisecond.
+//! Data flow: [`Port`] reads the pins. `Debounce` turns them into closed [`Contacts`], once a millisecond.
 //! [`settings::Settings::interlock`] says whether they let the drive run. The [`Sequence`] turns START into starts and stops. A
 //! [reference](mod@reference) gives a speed. Nothing here waits.
 
 mod contacts;
-pub mod debounce;
+mod interlock;
 #[cfg(target_os = "none")]
-pub mod port;
+mod port;
 pub mod reference;
 pub mod sequence;
 pub mod settings;
-pub mod state;
 #[cfg(test)]
 mod tests;
 
@@ -26,10 +25,14 @@ use crate::link::Status;
 use crate::settings::Commander;
 use crate::settings::FirmwareSettings;
 pub use contacts::Contacts;
-use debounce::Debounce;
+use contacts::Debounce;
+pub use interlock::Interlock;
+#[cfg(target_os = "none")]
+pub use port::Pins;
 use reference::Lost;
 use sequence::{Act, Seen, Sequence};
 use settings::Reference;
+pub use settings::{ROWS, Settings};
 
 /// The pins of the terminals. Without a pin a contact counts as open.
 pub trait Port {
@@ -37,9 +40,11 @@ pub trait Port {
     fn look(&mut self) -> Contacts;
     /// The last ADC counts of reference, second reference, and the sensor in the motor's winding; `None` if the board has no such input,
     /// or its ADC gives no result.
-    fn codes(&self) -> [Option<u16>; ANALOG];
+    fn codes(&self) -> [Option<u16>; ANALOG] {
+        [None; ANALOG]
+    }
     /// Sets the outputs RUN, FAULT and BRAKE.
-    fn show(&mut self, outputs: [bool; 3]);
+    fn show(&mut self, _: [bool; 3]) {}
 }
 
 /// Speed at and below which the brake closes during a stop by ramp, rpm.

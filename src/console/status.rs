@@ -39,7 +39,7 @@ impl Console {
             desk.modules.status(desk.settings().in_force(), f)?;
             let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
             let settings = &desk.settings().in_force().drive;
-            temperatures(f, status.stator_resistance, rotor, desk.modules.motor_c, settings)?;
+            temperatures(f, status.stator_resistance, rotor, desk.modules.motor_c(), settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
         self.out.answer(format_args!("{line}"));

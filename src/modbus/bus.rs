@@ -161,8 +161,7 @@ impl Bus {
 impl From<Refusal> for Exception {
     fn from(why: Refusal) -> Self {
         match why {
-            Refusal::Set(SetError::Loosens(..)) => Self::ServerDeviceFailure,
-            Refusal::Set(_) => Self::IllegalDataValue,
+            Refusal::Set(SetError::Board(_) | SetError::Range(_)) => Self::IllegalDataValue,
             _ => Self::ServerDeviceFailure,
         }
     }

@@ -20,10 +20,10 @@ use crate::chip::serial::PRIORITY;
 use crate::link::mailbox::{Mailbox, Receiver, Sender};
 use crate::modbus::settings::{Baud, Format, Settings};
 use crate::modbus::slave::{self, Written};
-use crate::modbus::{self, Frame, bus};
+use crate::modbus::{Frame, Port, bus};
 
 /// The main loop's end of the port.
-pub struct Port {
+pub struct Usart {
     received: Receiver<'static, Frame>,
     to_send: Sender<'static, Frame>,
 }
@@ -47,7 +47,7 @@ struct PortInterrupt {
 /// The interrupt's own memory.
 struct Owned(UnsafeCell<Option<PortInterrupt>>);
 
-// SAFETY: `Port::new` writes it before it unmasks the interrupt, once, because it takes the port;
+// SAFETY: `Usart::new` writes it before it unmasks the interrupt, once, because it takes the port;
 // after that only the interrupt touches it.
 unsafe impl Sync for Owned {}
 
@@ -73,7 +73,7 @@ fn line(settings: &Settings) -> u32 {
     ])
 }
 
-impl Port {
+impl Usart {
     /// Sets the port up, without a line yet; `None` on a second call.
     pub fn new(port: pac::USART3, wires: &Rs485, nvic: &mut NVIC, rcc: &mut Rcc) -> Option<Self> {
         let received = cortex_m::singleton!(: Mailbox<Frame> = Mailbox::new(Frame::new()))?;
@@ -109,7 +109,7 @@ impl Port {
     }
 }
 
-impl modbus::Port for Port {
+impl Port for Usart {
     fn set_line(&mut self, settings: &Settings) {
         let wanted = line(settings);
         if LINE.swap(wanted, Ordering::Relaxed) != wanted {

@@ -10,23 +10,24 @@ use crate::boards;
 /// FIELD: TYPE = DEFAULT, MEANING;`, see `entry!`. The path is that of the module in [`FirmwareSettings`](super::FirmwareSettings).
 macro_rules! settings {
     ($path:tt $($id:literal: $kind:ident($($unit:literal)?), $name:literal, $field:ident: $type:ty = $default:expr,
-        $help:literal$(.$more:ident($($with:expr),+))*;)+) => {
+        $help:literal$(.$more:ident($($with:expr),+))*;)*) => {
         /// Settings of the module.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Settings { $(#[doc = $help] pub $field: $type,)+ }
+        pub struct Settings { $(#[doc = $help] pub $field: $type,)* }
 
         impl Default for Settings {
             fn default() -> Self {
-                Self { $($field: $default,)+ }
+                Self { $($field: $default,)* }
             }
         }
 
         /// Their rows, in the order in which they are shown.
         pub static ROWS: &[drive_settings::entry::Entry<$crate::settings::FirmwareSettings>] = {
-            use drive_settings::entry::{Access, Entry, Guard};
-            use drive_settings::value::Words;
+            #[allow(unused_imports)] // by a module without some kind of row
+            use drive_settings::{entry::{Access, Entry, Guard}, value::Words};
+            #[allow(unused_imports)]
             use $crate::settings::FirmwareSettings as Settings;
-            &[$(drive_settings::entry!($id: $kind($($unit)?), $name, $path $field: $type, $help)$(.$more($($with),+))*),+]
+            &[$(drive_settings::entry!($id: $kind($($unit)?), $name, $path $field: $type, $help)$(.$more($($with),+))*),*]
         };
     };
 }

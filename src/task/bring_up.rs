@@ -44,9 +44,9 @@ pub struct Board<'a> {
     /// The serial port of the console.
     pub port: Port,
     /// The port of the field bus, if the board has one.
-    pub line: Option<modbus::port::Port>,
+    pub line: Option<modbus::Usart>,
     /// The terminals, with the slow analog inputs.
-    pub contacts: terminals::port::Port,
+    pub contacts: terminals::Pins,
     /// The drive.
     pub supervisor: &'a mut Supervisor,
 }
@@ -108,8 +108,8 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     let port = Port::new(chip.LPUART1, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
     let line = SELECTED
         .bus
-        .and_then(|wires| modbus::port::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
-    let contacts = terminals::port::Port::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
+        .and_then(|wires| modbus::Usart::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
+    let contacts = terminals::Pins::new(chip.ADC3, chip.ADC4, &chip.ADC345_COMMON, &mut rcc);
     let encoder = encoder::Encoder::new(chip.TIM2, &mut rcc);
     // Made before the control runs, because these are made with the interrupts masked.
     let front = singleton!(: MaybeUninit<Front> = MaybeUninit::uninit()).ok_or(TWICE)?;
@@ -147,7 +147,7 @@ pub fn bring_up(supervisor: &mut MaybeUninit<Supervisor>) -> Result<Board<'_>, S
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     if let Some(Rejected::Board(theirs)) = rejected {
-        front.desk.saved_on(theirs);
+        front.desk.saved_on = Some(theirs);
     }
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, timer, not_started, connected };

@@ -13,7 +13,7 @@ use crate::boards::pin::Pin;
 use crate::boards::{ANALOG, CONTACTS, Level, SELECTED};
 use crate::chip::clocks::clock_on;
 use crate::chip::{StartError, adc, pins};
-use crate::terminals::{self, Contacts};
+use crate::terminals::{Contacts, Port};
 
 /// Pins of the analog inputs, of the contacts, and of the outputs.
 const INPUTS: &[Option<Pin>] = SELECTED.terminals.pins.split_at(ANALOG).0;
@@ -23,7 +23,7 @@ const OUTPUTS: &[Option<Pin>] = OTHERS.split_at(CONTACTS).1;
 const CLOSED_AT: Level = SELECTED.terminals.closed_at;
 
 /// The pins of the terminals.
-pub struct Port {
+pub struct Pins {
     three: pac::ADC3,
     four: pac::ADC4,
     codes: [Option<u16>; ANALOG],
@@ -31,7 +31,7 @@ pub struct Port {
     at: usize,
 }
 
-impl Port {
+impl Pins {
     /// Sets pins and ADCs up. An input whose ADC does not start has no ADC counts.
     pub fn new(
         three: pac::ADC3,
@@ -83,7 +83,7 @@ impl Port {
     }
 }
 
-impl terminals::Port for Port {
+impl Port for Pins {
     fn look(&mut self) -> Contacts {
         self.convert();
         let high = CLOSED_AT == Level::High;

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 mod panel;
 
-use super::debounce::{CLOSES, OPENS};
+use super::contacts::{CLOSES, OPENS};
 use super::reference::{Lost, share};
 use super::sequence::ARMED;
 use super::settings::{Enable, Settings, Start};

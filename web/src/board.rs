@@ -7,11 +7,9 @@ use std::collections::VecDeque;
 use drive_core::{Line, State};
 use drive_settings::SettingsError;
 use induction_drive::board;
-use induction_drive::boards::ANALOG;
 use induction_drive::console::handle::Port;
 use induction_drive::front::Front;
 use induction_drive::modbus;
-use induction_drive::modbus::slave::Written;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::terminals;
 use motor_plant::{
@@ -57,10 +55,6 @@ impl terminals::Port for Contacts {
     fn look(&mut self) -> terminals::Contacts {
         self.0
     }
-    fn codes(&self) -> [Option<u16>; ANALOG] {
-        [None; ANALOG]
-    }
-    fn show(&mut self, _: [bool; 3]) {}
 }
 
 impl Port for Wires {
@@ -82,17 +76,7 @@ impl Port for Wires {
 /// A board without a field bus.
 enum NoBus {}
 
-impl modbus::Port for NoBus {
-    fn set_line(&mut self, _: &modbus::settings::Settings) {}
-    fn receive(&mut self) -> Option<modbus::Frame> {
-        None
-    }
-    fn send(&mut self, _: &modbus::Frame) {}
-    fn set_busy(&mut self, _: bool) {}
-    fn take_stop(&mut self) -> Option<Written> {
-        None
-    }
-}
+impl modbus::Port for NoBus {}
 
 /// The plant that `cargo sim` simulates by default, with the ADCs and the timer of the reference board, as on the virtual board.
 pub fn plant_settings(settings: &FirmwareSettings) -> PlantSettings {

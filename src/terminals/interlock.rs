@@ -1,4 +1,4 @@
-//! State of the terminals, as command arbiter and console see it.
+//! State of the terminals, as command arbiter and console see it: what keeps the drive from running.
 
 use core::fmt;
 
@@ -11,18 +11,18 @@ use crate::settings::FirmwareSettings;
 
 /// The state, see the head of the module.
 #[derive(Default)]
-pub struct State {
+pub struct Interlock {
     /// Closed contacts, and the contacts when they were last read.
-    pub closed: Contacts,
+    pub(super) closed: Contacts,
     /// See `closed`.
-    pub contacts: Contacts,
+    pub(super) contacts: Contacts,
     /// Reason why the reference was lost, until that is cleared.
-    pub lost: Option<Lost>,
+    pub(super) lost: Option<Lost>,
     /// Last reading of the motor's temperature sensor, °C.
-    pub motor_c: Option<Result<f32, Fault>>,
+    pub(super) motor_c: Option<Result<f32, Fault>>,
 }
 
-impl State {
+impl Interlock {
     /// Checks what depends on the board.
     ///
     /// # Errors
@@ -41,6 +41,16 @@ impl State {
     pub fn hold(&self, settings: &FirmwareSettings) -> Option<&'static str> {
         let closed = Contacts(self.closed.0 & self.contacts.0);
         settings.modules.terminals.interlock(closed).map(open)
+    }
+
+    /// Clears the lost reference, with the latched fault.
+    pub fn clear(&mut self) {
+        self.lost = None;
+    }
+
+    /// Temperature of the motor, °C, if its sensor is read.
+    pub fn motor_c(&self) -> Option<Result<f32, Fault>> {
+        self.motor_c
     }
 
     /// Writes closed contacts, an interlock and a lost reference.
