@@ -16,6 +16,8 @@ const FILE: &str = "xtask/budgets.toml";
 pub struct Budgets {
     pub lines: Lines,
     pub part: Vec<Part>,
+    /// Modules of the firmware that an image may leave out, by folder: feature, and most files outside the folder that name it.
+    pub modules: BTreeMap<String, (String, usize)>,
     pub seconds: Seconds,
     pub cycles: Cycles,
 }

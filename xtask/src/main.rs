@@ -26,6 +26,7 @@ mod stack;
 mod times;
 mod toolchain;
 mod tools;
+mod uses;
 mod web;
 #[cfg(test)]
 mod words;
@@ -87,7 +88,7 @@ enum Task {
     Size,
     /// Counts lines of code, documentation, comments and tests; fails above the budgets
     Lines,
-    /// Fails if modules of a crate refer to each other in a circle
+    /// Fails if modules of a crate refer to each other in a circle, or if too many files name a module of the firmware
     Rooms,
     /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught. Installs cargo-mutants from
     /// crates.io
@@ -160,7 +161,7 @@ fn run(task: Task) -> Result<()> {
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report_all(),
         Task::Lines => lines::report(),
-        Task::Rooms => rooms::check(),
+        Task::Rooms => rooms::check().and_then(|()| uses::check()),
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book().map(drop),
         Task::Pages => by_name::pages(),
@@ -189,6 +190,7 @@ fn before_tests(steps: &mut run::Steps) {
     let fuzz = run::cargo("fmt --check --manifest-path fuzz/Cargo.toml");
     steps.command("format of the fuzz targets", fuzz);
     steps.run("rooms", rooms::check);
+    steps.run("modules of the firmware", uses::check);
     steps.run("lines", lines::report);
     steps.command("lints", run::cargo("clippy --workspace --all-targets -- -D warnings"));
 }
@@ -198,8 +200,11 @@ fn images() -> Result<()> {
     let target = toolchain::for_target()?;
     // The firmware itself does not enable this feature of the control crates.
     let log = ["--package=induction-drive", "--features=drive-core/defmt", "--no-deps"];
-    let mut lints = target.cargo("clippy")?;
-    run::step("lints of the firmware", lints.args(log).args(["--", "-D", "warnings"]))?;
+    for (name, features) in [("all", "--all-features"), ("no", "--no-default-features")] {
+        let mut lints = target.cargo("clippy")?;
+        let lints = lints.args(log).args([features, "--", "-D", "warnings"]);
+        run::step(&format!("lints of the firmware with {name} modules"), lints)?;
+    }
     let full = image::build_all(&target)?;
     size::report(&full, image::FULL)
 }
