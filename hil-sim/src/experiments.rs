@@ -99,28 +99,15 @@ pub const EVERYDAY: [&str; 10] = [
     "full-range", "torque-envelope", "lock-monitor",
 ];
 
-/// The experiments of many independent runs, which can be shared between machines and continued.
-pub const STATISTICAL: &[Statistical] = &[
-    Statistical::of::<monte_carlo::MonteCarlo>(),
-    Statistical::of::<machines::Machines>(),
-    Statistical::of::<commission::Commission>(),
-    Statistical::of::<commission::refusals::Refusals>(),
-    Statistical::of::<battery::Battery>(),
-    Statistical::of::<full_range::FullRange>(),
-    Statistical::of::<lock_monitor::LockMonitor>(),
-    Statistical::of::<smallest_slope::SmallestSlope>(),
-    Statistical::of::<foreign_motors::ForeignMotors>(),
-];
-
-/// Returns the entry of the statistical experiment with this name.
+/// Returns the single runs of an experiment.
 ///
 /// # Errors
-/// [`Error::Refused`] if it is not a statistical experiment.
-pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
-    let found = STATISTICAL.iter().find(|statistical| statistical.experiment.name == name);
-    found.ok_or_else(|| {
-        let known: Vec<_> = STATISTICAL.iter().map(|known| known.experiment.name).collect();
-        let (name, known) = (cut(name), known.join(", "));
+/// [`Error::Refused`] if it does not consist of independent runs.
+pub fn statistical(experiment: &Experiment) -> Result<&Statistical, Error> {
+    experiment.study.as_ref().ok_or_else(|| {
+        let known = EXPERIMENTS.iter().filter(|known| known.study.is_some());
+        let known: Vec<_> = known.map(|known| known.name).collect();
+        let (name, known) = (cut(experiment.name), known.join(", "));
         Error::Refused(format!(
             "{name} does not consist of independent runs; those that do: {known}"
         ))

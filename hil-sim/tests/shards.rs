@@ -7,34 +7,16 @@ use std::process::Command;
 use crate::cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 9] = [
-    (
-        "monte-carlo",
-        &[
-            "--set",
-            "runs=7",
-            "--seconds",
-            "0.2",
-            "--set",
-            "spread.motor=0.1",
-            "--set",
-            "drive.motor.r_s=5",
-        ],
-    ),
-    ("machines", &["--set", "runs=2", "--set", "spread.machine=1.5", "--seconds", "0.2"]),
-    ("commission", &["--set", "runs=4"]),
-    ("commission-refusals", &["--set", "runs=1"]),
-    (
-        "battery",
-        &["--set", "runs=14", "--set", "disturbed.drawn=0.5", "--set", "after.motor.r_r=1.2"],
-    ),
-    (
-        "full-range",
-        &["--set", "runs=1", "--set", "full_range.kind=constant", "--set", "angle_source=encoder"],
-    ),
-    ("lock-monitor", &["--set", "runs=1"]),
-    ("smallest-slope", &["--set", "runs=1"]),
-    ("foreign-motors", &["--set", "runs=3"]),
+const SMALL: [(&str, &str); 9] = [
+    ("monte-carlo", "--set runs=7 --seconds 0.2 --set spread.motor=0.1 --set drive.motor.r_s=5"),
+    ("machines", "--set runs=2 --set spread.machine=1.5 --seconds 0.2"),
+    ("commission", "--set runs=4"),
+    ("commission-refusals", "--set runs=1"),
+    ("battery", "--set runs=14 --set disturbed.drawn=0.5 --set after.motor.r_r=1.2"),
+    ("full-range", "--set runs=1 --set full_range.kind=constant --set angle_source=encoder"),
+    ("lock-monitor", "--set runs=1"),
+    ("smallest-slope", "--set runs=1"),
+    ("foreign-motors", "--set runs=3"),
 ];
 
 /// A small run whose outcome depends on every record.
@@ -59,12 +41,11 @@ fn shards(folder: &Path, arguments: &[&str], indices: &[usize], count: usize) {
 
 #[test]
 fn every_statistical_experiment_is_in_the_list() {
-    let known = hil_sim::experiments::STATISTICAL.iter().map(|known| known.experiment.name);
-    assert!(known.eq(SMALL.map(|(name, _)| name)));
-    // All experiments with a number of runs can be shared.
     for experiment in hil_sim::experiments::EXPERIMENTS {
-        let takes_runs = experiment.uses.concat().contains(&"runs");
         let is_shared = SMALL.iter().any(|(name, _)| *name == experiment.name);
+        assert_eq!(experiment.study.is_some(), is_shared, "{}", experiment.name);
+        // All experiments with a number of runs can be shared.
+        let takes_runs = experiment.uses.concat().contains(&"runs");
         assert!(!takes_runs || is_shared, "{}", experiment.name);
     }
 }
@@ -78,6 +59,7 @@ fn is_long(name: &str) -> bool {
 /// tables, figures and all.
 fn shards_are_the_whole_run(which: impl Fn(&str) -> bool) {
     for (name, options) in SMALL.into_iter().filter(|(name, _)| which(name)) {
+        let options: &[&str] = &options.split(' ').collect::<Vec<_>>();
         let folder = folder(&format!("shards-{name}"));
         let whole = run(&folder, name, options, &["--json", "--seed", "5"]);
         let arguments = [&["run", name, "-q", "--seed", "5"], options].concat();

@@ -1,51 +1,11 @@
 //! An experiment: one function from a [`Context`] to an [`Outcome`].
 
 use crate::config::{Config, Key, plant_settings};
+pub use crate::context::Context;
 use crate::error::Error;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
-use rayon::prelude::*;
-use std::path::Path;
-
-/// Input of an experiment.
-pub struct Context<'a> {
-    /// The configuration.
-    pub config: &'a Config,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Simulated time, s; unset: the experiment's own time.
-    pub seconds: Option<f64>,
-    /// The progress bars.
-    pub progress: Progress,
-    /// File for an experiment that takes one.
-    pub file: Option<&'a Path>,
-}
-
-impl<'a> Context<'a> {
-    /// Makes an input without a file, for as long as the configuration says.
-    pub fn new(config: &'a Config, seed: u64, progress: Progress) -> Self {
-        Self { config, seed, seconds: config.extent.seconds, progress, file: None }
-    }
-
-    /// Runs `run` with number and value of every job on all cores, with a progress bar.
-    ///
-    /// # Errors
-    /// The error of a failed job.
-    pub fn in_parallel<J: Sync, T: Send>(
-        &self,
-        label: &str,
-        jobs: &[J],
-        run: impl Fn(u64, &J) -> Result<T, Error> + Sync,
-    ) -> Result<Vec<T>, Error> {
-        let bar = self.progress.bar(label, jobs.len() as u64);
-        let one = |(number, job): (usize, &J)| {
-            let result = run(number as u64, job);
-            bar.advance(1);
-            result
-        };
-        jobs.par_iter().enumerate().map(one).collect()
-    }
-}
+use crate::statistics::{Statistical, Study, whole};
 
 /// An experiment.
 pub struct Experiment {
@@ -61,12 +21,19 @@ pub struct Experiment {
     pub not: &'static [&'static [&'static str]],
     /// Runs the experiment.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
+    /// The single runs of an experiment that consists of independent runs.
+    pub study: Option<Statistical>,
 }
 
 impl Experiment {
     /// Makes an experiment that uses no key, from its name and its function.
     pub const fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
-        Self { name, stands_for: "", about: "", uses: &[], not: &[], run }
+        Self { name, stands_for: "", about: "", uses: &[], not: &[], run, study: None }
+    }
+
+    /// Makes an experiment of independent runs, which can be shared between machines and continued.
+    pub const fn study<S: Study>() -> Self {
+        Self { study: Some(Statistical::of::<S>()), ..Self::new(S::NAME, whole::<S>) }
     }
 
     /// Sets the part of the source that it reproduces.

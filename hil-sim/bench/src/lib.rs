@@ -6,6 +6,7 @@ pub mod bode;
 pub mod bounded;
 pub mod columns;
 pub mod config;
+pub mod context;
 pub mod error;
 pub mod experiment;
 pub mod learning;

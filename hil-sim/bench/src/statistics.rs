@@ -3,8 +3,8 @@
 
 pub mod fault_code;
 
+use crate::context::Context;
 use crate::error::Error;
-use crate::experiment::{Context, Experiment};
 use crate::outcome::Outcome;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -15,8 +15,8 @@ pub trait Study: Sized + Sync {
     /// Everything that the outcome needs from a run. Written as JSON, it must be read back exactly: see
     /// [`exact`](crate::stats::exact).
     type Record: Serialize + DeserializeOwned + Send;
-    /// The experiment; its `run` is [`whole`].
-    const EXPERIMENT: &'static Experiment;
+    /// Name of the experiment on the command line.
+    const NAME: &'static str;
 
     /// Plans the runs.
     ///
@@ -64,18 +64,15 @@ pub fn seed_of(seed: u64, number: usize) -> u64 {
 pub fn whole<S: Study>(context: &Context<'_>) -> Result<Outcome, Error> {
     let study = S::new(context)?;
     let numbers: Vec<usize> = (0..study.runs()).collect();
-    let name = S::EXPERIMENT.name;
-    let records = context.in_parallel(name, &numbers, |_, &number| study.run(number))?;
+    let records = context.in_parallel(S::NAME, &numbers, |_, &number| study.run(number))?;
     study.outcome(context, records)
 }
 
 /// A function that stores the record of a run.
 pub type Keep<'a> = &'a (dyn Fn(usize, Value) -> Result<(), Error> + Sync);
 
-/// A statistical experiment whose runs are kept as JSON.
+/// The runs of a statistical experiment, kept as JSON.
 pub struct Statistical {
-    /// The experiment.
-    pub experiment: &'static Experiment,
     /// Returns the number of its runs.
     pub runs: fn(&Context<'_>) -> Result<usize, Error>,
     /// Does these runs on all cores and passes each record on as soon as it is complete.
@@ -85,21 +82,16 @@ pub struct Statistical {
 }
 
 impl Statistical {
-    /// Makes the entry of a study.
+    /// Makes the runs of a study.
     pub const fn of<S: Study>() -> Self {
-        Self {
-            experiment: S::EXPERIMENT,
-            runs: |context| Ok(S::new(context)?.runs()),
-            some: some::<S>,
-            outcome: outcome::<S>,
-        }
+        Self { runs: |context| Ok(S::new(context)?.runs()), some: some::<S>, outcome: outcome::<S> }
     }
 }
 
 fn some<S: Study>(context: &Context<'_>, numbers: &[usize], keep: Keep<'_>) -> Result<(), Error> {
     let study = S::new(context)?;
     let one = |_, &number: &usize| keep(number, value::<S>(number, &study.run(number)?)?);
-    context.in_parallel(S::EXPERIMENT.name, numbers, one).map(|_: Vec<()>| ())
+    context.in_parallel(S::NAME, numbers, one).map(|_: Vec<()>| ())
 }
 
 /// Converts a record to JSON, after a check that it is read back unchanged.

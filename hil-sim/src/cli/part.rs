@@ -35,7 +35,7 @@ impl Part {
         if self.shard.is_none() && self.resume.is_none() && self.rows.is_none() {
             return (experiment.run)(context).map(Some);
         }
-        let statistical = experiments::statistical(experiment.name)?;
+        let statistical = experiments::statistical(experiment)?;
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         let all = (statistical.runs)(context)?;
         let header = Header::new(experiment.name, context.config, context.seed, all)?;

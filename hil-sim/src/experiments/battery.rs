@@ -26,7 +26,7 @@ pub use trial::{Refused, Trial};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("battery", whole::<Battery>)
+pub const EXPERIMENT: Experiment = Experiment::study::<Battery>()
     .stands_for("what section 5.2 leaves open")
     .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and errors that the drive does not detect.")
     .uses(&[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]]);
@@ -110,7 +110,7 @@ impl Battery {
 
 impl Study for Battery {
     type Record = Trial;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "battery";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let config = context.config.clone();

@@ -16,7 +16,7 @@ pub(super) use session::unaware;
 use session::{Abort, Session};
 
 /// Not in the source, which lists it as future work.
-pub const EXPERIMENT: Experiment = Experiment::new("commission", whole::<Commission>)
+pub const EXPERIMENT: Experiment = Experiment::study::<Commission>()
     .stands_for("beyond the dissertation")
     .about("From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
             with `prepare.learn` the drive then learns and is judged at 16 operating points.")
@@ -164,7 +164,7 @@ impl Commission {
 
 impl Study for Commission {
     type Record = Record;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "commission";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let mut config = context.config.clone();

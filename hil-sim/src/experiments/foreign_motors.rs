@@ -16,7 +16,7 @@ use crate::prelude::*;
 use crate::stats::exact;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("foreign-motors", whole::<ForeignMotors>)
+pub const EXPERIMENT: Experiment = Experiment::study::<ForeignMotors>()
     .stands_for("beyond the dissertation")
     .about("Random motors over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
     .uses(&[&["runs"]]);
@@ -257,7 +257,7 @@ impl ForeignMotors {
 
 impl Study for ForeignMotors {
     type Record = Record;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "foreign-motors";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         Ok(Self { seed: context.seed, runs: context.config.extent.runs.unwrap_or(RUNS) as usize })

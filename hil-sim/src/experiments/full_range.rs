@@ -20,7 +20,7 @@ use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("full-range", whole::<FullRange>)
+pub const EXPERIMENT: Experiment = Experiment::study::<FullRange>()
     .stands_for("beyond the dissertation")
     .about("Runs over the full speed range, `runs` of each kind in each region: angle error, current, dc link, and errors that \
             the drive does not detect.")
@@ -128,7 +128,7 @@ impl FullRange {
 
 impl Study for FullRange {
     type Record = Trial;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "full-range";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let mut config = for_the_range(context.config)?;

@@ -8,7 +8,7 @@ use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
 /// Not in the source: it has no monitor.
-pub const EXPERIMENT: Experiment = Experiment::new("lock-monitor", whole::<LockMonitor>)
+pub const EXPERIMENT: Experiment = Experiment::study::<LockMonitor>()
     .stands_for("what section 5.2 leaves open")
     .about("The angle forced off, false alarms, over-speed, flying starts; `--set runs=N`.")
     .uses(&[BENCH, DRIVE, &["prepare.learn", "runs"]])
@@ -37,7 +37,7 @@ pub struct LockMonitor {
 
 impl Study for LockMonitor {
     type Record = Trial;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "lock-monitor";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let config = context.config.clone();

@@ -6,7 +6,7 @@ use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use crate::prelude::*;
 
 /// Not a figure of the source: tests whether the drive suits other motors.
-pub const EXPERIMENT: Experiment = Experiment::new("machines", whole::<Machines>)
+pub const EXPERIMENT: Experiment = Experiment::study::<Machines>()
     .stands_for("beyond the dissertation")
     .about("A drive that has learned its motor, at 16 operating points; with `spread.machine` for random machines around \
             the motor.")
@@ -121,7 +121,7 @@ impl Machines {
 impl Study for Machines {
     /// The runs, or the refusal of the drive.
     type Record = Result<Vec<SteadyRun>, String>;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "machines";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let mut config = context.config.clone();

@@ -4,7 +4,7 @@ use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use crate::prelude::*;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
-pub const EXPERIMENT: Experiment = Experiment::new("monte-carlo", whole::<MonteCarlo>)
+pub const EXPERIMENT: Experiment = Experiment::study::<MonteCarlo>()
     .stands_for("the claim behind Figures 38 and 39")
     .about("Random q-axis current (a seventh to six sevenths of the limit, both signs) and speed, and the errors of `spread.*`; `--set runs=N`.")
     .uses(&[
@@ -35,7 +35,7 @@ pub struct MonteCarlo {
 
 impl Study for MonteCarlo {
     type Record = SteadyRun;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "monte-carlo";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let config = context.config.clone();

@@ -6,7 +6,7 @@ use super::saliency::Probe;
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("smallest-slope", whole::<SmallestSlope>)
+pub const EXPERIMENT: Experiment = Experiment::study::<SmallestSlope>()
     .stands_for("what section 5.2 leaves open")
     .about("The stress test with decreasing saliency of the motor: sensitivity dq/de and behaviour of the drive; `runs` at each.")
     .uses(&[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]]);
@@ -46,7 +46,7 @@ pub struct SmallestSlope {
 
 impl Study for SmallestSlope {
     type Record = Trial;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "smallest-slope";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let each = context.config.extent.runs.unwrap_or(RUNS);

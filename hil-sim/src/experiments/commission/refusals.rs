@@ -10,7 +10,7 @@ use crate::plant::{Channel, CurrentFault};
 use crate::prelude::*;
 
 /// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("commission-refusals", whole::<Refusals>)
+pub const EXPERIMENT: Experiment = Experiment::study::<Refusals>()
     .stands_for("beyond the dissertation")
     .about("Defects of motor, wiring, sensors and board, on random machines: does the commissioning refuse them by name? `--set runs=N` of each.")
     .uses(&[BENCH, DRIVE, &["load.", "spread.machine", "runs"]]);
@@ -125,7 +125,7 @@ pub struct Record {
 
 impl Study for Refusals {
     type Record = Record;
-    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+    const NAME: &'static str = "commission-refusals";
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
         let mut config = context.config.clone();
