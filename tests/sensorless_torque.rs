@@ -20,22 +20,6 @@ fn the_rectified_chain_tracks_within_13_degrees() {
     }
 }
 
-/// With ADC, noise and dead-time residual, several seeds: rectified, and the default.
-#[test]
-fn the_drive_holds_torque_with_a_realistic_measurement() {
-    // Rectified: 3.7 to 4.1 rms and 10.7 to 12.8 largest over the first six seeds; synchronous: 1.3
-    // to 1.9 and 4 to 9. Noise decides the rest.
-    for (changes, rms, most) in [(&RECTIFIED[..], 5.0, 16.0), (&[], 2.5, 11.0)] {
-        for seed in 1..=5 {
-            let outcome = run("torque-steps", changes, seed);
-            println!("{changes:?} {:?}", outcome.metrics);
-            assert_eq!(outcome.metrics.get("lost"), Some(0.0));
-            assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= rms);
-            assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= most);
-        }
-    }
-}
-
 /// The default drive without measurement errors: the remainder is the error of the saliency offset itself, which was learned with a
 /// dead-time residual.
 #[test]
@@ -49,44 +33,6 @@ fn the_synchronous_chain_is_exact_to_a_degree() {
         // 1.3 measured: 0.9 from the saliency offset and 0.4 in the steps.
         assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 2.0);
     }
-}
-
-/// Steps up to full reversal, and with a rotor resistance 30 % above the settings. Eight seeds give 5.8 to 10.0 degrees, and 6.5 to 9.3
-/// without the observer: the noise of the injection at the reversal.
-#[test]
-fn reversals_keep_the_angle() {
-    for (changes, limit) in [(vec![], 11.0), (vec!["drive.motor.rr=0.846"], 18.0)] {
-        for seed in 1..=4 {
-            let outcome = run("torque-reversal", &changes, seed);
-            let largest = outcome.metrics.get("angle_error_max_deg").unwrap();
-            println!("{changes:?} seed {seed}: {largest:.2}");
-            assert!(largest <= limit, "{changes:?} seed {seed}: {largest}");
-            assert_eq!(outcome.metrics.get("lost"), Some(0.0));
-        }
-    }
-}
-
-/// Random operating points: a part of the runs of `cargo sim run monte-carlo --set runs=1000`.
-#[test]
-fn no_angle_is_lost_within_150_and_300_rpm() {
-    for (speed, seed) in [("0", 21), ("300", 22)] {
-        let speed = format!("load.speed_rpm={speed}");
-        let outcome = run("monte-carlo", &["runs=100", &speed], seed);
-        println!("{speed}: {:?}", outcome.metrics);
-        assert_eq!(outcome.metrics.get("lost_runs"), Some(0.0));
-        // 1.6 pooled; the largest of 1000 is 9 to 12.
-        assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 2.3);
-        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 14.0);
-    }
-}
-
-/// The torque follows Eq. 4.4 with the true flux and angle, for any angle error.
-#[test]
-fn torque_follows_equation_4_4() {
-    let outcome = run("torque-steps", &[], 3);
-    let difference = outcome.metrics.get("torque_minus_eq_4_4_rms_nm").unwrap();
-    // The injection on the torque axis causes 0.083 Nm peak of ripple; the equation has none of it.
-    assert!(difference < 0.075, "{difference} Nm");
 }
 
 /// A weak saliency with the constant 10 mA offset does not explain the 40° to 60° of the source, which states them at every level: with a

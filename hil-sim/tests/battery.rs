@@ -39,17 +39,6 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     }
 }
 
-/// At a q-axis current of three times the d-axis current, an angle error changes the flux, and with it the speed that
-/// the voltage shows. Near the hand-over this once oscillated until the angle was lost, in four of these runs.
-#[test]
-fn a_torque_current_of_three_times_the_direct_one_is_held_up_to_600_rpm() {
-    let config =
-        Config::load(None, None, &["load.speed_rpm=600", "runs=70"]).expect("allowed settings");
-    let metrics = experiments::run("monte-carlo", &config, 19322).expect("statistics").metrics;
-    assert_eq!(get(&metrics, "lost_runs"), 0.0, "{metrics:?}");
-    assert!(get(&metrics, "angle_error_rms_deg") < 1.1, "{metrics:?}");
-}
-
 /// Without saliency there is nothing to track: fault 25 refuses each start, and there is no error to report.
 #[test]
 fn a_motor_without_saliency_is_refused() {
@@ -58,15 +47,6 @@ fn a_motor_without_saliency_is_refused() {
     assert_eq!(get(&metrics, "refused_by_fault_25"), 12.0);
     assert!(get(&metrics, "angle_error_rms_deg").is_nan());
     assert_eq!((get(&metrics, "lost_runs"), faults), (0.0, 12));
-}
-
-/// The same motor with a drive without check and monitor: lost, and wrong for a long time.
-#[test]
-fn a_drive_that_does_not_watch_is_wrong_for_long() {
-    let unwatched = ["saliency.a_psi=0", "injection.check=no", "injection.monitor=no", "runs=12"];
-    let (metrics, _) = battery(&unwatched);
-    assert!(get(&metrics, "lost_runs") >= 4.0 && get(&metrics, "wrong_runs") >= 4.0, "{metrics:?}");
-    assert!(get(&metrics, "wrong_longest_s") > 1.0, "{metrics:?}");
 }
 
 /// With an encoder the slip determines the flux. If the drive assumes a slip `k` times too large, the current of 0.7 A
@@ -154,14 +134,6 @@ fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     let (blind, _) = battery(&blind);
     let longest = get(&blind, "wrong_longest_s");
     assert!(get(&blind, "silent_runs") >= 9.0 && longest > 1.0, "{blind:?}");
-}
-
-/// Dithered torque commands neither hide a rotated flux nor stop a healthy drive: half of the runs rotate it, and none
-/// of the others stops.
-#[test]
-fn commands_that_never_rest_are_borne() {
-    let (metrics, faults) = battery(&["battery.runs=restless", "runs=12", "prepare.learn=yes"]);
-    assert_eq!((get(&metrics, "silent_runs"), faults), (0.0, 0), "{metrics:?}");
 }
 
 /// Random disturbances depend on the seed alone, in any order of the runs, and reduce the accuracy.
