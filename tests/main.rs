@@ -12,7 +12,6 @@ mod learning;
 mod lock_monitor;
 mod motor_sensor;
 mod online_tracking;
-mod position_step;
 mod power_limit;
 mod protections;
 mod replay;

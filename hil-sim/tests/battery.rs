@@ -14,31 +14,6 @@ fn get(metrics: &Metrics, name: &str) -> f64 {
     metrics.get(name).unwrap_or(0.0)
 }
 
-/// The tracking loop that preceded the filter had 1.86° rms and 10.1° at most on this motor, in 480 runs, with default
-/// tables, and 1.88° and 10.6° with learned ones. Forty-eight runs of the filter give 1.14° and 7.5°, and 1.16° and
-/// 6.9°; the largest error depends on the profiles.
-#[test]
-fn the_drive_passes_on_the_motor_that_it_is_made_for() {
-    for learn in ["no", "yes"] {
-        let (metrics, faults) = battery(&[&format!("prepare.learn={learn}"), "runs=48"]);
-        let rms = get(&metrics, "angle_error_rms_deg");
-        assert!((rms - 1.15).abs() < 0.12, "{rms}");
-        assert!((3.0..4.2).contains(&get(&metrics, "angle_error_p99_deg")));
-        assert!(get(&metrics, "angle_error_max_deg") < 10.0);
-        // Torque of healthy runs: angle errors of 2° rms hardly reduce the mean.
-        assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
-        // At 0.7 A the saliency sensitivity allows a drive that has learned 2.25 A to 2.75 A of 3 A.
-        let limited = if learn == "yes" { 48.0 } else { 0.0 };
-        assert_eq!(get(&metrics, "limited_runs"), limited);
-        assert!(learn == "no" || get(&metrics, "limit_pct") > 70.0, "{metrics:?}");
-        let none = ["lost_runs", "silent_runs", "stuck_runs", "trips", "refused_starts"];
-        for name in none {
-            assert_eq!(get(&metrics, name), 0.0, "{name}");
-        }
-        assert_eq!((get(&metrics, "runs"), faults), (48.0, 0));
-    }
-}
-
 /// Without saliency there is nothing to track: fault 25 refuses each start, and there is no error to report.
 #[test]
 fn a_motor_without_saliency_is_refused() {

@@ -9,36 +9,6 @@ fn config(runs: u32) -> Config {
     config
 }
 
-/// Half of the bounds that hold over thousands of machines (1.5 %), so that a defect of any part exceeds them.
-#[test]
-fn random_machines_are_accepted_and_right() {
-    for seed in [1, 2] {
-        let metrics = experiments::run("commission", &config(40), seed).unwrap().metrics;
-        let get = |name: &str| metrics.get(name).unwrap();
-        assert_eq!((get("accepted"), get("wrongly_accepted")), (40.0, 0.0), "seed {seed}");
-        for name in ["r_s", "sigma_ls", "rr", "lm", "tau_r"] {
-            let error = get(&format!("error_q95_pct.{name}"));
-            assert!(error < 0.9, "seed {seed}: {name} {error} %");
-        }
-        // Free shafts; currents below the nameplate's peak; 12 s for all steps but the check of the current loop.
-        assert!(get("shaft_deg_max") < 0.5 && get("current_max_of_peak") < 1.0);
-        assert!(get("seconds_max") < 13.0 && get("margin_deg_min") > 45.0);
-    }
-}
-
-/// Phases, legs and sensors that differ as they do in healthy motors and boards, all at once.
-#[test]
-fn small_differences_of_the_phases_are_no_refusal() {
-    let mut config = config(20);
-    config.commission.disturbed = true;
-    for seed in [5, 6] {
-        let metrics = experiments::run("commission", &config, seed).unwrap().metrics;
-        let get = |name: &str| metrics.get(name).unwrap();
-        assert_eq!((get("accepted"), get("wrongly_accepted")), (20.0, 0.0), "seed {seed}");
-        assert!(get("error_max_pct.mismatch") < 0.4 && get("error_max_pct.r_s") < 2.0);
-    }
-}
-
 /// Different resistances are distinguished from the gains of the sensors, which `accept` scales, for any gains.
 #[test]
 fn a_resistance_is_no_gain() {
@@ -92,19 +62,6 @@ fn the_capacitance_of_the_nodes_is_no_resistance() {
             assert!(error.abs() < 0.003, "{picofarad} pF, {plant:?}: r_s by {error}");
         }
     }
-}
-
-/// The chord of the main flux, with iron that saturates by a fifth: 6 % in 95 of 100 runs.
-#[test]
-fn iron_is_found_by_the_staircase() {
-    let mut config = config(20);
-    config.model.plant = PlantModel::M4;
-    config.model.flux_level = FluxLevel::High;
-    let metrics = experiments::run("commission", &config, 3).unwrap().metrics;
-    let get = |name: &str| metrics.get(name).unwrap();
-    assert_eq!((get("accepted"), get("wrongly_accepted")), (20.0, 0.0));
-    assert!(get("error_max_pct.lm") < 12.0 && get("error_max_pct.tau_r") < 12.0);
-    assert!(get("error_q95_pct.r_s") < 1.0 && get("seconds_max") < 45.0);
 }
 
 #[test]

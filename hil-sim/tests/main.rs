@@ -26,7 +26,6 @@ mod measured_motors;
 mod no_debug_text;
 mod outcomes;
 mod own_motor;
-mod plant_identification;
 mod promises;
 mod quiet_inverter;
 mod record;
