@@ -37,6 +37,8 @@ pub struct Part {
     pub name: String,
     /// Beginnings of the paths of its files.
     pub paths: Vec<String>,
+    /// Most lines of code, if the part has a budget of its own.
+    pub code: Option<usize>,
 }
 
 /// Time limits, seconds on two quiet cores.

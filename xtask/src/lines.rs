@@ -32,6 +32,11 @@ pub fn report() -> Result<()> {
             add(&mut rows[part], count(path, &sources::read(path)?));
         }
     }
+    for (part, counts) in parts.iter().zip(&rows) {
+        if let Some(limit) = part.code {
+            run::limit(&format!("lines of the {}", part.name), counts[0], limit, "lines")?;
+        }
+    }
     let mut all = Counts::default();
     rows.iter().for_each(|counts| add(&mut all, *counts));
 
