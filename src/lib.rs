@@ -33,11 +33,20 @@ pub mod terminals;
 pub mod terminals;
 
 use drive_settings::entry::Entry;
-use settings::{FirmwareSettings, command, own};
+use settings::{Commander, FirmwareSettings, command, own};
 
 /// The tables of the firmware's own settings, in the order in which they are shown.
 const OWN: [&[Entry<FirmwareSettings>]; 4] =
     [command::ROWS, modbus::ROWS, terminals::ROWS, &own::OF_BOARD];
+
+/// Whether the image has the module of this commander.
+const fn has(commander: Commander) -> bool {
+    match commander {
+        Commander::Console => true,
+        Commander::Bus => !modbus::ROWS.is_empty(),
+        Commander::Terminals => !terminals::ROWS.is_empty(),
+    }
+}
 
 /// Settings of the modules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -17,6 +17,8 @@ use crate::ModuleSettings;
 use crate::board;
 use crate::boards::{Board, SELECTED};
 
+/// Reason why an image refuses a commander.
+const LEFT_OUT: &str = "this image is built without it";
 /// Reason why a board refuses a switching frequency.
 const TOO_FAST: &str = "the switches of the board do not take it; set a lower one";
 
@@ -141,6 +143,10 @@ impl FirmwareSettings {
         let carrier = self.drive.inverter.carrier_khz;
         if carrier > self.board.carrier_max_khz {
             return Err(SettingsError::Word("inverter.carrier_khz", carrier.word(), TOO_FAST));
+        }
+        let commander = self.command.commander;
+        if !crate::has(commander) {
+            return Err(SettingsError::Word("bus.commands", commander.word(), LEFT_OUT));
         }
         // The ranges of the board are narrower.
         keys::all().try_for_each(|key| key.check(self))

@@ -17,7 +17,7 @@ pub const UNASKED: &str = "* ";
 /// Longest line that is assembled.
 const LONGEST: usize = 4096;
 
-/// What the drive has sent.
+/// Something that the drive has sent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A frame of a stream; `None` for damaged bytes.

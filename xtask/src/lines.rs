@@ -104,6 +104,7 @@ mod tests {
         let part = |paths: &[&str]| Part {
             name: String::new(),
             paths: paths.iter().map(|path| (*path).to_owned()).collect(),
+            code: None,
         };
         let parts = [part(&["a/b/", "a/c."]), part(&["a/"])];
         let of = |path: &str| part_of(&parts, Path::new(path));
