@@ -293,6 +293,9 @@ impl Cpu {
                 break result;
             }
             self.set(Register::XPSR, self.get(Register::XPSR) & !IT_STATE);
+            // The block was translated with the stale state, and the block before leads to it directly from now on.
+            let block = u64::from(self.get(Register::PC));
+            self.uc.ctl_remove_cache(block, block + 2).ok();
         };
         let pc = self.get(Register::PC);
         self.chip_mut().core_runs = false;
