@@ -44,8 +44,13 @@ impl Front {
         line.iter_mut().for_each(|line| bus.serve(*line, desk, drive, now_ms));
         terminals.serve(contacts, desk, drive, now_ms);
         if desk.is_busy() && console.has_said_all() {
-            line.iter_mut().for_each(|line| line.set_busy(true));
+            // A frame that came since the bus was served would wait for seconds.
+            line.iter_mut().for_each(|line| {
+                line.set_busy(true);
+                bus.serve(*line, desk, drive, now_ms);
+            });
             desk.run_pending(drive, now_ms);
+            bus.end_design(desk);
             line.iter_mut().for_each(|line| line.set_busy(false));
         } else {
             desk.watch_silence(drive, now_ms);

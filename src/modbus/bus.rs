@@ -73,6 +73,11 @@ pub struct Bus {
 }
 
 impl Bus {
+    /// Notes that a design has ended: a frame that comes from here on is not from before it.
+    pub fn end_design(&mut self, desk: &Desk) {
+        desk.has_designed(&mut self.designs);
+    }
+
     /// Answers a frame of the bus, if there is one, and follows its run command; never waits. `now_ms` wraps.
     #[inline(never)] // its stack does not add to that of a design
     pub fn serve(
@@ -99,9 +104,10 @@ impl Bus {
         let late = desk.has_designed(&mut self.designs);
         let mut access = Access { bus: self, desk, drive, commanded: false };
         match frame {
-            // A stop in such a request is carried out all the same.
-            Some(frame) if late => {
-                let (_, stop) = slave::busy(&frame, settings.own(), is_stop);
+            // A busy slave carries out a stop all the same.
+            Some(frame) if late || access.desk.is_busy() => {
+                let (answer, stop) = slave::busy(&frame, settings.own(), is_stop);
+                answer.iter().filter(|_| !late).for_each(|answer| port.send(answer));
                 stop.iter().for_each(|stop| access.carry_out(*stop));
             }
             Some(frame) => {

@@ -29,4 +29,6 @@ pub struct Bus {}
 impl Bus {
     /// Does nothing.
     pub fn serve<P, D>(&mut self, _: &mut P, _: &mut Desk, _: &mut D, _: u32) {}
+    /// Does nothing.
+    pub fn end_design(&mut self, _: &Desk) {}
 }

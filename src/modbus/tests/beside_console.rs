@@ -202,8 +202,8 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     both.talk.say("");
     assert_eq!((both.write(0x2001, 300), both.write(0x2000, 18)), (0, 0));
     assert!(both.talk.drive.commands.is_empty());
-    // Every request until then is answered with exception 6.
-    assert_eq!((both.write(0x2000, 1), both.ask(&[3, 0x21, 1, 0, 1])), (6, vec![0x83, 6]));
+    // Every request until then, but for a stop, is answered with exception 6.
+    assert_eq!((both.write(0x2001, 200), both.ask(&[3, 0x21, 1, 0, 1])), (6, vec![0x83, 6]));
     // Requests received meanwhile are not answered: the master has given them up.
     let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
     both.port()
