@@ -3,7 +3,7 @@
 pub mod refusals;
 mod session;
 
-use drive_commission::{Commissioning, Step};
+use drive_commission::Step;
 use drive_core::filter::LPF;
 use drive_core::io::PERIOD_S;
 use drive_settings::tuning::{EquivalentCircuit, current_loop_margins, motor_plant};
@@ -12,8 +12,7 @@ use super::drawn_machine::{Circuit, drawn};
 use super::{machines, steady};
 use crate::prelude::*;
 use crate::stats::exact;
-pub(super) use session::unaware;
-use session::{Abort, Session};
+pub(super) use session::{Outside, Session, unaware};
 
 /// Not in the source, which lists it as future work.
 pub const EXPERIMENT: Experiment = Experiment::study::<Commission>()
@@ -37,22 +36,12 @@ const ENOUGH: f64 = 0.7;
 /// Number of machines in the table, worst first.
 const LISTED: usize = 20;
 
-/// Runs a whole commissioning of the motor of this configuration with a drive that knows its nameplate.
-pub(super) fn session(config: &Config, seed: u64) -> Result<Session, Error> {
-    let settings = unaware(config);
-    let mut unlearned = Config { drive: settings, ..config.clone() };
-    unlearned.prepare.learn = false;
-    let rig = Rig::from_config(&unlearned, seed)?;
-    let steps = (Step::Nameplate, Step::CurrentLoop);
-    Session::run(rig, Commissioning::new(&settings), steps, Abort::default(), |_| {})
-}
-
 /// Returns the settings that `accept` then puts into force. The inertia, which needs a free shaft, is the one of the configuration.
 ///
 /// # Errors
 /// If the commissioning is refused, or does not end.
 pub fn commissioned(config: &Config, seed: u64) -> Result<Settings, Error> {
-    let session = session(config, seed)?;
+    let session = Session::run(config, seed, &Outside::NONE)?;
     if let Some((step, why)) = session.refusal() {
         return Err(Error::Refused(format!("commissioning: {}: {why}", step.word())));
     }
@@ -90,9 +79,8 @@ pub struct Record {
     margin_deg: f64,
     /// Whether its saliency is at least 0.7 of the expected value.
     salient: bool,
-    /// Whether all runs after the commissioning are good, and the time of the saliency self-commissioning, s; or the
-    /// reason why there are none.
-    after: Option<Result<(bool, f64), String>>,
+    /// The runs after the commissioning, if they were requested.
+    after: Option<After>,
     /// The identified parameters, as [`Circuit::values`].
     found: Vec<f64>,
     /// The session in words: time, step and verdict; its values.
@@ -116,26 +104,24 @@ impl Record {
     }
 }
 
-impl Commission {
-    /// Whether a commissioned drive, which learns with the shaft locked, is good at all operating points.
-    fn judged(
-        &self,
-        config: &Config,
-        drive: &Settings,
-        seed: u64,
-        seconds: f64,
-    ) -> Result<Result<(bool, f64), String>, Error> {
-        let mut config = Config { drive: *drive, ..config.clone() };
-        config.prepare.learn = true;
-        config.drive.injection.synchronous.allow_unlearned = false;
-        let learned = match or_refusal(steady::prepared(&config, seed))? {
-            Ok(learned) => learned,
-            Err(why) => return Ok(Err(why)),
-        };
-        let runs = machines::runs(&learned, &config, seed, seconds)?;
-        Ok(Ok((machines::good(&runs), learned.learning_s)))
-    }
+/// Whether all runs after a commissioning are good, and the time of the saliency self-commissioning, s; or the reason why there are
+/// no runs.
+type After = Result<(bool, f64), String>;
 
+/// Whether a commissioned drive, which learns with the shaft locked, is good at all operating points.
+fn judged(config: &Config, drive: &Settings, seed: u64, seconds: f64) -> Result<After, Error> {
+    let mut config = Config { drive: *drive, ..config.clone() };
+    config.prepare.learn = true;
+    config.drive.injection.synchronous.allow_unlearned = false;
+    let learned = match or_refusal(steady::prepared(&config, seed))? {
+        Ok(learned) => learned,
+        Err(why) => return Ok(Err(why)),
+    };
+    let runs = machines::runs(&learned, &config, seed, seconds)?;
+    Ok(Ok((machines::good(&runs), learned.learning_s)))
+}
+
+impl Commission {
     /// Makes the table of the results that are shown beside the filed ones.
     fn found_table(&self, record: &Record) -> Table {
         let mut table = Table::new("The motor", &["parameter", "found", "true", "error (%)"]);
@@ -181,7 +167,7 @@ impl Study for Commission {
     fn run(&self, number: usize) -> Result<Record, Error> {
         let (config, seed) = self.machine(number);
         let settings = unaware(&config);
-        let session = session(&config, seed)?;
+        let session = Session::run(&config, seed, &Outside::NONE)?;
         let refused = session.refusal().map(|(step, why)| format!("{}: {why}", step.word()));
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;
@@ -209,7 +195,7 @@ impl Study for Commission {
             Some(_) => f64::NAN,
         };
         let after = self.after.filter(|_| refused.is_none());
-        let after = after.map(|seconds| self.judged(&config, &commissioned, seed, seconds));
+        let after = after.map(|seconds| judged(&config, &commissioned, seed, seconds));
         let expected = f64::from(commissioned.injection.synchronous.flux_saliency);
         Ok(Record {
             found: found.values().map(|(_, value)| value).into(),

@@ -9,7 +9,7 @@ use drive_settings::tuning::bisected;
 use drive_settings::{Flux, SettingsError};
 
 use super::battery::{Kind, Refused, Summary, Trial, allowed_a, disturbed, nominal_limit_a, trial};
-use super::commission::{session, unaware};
+use super::commission::{Outside, Session, unaware};
 use super::drawn_machine::Circuit;
 use super::saliency::Probe;
 use crate::prelude::*;
@@ -166,7 +166,7 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
     if let Err(error) = config.drive.build() {
         return refused(if by_plate(&error) { "nameplate" } else { "settings" }, error, true);
     }
-    let session = match or_refusal(session(config, seed))? {
+    let session = match or_refusal(Session::run(config, seed, &Outside::NONE))? {
         Ok(session) => session,
         Err(why) => return refused("commission", why, false),
     };

@@ -1,9 +1,9 @@
 //! Tests whether defects of motor, wiring, sensors and board are refused by name.
 
-use drive_commission::{Commissioning, Meaning, Refusal, Step};
+use drive_commission::{Meaning, Refusal, Step};
 use drive_core::Sample;
 
-use super::session::{Abort, Session, unaware};
+use super::session::{Outside, Session, unaware};
 use crate::config::{FluxLevel, OpenPhase};
 use crate::experiments::drawn_machine::drawn;
 use crate::plant::{Channel, CurrentFault};
@@ -16,8 +16,6 @@ pub const EXPERIMENT: Experiment = Experiment::study::<Refusals>()
     .uses(&[BENCH, DRIVE, &["load.", "spread.machine", "runs"]]);
 
 const RUNS: u32 = 50;
-/// The first and the last step of a session.
-const STEPS: (Step, Step) = (Step::Nameplate, Step::CurrentLoop);
 
 /// A defect.
 struct Defect {
@@ -145,14 +143,10 @@ impl Study for Refusals {
         (defect.make)(&mut config);
         config.calibrate();
         let settings = unaware(&config);
-        let mut rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
-        (defect.on_bench)(&mut rig);
-        let abort = defect.abort.map_or(Abort::default(), |step| {
-            let after = seeded(seed).random_range(1..abort_within(step));
-            Abort { step: Some(step), after }
-        });
-        let commissioning = Commissioning::new(&settings);
-        let session = Session::run(rig, commissioning, STEPS, abort, defect.sensors)?;
+        let within = |step| (step, seeded(seed).random_range(1..abort_within(step)));
+        let Defect { on_bench, sensors, abort, .. } = *defect;
+        let outside = Outside { on_bench, sensors, abort: abort.map(within) };
+        let session = Session::run(&config, seed, &outside)?;
         let refusal = session.refusal().map(|(_, refusal)| refusal);
         let off = session.rig.drive.state().is_off();
         Ok(Record {

@@ -42,28 +42,34 @@ fn transient(rig: &Rig) -> Option<[f64; 2]> {
     Some([1.0 / along.re, 1.0 / across.im])
 }
 
-/// Point at which a session is stopped from outside.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Abort {
-    /// The step.
-    pub step: Option<Step>,
-    /// Control periods after its beginning.
-    pub after: u32,
+/// Influences on a session from outside.
+pub struct Outside {
+    /// Changes the bench before the session.
+    pub on_bench: fn(&mut Rig),
+    /// Changes the sensor readings.
+    pub sensors: fn(&mut Sample),
+    /// Step in which the session is stopped, and the control periods from the beginning of the step to the stop.
+    pub abort: Option<(Step, u32)>,
+}
+
+impl Outside {
+    /// No influence.
+    pub const NONE: Self = Self { on_bench: |_| {}, sensors: |_| {}, abort: None };
 }
 
 impl Session {
-    /// Runs the steps from `first` to `last`; `sensors` changes the sensor readings.
+    /// Runs all steps at standstill for the motor of this configuration, with a drive that knows its nameplate.
     ///
     /// # Errors
-    /// If the drive refuses a command, or the session does not end.
-    pub fn run(
-        mut rig: Rig,
-        mut commissioning: Commissioning,
-        (first, last): (Step, Step),
-        abort: Abort,
-        sensors: fn(&mut Sample),
-    ) -> Result<Self, Error> {
-        commissioning.start(first, last);
+    /// If the plant is refused, the drive refuses a command, or the session does not end.
+    pub fn run(config: &Config, seed: u64, outside: &Outside) -> Result<Self, Error> {
+        let settings = unaware(config);
+        let mut unlearned = Config { drive: settings, ..config.clone() };
+        unlearned.prepare.learn = false;
+        let mut rig = Rig::from_config(&unlearned, seed)?;
+        (outside.on_bench)(&mut rig);
+        let mut commissioning = Commissioning::new(&settings);
+        commissioning.start(Step::Nameplate, Step::LAST);
         let mut sums = Collector::default();
         let (mut reports, mut shaft_deg, mut largest_a) = (Vec::new(), 0.0_f64, 0.0_f64);
         let (began, mut in_step) = (rig.time(), 0);
@@ -73,22 +79,22 @@ impl Session {
         let order = |rig: &mut Rig, command| rig.command(&command).map(|_| ());
         for period in 0..(LONGEST_S * RATE_HZ) as u32 {
             let mut sample = rig.plant.sample();
-            sensors(&mut sample);
+            (outside.sensors)(&mut sample);
             rig.step_with(&sample);
+            let seen = rig.drive.telemetry();
             if rig.drive.is_testing() {
-                let seen = rig.drive.telemetry();
                 sums.push(seen.measured, seen.realised, seen.dc_link);
             }
             if rig.drive.state().regulates() {
-                let seen = rig.drive.telemetry();
                 sums.push_motion(seen.reference.q, seen.rotor_freq);
             }
             let turned = (rig.plant.mechanical_angle() - from) * 360.0 / TAU;
             shaft_deg = shaft_deg.max(turned.abs());
             largest_a = rig.plant.phase_currents().iter().fold(largest_a, |m, i| m.max(i.abs()));
-            if abort.step == Some(commissioning.step()) && rig.drive.state() != State::Off {
+            let aborted = outside.abort.filter(|(step, _)| *step == commissioning.step());
+            if let Some((_, after)) = aborted.filter(|_| rig.drive.state() != State::Off) {
                 in_step += 1;
-                if in_step == abort.after {
+                if in_step == after {
                     order(&mut rig, Command::Stop(Stop::Coast))?;
                 }
             }
@@ -114,23 +120,16 @@ impl Session {
                 Next::Torque(i_q) => order(&mut rig, Command::Torque(i_q))?,
                 Next::Design => commissioning.design(),
                 Next::Report(report) => reports.push((rig.time() - began, report)),
-                Next::Done => {
-                    let seconds = rig.time() - began;
-                    let [along, across] = leakage.map(|axis| axis.mean());
-                    let iron = rig.plant.energy_model().is_some();
-                    return Ok(Self {
-                        rig,
-                        commissioning,
-                        reports,
-                        seconds,
-                        shaft_deg,
-                        largest_a,
-                        leakage: iron.then_some(0.5 * (along + across)),
-                    });
-                }
+                Next::Done => break,
             }
         }
-        Err(Error::Refused(format!("the commissioning does not end in {LONGEST_S} s")))
+        if commissioning.is_running() {
+            return Err(Error::Refused(format!("the commissioning does not end in {LONGEST_S} s")));
+        }
+        let seconds = rig.time() - began;
+        let [along, across] = leakage.map(|axis| axis.mean());
+        let leakage = rig.plant.energy_model().map(|_| 0.5 * (along + across));
+        Ok(Self { rig, commissioning, reports, seconds, shaft_deg, largest_a, leakage })
     }
 
     /// Returns the time until the last report of a step up to this one, s.
