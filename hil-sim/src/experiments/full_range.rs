@@ -122,7 +122,7 @@ impl FullRange {
         if case.kind == RangeKind::WrongParameters {
             bench = self.changed(number, &bench);
         }
-        Run::new(case, &bench, drive, seed, traced)?.run()
+        Run::new(case, &bench, drive, seed)?.run(traced)
     }
 }
 

@@ -81,6 +81,8 @@ pub struct Bench {
     is_off: bool,
     /// Whether the flux was rotated.
     turned: bool,
+    /// Quantity that the drive regulates since the last [`Bench::start`].
+    pub mode: Mode,
 }
 
 impl Bench {
@@ -108,6 +110,7 @@ impl Bench {
             was_off: false,
             is_off: false,
             turned: false,
+            mode: Mode::Torque,
         })
     }
 
@@ -161,6 +164,7 @@ impl Bench {
     /// # Errors
     /// The reason why it does not.
     pub fn start(&mut self, mode: Mode) -> Result<(), Refused> {
+        self.mode = mode;
         let started = self.rig.command(&Command::Start(mode));
         started.map_err(|why| Refused::Otherwise(why.to_string()))?;
         match self.wait(LONGEST_START_S) {

@@ -53,7 +53,7 @@ pub fn trial(config: &Config, drive: &Drive, kind: Kind, seed: u64) -> Result<Tr
     let mut still = bring_up(&mut bench, kind.shaft(), config)?;
     if still {
         bench.counted_from = Some(bench.time() + SETTLING_S);
-        let taken = follow(&mut bench, mode, config, &parts)?;
+        let taken = follow(&mut bench, config, &parts)?;
         still = taken.is_some();
         let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
         bench.trial.torque_error = constant.map(|i_q| bench.torque_error(config, i_q));
@@ -95,15 +95,10 @@ pub fn bring_up(bench: &mut Bench, shaft: Shaft, config: &Config) -> Result<bool
 ///
 /// # Errors
 /// If the plant is refused, or the drive refuses a reference.
-pub fn follow(
-    bench: &mut Bench,
-    mode: Mode,
-    config: &Config,
-    parts: &[Part],
-) -> Result<Option<f64>, Error> {
+pub fn follow(bench: &mut Bench, config: &Config, parts: &[Part]) -> Result<Option<f64>, Error> {
     let mut taken = 0.0;
     for part in parts {
-        if mode == Mode::Speed {
+        if bench.mode == Mode::Speed {
             bench.rig.set_load(Load::Free { torque: part.load.newton_metres(config) })?;
         }
         if part.turn_deg != 0.0 {
@@ -118,7 +113,7 @@ pub fn follow(
             if let Some(rpm) = part.shaft_rpm.map(between) {
                 bench.rig.set_load(Load::Speed { speed: config.rpm(rpm) * TAU / 60.0 })?;
             }
-            taken = match mode {
+            taken = match bench.mode {
                 Mode::Speed => {
                     let rpm = config.rpm(reference) as f32;
                     bench.rig.command(&Command::Speed(rpm))?;
@@ -189,7 +184,7 @@ mod tests {
             bench.trace = Some(Vec::new());
             bench.start(Mode::Torque).unwrap();
             let started = bench.time();
-            assert!(follow(&mut bench, Mode::Torque, &config, &parts).unwrap().is_some(), "{seed}");
+            assert!(follow(&mut bench, &config, &parts).unwrap().is_some(), "{seed}");
             // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.
             let moments = bench.trace.unwrap();
             let torque: Vec<_> = moments.iter().filter(|m| m.t > started + 1.5).collect();

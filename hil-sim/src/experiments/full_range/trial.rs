@@ -91,13 +91,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// If the plant is refused.
-    pub fn new(
-        case: Case,
-        config: &'a Config,
-        drive: &Drive,
-        seed: u64,
-        traced: bool,
-    ) -> Result<Self, Error> {
+    pub fn new(case: Case, config: &'a Config, drive: &Drive, seed: u64) -> Result<Self, Error> {
         let mut random = seeded(seed);
         let rpm = case.speed(&mut random);
         let per_a = config.amperes(1.0);
@@ -111,15 +105,15 @@ impl<'a> Run<'a> {
         let mut bench = Bench::new(config, drive, case.shaft(rpm).at_rest().0, seed)?;
         bench.trial = Trial { case: case.name(), rpm, i_q, ..bench.trial };
         bench.wrong_deg = LOST_DEG;
-        bench.trace = traced.then(Vec::new);
         Ok(Self { case, config, rpm, i_q, sign, turn_deg, off_s, bench })
     }
 
-    /// Does the run; also returns its curves, if they were requested.
+    /// Does the run; with `traced` it also returns the curves.
     ///
     /// # Errors
     /// If the plant is refused, or the drive refuses a reference.
-    pub fn run(mut self) -> Result<(Trial, Vec<Moment>), Error> {
+    pub fn run(mut self, traced: bool) -> Result<(Trial, Vec<Moment>), Error> {
+        self.bench.trace = traced.then(Vec::new);
         let still = match self.course() {
             Ok(()) => true,
             Err(End::Stopped) => false,
@@ -183,13 +177,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn mode(&self) -> Mode {
-        self.case.shaft(self.rpm).at_rest().1
-    }
-
     /// Starts, and waits until the drive regulates.
     fn start(&mut self) -> Result<(), End> {
-        self.bench.start(self.mode()).map_err(End::Refused)
+        self.bench.start(self.case.shaft(self.rpm).at_rest().1).map_err(End::Refused)
     }
 
     /// Starts at rest and brings the shaft up to speed, without torque or by the drive's regulation.
@@ -206,8 +196,7 @@ impl<'a> Run<'a> {
     }
 
     fn follow(&mut self, parts: &[Part]) -> Result<(), End> {
-        let mode = self.mode();
-        still(follow(&mut self.bench, mode, self.config, parts)?.is_some())
+        still(follow(&mut self.bench, self.config, parts)?.is_some())
     }
 
     /// Follows the parts, and counts the error after this many seconds.
