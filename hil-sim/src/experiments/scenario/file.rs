@@ -269,7 +269,8 @@ impl Scenario {
             let mut part = Part { begin: before, seconds: this - before, ..scenario.next() };
             for (name, values) in &given {
                 let ramp = Ramp(values[row - 1], values[row]);
-                scenario.put(&mut part, config, name, ramp).map_err(|e| columns.error(e))?;
+                let ramp = scenario.in_units(config, name, ramp);
+                scenario.put(&mut part, name, ramp).map_err(|e| columns.error(e))?;
             }
             scenario.parts.push(part);
         }
@@ -314,21 +315,18 @@ impl Scenario {
                     return Err(unknown("column", name, &known));
                 }
                 let ramp = ramp.ok_or_else(|| wrong("a finite number, or two of them: [FROM, TO]"));
-                self.put(part, config, name, ramp?)?;
+                self.put(part, name, self.in_units(config, name, ramp?))?;
             }
         }
         Ok(())
     }
 
+    fn in_units(&self, config: &Config, column: &str, Ramp(from, to): Ramp) -> Ramp {
+        Ramp(self.scaled(config, column, from), self.scaled(config, column, to))
+    }
+
     /// Puts the value of a column into a part. All parts regulate the same quantity, and have the same kind of shaft.
-    fn put(
-        &mut self,
-        part: &mut Part,
-        config: &Config,
-        name: &str,
-        Ramp(from, to): Ramp,
-    ) -> Result<(), String> {
-        let value = Ramp(self.scaled(config, name, from), self.scaled(config, name, to));
+    fn put(&mut self, part: &mut Part, name: &str, value: Ramp) -> Result<(), String> {
         match COLUMNS.iter().find(|column| column.0 == name).map(|column| column.1) {
             Some(Ok(reference)) => {
                 let before = self.reference.get_or_insert(reference).column;
