@@ -246,13 +246,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.tables.push(table);
     outcome.faults.extend(pairs.iter().filter_map(|(case, [seen, _])| {
         let fault = seen.fault?;
-        Some(format!(
-            "{}, {:.0} % at {:.0} %: {}",
-            case.name(),
-            100.0 * case.load,
-            100.0 * case.speed,
-            fault_text(fault)
-        ))
+        let (name, load, speed) = (case.name(), 100.0 * case.load, 100.0 * case.speed);
+        Some(format!("{name}, {load:.0} % at {speed:.0} %: {}", fault_text(fault)))
     }));
     let of = |is: &dyn Fn(&Case) -> bool| -> Vec<[Response; 2]> {
         pairs.iter().filter(|(case, _)| is(case)).map(|(_, seen)| **seen).collect()
