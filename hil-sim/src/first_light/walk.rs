@@ -34,6 +34,12 @@ pub struct Walk<'a, W, P> {
     interrupted: Arc<AtomicBool>,
     /// The test record; its last attempt is the one at the present step.
     evidence: Evidence,
+    state: StepState,
+}
+
+/// State of the present step.
+#[derive(Default)]
+struct StepState {
     /// Lines received since the last line was sent.
     said: Vec<String>,
     /// Unsolicited lines that end the step, unless it waits for them.
@@ -77,20 +83,8 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             let image = &board.name;
             return Err(Error::Refused(format!("--board {wanted}: the image is for {image}")));
         }
-        let (said, doubts, readings, patience_s) = Default::default();
-        Ok(Self {
-            table,
-            board,
-            wire,
-            person,
-            options,
-            interrupted,
-            evidence,
-            said,
-            doubts,
-            readings,
-            patience_s,
-        })
+        let state = StepState::default();
+        Ok(Self { table, board, wire, person, options, interrupted, evidence, state })
     }
 
     /// Returns the test record so far.
@@ -146,26 +140,26 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             self.person.tell(&format!("\n{}\n{}", part.title, self.board.fill(&part.before)));
         }
         self.person.tell(&format!("\nStep {number}: {}", step.name));
-        (self.said, self.doubts, self.readings) = Default::default();
-        self.patience_s = step.patience_s.unwrap_or(PATIENCE_S);
+        let patience_s = step.patience_s.unwrap_or(PATIENCE_S);
+        self.state = StepState { patience_s, ..StepState::default() };
         self.wire.unasked();
         if step.switches_on() {
             self.send(&format!("set command.timeout_s {TIMEOUT_S}"))?;
             self.send("save")?;
         }
         step.acts.iter().try_for_each(|act| self.act(act))?;
-        self.doubts.first().map_or(Ok(()), |line| doubt(line.clone()))
+        self.state.doubts.first().map_or(Ok(()), |line| doubt(line.clone()))
     }
 
     /// Sends `stop`, and removes the limit on the time without lines.
     fn switch_off(&mut self) -> Checked {
         // The drive refuses `stop` in a fault, in which the outputs are already off.
         let _ = self.send("stop");
+        let is_off = |line: &String| line.starts_with("off") || line.starts_with("in fault");
         for _ in 0..STOPS_S {
             self.send("status")?;
-            if self.said.iter().any(|line| line.starts_with("off") || line.starts_with("in fault"))
-            {
-                self.doubts.clear();
+            if self.state.said.iter().any(is_off) {
+                self.state.doubts.clear();
                 return self.send("set command.timeout_s 0").and_then(|()| self.send("save"));
             }
             self.wire.wait(1.0);
@@ -195,7 +189,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             Act::Wait(seconds) => self.wire.wait(*seconds),
             Act::Hear(text) => self.hear(text)?,
             Act::Never(text) => {
-                if let Some(line) = self.said.iter().find(|line| line.contains(text)) {
+                if let Some(line) = self.state.said.iter().find(|line| line.contains(text)) {
                     return doubt(format!("`{text}` in `{line}`"));
                 }
             }
@@ -234,7 +228,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
         if answer.lines.len() == 1 {
             self.person.tell(&format!("  {line}: {}", answer.lines[0]));
         }
-        self.said.clone_from(&answer.lines);
+        self.state.said.clone_from(&answer.lines);
         answer.error().map_or(Ok(()), |error| doubt(format!("`{line}`: {error}")))
     }
 
@@ -244,9 +238,9 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             self.person.tell(&format!("  {line}"));
             self.note(&line);
             if DOUBTS.iter().any(|doubt| line.starts_with(doubt)) || line.contains(": refused") {
-                self.doubts.push(line.clone());
+                self.state.doubts.push(line.clone());
             }
-            self.said.push(line);
+            self.state.said.push(line);
         }
     }
 
@@ -257,27 +251,27 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             return there(None);
         }
         // A later action may wait for a fault.
-        match self.doubts.first() {
+        match self.state.doubts.first() {
             Some(line) if !line.starts_with("* fault ") => doubt(line.clone()),
             _ => Ok(()),
         }
     }
 
     fn hear(&mut self, text: &str) -> Checked {
-        let mut left = self.patience_s;
+        let mut left = self.state.patience_s;
         loop {
             self.look()?;
-            if self.said.iter().any(|line| line.contains(text)) {
-                self.doubts.retain(|line| !line.contains(text));
+            if self.state.said.iter().any(|line| line.contains(text)) {
+                self.state.doubts.retain(|line| !line.contains(text));
                 return Ok(());
             }
-            if let Some(line) = self.doubts.first() {
+            if let Some(line) = self.state.doubts.first() {
                 return doubt(line.clone());
             }
             // An answer without an `ok` is already complete.
-            let waits = self.said.iter().any(|line| line.starts_with("ok"));
+            let waits = self.state.said.iter().any(|line| line.starts_with("ok"));
             if !waits || left <= 0.0 {
-                return doubt(format!("not `{text}`, but `{}`", self.said.join("; ")));
+                return doubt(format!("not `{text}`, but `{}`", self.state.said.join("; ")));
             }
             left -= LOOK_S;
             self.wire.wait(LOOK_S);
@@ -290,7 +284,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
             self.wire.wait(1.0);
             if let Ok((board, build)) = identity(&mut self.wire) {
                 self.drain();
-                self.doubts.clear();
+                self.state.doubts.clear();
                 let found = format!("board {board}, build {build}");
                 return self.evidence.is_of(&found).or_else(doubt);
             }
@@ -301,10 +295,10 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
     /// Reads a number in the last answer.
     fn read(&mut self, read: &Read) -> Checked {
         let place = read.place();
-        let Some(value) = self.said.iter().find_map(|line| read.of(line)) else {
+        let Some(value) = self.state.said.iter().find_map(|line| read.of(line)) else {
             return doubt(format!("no number at `{place}`"));
         };
-        let before = self.readings.insert(place.to_owned(), value);
+        let before = self.state.readings.insert(place.to_owned(), value);
         let from = if read.rise { before.unwrap_or(f64::NAN) } else { 0.0 };
         self.judge(place, value, &read.unit, &read.is, from)
     }
@@ -320,7 +314,7 @@ impl<'a, W: Wire, P: Person> Walk<'a, W, P> {
 
     /// Judges mean and noise of a signal in the printed trace.
     fn noise(&mut self, signal: &str) -> Checked {
-        let mut rows = self.said.iter().map(|line| line.split(',').collect::<Vec<_>>());
+        let mut rows = self.state.said.iter().map(|line| line.split(',').collect::<Vec<_>>());
         let column = rows.by_ref().find_map(|row| row.iter().position(|name| *name == signal));
         let values: Vec<f64> = rows.filter_map(|row| row.get(column?)?.parse().ok()).collect();
         let mean = Stats::of(values.iter().copied()).mean();
