@@ -10,8 +10,9 @@ mod prose;
 
 use std::io::Write as _;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use sim_bench::outcome::Origin;
 use sim_bench::prelude::*;
 
 pub use console::{paragraph, table, text};
@@ -40,6 +41,20 @@ pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
         let _ = std::fs::remove_file(&beside);
         Error::write(path)(e)
     })
+}
+
+/// Writes the page of an experiment, and its plots beside it; returns the path of the page.
+///
+/// # Errors
+/// As [`page()`] and [`write_whole`].
+pub fn write(folder: &Path, origin: &Origin, section: Section<'_>) -> Result<PathBuf, Error> {
+    let (name, figures) = (section.name, &section.outcome.figures);
+    let path = folder.join(format!("{name}.html"));
+    write_whole(&path, &page("Induction drive", origin, &[section])?)?;
+    for figure in figures {
+        write_whole(&folder.join(format!("{name}-{}.svg", figure.name)), &svg(figure)?)?;
+    }
+    Ok(path)
 }
 
 #[cfg(test)]

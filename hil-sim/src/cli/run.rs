@@ -111,15 +111,8 @@ impl<'a> Run<'a> {
         let outcome = &whole;
         let origin = Origin::new(self.input.seed, &self.config.changes());
         let folder = output.out.clone().or_else(|| (!output.json).then(|| OUT.into()));
-        let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
-        if let (Some(folder), Some(path)) = (&folder, &path) {
-            let page = report::page("Induction drive", &origin, &[self.section(outcome)])?;
-            report::write_whole(path, &page)?;
-            for figure in &outcome.figures {
-                let file = folder.join(format!("{name}-{}.svg", figure.name));
-                report::write_whole(&file, &report::svg(figure)?)?;
-            }
-        }
+        let write = |folder: PathBuf| report::write(&folder, &origin, self.section(outcome));
+        let path = folder.map(write).transpose()?;
         if let Some(folder) = &output.csv {
             for (file, text) in report::csv(outcome)? {
                 report::write_whole(&folder.join(format!("{name}-{file}")), &text)?;

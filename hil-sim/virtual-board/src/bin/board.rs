@@ -133,12 +133,7 @@ fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBu
         outcome: &outcome,
     };
     let origin = Origin::new(options.input.seed, &config.changes());
-    let path = options.out.join(format!("{}.html", page::NAME));
-    report::write_whole(&path, &report::page("Induction drive", &origin, &[section])?)?;
-    for figure in &outcome.figures {
-        let file = options.out.join(format!("{}-{}.svg", page::NAME, figure.name));
-        report::write_whole(&file, &report::svg(figure)?)?;
-    }
+    let path = report::write(&options.out, &origin, section)?;
     let json = outcome.to_json(page::NAME, &origin).map_err(|e| anyhow!("{e}"))?;
     report::write_whole(&options.out.join(format!("{}.json", page::NAME)), &json)?;
     Ok(path)
