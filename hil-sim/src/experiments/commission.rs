@@ -170,21 +170,12 @@ impl Study for Commission {
         let session = Session::run(&config, seed, &Outside::NONE)?;
         let refused = session.refusal().map(|(step, why)| format!("{}: {why}", step.word()));
         let commissioned = session.commissioning.settings(&settings);
-        let m = commissioned.motor;
-        let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-        let mut truth = Circuit::at(&config, commissioned.i_d().into());
-        // With saturation the measured leakage is the incremental one at the bias.
-        let mut found = found;
-        let measured = session.commissioning.found().leakage;
-        if let (Some(incremental), Some(measured)) = (session.leakage, measured) {
-            (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
-        }
-        let pairs = found.values().into_iter().zip(truth.values());
-        let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0));
+        let [found, truth] = session.circuits(&config, &commissioned);
         let sensors = &config.measurement;
         let gains = (1.0 + sensors.gain_error_a) / (1.0 + sensors.gain_error_b);
         let mismatch = session.commissioning.found().levels.map_or(0.0, |levels| levels.mismatch);
-        let errors = errors.chain([100.0 * (1.0 + f64::from(mismatch) - gains)]).collect();
+        let mut errors = found.errors_pct(&truth).to_vec();
+        errors.push(100.0 * (1.0 + f64::from(mismatch) - gains));
         let mut told = Vec::new();
         for (at, report) in session.reports.iter().filter(|_| self.machines.is_none()) {
             let values = report.values.iter().flatten().map(ToString::to_string).collect();

@@ -51,6 +51,12 @@ impl Circuit {
         self.coupled / self.r_r
     }
 
+    /// Returns the errors of the values of this circuit, % of the true ones.
+    pub fn errors_pct(&self, truth: &Self) -> [f64; 5] {
+        let (found, truth) = (self.values(), truth.values());
+        std::array::from_fn(|n| 100.0 * (found[n].1 / truth[n].1 - 1.0))
+    }
+
     /// Returns the name for the metrics, and the value, of each parameter.
     pub fn values(&self) -> [(&'static str, f64); 5] {
         [

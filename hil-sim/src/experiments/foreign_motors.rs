@@ -177,14 +177,9 @@ fn course(config: &mut Config, seed: u64, record: &mut Record) -> Result<Option<
     let settings = session.commissioning.settings(&unaware(config));
     config.drive = settings;
     config.drive.motor.inertia = config.motor.inertia as f32;
-    let (m, i_d) = (&config.drive.motor, f64::from(config.drive.i_d()));
-    let mut found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-    let (mut truth, seen) = (Circuit::at(config, i_d), session.commissioning.found().leakage);
-    if let (Some(incremental), Some(measured)) = (session.leakage, seen) {
-        (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
-    }
-    let pairs = found.values().into_iter().zip(truth.values());
-    record.errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
+    let i_d = f64::from(settings.i_d());
+    let [found, truth] = session.circuits(config, &settings);
+    record.errors = found.errors_pct(&truth).to_vec();
     if let Err(error) = config.drive.build() {
         return refused("settings", error, true);
     }

@@ -3,6 +3,7 @@
 use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::{AlphaBeta, Motor, Sample, TestSignal};
 
+use crate::experiments::drawn_machine::Circuit;
 use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
 use crate::prelude::*;
 
@@ -136,6 +137,19 @@ impl Session {
     pub fn until(&self, step: Step) -> f64 {
         let earlier = self.reports.iter().filter(|(_, report)| report.step <= step);
         earlier.map(|(at, _)| *at).fold(0.0, f64::max)
+    }
+
+    /// Returns the circuit in these settings, which the session has found, and the true one. With saturation the measured leakage is
+    /// the incremental one at the bias.
+    pub fn circuits(&self, config: &Config, settings: &Settings) -> [Circuit; 2] {
+        let m = &settings.motor;
+        let mut found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
+        let mut truth = Circuit::at(config, settings.i_d().into());
+        let measured = self.commissioning.found().leakage;
+        if let (Some(incremental), Some(measured)) = (self.leakage, measured) {
+            (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
+        }
+        [found, truth]
     }
 
     /// Returns the reason why the session was refused.
