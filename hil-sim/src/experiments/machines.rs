@@ -79,17 +79,12 @@ pub(super) fn runs(
     seed: u64,
     seconds: f64,
 ) -> Result<Vec<SteadyRun>, Error> {
-    let mut runs = Vec::new();
-    for speed in SPEEDS_RPM {
-        for iq in IQ_A {
-            for sign in [1.0, -1.0] {
-                let iq = sign * config.amperes(iq);
-                let case = OperatingPoint { rpm: config.rpm(speed), iq, seed };
-                runs.push(judged(learned.clone(), case, seconds)?);
-            }
-        }
-    }
-    Ok(runs)
+    let both = |&iq: &f64| [1.0, -1.0].map(|sign| sign * config.amperes(iq));
+    let cases = SPEEDS_RPM.iter().flat_map(|&speed| {
+        let rpm = config.rpm(speed);
+        IQ_A.iter().flat_map(both).map(move |iq| OperatingPoint { rpm, iq, seed })
+    });
+    cases.map(|case| judged(learned.clone(), case, seconds)).collect()
 }
 
 /// Returns a random machine around the motor; its drive knows the circuit.
