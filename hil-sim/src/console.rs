@@ -1,8 +1,8 @@
 //! `cargo sim console`: talks to a drive at a serial port, of a board or a pseudo-terminal of the virtual board.
 //!
 //! Lines that begin with `!` are commands of this program ([`own`]); all others go to the drive. [`link`] moves lines,
-//! `editor` edits them; further, [`catalogue`] has commands and settings, for the completion, [`transfer`] backup and
-//! restore, and [`trace`] plots.
+//! `editor` edits them; further, [`catalogue`] has commands and settings, for the completion, [`transfer`] the restoring of
+//! settings, and [`trace`] plots.
 
 pub mod catalogue;
 mod editor;

@@ -76,8 +76,11 @@ impl Session {
                 HELP.iter().for_each(|(usage, meaning)| say(&format!("{usage:<18}{meaning}")));
             }
             Some(Own::Backup(file)) => {
-                let lines = transfer::backup(&mut self.link).map_err(failed)?;
-                let lines = lines.map_err(|why| Error::Internal(format!("no backup: {why}")))?;
+                let answer = self.link.ask("backup", |_| ()).map_err(failed)?;
+                if let Some(why) = answer.error() {
+                    return Err(Error::Internal(format!("no backup: {why}")));
+                }
+                let lines = answer.contents();
                 report::write_whole(&file, &(lines.join("\n") + "\n"))?;
                 say(&format!("{} lines in {}", lines.len(), file.display()));
             }

@@ -1,19 +1,7 @@
-//! Transfer of settings to and from a file: lines that are sent one by one.
+//! Transfer of settings from a file to the drive: lines that are sent one by one.
 
-use super::link::{Link, LinkError};
+use super::link::Link;
 use crate::error::cut;
-
-/// Returns the lines that restore the present settings, from the drive's `backup`.
-///
-/// # Errors
-/// The drive does not answer. The inner error is the answer of a drive that refuses.
-pub fn backup(link: &mut Link) -> Result<Result<Vec<String>, String>, LinkError> {
-    let answer = link.ask("backup", |_| ())?;
-    Ok(match answer.error() {
-        Some(error) => Err(error.to_owned()),
-        None => Ok(answer.contents().to_vec()),
-    })
-}
 
 /// Sends the lines of a text, without empty lines and lines that begin with `#`; returns their number. `progress` gets
 /// the number of lines sent so far and the number of all lines.
