@@ -30,9 +30,10 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
     let value_width = longest(|(_, cell)| cell.text().chars().count());
     let columns = ((WIDTH + 4) / (name_width + value_width + 6)).max(1);
     let rows = cells.len().div_ceil(columns);
-    if rows > 0 {
-        text.push_str("Metrics\n");
+    if rows == 0 {
+        return;
     }
+    text.push_str("Metrics\n");
     for row in 0..rows {
         let line =
             cells.iter().skip(row).step_by(rows).map(|(name, value)| {
@@ -40,9 +41,7 @@ fn write_metrics(text: &mut String, metrics: &Metrics) {
             });
         let _ = writeln!(text, "{}", line.collect::<Vec<_>>().join("    "));
     }
-    if rows > 0 {
-        text.push('\n');
-    }
+    text.push('\n');
 }
 
 /// Returns a table with aligned columns, with its title above and its note below.

@@ -111,8 +111,10 @@ fn draw(figure: &Figure, width: i32) -> Result<Vec<Part>, Failure> {
             labels: if k == 0 { labels(events, &x, width) } else { Vec::new() },
             events: events.iter().map(|event| event.0).filter(|at| x.contains(at)).collect(),
             has_x_labels: !shared || k + 1 == panels.len(),
+            x,
+            y,
         };
-        parts.push(draw_part(panel, &frame, x, y)?);
+        parts.push(draw_part(panel, &frame)?);
     }
     Ok(parts)
 }
@@ -124,15 +126,13 @@ struct Frame<'a> {
     labels: Vec<Label<'a>>,
     events: Vec<f64>,
     has_x_labels: bool,
+    /// Ranges of the axes.
+    x: Range<f64>,
+    y: Range<f64>,
 }
 
 /// Draws a panel with its legend and the names of the events.
-fn draw_part(
-    panel: &Panel,
-    frame: &Frame<'_>,
-    x: Range<f64>,
-    y: Range<f64>,
-) -> Result<Part, Failure> {
+fn draw_part(panel: &Panel, frame: &Frame<'_>) -> Result<Part, Failure> {
     let plot = if panel.equal_axes { 2 * HEIGHT } else { HEIGHT };
     let below = if frame.has_x_labels { LABELS } else { GAP };
     let width = frame.width;
@@ -156,9 +156,9 @@ fn draw_part(
             .set_label_area_size(LabelAreaPosition::Left, LEFT - GAP)
             .set_label_area_size(LabelAreaPosition::Bottom, below);
         if panel.log_x {
-            draw_plot(&mut chart, panel, frame, x.log_scale(), y)?;
+            draw_plot(&mut chart, panel, frame, frame.x.clone().log_scale())?;
         } else {
-            draw_plot(&mut chart, panel, frame, x, y)?;
+            draw_plot(&mut chart, panel, frame, frame.x.clone())?;
         }
         area.present()?;
     }
@@ -230,12 +230,12 @@ fn draw_plot<X>(
     panel: &Panel,
     frame: &Frame<'_>,
     x: X,
-    y: Range<f64>,
 ) -> Result<(), Failure>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
+    let y = &frame.y;
     let mut chart = chart.build_cartesian_2d(x, y.clone())?;
     let unlabelled = |_: &f64| String::new();
     let mut mesh = chart.configure_mesh();
