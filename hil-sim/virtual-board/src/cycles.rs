@@ -48,7 +48,7 @@ const IDENTIFICATION: &str = "induction_drive_rotor_id::online::Online::sample";
 const WATCHED_PERIODS: u64 = 18_000;
 
 /// A row of the table.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
     /// `sensored` or `sensorless`: the control interrupt. `identification`: a control period in the main loop; the
     /// longest contains a sample of the recursive least squares, the median does not.
@@ -211,16 +211,9 @@ fn row(
     let mut all: Vec<u32> = all.into_iter().map(|(_, cycles)| cycles).collect();
     all.sort_unstable();
     let median = *all.get(all.len() / 2).context("nothing was counted")?;
-    let mut row = Row {
-        name,
-        instructions: 0,
-        cycles: path.cycles,
-        median,
-        whole,
-        by_turn,
-        blocks: BTreeMap::from([(OVERHEAD[0], entry), (OVERHEAD[1], path.accesses * BUS)]),
-        functions: BTreeMap::new(),
-    };
+    let blocks = BTreeMap::from([(OVERHEAD[0], entry), (OVERHEAD[1], path.accesses * BUS)]);
+    let cycles = path.cycles;
+    let mut row = Row { name, cycles, median, whole, by_turn, blocks, ..Row::default() };
     let mut places: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
     for block in &path.blocks {
         let mut code = vec![0; block.size as usize];

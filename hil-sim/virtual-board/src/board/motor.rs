@@ -66,15 +66,10 @@ impl Connection {
             Sensors::InLine => None,
             Sensors::LowSide(shunts) => {
                 let delay_s = stage.delay_and_drop.map_or(0.0, |(delay, _)| delay);
-                Some(ShuntReader {
-                    shunts,
-                    delay: (delay_s * TICKS_PER_S as f64) as i64,
-                    rng: Xoshiro256PlusPlus::seed_from_u64(seed),
-                    amplifiers: Amplifiers::default(),
-                    bridge: Bridge::default(),
-                    top: Top::default(),
-                    before: Top::default(),
-                })
+                let delay = (delay_s * TICKS_PER_S as f64) as i64;
+                let rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+                let (amplifiers, bridge, top, before) = Default::default();
+                Some(ShuntReader { shunts, delay, rng, amplifiers, bridge, top, before })
             }
         };
         Self {
