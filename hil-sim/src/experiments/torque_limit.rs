@@ -33,9 +33,8 @@ pub struct TorqueLimit {
 /// # Errors
 /// If settings or plant are refused, or the drive does not learn.
 pub fn learned_limit(config: &Config, seed: u64) -> Result<(Drive, TorqueLimit), Error> {
-    let drive = learned_drive(config, seed)?;
-    let drive = drive
-        .map_err(|fault| Error::Refused(format!("the drive does not learn: fault {fault}")))?;
+    let refused = |fault| Error::Refused(format!("the drive does not learn: fault {fault}"));
+    let drive = learned_drive(config, seed)?.map_err(refused)?;
     let limit = TorqueLimit::new(config, allowed_a(&drive, config.amperes(BEYOND_A))?);
     Ok((drive, limit))
 }

@@ -95,9 +95,8 @@ const DEFECTS: &[Defect] = &[
 /// Longest time from the beginning of a step to its abort, control periods.
 fn abort_within(step: Step) -> u32 {
     match step {
-        Step::Sensors => 1200,
+        Step::Sensors | Step::CurrentLoop => 1200,
         Step::Wiring => 800,
-        Step::CurrentLoop => 1200,
         _ => 6000,
     }
 }
