@@ -42,7 +42,7 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::flux::observer::{Induced, ObserverState, Resistance};
-use crate::flux::{AngleLoop, DefaultLoop, FilterLoop};
+use crate::flux::{AngleLoop, FilterLoop};
 use crate::front_end::{FrontEnd, FrontEndState};
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Measured, Output, Sample};
@@ -58,7 +58,9 @@ use crate::protect::travel_watch::TravelWatchState;
 use crate::supply::RelayState;
 
 use axes::Axes;
-pub use coefficients::{Coefficients, DcLimit, FlyingStart, PowerLimit, Protection, SequenceSteps};
+pub use coefficients::{
+    Coefficients, DcLimit, DefaultLoop, FlyingStart, PowerLimit, Protection, SequenceSteps,
+};
 pub use command::{Accepted, Command, Refused, Stop};
 use flying_start::Residual;
 use limits::Limits;

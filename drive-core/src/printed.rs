@@ -37,14 +37,13 @@
 //! tracker's own corrections it acts as damping, on which the printed controller (z_s = 0.90) relies: with
 //! the rotation before the band-pass, the rectified chain loses the angle with that controller.
 
-mod kind;
-mod settings;
-
-pub use kind::DemodulatorKind;
-pub use settings::PrintedSettings;
+pub use crate::carrier::DemodulatorKind;
+pub use crate::flux::PrintedSettings;
 
 #[cfg(feature = "printed")]
 mod chain;
+#[cfg(feature = "printed")]
+mod demodulate;
 #[cfg(feature = "printed")]
 mod demodulator;
 #[cfg(feature = "printed")]
@@ -59,7 +58,8 @@ mod tracker;
 #[cfg(feature = "printed")]
 pub use {
     chain::{Literal, Rectified},
-    demodulator::{Demodulate, Demodulator},
+    demodulate::Demodulate,
+    demodulator::Demodulator,
     envelope::Envelope,
     loops::{ComparedLoop, PrintedState},
     rms_impedance::RmsImpedance,

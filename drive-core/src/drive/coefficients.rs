@@ -7,7 +7,7 @@ use crate::blocks::{Catch, Power};
 use crate::carrier::Injection;
 use crate::carrier::at_start::AtStart;
 use crate::current::{DeadTime, DqPi, InverterDrop, Modulator, VoltageLimit};
-use crate::flux::{DefaultLoop, Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
 use crate::protect::{
     LockMonitor, NoiseWatch, OffsetCheck, Prediction, SaliencyCheck, Thermal, TravelWatch,
     WiringCheck,
@@ -15,6 +15,13 @@ use crate::protect::{
 use crate::{
     Angle, AngleLoop, AngleSource, DcLink, Fault, FrontEnd, Learning, Motion, Relay, UnitVector,
 };
+
+/// The loop of a drive that names none: with the feature `printed` a [choice](crate::printed::ComparedLoop) by the settings.
+#[cfg(feature = "printed")]
+pub type DefaultLoop = crate::printed::ComparedLoop;
+/// The loop of a drive that names none: the filter.
+#[cfg(not(feature = "printed"))]
+pub type DefaultLoop = crate::flux::FilterLoop;
 
 /// Coefficients of the control step, designed outside the interrupt.
 // The order matters: the fields that every step uses come first and lie together; see the state of the drive.

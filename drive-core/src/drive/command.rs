@@ -1,8 +1,8 @@
 //! Commands to the drive, and its answers.
 
+use crate::drive::coefficients::DefaultLoop;
 use crate::drive::state::{Mode, State};
 use crate::drive::test_signal::TestSignal;
-use crate::flux::DefaultLoop;
 use crate::{Coefficients, Dq, Fault};
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.

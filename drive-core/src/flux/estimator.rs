@@ -12,10 +12,10 @@ use crate::flux::angle_filter::{AngleFilter, AngleFilterState, Correction};
 use crate::flux::hand_over::Turning;
 use crate::flux::indirect::FluxAngle;
 use crate::flux::observer::SeenSpeed;
+use crate::flux::printed_settings::PrintedSettings;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::Axis;
 use crate::learned::Learned;
-use crate::printed::PrintedSettings;
 use crate::{Angle, UnitVector};
 
 /// A loop that turns the injection axis so that it follows the flux. Its settings are `self`.
@@ -56,13 +56,6 @@ pub trait AngleLoop: Copy + Debug + PartialEq {
         turning: &Turning,
     ) -> bool;
 }
-
-/// The loop of a drive that names none: with the feature `printed` a [choice](crate::printed::ComparedLoop) by the settings.
-#[cfg(feature = "printed")]
-pub type DefaultLoop = crate::printed::ComparedLoop;
-/// The loop of a drive that names none: the filter.
-#[cfg(not(feature = "printed"))]
-pub type DefaultLoop = FilterLoop;
 
 /// The loop of the synchronous demodulation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The chain of section 3.4 (Figure 20): band-pass, rotation into the dm-qm frame, difference,
 //! post-processing low-pass.
 
-use super::Demodulate;
+use super::demodulate::Demodulate;
 use crate::carrier::CarrierSample;
 use crate::filter::dissertation::{BpfState, PpState};
 use crate::filter::{BPF, PP};

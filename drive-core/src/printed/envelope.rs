@@ -14,8 +14,7 @@
 //! at 600 Hz and 1200 Hz (the "spurious oscillations" of section 5.2), where this average has zeros.
 //! No post-processing filter is needed, which saves its delay of 24 samples.
 
-use super::Demodulate;
-use super::demodulator::{RotatedBandPass, rotated_carrier};
+use super::demodulate::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::filter::moving_sum::MovingSum;

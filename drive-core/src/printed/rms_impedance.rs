@@ -15,10 +15,8 @@
 //! an rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum
 //! of band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::Demodulate;
-use super::DemodulatorKind;
-use super::demodulator::{RotatedBandPass, rotated_carrier};
-use crate::carrier::CarrierSample;
+use super::demodulate::{Demodulate, RotatedBandPass, rotated_carrier};
+use crate::carrier::{CarrierSample, DemodulatorKind};
 use crate::filter::PP;
 use crate::filter::dissertation::PpState;
 use crate::filter::moving_sum::MovingSum;

@@ -1,6 +1,6 @@
 //! Settings of the loop of the dissertation.
 
-use super::DemodulatorKind;
+use crate::carrier::DemodulatorKind;
 use crate::table::ReferenceTable;
 
 /// Settings of the loop of the dissertation, which a build without the feature `printed` does not use.
