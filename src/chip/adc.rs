@@ -102,6 +102,7 @@ impl Adc {
     }
 
     /// The events of both converters; clears those of the analog watchdogs.
+    #[inline] // into the control interrupt
     pub fn take_events(&mut self) -> AdcEvents {
         let (one, two) = (self.one.isr().read().bits(), self.two.isr().read().bits());
         let over_current = (one | two) & AWD1 != 0;
