@@ -1,7 +1,7 @@
 //! The loop of the dissertation: four demodulators and the PII controller that turns the injection axis, to compare with.
 //!
 //! Everything but its [settings](PrintedSettings) needs the feature `printed`. A drive with it has both loops, and the setting
-//! `injection.demodulator` selects one: see [`ComparedLoop`].
+//! `injection.demodulator` selects one: see `ComparedLoop`.
 //!
 //! # Demodulators
 //!
