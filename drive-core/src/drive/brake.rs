@@ -1,7 +1,7 @@
 //! Control of a motor with a mechanical brake, for example of a hoist. The brake opens only after the torque was proven, and the torque
 //! ends only after the brake has closed.
 //!
-//! The firmware opens the brake while the drive regulates, and closes it when the drive stops; see `src/strip.rs`.
+//! The firmware opens the brake while the drive regulates, and closes it when the drive stops; see `src/terminals.rs`.
 
 use super::{Common, Field, FluxPhase, Goal};
 use crate::{AngleLoop, Coefficients, Dq, Fault};

@@ -105,16 +105,16 @@ impl<L: AngleLoop> Drive<L> {
             }
             Start::Test(wanted) => self.enter(Phase::Test(StandstillTest::new(wanted, left))),
             Start::Field(goal) => {
-                let catches = self.c.catches(&prepare.job).map(|start| start.built);
+                let built = self.c.catches(&prepare.job).map(|start| start.built);
                 // The field is large, so it is built in place.
                 self.enter(Phase::Field(Field::default()));
                 let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
                     return;
                 };
                 c.begin_field(field, goal, &left);
-                if let Some(start) = catches {
+                if let Some(built) = built {
                     field.hand_over.switch_carrier_off();
-                    field.flux = FluxPhase::Search(CatchState::new(start));
+                    field.flux = FluxPhase::Search(CatchState::new(built));
                 } else {
                     c.continue_at_standstill(field, k, encoder);
                 }
