@@ -22,6 +22,8 @@ mod torque_envelope;
 pub mod torque_limit;
 mod torque_rise;
 
+use std::sync::LazyLock;
+
 pub use sim_bench::experiment::*;
 use sim_bench::steady;
 pub use sim_bench::{learning, statistics};
@@ -32,53 +34,53 @@ use crate::prelude::*;
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
-pub const EXPERIMENTS: &[Experiment] = &[
-    recomputed::EXPERIMENT,
-    modulation::EXPERIMENT,
-    filters::EXPERIMENT,
-    adc_calibration::EXPERIMENT,
-    pi_design::EXPERIMENT,
-    plant_identification::EXPERIMENT,
-    current_step::EXPERIMENT,
-    anti_windup::EXPERIMENT,
-    dead_time::EXPERIMENT,
-    orientation::EXPERIMENT,
-    injection_map::EXPERIMENT,
-    saliency::EXPERIMENT,
-    demodulators::EXPERIMENT,
-    angle_identification::EXPERIMENT,
-    learn_reference::EXPERIMENT,
-    as_printed::EXPERIMENT,
-    scenario::POSITION,
-    sensorless_position::EXPERIMENT,
-    scenario::STEPS,
-    scenario::RAMP,
-    scenario::REVERSAL,
-    perturbation::EXPERIMENT,
-    scenario::SPEED,
-    monte_carlo::EXPERIMENT,
-    machines::EXPERIMENT,
-    commission::EXPERIMENT,
-    commission::refusals::EXPERIMENT,
-    battery::EXPERIMENT,
-    full_range::EXPERIMENT,
-    torque_envelope::EXPERIMENT,
-    losses::EXPERIMENT,
-    lock_monitor::EXPERIMENT,
-    record::EXPERIMENT,
-    torque_rise::EXPERIMENT,
-    shaft::EXPERIMENT,
-    smallest_slope::EXPERIMENT,
-    foreign_motors::EXPERIMENT,
-    identify_discrete::EXPERIMENT,
-    identify_continuous::EXPERIMENT,
-    identify_recursive::EXPERIMENT,
-    identify_validate::EXPERIMENT,
-    identify_machine::EXPERIMENT,
-    motor_tests::EXPERIMENT,
-    online_tracking::EXPERIMENT,
-    measured_motors::EXPERIMENT,
-];
+pub static EXPERIMENTS: LazyLock<Vec<Experiment>> = LazyLock::new(|| Vec::from([
+    Experiment::new("printed-numbers", recomputed::run),
+    Experiment::new("modulation", modulation::run),
+    Experiment::new("filters", filters::run),
+    Experiment::new("adc-calibration", adc_calibration::run),
+    Experiment::new("pi-design", pi_design::run),
+    Experiment::new("plant-identification", plant_identification::run),
+    Experiment::new("current-step", current_step::run),
+    Experiment::new("anti-windup", anti_windup::run),
+    Experiment::new("dead-time", dead_time::run),
+    Experiment::new("encoder-orientation", orientation::run),
+    Experiment::new("injection-map", injection_map::run),
+    Experiment::new("saliency", saliency::run),
+    Experiment::new("demodulators", demodulators::run),
+    Experiment::new("angle-identification", angle_identification::run),
+    Experiment::new("learn-reference", learn_reference::run),
+    Experiment::new("as-printed", as_printed::run),
+    Experiment::new("position-step", |context| scenario::shipped("position-step", context)),
+    Experiment::new("sensorless-position", sensorless_position::run),
+    Experiment::new("torque-steps", |context| scenario::shipped("torque-steps", context)),
+    Experiment::new("torque-ramp", |context| scenario::shipped("torque-ramp", context)),
+    Experiment::new("torque-reversal", |context| scenario::shipped("torque-reversal", context)),
+    Experiment::new("perturbation", perturbation::run),
+    Experiment::new("speed-profile", |context| scenario::shipped("speed-profile", context)),
+    Experiment::study::<monte_carlo::MonteCarlo>(),
+    Experiment::study::<machines::Machines>(),
+    Experiment::study::<commission::Commission>(),
+    Experiment::study::<commission::refusals::Refusals>(),
+    Experiment::study::<battery::Battery>(),
+    Experiment::study::<full_range::FullRange>(),
+    Experiment::new("torque-envelope", torque_envelope::run),
+    Experiment::new("losses", losses::run),
+    Experiment::study::<lock_monitor::LockMonitor>(),
+    Experiment::new("record", record::run),
+    Experiment::new("torque-rise", torque_rise::run),
+    Experiment::new("shaft", shaft::run),
+    Experiment::study::<smallest_slope::SmallestSlope>(),
+    Experiment::study::<foreign_motors::ForeignMotors>(),
+    Experiment::new("identify-discrete", identify_discrete::run),
+    Experiment::new("identify-continuous", identify_continuous::run),
+    Experiment::new("identify-recursive", identify_recursive::run),
+    Experiment::new("identify-validate", identify_validate::run),
+    Experiment::new("identify-machine", identify_machine::run),
+    Experiment::new("motor-tests", motor_tests::run),
+    Experiment::new("online-tracking", online_tracking::run),
+    Experiment::new("measured-motors", measured_motors::run),
+].map(described)));
 
 /// The experiments that report printed values of the sources.
 #[rustfmt::skip] // names, side by side
@@ -90,7 +92,17 @@ pub const SOURCES: [&str; 20] = [
 ];
 
 /// The experiments that need an input file; they are not part of the report.
-pub const WITH_INPUT: &[Experiment] = &[scenario::PROFILE, measured_start::EXPERIMENT];
+pub static WITH_INPUT: LazyLock<[Experiment; 2]> = LazyLock::new(|| {
+    let profile = Experiment::new("profile", scenario::profile);
+    [profile, Experiment::new("measured-start", measured_start::run)].map(described)
+});
+
+/// The identification from a recorded trace. It is a command of its own, for its options, and not in the lists.
+pub static TRACE: LazyLock<Experiment> = LazyLock::new(|| {
+    described(Experiment::new("identify-trace", |_| {
+        Err(Error::Refused("identify-trace is a command of its own".into()))
+    }))
+});
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
 #[rustfmt::skip] // names, side by side
@@ -98,6 +110,45 @@ pub const EVERYDAY: [&str; 10] = [
     "torque-steps", "speed-profile", "sensorless-position", "profile", "commission", "monte-carlo", "battery",
     "full-range", "torque-envelope", "lock-monitor",
 ];
+
+/// The file `experiments.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File<'a> {
+    /// Keys of a group by its name.
+    #[serde(borrow)]
+    groups: BTreeMap<&'a str, Vec<&'a str>>,
+    #[serde(borrow)]
+    experiment: BTreeMap<&'a str, Description<'a>>,
+}
+
+/// An experiment in the file; see the fields of [`Experiment`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Description<'a> {
+    #[serde(default)]
+    stands_for: &'a str,
+    about: &'a str,
+    #[serde(borrow, default)]
+    uses: Vec<&'a str>,
+    #[serde(borrow, default)]
+    not: Vec<&'a str>,
+}
+
+static FILE: LazyLock<File<'static>> = LazyLock::new(|| {
+    let file = toml::from_str(include_str!("experiments.toml"));
+    file.expect("experiments.toml is part of the program")
+});
+
+/// Adds the description of an experiment in `experiments.toml`.
+fn described(experiment: Experiment) -> Experiment {
+    let keys = |names: &[&'static str]| {
+        let of = |name: &&'static str| FILE.groups.get(name).cloned().unwrap_or(vec![*name]);
+        names.iter().flat_map(of).collect()
+    };
+    let Description { stands_for, about, uses, not } = &FILE.experiment[experiment.name];
+    Experiment { stands_for, about, uses: keys(uses), not: keys(not), ..experiment }
+}
 
 /// Returns the single runs of an experiment.
 ///
@@ -155,7 +206,7 @@ pub fn named(name: &str) -> Vec<&str> {
 /// # Errors
 /// [`Error::Unknown`] with the most similar name; [`Error::Refused`] with the replacement of a removed experiment.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
-    let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
+    let all = || EXPERIMENTS.iter().chain(&*WITH_INPUT);
     let found = all().find(|experiment| experiment.name == name);
     found.ok_or_else(|| match REPLACED.iter().find(|(old, _)| *old == name) {
         Some((_, by)) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
@@ -186,7 +237,8 @@ mod tests {
             page.contains(&format!("```rust\n{example}```")),
             "amplitude.rs differs from the page"
         );
-        let outcome = amplitude::EXPERIMENT.outcome(&Config::default(), 1).unwrap();
+        let outcome =
+            Experiment::new("amplitude", amplitude::run).outcome(&Config::default(), 1).unwrap();
         let rms = |volts: u32| outcome.metrics.get(&format!("rms_at_{volts}_v_deg")).unwrap();
         assert!((0.1..5.0).contains(&rms(80)) && rms(80) < rms(40), "more injection, less noise");
     }
@@ -199,10 +251,17 @@ mod tests {
     }
 
     #[test]
-    fn names_are_unique_and_found() {
+    fn names_are_unique_and_found_and_each_description_is_used() {
         assert!(find(DEFAULT).is_ok());
-        for experiment in EXPERIMENTS {
+        for experiment in EXPERIMENTS.iter() {
             assert_eq!(find(experiment.name).map(|found| found.about).ok(), Some(experiment.about));
+            for name in experiment.uses.iter().chain(&experiment.not) {
+                let is_meant = |key: Key| key.assigned_name().starts_with(name);
+                let is_key = Key::all().chain(Key::after()).any(is_meant);
+                assert!(is_key, "{}: {name}", experiment.name);
+            }
         }
+        // Besides those in the lists: a scenario of the user, and the command `identify-trace`.
+        assert_eq!(FILE.experiment.len(), EXPERIMENTS.len() + WITH_INPUT.len() + 2);
     }
 }

@@ -129,7 +129,7 @@ fn lists_name_every_experiment_and_key() {
     assert_eq!(everyday, EVERYDAY);
     let both = [everyday, names(&["list", "--lab"])].concat();
     assert_eq!(both.len(), EXPERIMENTS.len() + WITH_INPUT.len(), "each in one of the lists");
-    for experiment in EXPERIMENTS {
+    for experiment in EXPERIMENTS.iter() {
         assert!(both.iter().any(|name| name == experiment.name), "{}", experiment.name);
     }
     let keys = hil_sim(&folder, &["keys"]);

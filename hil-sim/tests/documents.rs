@@ -236,7 +236,7 @@ fn tables_of_the_pages_are_those_of_results_and_program() {
         }
     }
     let mut list = "| name | stands for |\n|---|---|\n".to_owned();
-    for experiment in EXPERIMENTS.iter().chain(WITH_INPUT) {
+    for experiment in EXPERIMENTS.iter().chain(&*WITH_INPUT) {
         writeln!(list, "| `{}` | {} |", experiment.name, experiment.stands_for).unwrap();
     }
     generated::check("simulator.md", "experiments", &list);

@@ -41,11 +41,11 @@ fn shards(folder: &Path, arguments: &[&str], indices: &[usize], count: usize) {
 
 #[test]
 fn every_statistical_experiment_is_in_the_list() {
-    for experiment in hil_sim::experiments::EXPERIMENTS {
+    for experiment in hil_sim::experiments::EXPERIMENTS.iter() {
         let is_shared = SMALL.iter().any(|(name, _)| *name == experiment.name);
         assert_eq!(experiment.study.is_some(), is_shared, "{}", experiment.name);
         // All experiments with a number of runs can be shared.
-        let takes_runs = experiment.uses.concat().contains(&"runs");
+        let takes_runs = experiment.uses.contains(&"runs");
         assert!(!takes_runs || is_shared, "{}", experiment.name);
     }
 }

@@ -16,9 +16,9 @@ pub struct Experiment {
     /// Description in one sentence.
     pub about: &'static str,
     /// The keys that the experiment uses: names, and beginnings of names that end in a full stop.
-    pub uses: &'static [&'static [&'static str]],
+    pub uses: Vec<&'static str>,
     /// Exceptions from `uses`, written alike: keys that the experiment sets itself, or that have no effect in it.
-    pub not: &'static [&'static [&'static str]],
+    pub not: Vec<&'static str>,
     /// Runs the experiment.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
     /// The single runs of an experiment that consists of independent runs.
@@ -26,34 +26,15 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Makes an experiment that uses no key, from its name and its function.
-    pub const fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
-        Self { name, stands_for: "", about: "", uses: &[], not: &[], run, study: None }
+    /// Makes an experiment without a description that uses no key, from its name and its function.
+    pub fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
+        let (uses, not) = (Vec::new(), Vec::new());
+        Self { name, stands_for: "", about: "", uses, not, run, study: None }
     }
 
     /// Makes an experiment of independent runs, which can be shared between machines and continued.
-    pub const fn study<S: Study>() -> Self {
+    pub fn study<S: Study>() -> Self {
         Self { study: Some(Statistical::of::<S>()), ..Self::new(S::NAME, whole::<S>) }
-    }
-
-    /// Sets the part of the source that it reproduces.
-    pub const fn stands_for(self, stands_for: &'static str) -> Self {
-        Self { stands_for, ..self }
-    }
-
-    /// Sets its description.
-    pub const fn about(self, about: &'static str) -> Self {
-        Self { about, ..self }
-    }
-
-    /// Sets the keys that it uses.
-    pub const fn uses(self, uses: &'static [&'static [&'static str]]) -> Self {
-        Self { uses, ..self }
-    }
-
-    /// Sets exceptions from these keys.
-    pub const fn not(self, not: &'static [&'static [&'static str]]) -> Self {
-        Self { not, ..self }
     }
 
     /// Runs the experiment for its own time, without progress bars.
@@ -70,8 +51,7 @@ impl Experiment {
         let is_in = |given: &&str| {
             if given.ends_with('.') { name.starts_with(given) } else { name == *given }
         };
-        self.uses.iter().copied().flatten().any(is_in)
-            && !self.not.iter().copied().flatten().any(is_in)
+        self.uses.iter().any(is_in) && !self.not.iter().any(is_in)
     }
 
     /// Describes the keys that it uses in words.
@@ -83,7 +63,7 @@ impl Experiment {
             });
             shown.collect::<Vec<_>>().join(", ")
         };
-        match (self.uses.concat().as_slice(), self.not.concat().as_slice()) {
+        match (&self.uses[..], &self.not[..]) {
             ([], _) => "no key".to_owned(),
             (uses, []) => words(uses),
             (uses, not) => format!("{}; except {}", words(uses), words(not)),
@@ -94,33 +74,6 @@ impl Experiment {
 /// Angle error beyond which the lock counts as lost, degrees: half way to the angle at which the saliency, which
 /// repeats every 180°, has the wrong sign.
 pub const LOST_DEG: f64 = 45.0;
-
-/// Keys of the simulated motor, inverter and sensors.
-#[rustfmt::skip] // names, side by side
-pub const BENCH: &[&str] = &[
-    "motor.", "saliency.", "plant", "flux_level", "iron.", "warming.", "inverter.", "dc_link.", "measurement.",
-    "shaft.",
-];
-/// Keys of the drive.
-#[rustfmt::skip] // names, side by side
-pub const DRIVE: &[&str] = &[
-    "drive.", "nameplate.", "scales.", "angle_source", "current_plant", "current_plant.", "ignore_delays",
-    "injection.", "limits.", "sequence.", "speed.", "observer.", "braking.", "flux.", "vf.",
-];
-/// Keys of the speed loop, which a drive that regulates torque does not use.
-#[rustfmt::skip] // names, side by side
-pub const SPEED_LOOP: &[&str] = &[
-    "speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.quick_rpm_per_s", "speed.s_ramp_s", "speed.phase_margin_deg",
-    "drive.motor.inertia",
-];
-/// Keys that have no effect while the shaft is locked or a dynamometer holds its speed.
-pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
-/// Keys of the saliency tracking, which a drive with an encoder does not use.
-pub const TRACKING: &[&str] =
-    &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
-/// Keys that have no effect while the shaft is locked.
-pub const TURNING: &[&str] =
-    &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
 /// Returns the assumptions of the simulated plant, for the remarks of an outcome.
 pub fn assumptions(config: &Config) -> Vec<String> {

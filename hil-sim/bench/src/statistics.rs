@@ -83,7 +83,7 @@ pub struct Statistical {
 
 impl Statistical {
     /// Makes the runs of a study.
-    pub const fn of<S: Study>() -> Self {
+    pub fn of<S: Study>() -> Self {
         Self { runs: |context| Ok(S::new(context)?.runs()), some: some::<S>, outcome: outcome::<S> }
     }
 }

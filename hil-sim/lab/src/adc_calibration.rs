@@ -4,15 +4,14 @@ use sim_bench::stats::StraightLine as Line;
 
 use crate::prelude::*;
 
-/// Table 4, Figure 17, Eq. 3.5.
-pub const EXPERIMENT: Experiment = Experiment::new("adc-calibration", run)
-    .stands_for("Table 4, Figure 17, Eq. 3.5")
-    .about("Least-squares lines through the readings of both current channels.");
-
 /// Largest count of the ADC: 12 bits.
 const LAST_CODE: f64 = 4095.0;
 
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Table 4, Figure 17, Eq. 3.5.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut readings = Panel::new("converter code", "current (A)");
     let mut residuals = Panel::new("converter code", "residual (mA)");

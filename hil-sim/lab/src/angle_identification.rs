@@ -15,16 +15,6 @@ use crate::prelude::*;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, Pii, TABLE_6_A};
 
-/// Section 3.11.
-pub const EXPERIMENT: Experiment = Experiment::new("angle-identification", run)
-    .stands_for("Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44")
-    .about(
-        "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
-            controller made from it, and why the loop is closed around another plant.",
-    )
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
-
 /// Row of Table 6 for which section 3.11 designs the controller: 1.5 A.
 const DESIGN_ROW: usize = 2;
 /// The printed zero, completed by the digit that seems to be missing.
@@ -55,7 +45,11 @@ impl IdentifiedPoint {
     }
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 3.11.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Demodulation, f64)> =
         DEMODULATIONS.iter().flat_map(|s| TABLE_6_A.iter().map(move |&iq| (s, iq))).collect();
     let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {

@@ -7,14 +7,6 @@ mod sources;
 
 use crate::prelude::*;
 
-/// Figures 37 to 39, Table 1, section 3.4.
-pub const EXPERIMENT: Experiment = Experiment::new("as-printed", run)
-    .stands_for("Figures 37, 38, 39, Table 1, section 3.4")
-    .about("The drive as the text has it, on motors of three saliencies: angle error over the q-axis current; its \
-            position controller on its plant; filter and rotation in either order; three angle sources at three speeds.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "saliency."]]);
-
 /// Flux-fixed saliencies of the simulated motors; the source measures none.
 const SALIENCIES: [f64; 3] = [-0.002, -0.0035, -0.035];
 /// Current levels of Figure 38, A.
@@ -30,7 +22,11 @@ struct Levels {
     trace: Vec<(f64, f64)>,
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 37 to 39, Table 1, section 3.4.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let found =
         context.in_parallel("as-printed", &SALIENCIES, |_, &a_psi| levels(context, a_psi))?;

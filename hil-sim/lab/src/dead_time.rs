@@ -2,18 +2,6 @@
 
 use crate::prelude::*;
 
-/// Figures 28 and 29.
-pub const EXPERIMENT: Experiment = Experiment::new("dead-time", run)
-    .stands_for("Figures 28 and 29, section 3.9")
-    .about("Voltage error and current distortion by the dead time, with and without compensation.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[
-        FREE_SHAFT,
-        SPEED_LOOP,
-        TRACKING,
-        &["angle_source", "inverter.residual_v", "inverter.switched", "inverter.compensate"],
-    ]);
-
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;
 const IQ_A: f64 = 1.0;
@@ -32,7 +20,11 @@ struct Case {
     harmonics: [f64; 4],
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 28 and 29.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let cases = [case(context, false)?, case(context, true)?];
     let names = [("without compensation", "uncompensated"), ("with compensation", "compensated")];
     let mut outcome = Outcome::default();

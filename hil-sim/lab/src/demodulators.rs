@@ -13,14 +13,6 @@ use demodulation::{DEMODULATIONS, Demodulation, ReferenceKind};
 use signal::{SETTLED_S, SignalQuality, signal_quality};
 use tracked::StepsRun;
 
-/// Section 5.2 names two ways to extract the injection current better.
-pub const EXPERIMENT: Experiment = Experiment::new("demodulators", run)
-    .stands_for("Figures 10, 19, 20, section 5.2")
-    .about("Five demodulations on one motor: the signal of each over the injection angle, with and without \
-            a saliency, noise, delay, and the angle error without a position sensor.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
-
 /// q-axis currents of the map and of the table, A.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 /// q-axis current for the measurement of the delay and for the runs at constant speed, A.
@@ -99,7 +91,11 @@ struct ClosedLoop {
     turning: Vec<SteadyRun>,
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 5.2 names two ways to extract the injection current better.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let found = context.in_parallel("demodulators", &DEMODULATIONS, |_, demodulation| {
         DemodulationResults::of(demodulation, context)
     })?;

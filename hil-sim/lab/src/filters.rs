@@ -12,19 +12,14 @@ use crate::recomputed::CARRIER_HZ;
 use compared::{ComparedFilter, filters};
 use design::{Band, Prototype, butterworth, chebyshev_1, chebyshev_2, elliptic};
 
-/// Figure 30, Tables 7 and 8.
-pub const EXPERIMENT: Experiment = Experiment::new("filters", run)
-    .stands_for("Figure 30, Tables 7, 8")
-    .about(
-        "Response of the three elliptic filters, and their error in single precision as \
-            second-order sections and in the printed direct form.",
-    )
-    .uses(&[&["seconds"]]);
-
 /// Time for which each filter gets input, s.
 const SECONDS: f64 = 100.0;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figure 30, Tables 7 and 8.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let samples = (context.seconds.unwrap_or(SECONDS) * RATE) as u64;
     let filters = filters();
     let mut outcome = Outcome::default();

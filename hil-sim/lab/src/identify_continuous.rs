@@ -6,16 +6,11 @@ use crate::identification::study::{Entry, MODELS, TRIALS, errors_of, tables};
 use crate::identification::{Noise, Parameters, Signal, Trial};
 use crate::prelude::*;
 
-/// Tables 2, 3 and 5.
-pub const EXPERIMENT: Experiment = Experiment::new("identify-continuous", run)
-    .stands_for("Jacobina 1996, Tables 2, 3 and 5")
-    .about(
-        "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
-            the paper, beside the printed ones, and by the exact inverse (D) and the structured \
-            fit (S).",
-    );
-
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Tables 2, 3 and 5.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (all, mut outcome) = tables(context, &MODELS)?;
     outcome.tables.push(means(&all, &mut outcome.metrics));
     let table = low_speeds(context.seed, &mut outcome);

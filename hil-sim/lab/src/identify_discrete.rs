@@ -3,14 +3,11 @@
 use crate::identification::study::tables;
 use crate::prelude::*;
 
-/// Tables 1 and 4.
-pub const EXPERIMENT: Experiment =
-    Experiment::new("identify-discrete", run).stands_for("Jacobina 1996, Tables 1 and 4").about(
-        "Errors of the coefficients of the sampled equation between current and voltage, by \
-            least squares on seven noisy simulated measurements each, beside the printed ones.",
-    );
-
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Tables 1 and 4.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (_, mut outcome) = tables(context, &["A"])?;
     outcome.remark(
         "h_1b is never estimated: it is 3e-5 of h_1a. h_1b and h_0b with S_s at 100 and 200 µs come out worse than in \

@@ -4,14 +4,11 @@ use crate::identification::ratios::{self, Ratio};
 use crate::identification::{Parameters, claims};
 use crate::prelude::*;
 
-/// Numbers that do not depend on the noise.
-pub const EXPERIMENT: Experiment =
-    Experiment::new("identify-machine", run).stands_for("Jacobina 1996, Tables 1 to 6").about(
-        "Numbers that follow from the printed tables whatever the noise, beside those of the \
-            machine of Table 6 and of one inferred from them.",
-    );
-
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, of numbers that do not depend on the noise.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let ratios = ratios::all();
     let largest = |of: fn(&Ratio) -> f64| {

@@ -8,15 +8,6 @@ use crate::identification::trial::{Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial, Value, model_c};
 use crate::prelude::*;
 
-/// Figures 2 to 4.
-pub const EXPERIMENT: Experiment = Experiment::new("identify-recursive", run)
-    .stands_for("Jacobina 1996, Figures 2 to 4")
-    .about(
-        "Parameters and speed by recursive least squares while the machine runs: the f32 code \
-            of the drive beside the same in f64, and its convergence time.",
-    )
-    .uses(&[&["seconds"]]);
-
 const H: f64 = 50e-6;
 const RATE: usize = 20_000;
 /// Base current, A.
@@ -80,7 +71,11 @@ fn convergence(estimates: &[[Value; 5]], k: usize) -> f64 {
     last.unwrap_or(0) as f64 / RATE as f64
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 2 to 4.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let seconds = context.seconds.unwrap_or(2.0).clamp(0.2, 60.0);
     let mut outcome = Outcome::default();
     let mut table = Table::new("Recursive least squares, λ = 0.999, P₀ = 1000 I", &[]);

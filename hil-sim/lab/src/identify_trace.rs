@@ -11,12 +11,6 @@ use crate::identification::output_error::{OutputErrorFit, Record};
 use crate::identification::{Complex, NotIdentifiable, Parameters};
 use crate::prelude::*;
 
-/// A command of its own, for its options; not in the list of experiments.
-pub const EXPERIMENT: Experiment = Experiment::new("identify-trace", |_| Err(Error::Refused("identify-trace is a command of its own".into())))
-    .stands_for("a recorded trace")
-    .about("Parameters of the motor from a recorded trace: the machine whose current is nearest to the recorded one.")
-    .uses(&[&["motor.", "drive.motor.", "scales.current_delay_s"]]);
-
 const TIME: &str = "time_s";
 const SPEED: &str = "speed_rpm";
 /// Columns of voltages and currents, as vectors or per phase. The third phase may be absent.

@@ -6,14 +6,6 @@ use crate::identification::study::errors;
 use crate::identification::{Noise, Parameters, Signal, Trial, model_c};
 use crate::prelude::*;
 
-/// Figure 5, Tables 6 and 7.
-pub const EXPERIMENT: Experiment = Experiment::new("identify-validate", run)
-    .stands_for("Jacobina 1996, Figure 5, Tables 6 and 7")
-    .about(
-        "The current of a machine beside the current simulated with estimated and with \
-            classical parameters, and the parameters themselves beside the printed ones.",
-    );
-
 const H: f64 = 50e-6;
 /// Noise as with a real ADC: a tenth of the noise of section 5.
 const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
@@ -26,7 +18,11 @@ fn printed(table: &str, row: &str) -> Parameters {
 /// Measured speeds, electrical rad/s.
 const SPEEDS: [f64; 2] = [366.0, 57.6];
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figure 5, Tables 6 and 7.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     for (table, speed) in [("Table 6", SPEEDS[0]), ("Table 7", SPEEDS[1])] {
         let machine = printed(table, "Ss").at(speed);

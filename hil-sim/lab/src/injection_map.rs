@@ -5,13 +5,6 @@ use crate::prelude::*;
 /// Gain of the post-processing filter at dc.
 pub(super) const PP: f64 = 0.944_061;
 
-/// Figure 19.
-pub const EXPERIMENT: Experiment = Experiment::new("injection-map", run)
-    .stands_for("Figure 19, Figure 18")
-    .about("Current difference over the injection angle, with the encoder: the signal of each demodulator.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source"]]);
-
 const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// Step of phi2 - theta, degrees.
 const STEP_DEG: i32 = 15;
@@ -51,7 +44,11 @@ const VARIANTS: [Variant; 7] = [
 /// delta_i in mA (with the synchronous demodulation: thousandths) over phi2 - theta in degrees.
 pub(super) type Curve = Vec<(f64, f64)>;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figure 19.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(Variant, f64)> =
         VARIANTS.iter().flat_map(|&v| IQ_A.iter().map(move |&iq| (v, iq))).collect();
     let curves = context.in_parallel("injection-map", &jobs, |_, &(variant, iq)| {

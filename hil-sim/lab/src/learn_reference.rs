@@ -5,14 +5,11 @@ use sim_bench::learning;
 
 use crate::prelude::*;
 
-/// Section 5.2 asks for a detection that works at every operating point.
-pub const EXPERIMENT: Experiment = Experiment::new("learn-reference", run)
-    .stands_for("section 3.3, section 5.2")
-    .about("The drive learns saliency offset, sensor mismatch and saliency with the shaft locked.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]]);
-
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 5.2 asks for a detection that works at every operating point.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let learned = learning::learned(context.config, context.seed)?;
     let mut outcome = Outcome::default();
     let reference = learned.reference.points().iter().take(learned.points + 1).enumerate();

@@ -9,10 +9,6 @@ use sim_bench::plant::{EnergyState, phases};
 use crate::prelude::*;
 use crate::saliency::steady::at_voltage;
 
-/// All comparisons.
-pub const EXPERIMENT: Experiment = Experiment::new("measured-motors", run)
-    .about("Simulated motors beside measured ones: load test of an 18.5 kW, saturation curve of a 2.2 kW, direct start of a 4 kW motor.");
-
 /// The linear circuit of the same motor, from its locked-rotor test and its no-load current; its inertia is fitted to the start as well.
 const CIRCUIT: [(&str, f64); 6] = [
     ("motor.r_r", 1.287),
@@ -181,7 +177,11 @@ pub fn published(psi: f64) -> f64 {
     psi * (1.0 + (0.84 * psi).powi(7)) / 0.34
 }
 
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs all comparisons.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let measured = measured()?;
     let simulated = simulated(&measured)?;

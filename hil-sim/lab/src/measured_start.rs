@@ -5,19 +5,17 @@ use sim_bench::plant::IronSettings;
 use crate::identify_trace::{Reading, Voltages, read, rms};
 use crate::prelude::*;
 
-/// Needs a file of the user, with the columns of `identify-trace` and voltages sampled at the terminals, starting when
-/// the motor is switched on.
-pub const EXPERIMENT: Experiment = Experiment::new("measured-start", run)
-    .stands_for("a recorded start")
-    .about("A recorded direct start beside the simulated motor: its voltages imposed, current and speed compared.")
-    .uses(&[&["motor.", "plant", "iron.", "flux_level", "nameplate.", "load.torque_nm"]]);
-
 /// Parts of a start, with their ends, s: the largest currents occur in the first.
 const PARTS: [(&str, f64); 3] = [("start", 0.12), ("run_in", 0.25), ("later", f64::INFINITY)];
 /// Integration steps per row.
 const STEPS: u32 = 4;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment. It needs a file of the user, with the columns of `identify-trace` and voltages sampled at the
+/// terminals, starting when the motor is switched on.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, file) = (context.config, context.file);
     let path =
         file.ok_or_else(|| Error::Refused("measured-start needs --input FILE".to_owned()))?;

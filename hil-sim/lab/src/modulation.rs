@@ -9,15 +9,6 @@ use drive_core::io::PERIOD_S;
 use crate::dead_time::steps;
 use crate::prelude::*;
 
-/// Figures 4, 5 and 11, Table 2.
-pub const EXPERIMENT: Experiment = Experiment::new("modulation", run)
-    .stands_for("Figures 4, 5, 11, Table 2")
-    .about(
-        "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
-            spectrum of the current difference, an amplitude modulation of the injection.",
-    )
-    .uses(&[&["inverter.dc_link_v"]]);
-
 /// The modulator of the drive at this dc-link voltage.
 struct Inverter {
     modulator: Modulator,
@@ -46,7 +37,11 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
     AlphaBeta::new((volts * angle.cos()) as f32, (volts * angle.sin()) as f32)
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 4, 5 and 11, Table 2.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let settings = drive_settings::Inverter::default();
     let inverter = Inverter {
         modulator: Modulator::new(settings.dead_time_s, PERIOD_S, false),

@@ -3,17 +3,11 @@
 use crate::identification::bench_tests::{Readings, Shaft, measure};
 use crate::prelude::*;
 
-/// Section 3.6, Table 5.
-pub const EXPERIMENT: Experiment = Experiment::new("motor-tests", run)
-    .stands_for("Table 5, section 3.6, Eq. 3.17 to 3.19")
-    .about(
-        "Direct-current, locked-rotor and no-load test of the simulated motor, and the equivalent \
-            circuit from them, by the source's formulas and without what these neglect.",
-    )
-    .uses(&[&["motor.", "saliency.", "nameplate.current_a"]])
-    .not(&[TURNING]);
-
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 3.6, Table 5.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let plant = plant_settings(context.config);
     let on_the_bench = |shaft| {
         measure(&plant.machine, &plant.saliency, &plant.mechanics, shaft).map_err(Error::refused)

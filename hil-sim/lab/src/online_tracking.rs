@@ -7,16 +7,6 @@ use rotor_id::online::RotorEstimate;
 use crate::prelude::*;
 use crate::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 
-/// Not in the sources: the recursive estimate in operation.
-pub const EXPERIMENT: Experiment = Experiment::new("online-tracking", run)
-    .stands_for("Jacobina 1996, on the drive")
-    .about(
-        "The rotor warms up by 30 % of its resistance: the rotor time constant found while the \
-            drive runs, the flux angle error with and without it, and the speed without a sensor.",
-    )
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["angle_source", "inverter.residual_v"]]);
-
 /// Beginning and end of the warming, s, and the relative increase of r_r. This is fast: a motor takes minutes.
 const WARMING: (f64, f64, f64) = (4.0, 10.0, 0.3);
 const SECONDS: f64 = 18.0;
@@ -88,7 +78,11 @@ fn jobs() -> Vec<Job> {
     jobs
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the sources: the recursive estimate in operation.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs = jobs();
     let runs = context.in_parallel("online-tracking", &jobs, |_, &job| {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;

@@ -3,13 +3,6 @@
 use crate::linear_model::{Disturbance, LinearModel, LinearResponse};
 use crate::prelude::*;
 
-/// Section 5.2 lists it as future work.
-pub const EXPERIMENT: Experiment = Experiment::new("perturbation", run)
-    .stands_for("section 5.2")
-    .about("Angle error after load and current steps, measured and by the linear model.")
-    .uses(&[BENCH, DRIVE, &["prepare.learn"]])
-    .not(&[&["angle_source"]]);
-
 /// Number of seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;
 /// Time before the step that is included in the comparison, and time after it, s.
@@ -148,7 +141,11 @@ fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, E
     })
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 5.2 lists it as future work.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let results = context.in_parallel("perturbation", &CASES, |_, case| {
         measure(context.config, case.scaled(context.config), context.seed)
     })?;

@@ -8,16 +8,6 @@ use drive_settings::tuning::{
 use crate::prelude::*;
 use crate::recomputed::{PERIOD_S, plant};
 
-/// Figures 23 to 25, section 3.8.
-pub const EXPERIMENT: Experiment = Experiment::new("pi-design", run)
-    .stands_for("Figures 23, 24, 25, Eq. 3.35 to 3.42")
-    .about(
-        "The current controllers by the rule of section 3.8, beside the printed ones, and their \
-            margins with the filter, the delay and the motor.",
-    )
-    .uses(&[&["motor.", "drive.motor."]])
-    .not(&[TURNING, &["drive.motor.inertia"]]);
-
 /// The identified plants: the place where they are printed, and their names in the tables and in the metrics.
 pub const PLANTS: [(&str, &str, &str); 3] = [
     ("Eq. 3.34", "Eq. 3.34", "motor"),
@@ -25,7 +15,11 @@ pub const PLANTS: [(&str, &str, &str); 3] = [
     ("Eq. 3.42", "Eq. 3.42, q axis", "q"),
 ];
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 23 to 25, section 3.8.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let motor = context.config.drive.motor.into();
     let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();

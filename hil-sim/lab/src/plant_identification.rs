@@ -8,14 +8,6 @@ use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
 use crate::prelude::*;
 
-/// Sections 3.7, 3.8 and 3.10, appendix A.
-pub const EXPERIMENT: Experiment = Experiment::new("plant-identification", run)
-    .stands_for("Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A")
-    .about("Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
-            by least squares from what the drive saw, and the controllers by the rule of section 3.8.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]]);
-
 /// Amplitude of the pseudo-random voltage, V: assumed, because the source gives none. It changes the current by about
 /// 0.3 A.
 const PRBS_V: f32 = 30.0;
@@ -155,7 +147,11 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
     Rig::started(&config, context.seed, Mode::Torque)
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Sections 3.7, 3.8 and 3.10, appendix A.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let motor = context.config.drive.motor.into();
     let motor = motor_plant(&motor, 1.0 / RATE_HZ).map_err(Error::refused)?;
     let mut outcome = Outcome::default();

@@ -7,11 +7,6 @@ use sim_bench::plant::InverterSettings;
 use crate::identification::bench_tests::Readings;
 use crate::prelude::*;
 
-/// Chapters 2 to 4.
-pub const EXPERIMENT: Experiment = Experiment::new("printed-numbers", run)
-    .stands_for("Figure 13, Eq. 4.2, Tables 3 and 5")
-    .about("The constants of the drive and of the simulated motor beside the printed ones they stand for.");
-
 /// Control period, s.
 pub const PERIOD_S: f64 = 1.0 / RATE;
 /// The injection frequency, Hz.
@@ -22,7 +17,11 @@ pub fn plant(place: &str) -> FirstOrder {
     FirstOrder { k: printed(place, "gain"), p: printed(place, "pole") }
 }
 
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Chapters 2 to 4.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     constants(&mut outcome);
     let bound = printed("Figure 13", "bound of the relative difference");

@@ -12,15 +12,6 @@ use steady::Listed;
 
 use crate::prelude::*;
 
-/// The map.
-pub const EXPERIMENT: Experiment = Experiment::new("saliency", run)
-    .about("Saliency at 600 Hz over q-axis current and angle error: sign, sensitivity, second zeros; with --plant MODEL, as saturation causes it.")
-    .uses(&[&["motor.", "saliency.", "plant", "flux_level", "iron.", "nameplate."]])
-    .not(&[
-        &["iron.slots", "iron.bars", "iron.stator_fixed", "iron.stator_fixed_deg"],
-        &["motor.inertia", "motor.friction"],
-    ]);
-
 /// Angular frequency of the injection, rad/s.
 const CARRIER: f64 = TAU * 600.0;
 /// q-axis currents, A with the dissertation's motor: up to 1.66 times the rated one.
@@ -166,7 +157,11 @@ impl Probe {
     }
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, a map of the saliency.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let config = context.config;
     let probe = Probe::new(config)?;
     let currents = CURRENTS_A.map(|on_reference| config.amperes(on_reference));

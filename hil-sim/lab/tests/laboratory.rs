@@ -180,7 +180,7 @@ fn filters_in_single_precision() {
         progress: Progress::hidden(),
         file: None,
     };
-    let outcome = (filters::EXPERIMENT.run)(&context).unwrap();
+    let outcome = filters::run(&context).unwrap();
     let metric = |name: &str| outcome.metrics.get(name).unwrap();
     for filter in ["lpf", "bpf", "pp"] {
         assert!(metric(&format!("{filter}_sections_error_rms_a")) <= 2e-5, "{filter}");
@@ -199,7 +199,8 @@ fn filters_in_single_precision() {
 
 #[test]
 fn the_modulator_gives_the_voltage_asked_for() {
-    let outcome = modulation::EXPERIMENT.outcome(&Config::default(), 1).unwrap();
+    let outcome =
+        modulation::run(&Context::new(&Config::default(), 1, Progress::hidden())).unwrap();
     let metric = |name: &str| outcome.metrics.get(name).unwrap();
     assert!(metric("voltage_error_max_v") < 0.05);
     assert!(metric("on_time_difference_max_us") < 0.03);

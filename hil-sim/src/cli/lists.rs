@@ -12,9 +12,9 @@ use crate::prelude::*;
 /// # Errors
 /// [`Error::Internal`] if JSON cannot be made.
 pub fn experiments(as_json: bool, lab: bool) -> Result<String, Error> {
-    let all = EXPERIMENTS.iter().chain(WITH_INPUT);
+    let all = EXPERIMENTS.iter().chain(&*WITH_INPUT);
     if as_json {
-        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "everyday": EVERYDAY.contains(&e.name), "uses": e.uses.concat(), "not": e.not.concat() });
+        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "everyday": EVERYDAY.contains(&e.name), "uses": e.uses, "not": e.not });
         return pretty(&all.map(object).collect());
     }
     let place = |e: &&Experiment| EVERYDAY.iter().position(|name| *name == e.name);

@@ -5,7 +5,7 @@ use trace::Voltages;
 use super::part::Part;
 use super::{say, used};
 use crate::experiments::source::evidence::Evidence;
-use crate::experiments::{self, identify_trace as trace, scenario};
+use crate::experiments::{self, TRACE, identify_trace as trace, scenario};
 use crate::outcome::{self, Origin};
 use crate::passport;
 use crate::prelude::*;
@@ -206,7 +206,7 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     if let Some(path) = &given.passport {
         passport::write(&passport::of_trace(&outcome, &config, &given.file), path)?;
     }
-    used::check(trace::EXPERIMENT.name, &[&trace::EXPERIMENT], input)?;
+    used::check(TRACE.name, &[&TRACE], input)?;
     let mut command = format!("identify-trace --input {}", given.file.display());
     if voltages != Voltages::Commanded {
         command.push_str(&format!(" --voltages {}", voltages.word()));
@@ -217,7 +217,7 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     for column in &given.columns {
         command.push_str(&format!(" --column {column}"));
     }
-    let run = Run { experiment: &trace::EXPERIMENT, input, config: &config, command };
+    let run = Run { experiment: &TRACE, input, config: &config, command };
     print(&[run.write(&outcome, output)?], output)
 }
 

@@ -7,11 +7,6 @@ use sim_lab::source::named;
 use super::poles::largest_pole;
 use crate::prelude::*;
 
-/// Figure 40, Eq. B.1 to B.3.
-pub const EXPERIMENT: Experiment = Experiment::new("anti-windup", run)
-    .stands_for("Figure 40")
-    .about("Step of an integrator under a limited PI controller, without and with anti-windup.");
-
 const K_C: f64 = 0.25;
 const Z_C: f64 = 0.1;
 const LIMIT: f64 = 0.15;
@@ -88,7 +83,11 @@ fn highest(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figure 40, Eq. B.1 to B.3.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     // (z - 1)^2 + k_c (z - z_c), and z (z - 1)^2 + k_c (z - z_c) with the delayed index.
     let immediate = largest_pole(&[K_C - 2.0, 1.0 - K_C * Z_C]);

@@ -25,12 +25,6 @@ pub use trial::{Refused, Trial};
 
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::study::<Battery>()
-    .stands_for("what section 5.2 leaves open")
-    .about("Runs of `battery.runs`, eight of each of twelve kinds: angle error, and errors that the drive does not detect.")
-    .uses(&[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]]);
-
 /// Number of runs after which the drive repeats the saliency self-commissioning.
 const GROUP: usize = KINDS.len();
 

@@ -14,17 +14,6 @@ use crate::prelude::*;
 use crate::stats::exact;
 pub(super) use session::{Outside, Session, unaware};
 
-/// Not in the source, which lists it as future work.
-pub const EXPERIMENT: Experiment = Experiment::study::<Commission>()
-    .stands_for("beyond the dissertation")
-    .about("From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
-            with `prepare.learn` the drive then learns and is judged at 16 operating points.")
-    .uses(&[
-        BENCH,
-        DRIVE,
-        &["load.", "prepare.learn", "spread.machine", "runs", "seconds", "commission."],
-    ]);
-
 /// Errors, in percent, of [`Circuit::values`] and of the gain mismatch, for a linear machine and for one with
 /// saturation. Twice these errors count as wrong.
 const RIGHT_PCT: [f64; 6] = [1.5, 1.5, 1.5, 1.5, 1.5, 0.5];

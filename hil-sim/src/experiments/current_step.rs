@@ -7,13 +7,6 @@ use sim_lab::source::{named, printed};
 use super::poles::largest_pole;
 use crate::prelude::*;
 
-/// Figures 26 and 27, Eq. 3.34, 3.39, 3.40.
-pub const EXPERIMENT: Experiment =
-    Experiment::new("current-step", run).stands_for("Figures 26, 27").about(
-        "Step of the closed current loop on the identified plant, with and without reference \
-            filter, and with a pole 3 % larger.",
-    );
-
 const SAMPLES: usize = 240;
 const PERIOD_MS: f64 = 1.0 / 6.0;
 
@@ -49,7 +42,11 @@ fn settling(response: &[f64]) -> usize {
     response.iter().rposition(|y| (y - 1.0).abs() > 0.02).map_or(0, |k| k + 1)
 }
 
-fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Figures 26 and 27, Eq. 3.34, 3.39, 3.40.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let (nominal, larger) = plants();
     let z_c = printed("Eq. 3.38", "z_c");

@@ -15,12 +15,6 @@ use super::saliency::Probe;
 use crate::prelude::*;
 use crate::stats::exact;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::study::<ForeignMotors>()
-    .stands_for("beyond the dissertation")
-    .about("Random motors over the range of the nameplate, with teeth and yoke: each is commissioned, learned and run, undisturbed and disturbed; `--set runs=N`.")
-    .uses(&[&["runs"]]);
-
 const RUNS: u32 = 30;
 /// Disturbances in the two parts of a record: none, and all of them at random up to this share of their full sizes.
 const DRAWN: [f64; 2] = [0.0, 0.5];

@@ -19,13 +19,6 @@ use super::commission::commissioned;
 use crate::config::{FluxLevel, RangeKind};
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::study::<FullRange>()
-    .stands_for("beyond the dissertation")
-    .about("Runs over the full speed range, `runs` of each kind in each region: angle error, current, dc link, and errors that \
-            the drive does not detect.")
-    .uses(&[BENCH, DRIVE, &["full_range.", "prepare.commission", "after.", "runs"]]);
-
 /// Number of runs of a kind in a region, unless `runs` sets another.
 const RUNS: u32 = 10;
 /// Magnetising current of model A, A on the dissertation's motor.

@@ -7,13 +7,6 @@ use self::trials::{HealthyKind, OVER_SPEED_S};
 use crate::prelude::*;
 use crate::stats::upper_bound_95;
 
-/// Not in the source: it has no monitor.
-pub const EXPERIMENT: Experiment = Experiment::study::<LockMonitor>()
-    .stands_for("what section 5.2 leaves open")
-    .about("The angle forced off, false alarms, over-speed, flying starts; `--set runs=N`.")
-    .uses(&[BENCH, DRIVE, &["prepare.learn", "runs"]])
-    .not(&[&["angle_source"]]);
-
 /// Number of trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;
 const HEALTHY_PER_RUN: usize = 10;

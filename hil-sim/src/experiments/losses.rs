@@ -6,13 +6,6 @@ use super::torque_limit::learned_limit;
 use crate::plant::MachineSettings;
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("losses", run)
-    .stands_for("beyond the dissertation")
-    .about("Copper loss against the minimum for the torque, at 25, 50 and 100 % of the torque limit, with and without flux.economy.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT]);
-
 /// Speed, rpm on four poles: above the range of the injection, below field weakening.
 const RPM: f64 = 1200.0;
 const SHARES: [f64; 3] = [0.25, 0.5, 1.0];
@@ -23,7 +16,11 @@ const CORRECTED_S: f64 = 1.5;
 const SAMPLES: u32 = 50;
 const SAMPLE_S: f64 = 0.01;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the source.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut table = Table::new("Copper loss", &[]);
     let mut config = for_the_range(context.config)?;
@@ -31,7 +28,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         config.drive.flux.economy = economy;
         let (drive, limit) = learned_limit(&config, context.seed)?;
         let points = SHARES.map(|share| (share * limit.nm, share * limit.i_q));
-        let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
+        let measured = context.in_parallel("losses", &points, |number, &point| {
             measure(&config, &drive, point, context.seed.wrapping_add(number))
         })?;
         let word = if economy { "economy" } else { "setting" };

@@ -5,14 +5,6 @@ use super::drawn_machine::around;
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use crate::prelude::*;
 
-/// Not a figure of the source: tests whether the drive suits other motors.
-pub const EXPERIMENT: Experiment = Experiment::study::<Machines>()
-    .stands_for("beyond the dissertation")
-    .about("A drive that has learned its motor, at 16 operating points; with `spread.machine` for random machines around \
-            the motor.")
-    .uses(&[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
-
 /// q-axis currents of the operating points, A on the dissertation's motor; both signs.
 const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 /// Speeds, rpm on four poles.

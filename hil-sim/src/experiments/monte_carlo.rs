@@ -3,19 +3,6 @@
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use crate::prelude::*;
 
-/// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
-pub const EXPERIMENT: Experiment = Experiment::study::<MonteCarlo>()
-    .stands_for("the claim behind Figures 38 and 39")
-    .about("Random q-axis current (a seventh to six sevenths of the limit, both signs) and speed, and the errors of `spread.*`; `--set runs=N`.")
-    .uses(&[
-        BENCH,
-        DRIVE,
-        &["load.speed_rpm", "prepare.learn"],
-        &["spread.motor", "spread.noise", "spread.gain"],
-        &["runs", "seconds"],
-    ])
-    .not(&[FREE_SHAFT, SPEED_LOOP]);
-
 const RUNS: u32 = 200;
 /// Number of worst runs in the list.
 const WORST: usize = 10;

@@ -2,20 +2,17 @@
 
 use crate::prelude::*;
 
-/// Section 2.3.
-pub const EXPERIMENT: Experiment = Experiment::new("encoder-orientation", run)
-    .stands_for("Section 2.3, Eq. 2.7 and 2.10")
-    .about("Flux angle and torque over speed with the encoder, delays compensated and left in.")
-    .uses(&[BENCH, DRIVE, &["seconds"]])
-    .not(&[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]]);
-
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;
 
 /// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) ψ i_q.
 type Orientation = (f64, f64);
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment: Section 2.3.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(bool, f64)> =
         [true, false].iter().flat_map(|&c| SPEEDS_RPM.iter().map(move |&n| (c, n))).collect();
     let results = context.in_parallel("encoder-orientation", &jobs, |_, &(compensate, rpm)| {

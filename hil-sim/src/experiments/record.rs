@@ -8,13 +8,6 @@ use super::steady::{bring_up, prepared};
 use super::torque_limit::{BEYOND_A, TorqueLimit};
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("record", run)
-    .stands_for("what section 5.2 leaves open")
-    .about("A drive that has learned, at its torque limit: zero stator frequency for `record.minutes`, and a reversal of the speed.")
-    .uses(&[BENCH, DRIVE, &["record.", "after."]])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
-
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
 const SETTLING_S: f64 = 12.0;
 /// Initial speed of the reversal, rpm on four poles; the final speed is its opposite.
@@ -33,7 +26,11 @@ const REVERSAL: Course = Course { key: "reversal", name: "reversal of the speed"
 const COURSES: [(Course, f64); 4] =
     [(STANDSTILL, 1.0), (STANDSTILL, -1.0), (REVERSAL, 1.0), (REVERSAL, -1.0)];
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the source.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = context.config.clone();
     config.prepare.learn = true;
     let mut rig = prepared(&config, context.seed)?;

@@ -14,56 +14,40 @@ pub use record::Record;
 use self::file::{Ramp, Text};
 use crate::prelude::*;
 
-/// Defines experiments that are scenarios of the program. Each has the name of its file, the part of the source that it
-/// reproduces, the keys that it uses, the keys that it does not use, and a description.
-macro_rules! shipped {
-    ($($place:ident $name:literal $stands_for:literal $uses:expr, $not:expr; $about:literal)+) => {$(
-        #[doc = $about]
-        pub const $place: Experiment = Experiment::new($name, |context| {
-            const TEXT: &str = include_str!(concat!("../../scenarios/", $name, ".toml"));
-            Scenario::of_toml(Path::new(concat!($name, ".toml")), TEXT, context.config)?.outcome(context)
-        })
-        .stands_for($stands_for)
-        .about($about)
-        .uses($uses)
-        .not($not);
-    )+};
+/// The scenarios of the program by the names of their experiments.
+static SHIPPED: [(&str, &str); 5] = [
+    ("torque-steps", include_str!("../../scenarios/torque-steps.toml")),
+    ("torque-ramp", include_str!("../../scenarios/torque-ramp.toml")),
+    ("torque-reversal", include_str!("../../scenarios/torque-reversal.toml")),
+    ("speed-profile", include_str!("../../scenarios/speed-profile.toml")),
+    ("position-step", include_str!("../../scenarios/position-step.toml")),
+];
+
+/// Runs the scenario of the program with this name.
+///
+/// # Errors
+/// [`Error::Internal`] if there is none; as [`Scenario::outcome`].
+pub fn shipped(name: &str, context: &Context<'_>) -> Result<Outcome, Error> {
+    Scenario::shipped(name, context.config)?.outcome(context)
 }
 
-shipped! {
-    STEPS "torque-steps" "Figure 38, Eq. 4.4" &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]], &[SPEED_LOOP];
-    "Torque steps with a locked shaft and no position sensor: five levels, 1 to 2 times `reference.iq_a`."
-    RAMP "torque-ramp" "Figure 39, Eq. 4.4" STEPS.uses, STEPS.not;
-    "Torque ramp with a locked shaft and no position sensor: `reference.iq_a` to twice that and back."
-    REVERSAL "torque-reversal" "section 5.2" &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]], STEPS.not;
-    "Sudden steps of the q-axis current up to full reversal, without a position sensor."
-    SPEED "speed-profile" "section 5.2" &[BENCH, DRIVE, &["load.torque_nm", "prepare.learn", "seconds"]], &[];
-    "Speed steps with a reversal through standstill and a load, with the angle source as set."
-    POSITION "position-step" "Figure 37, Eq. 4.1 to 4.3" &[BENCH, DRIVE, &["load.", "seconds"]], &[TRACKING, &["angle_source"]];
-    "A position step of five turns with the encoder and a free shaft."
+/// Runs a scenario with references and a load in the rows of a CSV file.
+///
+/// # Errors
+/// [`Error::Refused`] without a file; as [`Scenario::of_csv`] and [`Scenario::outcome`].
+pub fn profile(context: &Context<'_>) -> Result<Outcome, Error> {
+    let path = context.file.ok_or_else(|| Error::Refused("profile needs --input FILE".into()))?;
+    Scenario::of_csv(path, context.config)?.outcome(context)
 }
-
-/// An experiment with references and a load in the rows of a CSV file.
-pub const PROFILE: Experiment = Experiment::new("profile", |context| {
-    super::check_file(&PROFILE, context.file)?;
-    Scenario::of_csv(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
-})
-.stands_for("a profile of the user")
-.about("References and load over time from a CSV file: `run profile --input FILE.csv`.")
-.uses(REVERSAL.uses);
-/// An experiment in a TOML file of the user.
-const OWN: Experiment = Experiment::new("scenario", |context| {
-    Scenario::read(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
-})
-.stands_for("a scenario of the user")
-.about("Parts, shaft, columns and judge of a TOML file.")
-.uses(STEPS.uses);
 
 /// Returns the scenario of a TOML file, with the name of the file; none for a name that is not a TOML file. The name
 /// lasts as long as the program.
 pub fn own(name: &str) -> Option<Experiment> {
     let stem = Path::new(name.strip_suffix(".toml")?).file_name()?.to_string_lossy();
-    Some(Experiment { name: stem.into_owned().leak(), ..OWN })
+    let own = Experiment::new("scenario", |context| {
+        Scenario::read(context.file.unwrap_or(Path::new("")), context.config)?.outcome(context)
+    });
+    Some(Experiment { name: stem.into_owned().leak(), ..super::described(own) })
 }
 
 /// Records the step of five turns with an encoder, for the comparison with one without. The settings of the scenario
@@ -72,8 +56,7 @@ pub fn own(name: &str) -> Option<Experiment> {
 /// # Errors
 /// As [`Scenario::record`].
 pub fn position_step(context: &Context<'_>, encoder: bool, seconds: f64) -> Result<Record, Error> {
-    let text = include_str!("../../scenarios/position-step.toml");
-    let mut scenario = Scenario::of_toml(Path::new("position-step.toml"), text, context.config)?;
+    let mut scenario = Scenario::shipped("position-step", context.config)?;
     if !encoder {
         scenario.settings.clear();
     }
@@ -147,6 +130,12 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    fn shipped(name: &str, config: &Config) -> Result<Self, Error> {
+        let missing = || Error::Internal(format!("scenarios/{name}.toml is missing"));
+        let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(missing)?;
+        Self::of_toml(Path::new(name), text, config)
+    }
+
     fn reference(&self) -> &'static Reference {
         self.reference.unwrap_or(&REFERENCES[0])
     }

@@ -5,15 +5,6 @@ use super::scenario::{Metric, Record, Statistic, position_step};
 use crate::prelude::*;
 use crate::stats::StraightLine;
 
-/// The objective that section 5.2 states.
-pub const EXPERIMENT: Experiment = Experiment::new("sensorless-position", run)
-    .stands_for("section 4.1 without its encoder, section 5.2")
-    .about(
-        "A position step of five turns without an encoder, beside the one with it, and the drift.",
-    )
-    .uses(&[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]])
-    .not(&[&["angle_source"]]);
-
 /// Duration of the step, s: long enough for both drives to arrive.
 const STEP_S: f64 = 6.0;
 /// Time over which the position is held for the drift, s.
@@ -86,7 +77,11 @@ fn hold(config: &Config, seed: u64, case: Case, seconds: f64) -> Result<HeldPosi
     Ok(held)
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, the objective that section 5.2 states.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, seed) = (context.config, context.seed);
     let step_s = context.seconds.unwrap_or(STEP_S);
     let [with, without] = [true, false].map(|encoder| position_step(context, encoder, step_s));

@@ -2,14 +2,6 @@
 
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("shaft", run)
-    .stands_for("beyond the dissertation")
-    .about("Load steps on a free shaft at four speeds, a hoist, other inertias and elastic couplings: lowest speed, area of the dip, recovery, \
-            torque noise, angle error, beside an encoder.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[&["angle_source", "shaft.load_inertia", "shaft.stiffness", "shaft.damping", "motor.inertia"]]);
-
 /// Largest full load, as a share of the torque that the drive allows.
 const SHARE_OF_ALLOWED_TORQUE: f64 = 0.9;
 /// Loads as shares of the full load, which is at most the rated torque; speeds as shares of the rated speed.
@@ -207,7 +199,11 @@ fn steps(seconds: f64) -> usize {
     (seconds / MEAN_S).round() as usize
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the source.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, seed) = (context.config, context.seed);
     let cases = Case::all();
     let seen = context.in_parallel("shaft", &cases, |_, case| {

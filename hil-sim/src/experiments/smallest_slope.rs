@@ -5,12 +5,6 @@ use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::study::<SmallestSlope>()
-    .stands_for("what section 5.2 leaves open")
-    .about("The stress test with decreasing saliency of the motor: sensitivity dq/de and behaviour of the drive; `runs` at each.")
-    .uses(&[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]]);
-
 /// Number of steps of the saliency's share, starting with the strongest.
 const STEPS: u32 = 20;
 const LEAST_SHARE: f64 = 0.05;

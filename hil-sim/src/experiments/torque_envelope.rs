@@ -5,13 +5,6 @@ use super::full_range::{I_D_A, for_the_range};
 use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("torque-envelope", run)
-    .stands_for("beyond the dissertation")
-    .about("Largest torque over speed at three voltages of the dc link, motoring and generating, measured on the motor.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT]);
-
 /// Speeds, rpm on four poles.
 const STEP_RPM: f64 = 300.0;
 const STEPS: u32 = 12;
@@ -35,14 +28,18 @@ struct Point {
 /// Result of the measurement; none if the drive did not regulate to the end.
 type Measured = Option<(f64, f64)>;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the source.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let config = for_the_range(context.config)?;
     let (drive, limit) = learned_limit(&config, context.seed)?;
     let curves = SIGNS.iter().flat_map(|&(sign, _)| LINKS.map(|link| (sign, link)));
     let rpm = || (0..=STEPS).map(|n| f64::from(n) * STEP_RPM);
     let points: Vec<_> =
         curves.flat_map(|(sign, link)| rpm().map(move |rpm| Point { rpm, link, sign })).collect();
-    let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
+    let measured = context.in_parallel("torque-envelope", &points, |number, &point| {
         measure(&config, &drive, point, context.seed.wrapping_add(number))
     })?;
     Ok(outcome(&config, &limit, &points.into_iter().zip(measured).collect::<Vec<_>>()))

@@ -9,14 +9,6 @@ use super::full_range::for_the_range;
 use super::steady::{bring_up, prepared};
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::new("torque-rise", run)
-    .stands_for("beyond the dissertation")
-    .about("Torque steps of a learned drive over speed and sign: rise time to 90 %, its physical limit by the dc-link voltage, overshoot, \
-            peak current and angle error.")
-    .uses(&[BENCH, DRIVE])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]]);
-
 /// Speeds, rpm on four poles, and the speed above which there is no injection.
 const SPEEDS_RPM: [f64; 9] = [0.0, 300.0, 600.0, 800.0, 1200.0, 1800.0, 2100.0, 2700.0, 3600.0];
 const WITHOUT_CARRIER_RPM: f64 = 780.0;
@@ -37,7 +29,11 @@ type Case = (f64, f64);
 /// The measured step, and the physical limit of its rise time, ms.
 type Seen = (Rise, f64);
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is not in the source.
+///
+/// # Errors
+/// If the configuration or the drive is refused.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = for_the_range(context.config)?;
     config.prepare.learn = true;
     let rig = prepared(&config, context.seed)?;

@@ -9,12 +9,6 @@ use crate::experiments::drawn_machine::drawn;
 use crate::plant::{Channel, CurrentFault};
 use crate::prelude::*;
 
-/// Not in the source.
-pub const EXPERIMENT: Experiment = Experiment::study::<Refusals>()
-    .stands_for("beyond the dissertation")
-    .about("Defects of motor, wiring, sensors and board, on random machines: does the commissioning refuse them by name? `--set runs=N` of each.")
-    .uses(&[BENCH, DRIVE, &["load.", "spread.machine", "runs"]]);
-
 const RUNS: u32 = 50;
 
 /// A defect.

@@ -3,14 +3,8 @@
 use super::steady::{OperatingPoint, steady_run};
 use crate::prelude::*;
 
-/// Not a figure of the source.
-pub const EXPERIMENT: Experiment = Experiment::new("amplitude", run)
-    .stands_for("section 3.4")
-    .about("Angle error at standstill for three amplitudes of the injection.")
-    .uses(&[BENCH, DRIVE, &["prepare.learn", "seconds"]])
-    .not(&[FREE_SHAFT, SPEED_LOOP, &["injection.amplitude_v"]]);
-
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+/// Runs the experiment, which is no figure of the source.
+pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut table = Table::new("Angle error", &["amplitude (V)", "rms (°)"]);
     for volts in [40.0, 50.0, 80.0] {
