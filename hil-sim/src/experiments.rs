@@ -133,6 +133,8 @@ struct Description<'a> {
     uses: Vec<&'a str>,
     #[serde(borrow, default)]
     not: Vec<&'a str>,
+    #[serde(default)]
+    remarks: Vec<String>,
 }
 
 static FILE: LazyLock<File<'static>> = LazyLock::new(|| {
@@ -146,8 +148,8 @@ fn described(experiment: Experiment) -> Experiment {
         let of = |name: &&'static str| FILE.groups.get(name).cloned().unwrap_or(vec![*name]);
         names.iter().flat_map(of).collect()
     };
-    let Description { stands_for, about, uses, not } = &FILE.experiment[experiment.name];
-    Experiment { stands_for, about, uses: keys(uses), not: keys(not), ..experiment }
+    let Description { stands_for, about, uses, not, remarks } = &FILE.experiment[experiment.name];
+    Experiment { stands_for, about, uses: keys(uses), not: keys(not), remarks, ..experiment }
 }
 
 /// Returns the single runs of an experiment.

@@ -19,7 +19,9 @@ pub struct Experiment {
     pub uses: Vec<&'static str>,
     /// Exceptions from `uses`, written alike: keys that the experiment sets itself, or that have no effect in it.
     pub not: Vec<&'static str>,
-    /// Runs the experiment.
+    /// Remarks for the reader of every outcome.
+    pub remarks: &'static [String],
+    /// Computes the outcome, without these remarks.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
     /// The single runs of an experiment that consists of independent runs.
     pub study: Option<Statistical>,
@@ -29,7 +31,7 @@ impl Experiment {
     /// Makes an experiment without a description that uses no key, from its name and its function.
     pub fn new(name: &'static str, run: fn(&Context<'_>) -> Result<Outcome, Error>) -> Self {
         let (uses, not) = (Vec::new(), Vec::new());
-        Self { name, stands_for: "", about: "", uses, not, run, study: None }
+        Self { name, stands_for: "", about: "", uses, not, remarks: &[], run, study: None }
     }
 
     /// Makes an experiment of independent runs, which can be shared between machines and continued.
@@ -42,7 +44,21 @@ impl Experiment {
     /// # Errors
     /// The errors of the experiment.
     pub fn outcome(&self, config: &Config, seed: u64) -> Result<Outcome, Error> {
-        (self.run)(&Context::new(config, seed, Progress::hidden()))
+        self.run(&Context::new(config, seed, Progress::hidden()))
+    }
+
+    /// Runs the experiment.
+    ///
+    /// # Errors
+    /// The errors of the experiment.
+    pub fn run(&self, context: &Context<'_>) -> Result<Outcome, Error> {
+        (self.run)(context).map(|outcome| self.remarked(outcome))
+    }
+
+    /// Adds the remarks of the experiment to the outcome of its function or of its single runs.
+    pub fn remarked(&self, mut outcome: Outcome) -> Outcome {
+        outcome.remarks.extend_from_slice(self.remarks);
+        outcome
     }
 
     /// Whether a key has an effect on this experiment.

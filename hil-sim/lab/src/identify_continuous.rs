@@ -27,10 +27,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let key = format!("{}_{}_{}", e.case.signal.name(), e.model, e.parameter).to_lowercase();
         outcome.metrics.set(format!("slow_{key}_pct"), e.ours_pct);
     }
-    outcome.remark(
-        "The columns B of Tables 2 and 3 were computed from the coefficients of Model A; here Model B is its own regression \
-         (Eq. 31).",
-    );
     Ok(outcome)
 }
 

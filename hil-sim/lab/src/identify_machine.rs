@@ -53,10 +53,5 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set(format!("{name}_below_rbv_pct"), 100.0 * (1.0 - ours / rbv));
     }
     claims::add(&mut outcome.compared, &mut outcome.metrics);
-    outcome.remark(
-        "The simulated tables were not made with the machine of Table 6 (rbv). PX is inferred from \
-         the tables; the paper does not name it. Errors in % do not depend on the level of voltage \
-         or impedance, so only r_s/(σ l_s), τ_r and l_s/(σ l_s) can be inferred at all.",
-    );
     Ok(outcome)
 }

@@ -124,11 +124,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "Convergence without noise, into 10 % of the final value by a moving median over 20 ms, \
          from a machine in its steady state; the input filters start at rest.",
     ));
-    outcome.remark(
-        "The figures of the paper are measured on the machine of Table 6. The numbers here are those of the machine PX at the \
-         same speeds; the figures have both, with a tenth of the noise of section 5. The plain \
-         recursion as printed in textbooks loses its covariance within 20 ms in f32 and f64.",
-    );
     Ok(outcome)
 }
 

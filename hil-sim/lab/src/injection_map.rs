@@ -101,16 +101,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let constant = Stats::of(rectified[2..].iter().map(error)).largest();
     outcome.metrics.set("rectified_differs_at_90_deg_pct", 100.0 * constant);
     outcome.compared.push(named("iq_does_not_affect").simulated(constant < 0.2));
-    outcome.remarks.extend([
-        "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
-         zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \
-         fundamental current leaking through the 40 dB of the band-pass at dc, without information \
-         about the flux. The rectified chain measures the saliency.",
-        "The rectified chain, its delay compensated, gives about the same current difference at \
-         ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
-         the delay of the band-pass (8.83 samples) left in, 2.4 mA per ampere are added by the slip \
-         of the flux, with or without saliency.",
-    ].map(String::from));
     Ok(outcome)
 }
 

@@ -211,10 +211,5 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(figure);
     outcome.figures.push(speeds);
     outcome.remarks = assumptions(context.config);
-    outcome.remark(
-        "The model is linear about the operating point after the step: tracking loop with its \
-         averages, slip fed forward, current loop, rotor flux, shaft and speed loop. It neglects \
-         the transition: gain, saliency sensitivity and flux at other currents.",
-    );
     Ok(outcome)
 }

@@ -33,7 +33,7 @@ impl Part {
         quiet: bool,
     ) -> Result<Option<Outcome>, Error> {
         if self.shard.is_none() && self.resume.is_none() && self.rows.is_none() {
-            return (experiment.run)(context).map(Some);
+            return experiment.run(context).map(Some);
         }
         let statistical = experiments::statistical(experiment)?;
         let shard = self.shard.unwrap_or(Shard::WHOLE);
@@ -53,7 +53,7 @@ impl Part {
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();
-        (statistical.outcome)(context, records).map(Some)
+        (statistical.outcome)(context, records).map(|outcome| Some(experiment.remarked(outcome)))
     }
 }
 

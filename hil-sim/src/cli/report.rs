@@ -28,7 +28,7 @@ impl Running<'_> {
 
     fn run(&self, experiment: &Experiment, context: &Context<'_>) -> Outcome {
         self.change(|names| names.push(experiment.name));
-        let outcome = (experiment.run)(context).unwrap_or_else(|error| Outcome::refused(&error));
+        let outcome = experiment.run(context).unwrap_or_else(|error| Outcome::refused(&error));
         self.change(|names| names.retain(|name| *name != experiment.name));
         self.bar.advance(1);
         outcome

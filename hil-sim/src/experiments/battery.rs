@@ -151,7 +151,6 @@ impl Study for Battery {
         }
         outcome.figures.push(summary::figure(&trials));
         outcome.remarks = assumptions(&self.config);
-        outcome.remarks.push(summary::REMARK.to_owned());
         Ok(outcome)
     }
 }

@@ -85,10 +85,6 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         named("filter_removes_overshoot").recomputed(overshoot(&filtered) < 0.001),
         named("filter_settles_later").recomputed(longer),
     ]);
-    outcome.remark(
-        "The identified plant contains no delay and no current filter; with them the same rule \
-         leaves less margin (see pi-design).",
-    );
     Ok(outcome)
 }
 

@@ -155,7 +155,6 @@ impl Study for FullRange {
             outcome.figures.push(summary::figure(&self.done(index as usize, true)?.1));
         }
         outcome.remarks = assumptions(&self.config);
-        outcome.remarks.push(summary::REMARK.to_owned());
         Ok(outcome)
     }
 }

@@ -48,7 +48,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.tables.push(table);
     outcome.remarks = assumptions(&config);
-    outcome.remark("Least: stator and rotor of a machine without iron losses and saturation, over all d-axis currents.");
     Ok(outcome)
 }
 

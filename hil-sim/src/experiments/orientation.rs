@@ -47,10 +47,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .with(line("delays left in", without));
     let figure = Figure::new("orientation", "Flux angle error over speed", "Eq. 2.10");
     outcome.figures.push(figure.panel(panel));
-    outcome.remark(
-        "The current is measured 1.53 samples late by the low-pass and 0.18 by the analog filter; \
-         if the delays are left in, the frame is rotated by that many samples times the speed.",
-    );
     Ok(outcome)
 }
 

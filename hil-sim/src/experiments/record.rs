@@ -81,10 +81,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.remarks = assumptions(&config);
     outcome.remarks.push(torque.text(&config));
-    outcome.remark(
-        "Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux is fixed at record.flux_deg \
-         from phase a.",
-    );
     Ok(outcome)
 }
 

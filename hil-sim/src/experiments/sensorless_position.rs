@@ -152,19 +152,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     outcome.remarks = assumptions(config);
-    outcome.remark(
-        "The position is the flux angle minus the integral of the slip. The injection observes the \
-         flux; nothing observes the rotor inside it, so an error of the slip, i_q/(τ_r i_d), is an \
-         error of the speed: at 1 A, 1 % of rotor resistance is 2.2 mechanical degrees per second, \
-         with any estimator. The rest of the drift comes from the angle error: by one \
-         degree at 1 A the slip is 16 electrical degrees per second off.",
-    );
-    outcome.remark(
-        "Learning with the shaft locked removes the error of the resistance: the commanded \
-         slip is then the actual slip, and the saliency offset makes the tracking loop find the same \
-         orientation again, with an angle error but without a drift. The resistance still changes \
-         afterwards, by about 0.4 % a kelvin.",
-    );
     Ok(outcome)
 }
 

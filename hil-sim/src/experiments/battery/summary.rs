@@ -4,14 +4,6 @@ use super::kind::Kind;
 use super::trial::{CLASSES_PER_DEG, Trial, UNNOTICED_S};
 use crate::prelude::*;
 
-/// The meaning of the columns.
-pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference. Lost: beyond 45° at \
-    any time after the start. Wrong: beyond 30° for more than 0.5 s, interruptions up to 0.1 s included. Flux off: below half or above \
-    twice that of the magnetising current for more than 0.5 s. Silent: undetected, wrong or flux off. Stuck: silent to the end of the \
-    run. Trips: stopped by a fault while it regulates. Sound: healthy, trips with the angle within 30° and the flux within a factor \
-    of two at all times before. Limited: the drive allows less q-axis current than the nominal limit. After a sudden rotation of \
-    the flux, wrong and flux off count from there, and the error no longer counts.";
-
 /// A duration in a run, s, and the number of a fault.
 type Seconds = fn(&Trial) -> f64;
 type Number = fn(&Trial) -> Option<u8>;

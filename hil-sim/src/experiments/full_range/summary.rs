@@ -4,14 +4,6 @@ use super::case::Case;
 use crate::experiments::battery::{Moment, Refused, Trial};
 use crate::prelude::*;
 
-/// The meaning of the columns.
-pub const REMARK: &str = "Error: true minus estimated, over all samples that count: at constant torque and in reversals from 0.5 s \
-    after the first torque, after a flying start from 0.1 s to 0.7 s after the torque, until the flux is rotated, and \
-    otherwise from the end of the run-up. Lost: stopped by a fault, or beyond 45° at any time; a rotated flux may end in a stop. \
-    Refused: not started; no failure if the shaft turns too fast for a flying start (fault 47). \
-    Silent: undetected, beyond 45° for more than 0.5 s while the drive regulates. Current: the largest of a phase, injection included. Took: \
-    until a flying start found the flux, or a braked shaft stopped.";
-
 /// Whether a run was lost: stopped by a fault, or beyond 45°. After a rotation of the flux neither counts.
 fn is_lost(case: &Case, run: &Trial) -> bool {
     run.trip.is_some() && case.kind != RangeKind::TurnedFlux || run.is_lost()
