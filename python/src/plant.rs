@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use hil_sim::config::plant_settings;
 use hil_sim::error::{self, Error};
-use hil_sim::plant::{self, Complex, ElectricalState as _, Load, MachineModel, MotorModel};
+use hil_sim::plant::{self, Complex, Load};
 use numpy::{IntoPyArray as _, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,35 +13,10 @@ use pyo3::types::PyDict;
 use crate::config::Config;
 use crate::{check, raised};
 
-/// Either machine model on its shaft.
-trait Motor: Send + Sync {
-    fn step(&mut self, voltage: Complex, h: f64);
-    /// Space vectors of current and rotor flux; torque, speed in rpm, and angle of the shaft.
-    fn seen(&self) -> ([Complex; 2], [f64; 3]);
-    fn set_load(&mut self, load: Load) -> Result<(), Error>;
-}
-
-impl<M: MachineModel<State: Send + Sync> + Send + Sync> Motor for MotorModel<M> {
-    fn step(&mut self, voltage: Complex, h: f64) {
-        self.step(voltage, h);
-    }
-    fn seen(&self) -> ([Complex; 2], [f64; 3]) {
-        let state = &self.state.electrical;
-        let rpm = self.state.speed * 60.0 / TAU;
-        let vectors = [state.current(), state.rotor_flux()];
-        (vectors, [self.machine.torque(state), rpm, self.state.angle])
-    }
-    fn set_load(&mut self, load: Load) -> Result<(), Error> {
-        self.mechanics.set_load(load).map_err(Error::refused)?;
-        self.hold_speed();
-        Ok(())
-    }
-}
-
 /// The motor of a configuration with its shaft, between voltages and currents: without inverter and sensors.
 #[pyclass(module = "induction_drive")]
 pub struct Plant {
-    motor: Box<dyn Motor>,
+    plant: plant::Plant,
     substeps: u32,
 }
 
@@ -61,17 +36,11 @@ impl Plant {
     fn new(config: &Config) -> PyResult<Self> {
         let settings = plant_settings(&config.values);
         let plant = plant::Plant::new(&settings, 1).map_err(Error::refused).map_err(raised)?;
-        let motor: Box<dyn Motor> = match (plant.model_a(), plant.energy_model()) {
-            (Some(motor), _) => Box::new(*motor),
-            (None, Some(motor)) => Box::new(*motor),
-            (None, None) => return Err(PyValueError::new_err("the motor has no model")),
-        };
-        Ok(Self { motor, substeps: settings.substeps })
+        Ok(Self { plant, substeps: settings.substeps })
     }
 
     /// Applies space vectors of the voltage, V, complex in the stator frame and amplitude-invariant, each for `step_s` seconds. Returns
     /// arrays with the values at the end of each step: `current` (A) and `flux` of the rotor (Wb) as space vectors, `torque_nm`,
-    /// `speed_rpm`, and `angle_rad` of the shaft.
     /// `speed_rpm`, and `angle_rad` of the shaft.
     fn run<'py>(
         &mut self,
@@ -80,10 +49,12 @@ impl Plant {
         step_s: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         check("step_s", step_s, (1e-7, 1e-3), "s")?;
-        let (voltages, motor, times) = (voltages.as_slice()?, &mut self.motor, self.substeps);
+        let (voltages, plant, times) = (voltages.as_slice()?, &mut self.plant, self.substeps);
         let seen = |&voltage: &Complex| {
-            (0..times).for_each(|_| motor.step(voltage, step_s / f64::from(times)));
-            motor.seen()
+            (0..times).for_each(|_| plant.step_motor(voltage, step_s / f64::from(times)));
+            let rpm = plant.mechanical_speed() * 60.0 / TAU;
+            let vectors = [plant.current(), plant.rotor_flux()];
+            (vectors, [plant.torque(), rpm, plant.mechanical_angle()])
         };
         let course: Vec<_> = py.detach(|| voltages.iter().map(seen).collect());
         let arrays = PyDict::new(py);
@@ -101,6 +72,6 @@ impl Plant {
     /// Couples another load: `free` against a torque in Nm, `locked`, or held at a `speed` in rpm.
     #[pyo3(signature = (mode, value=0.0))]
     fn set_load(&mut self, mode: &str, value: f64) -> PyResult<()> {
-        self.motor.set_load(load(mode, value)?).map_err(raised)
+        self.plant.set_load(load(mode, value)?).map_err(Error::refused).map_err(raised)
     }
 }

@@ -191,6 +191,11 @@ impl Plant {
         }
     }
 
+    /// Integrates only the motor over `h` seconds at the constant terminal voltage `v`, V, without inverter, sensors and encoder.
+    pub fn step_motor(&mut self, v: Complex, h: f64) {
+        whichever!(&mut self.motor, motor => motor.step(v, h));
+    }
+
     /// Advances the quantities that change once a period: the dc link and its sensor, and the resistances.
     fn slow(&mut self, period_s: f64) {
         let around = &mut self.around;
