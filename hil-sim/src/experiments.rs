@@ -83,13 +83,7 @@ pub static EXPERIMENTS: LazyLock<Vec<Experiment>> = LazyLock::new(|| Vec::from([
 ].map(described)));
 
 /// The experiments that report printed values of the sources.
-#[rustfmt::skip] // names, side by side
-pub const SOURCES: [&str; 20] = [
-    "printed-numbers", "modulation", "filters", "adc-calibration", "pi-design", "plant-identification",
-    "current-step", "anti-windup", "dead-time", "injection-map", "demodulators", "angle-identification", "as-printed",
-    "sensorless-position", "identify-discrete", "identify-continuous", "identify-recursive", "identify-validate",
-    "identify-machine", "motor-tests",
-];
+pub static SOURCES: LazyLock<&[&str]> = LazyLock::new(|| &FILE.sources);
 
 /// The experiments that need an input file; they are not part of the report.
 pub static WITH_INPUT: LazyLock<[Experiment; 2]> = LazyLock::new(|| {
@@ -105,16 +99,20 @@ pub static TRACE: LazyLock<Experiment> = LazyLock::new(|| {
 });
 
 /// The experiments that a user of a drive needs, in the order of `list`; `list --lab` shows the others.
-#[rustfmt::skip] // names, side by side
-pub const EVERYDAY: [&str; 10] = [
-    "torque-steps", "speed-profile", "sensorless-position", "profile", "commission", "monte-carlo", "battery",
-    "full-range", "torque-envelope", "lock-monitor",
-];
+pub static EVERYDAY: LazyLock<&[&str]> = LazyLock::new(|| &FILE.everyday);
 
 /// The file `experiments.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File<'a> {
+    /// See [`EVERYDAY`] and [`SOURCES`].
+    #[serde(borrow)]
+    everyday: Vec<&'a str>,
+    #[serde(borrow)]
+    sources: Vec<&'a str>,
+    /// Removed experiments, and their replacements.
+    #[serde(borrow)]
+    replaced: BTreeMap<&'a str, &'a str>,
     /// Keys of a group by its name.
     #[serde(borrow)]
     groups: BTreeMap<&'a str, Vec<&'a str>>,
@@ -167,13 +165,6 @@ pub fn statistical(experiment: &Experiment) -> Result<&Statistical, Error> {
     })
 }
 
-/// Removed experiments, and their replacements.
-const REPLACED: &[(&str, &str)] = &[
-    ("tracking", "`run record`, `run torque-steps` and `run perturbation`"),
-    ("torque-drift", "`run record --set record.minutes=1`"),
-    ("speed-torque-sweep", "`run full-range --set full_range.kind=constant`"),
-    ("saliency-check", "`run smallest-slope`"),
-];
 /// Checks that a file is given to an experiment that needs one, and to no other.
 ///
 /// # Errors
@@ -210,8 +201,8 @@ pub fn named(name: &str) -> Vec<&str> {
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     let all = || EXPERIMENTS.iter().chain(&*WITH_INPUT);
     let found = all().find(|experiment| experiment.name == name);
-    found.ok_or_else(|| match REPLACED.iter().find(|(old, _)| *old == name) {
-        Some((_, by)) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
+    found.ok_or_else(|| match FILE.replaced.get(name) {
+        Some(by) => Error::Refused(format!("the experiment `{name}` is gone; use {by}")),
         None => Error::unknown("experiment", name, all().map(|experiment| experiment.name)),
     })
 }

@@ -126,7 +126,7 @@ fn lists_name_every_experiment_and_key() {
         heads.map(|line| line.split_once(' ').unwrap().0.to_owned()).collect::<Vec<_>>()
     };
     let everyday = names(&["list"]);
-    assert_eq!(everyday, EVERYDAY);
+    assert_eq!(everyday, *EVERYDAY);
     let both = [everyday, names(&["list", "--lab"])].concat();
     assert_eq!(both.len(), EXPERIMENTS.len() + WITH_INPUT.len(), "each in one of the lists");
     for experiment in EXPERIMENTS.iter() {
