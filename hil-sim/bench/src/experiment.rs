@@ -19,7 +19,7 @@ pub struct Experiment {
     pub uses: Vec<&'static str>,
     /// Exceptions from `uses`, written alike: keys that the experiment sets itself, or that have no effect in it.
     pub not: Vec<&'static str>,
-    /// Remarks for the reader of every outcome.
+    /// Remarks for the reader of every outcome; `{assumptions}` stands for [`assumptions`].
     pub remarks: &'static [String],
     /// Computes the outcome, without these remarks.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
@@ -52,12 +52,17 @@ impl Experiment {
     /// # Errors
     /// The errors of the experiment.
     pub fn run(&self, context: &Context<'_>) -> Result<Outcome, Error> {
-        (self.run)(context).map(|outcome| self.remarked(outcome))
+        (self.run)(context).map(|outcome| self.remarked(outcome, context.config))
     }
 
     /// Adds the remarks of the experiment to the outcome of its function or of its single runs.
-    pub fn remarked(&self, mut outcome: Outcome) -> Outcome {
-        outcome.remarks.extend_from_slice(self.remarks);
+    pub fn remarked(&self, mut outcome: Outcome, config: &Config) -> Outcome {
+        for remark in self.remarks {
+            match remark.as_str() {
+                "{assumptions}" => outcome.remarks.extend(assumptions(config)),
+                _ => outcome.remarks.push(remark.clone()),
+            }
+        }
         outcome
     }
 

@@ -73,7 +73,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.extend(all().map(|(s, points)| bode_figure(s, points)));
     outcome.figures.extend(all().map(|(s, points)| step_figure(s, points)));
     outcome.remarks = remarks(&points);
-    outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
 }
 

@@ -126,8 +126,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let envelope = outcome.metrics.get("envelope_retuned_steps_lost") == Some(0.0);
     outcome.compared.push(named("envelope_promising").simulated(envelope));
-    outcome.remarks = REMARKS.map(String::from).into();
-    outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
 }
 
@@ -221,21 +219,3 @@ fn steps_figure(found: &[DemodulationResults]) -> Figure {
     let title = "Torque steps without a position sensor";
     panels.into_iter().fold(Figure::new("steps", title, "Figure 38"), Figure::panel)
 }
-
-const REMARKS: [&str; 3] = [
-    "The zero of the printed controller, z_s = 0.90, lies at 100 Hz: below, it is a bare double \
-         integrator. The rectified chain runs with it, because it rotates a current that the band-pass \
-         has delayed, and so sees how fast the axis turns: a damping (with the rotation put before the \
-         band-pass it loses the angle). Envelope and rms-impedance rotate first, which spares them the \
-         compensation of that delay, and oscillate or lose the angle with z_s = 0.90; with z_s = 0.995 \
-         both track. The rectified chain, retuned, loses the angle where the shaft gets up to speed without torque, \
-         as at 150 rpm here; it keeps it where the torque is there before the speed. A learned reference takes the bias out of whatever sees the \
-         saliency.",
-    "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
-         envelope promising but for spurious oscillations: they are the leak of the fundamental, at \
-         600 Hz and 1200 Hz, and an average over one injection period removes them.",
-    "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
-         filters (`injection.rms_samples`). Their impedance difference is shown as the current \
-         difference that it stands for, I²/(√2 V) amperes an ohm (0.94 mA/Ω with 50 V on the \
-         motor of Table 5), and θ is counted from 90° ahead of the flux, so that the maps compare.",
-];

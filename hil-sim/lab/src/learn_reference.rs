@@ -59,6 +59,5 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let panel = Panel::new("quadrature current (A)", "q").with(Series::line("learned", points));
     let figure = Figure::new("reference", "Saliency offset over the q-axis current", "section 3.3");
     outcome.figures.push(figure.panel(panel));
-    outcome.remarks = assumptions(context.config);
     Ok(outcome)
 }

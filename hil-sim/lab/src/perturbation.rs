@@ -210,6 +210,5 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.figures.push(figure);
     outcome.figures.push(speeds);
-    outcome.remarks = assumptions(context.config);
     Ok(outcome)
 }

@@ -53,7 +53,8 @@ impl Part {
             return Ok(None);
         }
         let records = runs.into_iter().map(|run| run.record).collect();
-        (statistical.outcome)(context, records).map(|outcome| Some(experiment.remarked(outcome)))
+        let outcome = (statistical.outcome)(context, records)?;
+        Ok(Some(experiment.remarked(outcome, context.config)))
     }
 }
 

@@ -150,7 +150,6 @@ impl Study for Battery {
             outcome.tables.push(summary::silent(&trials, |number| self.disturbances(number)));
         }
         outcome.figures.push(summary::figure(&trials));
-        outcome.remarks = assumptions(&self.config);
         Ok(outcome)
     }
 }

@@ -154,7 +154,6 @@ impl Study for FullRange {
         if let Some(index) = self.config.full_range.index {
             outcome.figures.push(summary::figure(&self.done(index as usize, true)?.1));
         }
-        outcome.remarks = assumptions(&self.config);
         Ok(outcome)
     }
 }

@@ -47,7 +47,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         }
     }
     outcome.tables.push(table);
-    outcome.remarks = assumptions(&config);
     Ok(outcome)
 }
 

@@ -128,7 +128,7 @@ impl Study for Machines {
         or_refusal(learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)))
     }
 
-    fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error> {
+    fn outcome(&self, _: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error> {
         let with_config = |(number, runs)| Machine { config: self.drawn(number).0, runs };
         let mut machines: Vec<Machine> = records.into_iter().enumerate().map(with_config).collect();
         machines.sort_by(|a, b| {
@@ -184,7 +184,6 @@ impl Study for Machines {
             .with(Series::points("rms", points(Machine::rms)));
         let title = "Worst of 16 runs over the saliency of the machine";
         outcome.figures.push(Figure::new("machines", title, "").panel(panel));
-        outcome.remarks = assumptions(context.config);
         Ok(outcome)
     }
 }

@@ -151,7 +151,6 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     ));
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
-    outcome.remarks = assumptions(config);
     Ok(outcome)
 }
 

@@ -218,7 +218,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let bound_rpm = |(case, [seen, _]): &(&Case, &[Response; 2])| {
         seen.load.abs() * loops.delay_s() / (mechanical_s * case.inertia) * rated_rpm
     };
-    let mut outcome = Outcome { remarks: assumptions(config), ..Outcome::default() };
+    let mut outcome = Outcome::default();
     let pairs: Vec<(&Case, &[Response; 2])> = cases.iter().zip(&seen).collect();
     let columns = columns![|_, pair: &(&Case, &[Response; 2])|
         "shaft" => Cell::from(pair.0.name());

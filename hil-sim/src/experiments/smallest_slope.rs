@@ -65,7 +65,7 @@ impl Study for SmallestSlope {
         self.steps[number / self.each].2.run(number % self.each)
     }
 
-    fn outcome(&self, context: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
+    fn outcome(&self, _: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
         let mut steps = Vec::new();
         for ((share, config, _), trials) in self.steps.iter().zip(trials.chunks(self.each)) {
             let slope = Probe::new(config)?.slope(config.drive.i_d().into(), 0.0);
@@ -106,7 +106,6 @@ impl Study for SmallestSlope {
             .with(points("rms", |s| s.error().rms()));
         let title = "Angle error over the saliency sensitivity";
         outcome.figures.push(Figure::new("slope", title, "").panel(panel));
-        outcome.remarks = assumptions(context.config);
         Ok(outcome)
     }
 }

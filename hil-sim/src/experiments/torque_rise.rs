@@ -40,7 +40,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let both = |&rpm: &f64| [1.0, -1.0].map(|sign| (config.rpm(rpm), sign));
     let cases: Vec<Case> = SPEEDS_RPM.iter().flat_map(both).collect();
     let seen = context.in_parallel("torque-rise", &cases, |_, &case| step(&config, &rig, case))?;
-    let mut outcome = Outcome { remarks: assumptions(&config), ..Outcome::default() };
+    let mut outcome = Outcome::default();
     outcome.tables.push(table(&config, &cases, &seen, &mut outcome.metrics));
     outcome.figures.push(figure(&cases, &seen));
     Ok(outcome)

@@ -16,6 +16,5 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set(format!("rms_at_{volts}_v_deg"), run.error.rms());
     }
     outcome.tables.push(table);
-    outcome.remarks = assumptions(context.config);
     Ok(outcome)
 }
