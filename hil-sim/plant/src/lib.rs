@@ -304,13 +304,17 @@ impl Plant {
         Ok(())
     }
 
+    /// Returns the rate of the stator current, A/s, at the terminal voltage `v`, V, in the stator frame.
+    pub fn current_rate(&self, v: Complex) -> Complex {
+        whichever!(&self.motor, motor => {
+            let speed = motor.machine.pole_pairs() * motor.state.speed;
+            motor.machine.derivative(&motor.state.electrical, v, speed).current_rate()
+        })
+    }
+
     /// Returns the rates of the phase currents while the terminals are shorted, A/s.
     pub fn shorted_slopes(&self) -> [f64; 3] {
-        phases(whichever!(&self.motor, motor => {
-            let speed = motor.machine.pole_pairs() * motor.state.speed;
-            let rate = motor.machine.derivative(&motor.state.electrical, Complex::ZERO, speed);
-            rate.current_rate()
-        }))
+        phases(self.current_rate(Complex::ZERO))
     }
 
     /// Changes the number of pulses of each leg in a period.

@@ -4,7 +4,7 @@ use drive_commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::{AlphaBeta, Motor, Sample, TestSignal};
 
 use crate::experiments::drawn_machine::Circuit;
-use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
+use crate::plant::Complex;
 use crate::prelude::*;
 
 /// Number of control periods between two polls of the main loop.
@@ -30,17 +30,12 @@ pub struct Session {
     pub leakage: Option<f64>,
 }
 
-/// Transient inductance of a motor with saturation at its present currents, along and across phase a, H.
-fn transient(rig: &Rig) -> Option<[f64; 2]> {
-    let motor = rig.plant.energy_model()?;
-    let rate = |volts| {
-        let speed = motor.machine.pole_pairs() * motor.state.speed;
-        motor.machine.derivative(&motor.state.electrical, volts, speed).current_rate()
-    };
-    let rest = rate(Complex::ZERO);
-    let along = rate(Complex::new(1.0, 0.0)) - rest;
-    let across = rate(Complex::new(0.0, 1.0)) - rest;
-    Some([1.0 / along.re, 1.0 / across.im])
+/// Transient inductance of a motor at its present currents, along and across phase a, H.
+fn transient(plant: &Plant) -> [f64; 2] {
+    let rest = plant.current_rate(Complex::ZERO);
+    let along = plant.current_rate(Complex::ONE) - rest;
+    let across = plant.current_rate(Complex::I) - rest;
+    [1.0 / along.re, 1.0 / across.im]
 }
 
 /// Influences on a session from outside.
@@ -101,9 +96,7 @@ impl Session {
             }
             if commissioning.step() == Step::Leakage && carrier_on != AlphaBeta::ZERO {
                 let axis = usize::from(carrier_on.beta != 0.0);
-                if let Some(inductances) = transient(&rig) {
-                    leakage[axis].push(inductances[axis]);
-                }
+                leakage[axis].push(transient(&rig.plant)[axis]);
             }
             if !period.is_multiple_of(POLL) {
                 continue;
