@@ -9,7 +9,7 @@ fn comments_messages_and_commits_use_the_terms() {
     let rules: Vec<_> = rules.map(|line| line.split_once(" -> ").expect("an arrow")).collect();
     let openings = ["What", "That which", "Of the", "By so"].map(|one| (one, "a noun or a verb"));
     let mut found = String::new();
-    let pages = ["README.md", "CONTRIBUTING.md"].map(Into::into);
+    let pages = ["README.md", "CONTRIBUTING.md", "hil-sim/lab/texts.toml"].map(Into::into);
     for path in crate::sources::files("rs").unwrap().into_iter().chain(pages) {
         let text = crate::sources::read(&path).unwrap();
         let lines: Vec<_> = text.lines().map(str::trim).collect();

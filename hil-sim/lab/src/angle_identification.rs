@@ -72,7 +72,11 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.extend(all().map(|(s, points)| fit_figure(s, &points[DESIGN_ROW])));
     outcome.figures.extend(all().map(|(s, points)| bode_figure(s, points)));
     outcome.figures.extend(all().map(|(s, points)| step_figure(s, points)));
-    outcome.remarks = remarks(&points);
+    let (literal, rest) = points.split_at(TABLE_6_A.len());
+    let (least, most) = fits(&rest[..TABLE_6_A.len()]);
+    let values =
+        [("distance", distance(literal)), ("rectified_least", least), ("rectified_most", most)];
+    texts::add_remarks(&mut outcome, "angle-identification", &values);
     Ok(outcome)
 }
 
@@ -93,24 +97,8 @@ fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[Identif
 fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
     let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit());
     let title = format!("Two plants: {}", demodulation.name());
-    let mut table = Table::new(title, &[]).note(match demodulation.0 {
-            DemodulatorKind::Literal => {
-                "Predicted: the leakage of the fundamental, −√2 0.01 0.944 |i| sin(x + γ) with x the \
-                 axis seen from the current's frame: slope √2 0.00944 iq while the current is held; \
-                 none when the current turns with the axis. The loop is closed around the second plant, which \
-                 has no gain."
-            }
-            DemodulatorKind::Synchronous => {
-                "Predicted: q = −Im(s e^(−2jθ)) with s = a e^(2jφ̂₂) + b |i| e^(2j arg i): slope \
-                 2(|a| − b |i| cos 2γ) while the current is held, 2|a| once it has turned with the \
-                 axis. The first applies to fast errors, and section 3.11 identifies it; the second \
-                 applies to slow errors."
-            }
-            _ => {
-                "Predicted: the slopes of the saliency (see synchronous) times √2 |I_hf| and the gain \
-                 of the chain, 0.945 2/π 0.944."
-            }
-        });
+    let note = texts::note(&format!("angle-identification/{}", demodulation.name()), &[]);
+    let mut table = Table::new(title, &[]).note(note);
     let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
     let inductance = config.motor.l_ls + config.motor.l_lr; // near sigma L_s
     let carrier = f64::from(config.drive.carrier_v()) / (TAU * 600.0 * inductance);
@@ -279,39 +267,4 @@ fn distance(points: &[IdentifiedPoint]) -> f64 {
         apart.re.abs().max(apart.im.abs())
     };
     points.iter().enumerate().map(of).fold(0.0, f64::max)
-}
-
-fn remarks(points: &[IdentifiedPoint]) -> Vec<String> {
-    let mut all = points.chunks(TABLE_6_A.len());
-    let literal = all.next().unwrap_or_default();
-    let [first, second] = [literal, all.next().unwrap_or_default()].map(fits);
-    vec![
-        "Two plants. With the encoder the current stays where it is when the injection axis is turned, so \
-         the part of the saliency that belongs to the current is seen to turn, together with that of \
-         the flux: slope 2(|a| + b |i| |cos 2γ|), growing with iq. This is what section 3.11 \
-         identifies (Table 6). Without the encoder the current is put on the estimated angle: it turns \
-         with the axis, its part of the saliency stands still in the estimated frame, and slow errors \
-         meet 2|a| alone, whatever iq. Errors faster than the current loop meet the first. A controller \
-         made from Table 6 is made for a plant the loop is not closed around."
-            .into(),
-        "As printed (literal), the identified plant is real, but all of it is the fundamental current \
-         leaking through the band-pass: with the current turning, its gain is zero. That is why an \
-         identification that looks sound made a loop that cannot track."
-            .into(),
-        format!(
-            "Eq. 3.43 fits no chain well: the literal one by {:.0} to {:.0} %, whose step response is that of the \
-             post-processing filter and whose poles come out within {:.3} of those of Table 6 in either part; the \
-             rectified one by {:.0} to {:.0} %. Where the injection is \
-             seen, a step of the axis shows at once, before the injection current has rotated: for 2 samples, \
-             and in the rectified chain for the 8.8 samples of the band-pass as well, which it rotates \
-             afterwards. The signal answers to how fast the axis turns, not only to where it is. Eq. 3.43 has \
-             no zero for that: its gain comes out too high (compare with the steps). In the \
-             loop it is a damping, without which the printed z_s = 0.90 loses the angle (see demodulators).",
-            first.0,
-            first.1,
-            distance(literal),
-            second.0,
-            second.1,
-        ),
-    ]
 }

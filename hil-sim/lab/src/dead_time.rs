@@ -56,11 +56,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let figure = Figure::new("dead_time", title, "section 3.9");
     outcome.figures.push(figure.panel(voltage).panel(current));
     outcome.figures.extend(edges(context));
-    outcome.remarks.push(format!(
-        "Per phase the dead time takes V_dc t_d / T = {lost:.2} V with the sign of the current. The \
-         source writes 2 ms and 4 ms where its figure shows 2 µs and 4 µs, and 2.64 % of the period \
-         for both delays together: 2.2 µs until the first switch acts, 2.2 µs of dead time."
-    ));
+    texts::add_remarks(&mut outcome, "dead-time", &[]);
     Ok(outcome)
 }
 

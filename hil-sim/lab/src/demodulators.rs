@@ -150,11 +150,9 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
             ]
         })
     });
-    Table::new("What each sees at the right angle", &[]).records(rows).note(
-        "Oriented by the encoder, shaft locked. Slope: the injection axis is rotated by ±4° and the \
-         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where the signal \
-         should be zero; as angle: the angle error that it would cause.",
-    )
+    Table::new("What each sees at the right angle", &[])
+        .records(rows)
+        .note(texts::note("demodulators/seen", &[]))
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {
@@ -164,15 +162,9 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
     let heads =
         fixed.map(String::from).into_iter().chain(SPEEDS_RPM.into_iter().flat_map(by_speed));
     let heads = heads.collect();
-    let mut table = Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
-        .note(format!(
-            "Steps: 1 A to 2 A, shaft locked. Speeds: a dynamometer brings the shaft there without torque, \
-             then a step to iq = {RUN_IQ_A} A, one second. lost: beyond 45°, or stopped. constant: the printed 10 mA and the printed k_s, both \
-             by the gain of the detector, and the printed z_s; Ha and Sul compare with zero. learned: a \
-             table over iq instead. retuned: the same, k_s = 0.1 rad/A, z_s = 0.995; the synchronous \
-             demodulation has its own loop. Delay: from a change of the motor's saliency to the signal, \
-             the motor and the sampling included."
-        ));
+    let mut table =
+        Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
+            .note(texts::note("demodulators/tracked", &[("iq_a", RUN_IQ_A)]));
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
             let (Some(t), kind) = (tracked, kind.word()) else { continue };

@@ -29,30 +29,16 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     recomputed(&filters, &mut outcome);
     let errors = precision::errors(&filters, samples, context, &mut outcome)?;
     outcome.tables.push(errors);
-    outcome.remark(
-        "Tables 7 and 8 hold elliptic designs without a misprint. \"LPF\" is a band stop: it \
-         passes everything above 650 Hz and is no filter against noise or aliases. Its gain at dc \
-         is 0.944, which makes every real current 5.9 % too large; the drive divides by it.",
-    );
     let direct = outcome.metrics.get("lpf_direct_1_error_rms_a").unwrap_or(f64::NAN);
     outcome.compared.push(named("filters_sensitive").recomputed(direct > 1e-3));
-    outcome.remark(
-        "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA pass, as much as \
-         the signal that the demodulation of the source looks for (see injection-map).",
-    );
     let worst = |quantity: &str| {
         let forms = ["direct_1", "direct_2", "transposed_2"]
             .map(|form| ["lpf", "pp"].map(|f| format!("{f}_{form}_{quantity}")));
         let values = forms.iter().flatten().filter_map(|name| outcome.metrics.get(name));
         1e3 * values.fold(0.0, f64::max)
     };
-    outcome.remarks.push(format!(
-        "In single precision and in the printed direct form (Eq. C.1), LPF and PP are wrong by up \
-         to {:.0} mA rms and {:.0} mA at worst: more than the 10 mA of the signal. The drive runs \
-         second-order sections.",
-        worst("error_rms_a"),
-        worst("error_max_a"),
-    ));
+    let values = [("rms_ma", worst("error_rms_a")), ("largest_ma", worst("error_max_a"))];
+    texts::add_remarks(&mut outcome, "filters", &values);
     Ok(outcome)
 }
 

@@ -27,11 +27,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             ("rbv/printed", Cell::fixed(ratio.rbv / ratio.printed, 3)),
         ]
     }));
-    outcome.tables.push(table.note(
-        "h_0b / h_1b: both have the same absolute error, so their relative errors in Tables 1 and 4 \
-         have the inverse ratio of their values. (1 - f_11)/2: what separates σ l_s by Models B \
-         and C in Tables 2 and 3. The error of τ_r by Model B is almost all bias.",
-    ));
+    outcome.tables.push(table.note(texts::note("identify-machine/ratios", &[])));
     let machines = [("PX", Parameters::PX), ("rbv", Parameters::RBV)].map(|(name, machine)| {
         let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
         [

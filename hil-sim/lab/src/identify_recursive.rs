@@ -120,10 +120,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         named("sg_converges_later").simulated(slowest[1] > slowest[2]),
         named("slow_converges_later").simulated(slowest[1] > slowest[0]),
     ]);
-    outcome.tables.push(table.note(
-        "Convergence without noise, into 10 % of the final value by a moving median over 20 ms, \
-         from a machine in its steady state; the input filters start at rest.",
-    ));
+    outcome.tables.push(table.note(texts::note("identify-recursive/convergence", &[])));
     Ok(outcome)
 }
 

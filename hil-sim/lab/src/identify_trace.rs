@@ -325,9 +325,6 @@ fn outcome(
             "The residual is large: harmonics, saturating leakage inductances, or a wrong scale.",
         );
     }
-    outcome.remark(
-        "The terminals determine four parameters. A T circuit with L_ls = L_lr has L_m = √(L_s (L_s − σL_s)), and \
-         r_r = L_s/τ_r.",
-    );
+    texts::add_remarks(&mut outcome, "identify-trace", &[]);
     outcome
 }

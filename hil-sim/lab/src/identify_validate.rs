@@ -69,18 +69,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     });
     outcome.metrics.set("tau_r_error_of_rbv_sg_printed_noise_pct", sg);
     outcome.metrics.set("tau_r_error_of_rbv_ss_printed_noise_pct", ss);
-    outcome.remark(
-        "The measured data are not printed. The simulated machine is therefore the printed estimate with S_s at the measured \
-         speed, and the estimate with S_g shows how closely Model C finds it again, at a tenth of the noise of section 5.",
-    );
-    outcome.remarks.push(format!(
-        "The paper does not discuss that τ_r by Model C (0.0114 s at 60 Hz, 0.021 s at 10 Hz) is \
-         73 and 50 % below the 0.0427 s of the locked-rotor and no-load tests, nor that it doubles \
-         at the lower frequency. The bias of Model C on the machine rbv is 0.3 % at 50 µs. All the \
-         noise of section 5, said to be far above that of the measurements, makes a mean error of \
-         {sg:.0} % with S_g and of {ss:.0} % with S_s at 375 rad/s; both signals gave the same \
-         τ_r. The gap stays unexplained."
-    ));
+    texts::add_remarks(&mut outcome, "identify-validate", &[]);
     Ok(outcome)
 }
 

@@ -157,12 +157,8 @@ fn zero(curve: &Curve) -> f64 {
 /// Makes the table of the printed chain on the motor without saliency beside the predicted leakage, and of the
 /// rectified chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
-    let mut table = Table::new("What Figure 19 shows", &[]).note(
-        "The leak predicts Δi = −√2 · 0.01 · 0.944 · |i| · sin(φ̂₂ − θ + γ), γ \
-         = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
-         (In the source the 0.944 of the low-pass, which makes the real currents larger than \
-         commanded, cancels that of PP: 9.9 mA.)",
-    );
+    let mut table =
+        Table::new("What Figure 19 shows", &[]).note(texts::note("injection-map/shown", &[]));
     for (k, iq) in IQ_A.iter().enumerate() {
         let seen = |variant: usize, x: f64| at(&curves[variant * IQ_A.len() + k], x);
         table.record([

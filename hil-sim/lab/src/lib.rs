@@ -31,4 +31,5 @@ mod prelude;
 pub mod recomputed;
 pub mod saliency;
 pub mod source;
+pub mod texts;
 pub mod warming_rotor;

@@ -185,10 +185,8 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let measured = measured()?;
     let simulated = simulated(&measured)?;
-    let mut table = Table::new("18.5 kW, 400 V, 50 Hz: simulated beside measured", &[]).note(
-        "Measured: Modelica Standard Library, IMC_withLosses (BSD-3-Clause). Speed is printed there to 1 rpm. The current \
-         without load fixes the knee of the main flux; everything else is from the published data.",
-    );
+    let mut table = Table::new("18.5 kW, 400 V, 50 Hz: simulated beside measured", &[])
+        .note(texts::note("measured-motors/load_test", &[]));
     for (m, s) in measured.iter().zip(&simulated) {
         let current = 100.0 * (s.current_a / m.current_a - 1.0);
         let efficiency = 100.0 * (s.efficiency - m.efficiency);
@@ -206,9 +204,8 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     outcome.tables.push(table);
-    let mut table = Table::new("2.2 kW: current without load at 50 Hz", &[]).note(
-        "Published: motulator (MIT), L_s = 0.34/(1 + (0.84 psi)^7) H over the stator flux psi.",
-    );
+    let mut table = Table::new("2.2 kW: current without load at 50 Hz", &[])
+        .note(texts::note("measured-motors/saturation", &[]));
     for voltage in [100.0, 200.0, 300.0, 350.0, 400.0, 430.0] {
         let (psi, current) = no_load(voltage)?;
         table.record([

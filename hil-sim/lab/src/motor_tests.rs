@@ -39,23 +39,15 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.compared.push(beside(place, quantity).simulated(value));
     }
     let bias = readings.as_printed().rr / plant.machine.rr;
-    outcome.remarks.extend([
-        format!(
-            "The locked-rotor test as section 3.6.2 evaluates it neglects the magnetising branch, which \
-             at 15 Hz takes part of the current: it gives r_r (L_m/L_r)² and less leakage, here {bias:.2} \
-             of r_r. If the printed readings are right, the motor of the source has r_r = {:.2} Ω and \
-             not 1.1.",
-            Readings::PRINTED.exact().rr
-        ),
-        format!(
-            "37.9 V are a sixth of the rated voltage. There the friction assumed here ({} N m s/rad) \
-             causes slip if the rotor is not driven: {:.3} A instead of {:.3} A, and L_m {:.0} % low. The \
-             test above is with the shaft driven at synchronous speed.",
-            plant.mechanics.friction,
-            free.no_load.2,
-            readings.no_load.2,
-            100.0 * (1.0 - free.as_printed().lm / readings.as_printed().lm),
-        ),
-    ]);
+    let low = 1.0 - free.as_printed().lm / readings.as_printed().lm;
+    let values = [
+        ("bias", bias),
+        ("r_r", Readings::PRINTED.exact().rr),
+        ("friction", plant.mechanics.friction),
+        ("free_a", free.no_load.2),
+        ("driven_a", readings.no_load.2),
+        ("low_percent", 100.0 * low),
+    ];
+    texts::add_remarks(&mut outcome, "motor-tests", &values);
     Ok(outcome)
 }

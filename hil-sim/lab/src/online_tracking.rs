@@ -104,7 +104,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let shown = 4 * POINTS.iter().position(|&p| p == (150.0, 2.0)).unwrap_or(0);
     outcome.figures.push(figure(&runs[shown + 2], &runs[shown + 3]));
     outcome.figures.push(speed_figure(&runs[4 * POINTS.len() + 10]));
-    outcome.remarks.extend(remarks(context.config));
+    let residual_v = residual(context.config, 1.0);
+    texts::add_remarks(&mut outcome, "online-tracking", &[("residual_v", residual_v)]);
     Ok(outcome)
 }
 
@@ -200,25 +201,4 @@ fn speed_figure(moments: &[WarmingMoment]) -> Figure {
     Figure::new("sensorless", title, "")
         .panel(traced("speed (electrical rad/s)", moments, |e| e.omega_m, |m| m.omega_m))
         .panel(time_constant(moments))
-}
-
-fn remarks(config: &Config) -> Vec<String> {
-    vec![
-        format!(
-            "The voltage is the output of the drive, reconstructed from its own compare values. The uncompensated \
-             part of the dead time ({:.1} V) acts like a resistance, and the stator \
-             resistance is estimated together with τ_r to absorb it; if it is fixed, 20 % of the dead time \
-             left cause an error of 10 % of τ_r at 2 A (measured on a motor without saliency).",
-            residual(config, 1.0)
-        ),
-        "Model D, the inverse of all four complex coefficients, is of no use here: two or three \
-         sinusoids do not fix them, and even without noise it missed the speed by a factor of two. The machine is fitted \
-         to the coefficients instead, weighted by their covariance."
-            .to_owned(),
-        "Without a sensor a constant flux shows only the slip, not speed and rotor \
-         resistance separately. The estimate reports this. The speed of the injection's tracking loop does not \
-         help, because it contains the assumed slip. Varying the magnetising current by ±0.1 A costs about 2° of \
-         angle error while it lasts."
-            .to_owned(),
-    ]
 }

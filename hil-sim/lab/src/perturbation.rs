@@ -155,11 +155,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
     }
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
-    let mut table = Table::new(title, &[]).note(
-        "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \
-         subtracted, but not from the largest single error, which contains \
-         noise and bias.",
-    );
+    let mut table = Table::new(title, &[]).note(texts::note("perturbation/steps", &[]));
     let is_load = |m: &&StepResponse| m.case.is_load();
     for m in &results {
         table.record([

@@ -55,13 +55,11 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.compared.push(beside("Figure 24", "crossover, fictitious").recomputed(hz(rule.v)));
     outcome.compared.push(beside("Figure 25", at).recomputed(gain));
     outcome.compared.push(named("loop_below_bpf").recomputed(hz(rule.v) < edges[0]));
-    outcome.remarks.push(format!(
-        "Section 3.7 prefers the identified plant because the computed one seems faster. It is not: \
-         its pole is at {:.1} Hz, below the identified ones; Eq. 3.20 to 3.22 and 3.32 contain an error \
-         of a factor {:.2}. The gain k_FTD is right because the factor cancels.",
-        -physical.p.ln() * RATE / std::f64::consts::TAU,
-        physical.k / (1.0 - physical.p) / printed("Eq. 3.20", "k_FT"),
-    ));
+    let values = [
+        ("pole_hz", -physical.p.ln() * RATE / std::f64::consts::TAU),
+        ("factor", physical.k / (1.0 - physical.p) / printed("Eq. 3.20", "k_FT")),
+    ];
+    texts::add_remarks(&mut outcome, "pi-design", &values);
     Ok(outcome)
 }
 
@@ -117,10 +115,9 @@ fn margin_table(loops: &[(&str, FirstOrder, RuleDesign, CurrentLoopDesign)]) -> 
             ]
         })
     });
-    Table::new("Margins on the motor, with LPF and one period of delay", &[]).records(rows).note(
-        "The rule considers neither the filter nor the delay. If it leaves less than 45° or a \
-         sensitivity peak Ms above 2.2, kc is lowered until both hold.",
-    )
+    Table::new("Margins on the motor, with LPF and one period of delay", &[])
+        .records(rows)
+        .note(texts::note("pi-design/margins", &[]))
 }
 
 fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {

@@ -209,7 +209,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     )));
     let constant = fit(&[10.0; 500], &[1.0; 500], Orders { outputs: 1, inputs: 1, delay: 0 });
     outcome.compared.push(named("constants_degrade").simulated(constant.is_err()));
-    outcome.remarks.extend(remarks(context)?);
+    remark(context, &mut outcome)?;
     Ok(outcome)
 }
 
@@ -242,7 +242,8 @@ fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) ->
     Figure::new(name, title, trial.figure).panel(voltage).panel(current)
 }
 
-fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
+/// Adds the remarks, with what the same least squares make of data without excitation.
+fn remark(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     let mut rig = bench(context)?;
     rig.wait(1.0);
     let mut still = Record::default();
@@ -256,20 +257,8 @@ fn remarks(context: &Context<'_>) -> Result<Vec<String>, Error> {
     };
     let still = still.without_mean();
     let noise = IdentifiedPlant::fit(&still.u, &still.y, 1, 0)?;
-    Ok(vec![
-        format!("A constant voltage and current is {verdict}."),
-        format!(
-            "Noise alone passes the check of the condition ({:.0}), but gives no information: k = {:.5} A/V. \
-             The loop must be designed from data with excitation.",
-            noise.condition, noise.plant.k
-        ),
-        "The voltage is the one of the current loop with the sequence added, the current the filtered \
-         one that the loop regulates; the sample of a period acts in the next one, so that a plant \
-         without a delay (as printed) cannot fit a voltage that changes every period: its k describes \
-         the response of the controller."
-            .to_owned(),
-        "The motor of the source and its amplitude of the sequence are not known; the simulated one is \
-         that of Table 5."
-            .to_owned(),
-    ])
+    outcome.remark(format!("A constant voltage and current is {verdict}."));
+    let values = [("condition", noise.condition), ("k", noise.plant.k)];
+    texts::add_remarks(outcome, "plant-identification", &values);
+    Ok(())
 }

@@ -11,3 +11,4 @@ pub use sim_bench::prelude::*;
 
 pub use crate::poles::largest_pole;
 pub use crate::source::{self, beside, named, printed};
+pub use crate::texts;

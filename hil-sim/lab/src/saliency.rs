@@ -184,14 +184,10 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set("slope_at_rest_per_rad", slope);
     }
     let mut panel = Panel::new("angle error (°)", "q (%)");
-    let mut map = Table::new("q (%) over the angle error", &[]).note(
-        "Rotor flux minus frame, electrical; positive: flux ahead. The saliency holds in steady state at a current that \
-         is constant in the frame, shaft locked. q is positive with low inductance ahead of the frame; -: the flux has collapsed.",
-    );
-    let mut table = Table::new("Slope and second zeros", &[]).note(
-        "Slope k = dq/de over ±8.5°: its sign shows which axis has the low inductance (positive: along the flux). Second zeros: \
-         angle errors from -60° to 90° with the signal of zero error, at which a drive may lock wrongly.",
-    );
+    let mut map =
+        Table::new("q (%) over the angle error", &[]).note(texts::note("saliency/map", &[]));
+    let mut table =
+        Table::new("Slope and second zeros", &[]).note(texts::note("saliency/zeros", &[]));
     for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
         let q = |e: i32| curve.iter().find(|point| point.0 == f64::from(e)).map(|point| point.1);
         let cell = |e: i32| Cell::fixed_or_dash(q(e).map(|q| 100.0 * q), 2);

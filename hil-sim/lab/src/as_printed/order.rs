@@ -26,10 +26,7 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
             ("filter before the rotation (mA)", milli(before)),
         ]);
     }
-    outcome.tables.push(table.note(
-        "Remaining oscillation of i_d and i_q. The current loop in complex numbers: Table 5, the controller of Eq. 3.39, a period of delay, LPF on the current in \
-         the frame of the stator (filter before the rotation) or in the frame of the flux.",
-    ));
+    outcome.tables.push(table.note(texts::note("as-printed/order", &[])));
     outcome.metrics.set("orders_that_settle", f64::from(u8::from(settles) + u8::from(all)));
     outcome.compared.extend([
         named("order_matters").simulated(settles != all),

@@ -45,10 +45,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
             outcome.compared.push(Compared { unknown, ..place }.simulated(works));
         }
     }
-    outcome.tables.push(table.note(
-        "The fundamental model is the drive's own flux observer. Far from standstill the drive itself switches the injection off; \
-         near standstill it does not start without the injection.",
-    ));
+    outcome.tables.push(table.note(texts::note("as-printed/sources", &[])));
     Ok(())
 }
 

@@ -158,10 +158,6 @@ pub fn tables(
     outcome.metrics.set("within_factor_2", share(&entries));
     let literal = share(&all(Noise::PRINTED, context.seed));
     outcome.metrics.set("within_factor_2_printed_noise", literal);
-    outcome.remark(
-        "Mean absolute errors of seven measurements of 4000 samples (Eq. 45). The machine is inferred \
-         from the tables themselves (identify-machine). The printed ranges of the noise are read \
-         as peak to peak, which comes nearer to these tables and contradicts the words of section 5.",
-    );
+    texts::add_remarks(&mut outcome, "identification", &[]);
     Ok((entries, outcome))
 }

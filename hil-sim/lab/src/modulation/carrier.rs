@@ -40,18 +40,15 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
         }
     }
     let metric = |name: &str| outcome.metrics.get(name).unwrap_or(f64::NAN);
-    let remark = format!(
-        "The pass band of BPF ends 100 Hz from the injection frequency: {} Hz away a change of the angle is \
-         attenuated by {:.1} dB below that frequency and {:.1} dB above, {} Hz away hardly \
-         ({:.1} and {:.1} dB).",
-        BAND.end(),
-        -metric("bpf_lower_outer_edge_db"),
-        -metric("bpf_upper_outer_edge_db"),
-        BAND.start(),
-        -metric("bpf_lower_inner_edge_db"),
-        -metric("bpf_upper_inner_edge_db"),
-    );
-    outcome.remarks.push(remark);
+    let values = [
+        ("far", f64::from(*BAND.end())),
+        ("far_below", -metric("bpf_lower_outer_edge_db")),
+        ("far_above", -metric("bpf_upper_outer_edge_db")),
+        ("near", f64::from(*BAND.start())),
+        ("near_below", -metric("bpf_lower_inner_edge_db")),
+        ("near_above", -metric("bpf_upper_inner_edge_db")),
+    ];
+    texts::add_remarks(outcome, "modulation", &values);
 
     let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
     let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);

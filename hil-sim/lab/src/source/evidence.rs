@@ -6,6 +6,7 @@ use sim_bench::outcome::{Cell, Compared, Figure, Outcome, Table};
 
 use super::errata::{ERRATA, Erratum, OWN, rounded};
 use super::{Kind, PRINTED, Printed, Verdict, place_of, value_of, verdict};
+use crate::texts;
 
 /// Results of the experiments.
 pub struct Evidence {
@@ -246,24 +247,16 @@ impl Evidence {
             let title = "Without a verdict, or no longer as the errata say";
             outcome.texts.push((title.into(), faults.join("\n")));
         }
-        outcome.remark(
-            "S1 is Barroso 2017, S0 is Jacobina, Lima and Ribeiro 1996. Recomputed: from the source's own numbers. Simulated: by \
-             the drive, or the method of the source, on the simulated motor of Table 5 with an assumed saliency fixed to the \
-             flux; the motors of the sources are not known. Conclusions from a saliency hold for that motor.",
-        );
         let drift = |name: &str| {
-            self.metric(&format!("sensorless-position/{name}")).unwrap_or(f64::NAN).abs()
+            self.metric(&format!("sensorless-position/drift_{name}")).unwrap_or(f64::NAN).abs()
         };
-        outcome.remark(format!(
-            "Sensorless position (section 5.1 of S1): the flux is seen, not the rotor, so more is not to be had without a \
-             saliency that is fixed to the rotor. A position at rest drifts by the error of the slip: {:.0}° a minute without \
-             load, {:.0}° a minute and ampere of q-axis current, {:.0}° more for each percent of error of the rotor resistance; \
-             {:.0}° a minute and ampere once that is learned. Homing finds the position again.",
-            drift("drift_no_load_deg_per_min"),
-            drift("drift_deg_per_min_a"),
-            drift("drift_deg_per_min_a_per_pct_rr"),
-            drift("drift_learned_deg_per_min_a"),
-        ));
+        let values = [
+            ("no_load", drift("no_load_deg_per_min")),
+            ("per_ampere", drift("deg_per_min_a")),
+            ("per_percent", drift("deg_per_min_a_per_pct_rr")),
+            ("learned", drift("learned_deg_per_min_a")),
+        ];
+        texts::add_remarks(&mut outcome, "sources", &values);
         Chapter {
             name: "sources".into(),
             source: "S1, S0",
