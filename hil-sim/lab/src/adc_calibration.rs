@@ -41,8 +41,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mismatch = outcome.metrics.get("slope_b_a").zip(outcome.metrics.get("slope_a_a"));
     let mismatch = mismatch.map_or(f64::NAN, |(b, a)| b / a - 1.0);
     outcome.metrics.set("gain_mismatch", mismatch);
-    let title = "Readings, calibration lines and what is left";
-    let figure = Figure::new("calibration", title, "Figure 17");
+    let figure = texts::figure("adc-calibration", "calibration");
     outcome.figures.push(figure.panel(readings).panel(residuals));
     outcome.remarks.push(format!(
         "The two channels differ by {:.2} % in gain before calibration. A mismatch of 1 % costs a \

@@ -96,9 +96,7 @@ fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[Identif
 /// Makes the table of the measured and predicted gains of the axis alone, and of axis and current together.
 fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
     let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit());
-    let title = format!("Two plants: {}", demodulation.name());
-    let note = texts::note(&format!("angle-identification/{}", demodulation.name()), &[]);
-    let mut table = Table::new(title, &[]).note(note);
+    let mut table = texts::table("angle-identification", demodulation.name());
     let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
     let inductance = config.motor.l_ls + config.motor.l_lr; // near sigma L_s
     let carrier = f64::from(config.drive.carrier_v()) / (TAU * 600.0 * inductance);
@@ -233,7 +231,7 @@ fn closed_loops(
         };
         Ok((tracked::steps(&config, context.seed)?, [at(0.0)?, at(150.0)?], pii))
     })?;
-    let mut table = Table::new("Controllers in the closed loop, constant reference of 10 mA", &[]);
+    let mut table = texts::table("angle-identification", "controllers");
     for ((name, from, key, ..), (steps, turning, pii)) in cases.iter().zip(&runs) {
         let shown =
             |lost: bool, value: f64| if lost { "lost".into() } else { Cell::fixed(value, 1) };

@@ -30,8 +30,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let found =
         context.in_parallel("as-printed", &SALIENCIES, |_, &a_psi| levels(context, a_psi))?;
-    let mut table =
-        Table::new("Figure 38 as in the source: rectified, delays left in, 10 mA, z_s = 0.90", &[]);
+    let mut table = texts::table("as-printed", "levels");
     let mut panel = Panel::new("time (s)", "angle error (°)").y_range(-20.0, 90.0);
     for (a_psi, run) in SALIENCIES.iter().zip(&found) {
         let name = format!("saliency {:.2} %", 100.0 * a_psi);
@@ -53,7 +52,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .with(Series::limit("printed, about 50°", band("Figure 38", "about")))
         .with(Series::reference("40° and 60° of Figure 39", band("Figure 39", "least")))
         .with(Series::reference("", band("Figure 39", "largest")));
-    let figure = Figure::new("levels", "Angle error of the drive as printed", "Figures 38, 39");
+    let figure = texts::figure("as-printed", "levels");
     outcome.figures.push(figure.panel(panel));
     outcome.tables.push(table);
     // The motor whose errors are closest to the printed ones: a tenth of the assumed saliency.

@@ -52,8 +52,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let clean = cases[1].error_rms < 0.1 * cases[0].error_rms;
     outcome.compared.push(named("dead_time_corrected").simulated(clean));
-    let title = "What the dead time does to voltage and current";
-    let figure = Figure::new("dead_time", title, "section 3.9");
+    let figure = texts::figure("dead-time", "dead_time");
     outcome.figures.push(figure.panel(voltage).panel(current));
     outcome.figures.extend(edges(context));
     texts::add_remarks(&mut outcome, "dead-time", &[]);
@@ -99,10 +98,9 @@ fn edges(context: &Context<'_>) -> [Figure; 2] {
     ] {
         pulse = pulse.with(Series::line(name, steps(false, &changes, end, offset)));
     }
-    let length = "A pulse of a leg: by the dead time too short or too long; the compensation lengthens the command by it";
     [
-        Figure::new("edge", "A rising edge of a leg", "Figure 28").panel(panel),
-        Figure::new("pulse", length, "Figure 29").panel(pulse),
+        texts::figure("dead-time", "edge").panel(panel),
+        texts::figure("dead-time", "pulse").panel(pulse),
     ]
 }
 

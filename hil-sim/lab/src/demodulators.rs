@@ -150,9 +150,7 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
             ]
         })
     });
-    Table::new("What each sees at the right angle", &[])
-        .records(rows)
-        .note(texts::note("demodulators/seen", &[]))
+    texts::table("demodulators", "seen").records(rows)
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {
@@ -162,9 +160,8 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
     let heads =
         fixed.map(String::from).into_iter().chain(SPEEDS_RPM.into_iter().flat_map(by_speed));
     let heads = heads.collect();
-    let mut table =
-        Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
-            .note(texts::note("demodulators/tracked", &[("iq_a", RUN_IQ_A)]));
+    let mut table = Table { columns: heads, ..texts::table("demodulators", "tracked") };
+    table.note = table.note.replace("{iq_a}", &RUN_IQ_A.to_string());
     for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
             let (Some(t), kind) = (tracked, kind.word()) else { continue };
@@ -208,6 +205,5 @@ fn steps_figure(found: &[DemodulationResults]) -> Figure {
             }
         }
     }
-    let title = "Torque steps without a position sensor";
-    panels.into_iter().fold(Figure::new("steps", title, "Figure 38"), Figure::panel)
+    panels.into_iter().fold(texts::figure("demodulators", "steps"), Figure::panel)
 }

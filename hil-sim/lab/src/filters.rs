@@ -56,9 +56,7 @@ fn bode(filters: &[ComparedFilter]) -> Figure {
         panel
     };
     let (gain, phase) = (dashed(gain, printed), dashed(phase, lag));
-    Figure::new("bode", "The digital filters, as the drive computes them", "Figure 30")
-        .panel(gain.y_range(-100.0, 5.0))
-        .panel(phase)
+    texts::figure("filters", "bode").panel(gain.y_range(-100.0, 5.0)).panel(phase)
 }
 
 fn stop_band(lpf: &ComparedFilter) -> Figure {
@@ -71,9 +69,7 @@ fn stop_band(lpf: &ComparedFilter) -> Figure {
         .with(Series::line("sections, f32", along(&|w| lpf.sections(w))))
         .with(Series::line("direct form, f32 coefficients", along(&|w| lpf.direct_rounded(w))))
         .with(Series::reference("Table 7, f64", along(&|w| lpf.direct(w))));
-    let title = "Stop band of LPF, and what is left of it when the coefficients of Table 7 are rounded to \
-         single precision";
-    Figure::new("stop-band", title, "Table 7").panel(panel)
+    texts::figure("filters", "stop-band").panel(panel)
 }
 
 fn characteristics(filters: &[ComparedFilter], outcome: &mut Outcome) {

@@ -39,7 +39,7 @@ const SWEEPS: u64 = 8;
 
 /// Tests the claim of section 5 that Model C is as good as Model B from 0 to 200 rad/s.
 fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
-    let mut table = Table::new("Models B and C from 0 to 200 rad/s, 50 µs, S_s", &[]);
+    let mut table = texts::table("identify-continuous", "low_speeds");
     let mut similar = true;
     for speed in LOW {
         let case = Case { speed, signal: Signal::Schroeder, period: 0 };
@@ -63,7 +63,7 @@ fn low_speeds(seed: u64, outcome: &mut Outcome) -> Table {
         }
     }
     outcome.compared.push(named("c_similar_to_b").simulated(similar));
-    table.note("Half the printed noise, the mean of eight times seven measurements; supply at the speed and 1.8 rad/s of slip.")
+    table
 }
 
 /// Computes means over the twelve columns.

@@ -16,7 +16,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     };
     outcome.metrics.set("px_largest_factor", largest(|ratio| ratio.px));
     outcome.metrics.set("rbv_largest_factor", largest(|ratio| ratio.rbv));
-    let table = Table::new("Deterministic ratios", &[]).records(ratios.iter().map(|ratio| {
+    let table = texts::table("identify-machine", "ratios").records(ratios.iter().map(|ratio| {
         [
             ("quantity", Cell::from(ratio.quantity)),
             ("h (µs)", Cell::fixed(1e6 * ratio.h, 0)),
@@ -27,7 +27,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             ("rbv/printed", Cell::fixed(ratio.rbv / ratio.printed, 3)),
         ]
     }));
-    outcome.tables.push(table.note(texts::note("identify-machine/ratios", &[])));
+    outcome.tables.push(table);
     let machines = [("PX", Parameters::PX), ("rbv", Parameters::RBV)].map(|(name, machine)| {
         let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
         [

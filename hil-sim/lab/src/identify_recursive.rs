@@ -78,7 +78,7 @@ fn convergence(estimates: &[[Value; 5]], k: usize) -> f64 {
 pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let seconds = context.seconds.unwrap_or(2.0).clamp(0.2, 60.0);
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Recursive least squares, λ = 0.999, P₀ = 1000 I", &[]);
+    let mut table = texts::table("identify-recursive", "convergence");
     let mut slowest = [0.0; CASES.len()];
     let bar = context.progress.bar("identification", 2 * CASES.len() as u64);
     for (index, (source, signal, speed, paper)) in CASES.into_iter().enumerate() {
@@ -120,7 +120,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         named("sg_converges_later").simulated(slowest[1] > slowest[2]),
         named("slow_converges_later").simulated(slowest[1] > slowest[0]),
     ]);
-    outcome.tables.push(table.note(texts::note("identify-recursive/convergence", &[])));
+    outcome.tables.push(table);
     Ok(outcome)
 }
 

@@ -318,8 +318,7 @@ fn outcome(
     let apart = Panel::new("time (s)", "difference (A)")
         .with(Series::line("α", line(&|k| difference(k).re)))
         .with(Series::line("β", line(&|k| difference(k).im)));
-    let title = "Recorded current, and current of the identified motor";
-    outcome.figures.push(Figure::new("trace", title, "").panel(current).panel(apart));
+    outcome.figures.push(texts::figure("identify-trace", "trace").panel(current).panel(apart));
     if share > REMARKED {
         outcome.remark(
             "The residual is large: harmonics, saturating leakage inductances, or a wrong scale.",

@@ -80,7 +80,7 @@ fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome)
         trial.raw().skip(20_000).take(1000).map(|sample| sample.1).collect()
     };
     let measured = current(machine);
-    let mut figure = Figure::new("currents", "Measured and simulated current", "Figure 5");
+    let mut figure = texts::figure("identify-validate", "currents");
     let rms = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
     let scale = rms(&mut measured.iter().map(|i| i.re));
     for (name, key, p) in [

@@ -157,8 +157,7 @@ fn zero(curve: &Curve) -> f64 {
 /// Makes the table of the printed chain on the motor without saliency beside the predicted leakage, and of the
 /// rectified chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
-    let mut table =
-        Table::new("What Figure 19 shows", &[]).note(texts::note("injection-map/shown", &[]));
+    let mut table = texts::table("injection-map", "shown");
     for (k, iq) in IQ_A.iter().enumerate() {
         let seen = |variant: usize, x: f64| at(&curves[variant * IQ_A.len() + k], x);
         table.record([

@@ -25,9 +25,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("carrier ratio", Cell::fixed(ratio, 5)),
         ]
     });
-    outcome.tables.push(Table::new("Over the q-axis current", &[]).records(rows).note(
-        "Saliency offset at the right angle, odd in iq; injection current relative to its value at 0 A, even.",
-    ));
+    outcome.tables.push(texts::table("learn-reference", "over_current").records(rows));
     let row = |name: &str, value: f32, decimals, misfit: Cell, used: bool| {
         let used = Cell::from(if used { "yes" } else { "no" });
         let value = Cell::fixed(value.into(), decimals);
@@ -40,10 +38,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         fitted("saliency of the current (1/A)", learned.current_saliency),
         row("saliency fixed to the flux", learned.flux_saliency, 4, "".into(), false),
     ];
-    outcome.tables.push(Table::new("Other values", &[]).records(rows).note(
-        "The saliency fixed to the flux agrees with the check at the start within 5 %; it is for \
-         the reader.",
-    ));
+    outcome.tables.push(texts::table("learn-reference", "others").records(rows));
 
     let m = &mut outcome.metrics;
     m.set("spread", learned.spread.into());
@@ -57,7 +52,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("current_saliency_misfit", learned.current_saliency.misfit.into());
     m.set("flux_saliency", learned.flux_saliency.into());
     let panel = Panel::new("quadrature current (A)", "q").with(Series::line("learned", points));
-    let figure = Figure::new("reference", "Saliency offset over the q-axis current", "section 3.3");
+    let figure = texts::figure("learn-reference", "reference");
     outcome.figures.push(figure.panel(panel));
     Ok(outcome)
 }

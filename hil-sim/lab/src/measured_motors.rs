@@ -185,8 +185,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let measured = measured()?;
     let simulated = simulated(&measured)?;
-    let mut table = Table::new("18.5 kW, 400 V, 50 Hz: simulated beside measured", &[])
-        .note(texts::note("measured-motors/load_test", &[]));
+    let mut table = texts::table("measured-motors", "load_test");
     for (m, s) in measured.iter().zip(&simulated) {
         let current = 100.0 * (s.current_a / m.current_a - 1.0);
         let efficiency = 100.0 * (s.efficiency - m.efficiency);
@@ -204,8 +203,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     outcome.tables.push(table);
-    let mut table = Table::new("2.2 kW: current without load at 50 Hz", &[])
-        .note(texts::note("measured-motors/saturation", &[]));
+    let mut table = texts::table("measured-motors", "saturation");
     for voltage in [100.0, 200.0, 300.0, 350.0, 400.0, 430.0] {
         let (psi, current) = no_load(voltage)?;
         table.record([
@@ -216,8 +214,7 @@ pub fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     outcome.tables.push(table);
-    let mut table = Table::new("4 kW, 400 V, 50 Hz: a measured start", &[])
-        .note("Measured: a public laboratory record; in it: at its voltages. The others at 400 V.");
+    let mut table = texts::table("measured-motors", "start");
     let (energy, linear) = (started(false)?, started(true)?);
     let quantities = [
         ("peak of the direct start (A)", 95.0, [89.0, 64.0]),

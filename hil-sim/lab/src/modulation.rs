@@ -77,8 +77,7 @@ fn vectors(inverter: &Inverter) -> Figure {
         .with(Series::limit("largest circle", around(360, &on(inner))))
         .with(Series::line("asked: 0.9 of the circle", given(0.9 * inner)))
         .with(Series::line("asked: 1.5 of the circle", given(1.5 * inner)));
-    let title = "Voltage vectors of the inverter, and the output of the modulator for two circles";
-    Figure::new("vectors", title, "Figure 4").panel(panel)
+    texts::figure("modulation", "vectors").panel(panel)
 }
 
 /// Draws Figure 5 at 20° and half of the largest circle.
@@ -94,9 +93,7 @@ fn sequence(inverter: &Inverter) -> Figure {
         let corners = steps(false, &[on, off], period_us, low);
         panel = panel.with(Series::line(format!("leg {name}"), corners));
     }
-    let title = "One period at 20° and half of the largest circle: O_000, U_0, U_60, O_111 and back; each leg \
-         switches twice";
-    Figure::new("sequence", title, "Figure 5").panel(panel.y_range(-0.2, 4.2))
+    texts::figure("modulation", "sequence").panel(panel.y_range(-0.2, 4.2))
 }
 
 /// On-times of the two vectors adjacent to a voltage in the first sector, by Table 2, divided by the period.

@@ -119,7 +119,7 @@ fn most(endings: &[FinalMeans], runs: Range<usize>, of: fn(&FinalMeans) -> f64) 
 }
 
 fn with_encoder(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
-    let mut table = Table::new("With the encoder: τ_r of the warm rotor, used by the drive", &[]);
+    let mut table = texts::table("online-tracking", "with_encoder");
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
         table.record([
             ("speed (rpm)", Cell::fixed(point.0, 0)),
@@ -137,12 +137,11 @@ fn with_encoder(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     }
     metrics.set("angle_error_max_deg", most(endings, 2..3, |e| e.angle));
     metrics.set("angle_error_untracked_max_deg", most(endings, 3..4, |e| e.angle));
-    table.note("Means of the last three of 18 s; r_r grows by 30 % between 4 and 10 s.")
+    table
 }
 
 fn without(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
-    let mut table =
-        Table::new("Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz", &[]);
+    let mut table = texts::table("online-tracking", "without");
     for (point, rows) in SENSORLESS.iter().zip(endings.chunks_exact(4)) {
         for (n, ending) in rows.iter().enumerate() {
             let left = RESIDUALS.get(n).map(|share| Cell::fixed(100.0 * share, 0));
@@ -191,14 +190,11 @@ fn figure(used: &[WarmingMoment], unused: &[WarmingMoment]) -> Figure {
     let error = Panel::new("time (s)", "flux angle error (° electrical)")
         .with(Series::line("tracked", angle(used)))
         .with(Series::line("not tracked", angle(unused)));
-    Figure::new("tracking", "The rotor warms up: 150 rpm, 2 A, encoder", "")
-        .panel(time_constant(used))
-        .panel(error)
+    texts::figure("online-tracking", "tracking").panel(time_constant(used)).panel(error)
 }
 
 fn speed_figure(moments: &[WarmingMoment]) -> Figure {
-    let title = "Speed and rotor time constant without a sensor: 150 rpm, 2 A";
-    Figure::new("sensorless", title, "")
+    texts::figure("online-tracking", "sensorless")
         .panel(traced("speed (electrical rad/s)", moments, |e| e.omega_m, |m| m.omega_m))
         .panel(time_constant(moments))
 }

@@ -154,8 +154,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for m in results.iter().filter(|m| m.lost > 0) {
         outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
     }
-    let title = format!("Angle error after a step, mean of {SEEDS} runs");
-    let mut table = Table::new(title, &[]).note(texts::note("perturbation/steps", &[]));
+    let mut table = texts::table("perturbation", "steps");
+    table.title = table.title.replace("{seeds}", &SEEDS.to_string());
     let is_load = |m: &&StepResponse| m.case.is_load();
     for m in &results {
         table.record([
@@ -182,9 +182,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     metrics.set("current_step_warm_fit_rms_deg", most(&StepResponse::fit, &warm));
     metrics.set("lost_runs", results.iter().map(|m| m.lost).sum::<usize>() as f64);
 
-    let title = "Angle error after a step: measured mean, and the linear model";
-    let mut figure = Figure::new("perturbation", title, "section 5.2");
-    let mut speeds = Figure::new("speed", "Speed after a load step", "section 5.2");
+    let mut figure = texts::figure("perturbation", "perturbation");
+    let mut speeds = texts::figure("perturbation", "speed");
     let line = |of: &[f64]| {
         let mean = |(n, c): (usize, &[f64])| {
             (n as f64 * 10.0 / RATE_HZ, c.iter().sum::<f64>() / c.len() as f64)

@@ -91,7 +91,7 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
         mark("section 3.8", "phase of the plant with integrator at the crossover"),
     ];
     let [gains, phases] = [gains, phases].map(|marks| Series::points("printed", marks));
-    Figure::new("w-plane", "Identified plant of Eq. 3.34 in the w plane", "Figures 23, 24, 25")
+    texts::figure("pi-design", "w-plane")
         .panel(gain.y_range(-100.0, 20.0).with(at(-100.0, 20.0)).with(gains))
         .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)).with(phases))
 }
@@ -115,9 +115,7 @@ fn margin_table(loops: &[(&str, FirstOrder, RuleDesign, CurrentLoopDesign)]) -> 
             ]
         })
     });
-    Table::new("Margins on the motor, with LPF and one period of delay", &[])
-        .records(rows)
-        .note(texts::note("pi-design/margins", &[]))
+    texts::table("pi-design", "margins").records(rows)
 }
 
 fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
@@ -151,8 +149,7 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         .with(Series::reference(&*names[0], sensitivity(&rule)))
         .with(Series::line(&*names[1], sensitivity(&used)))
         .with(Series::limit("largest allowed, 2.2", ends(2.2)));
-    let title = "Open loop L of the d axis (Eq. 3.41) with filter, delay and motor";
-    Figure::new("real-loop", title, "")
+    texts::figure("pi-design", "real-loop")
         .panel(gain.y_range(-60.0, 30.0).with(Series::limit("", ends(0.0))))
         .panel(phase.with(Series::limit("", ends(-180.0))))
         .panel(sensitivity)

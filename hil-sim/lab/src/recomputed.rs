@@ -104,7 +104,6 @@ fn figure_13() -> Figure {
     };
     let at = printed("Figure 13", "frequency up to which the difference stays below the bound");
     let mark = |x: f64| vec![(x, 0.0), (x, 10.0)];
-    let title = "Fictitious frequency of the w plane (Eq. 2.18) over the real one";
     let frequencies = Panel::new("real frequency (Hz)", "fictitious frequency (Hz)")
         .with(Series::line("Eq. 2.18", points(&fictitious)))
         .with(Series::reference("equal", points(&|hz| hz)));
@@ -114,5 +113,5 @@ fn figure_13() -> Figure {
         .with(Series::limit("1 %, printed at 460 Hz", vec![(0.0, 1.0), (2800.0, 1.0)]))
         .with(Series::limit("", mark(at)))
         .with(Series::reference("the carrier", mark(CARRIER_HZ)));
-    Figure::new("w-frequency", title, "Figure 13").panel(frequencies).panel(difference)
+    texts::figure("printed-numbers", "w-frequency").panel(frequencies).panel(difference)
 }

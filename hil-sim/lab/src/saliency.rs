@@ -184,10 +184,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.metrics.set("slope_at_rest_per_rad", slope);
     }
     let mut panel = Panel::new("angle error (°)", "q (%)");
-    let mut map =
-        Table::new("q (%) over the angle error", &[]).note(texts::note("saliency/map", &[]));
-    let mut table =
-        Table::new("Slope and second zeros", &[]).note(texts::note("saliency/zeros", &[]));
+    let mut map = texts::table("saliency", "map");
+    let mut table = texts::table("saliency", "zeros");
     for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
         let q = |e: i32| curve.iter().find(|point| point.0 == f64::from(e)).map(|point| point.1);
         let cell = |e: i32| Cell::fixed_or_dash(q(e).map(|q| 100.0 * q), 2);
@@ -207,7 +205,7 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let points = curve.iter().map(|(e, q)| (*e, 100.0 * q)).collect();
         panel = panel.with(Series::line(format!("iq = {i_q_text} A"), points));
     }
-    let figure = Figure::new("map", "Saliency signal over the angle error", "");
+    let figure = texts::figure("saliency", "map");
     outcome.figures.push(figure.panel(panel));
     outcome.tables.extend([map, table]);
     Ok(outcome)

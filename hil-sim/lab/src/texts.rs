@@ -1,18 +1,35 @@
-//! The long texts of the experiments: the remarks and notes of `hil-sim/lab/texts.toml`.
+//! The texts of the experiments, from `hil-sim/lab/texts.toml`: remarks, captions of figures, titles and notes of tables.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
-use sim_bench::outcome::{Metrics, Outcome};
+use sim_bench::outcome::{Figure, Metrics, Outcome, Table};
 
 /// Texts of an experiment.
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Texts {
     remarks: Vec<String>,
-    /// Notes below tables, by name.
-    notes: HashMap<String, String>,
+    tables: HashMap<String, TableText>,
+    figures: HashMap<String, FigureText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TableText {
+    title: String,
+    #[serde(default)]
+    note: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FigureText {
+    title: String,
+    /// The part of the source that the figure reproduces.
+    #[serde(default)]
+    source: String,
 }
 
 /// The texts by the name of the experiment.
@@ -29,13 +46,22 @@ pub fn add_remarks(outcome: &mut Outcome, experiment: &str, values: &[(&str, f64
     outcome.remarks.extend(remarks.iter().map(|text| filled(text, values, &outcome.metrics)));
 }
 
-/// Returns the note `EXPERIMENT/NAME`.
+/// Makes a table of an experiment, without rows.
 ///
 /// # Panics
-/// If there is no such note: they are part of the program.
-pub fn note(name: &str, values: &[(&str, f64)]) -> String {
-    let (experiment, name) = name.split_once('/').unwrap_or((name, ""));
-    filled(&TEXTS[experiment].notes[name], values, &Metrics::default())
+/// If the experiment has no such table: the texts are part of the program.
+pub fn table(experiment: &str, name: &str) -> Table {
+    let TableText { title, note } = &TEXTS[experiment].tables[name];
+    Table::new(title, &[]).note(note)
+}
+
+/// Makes a figure of an experiment, without panels.
+///
+/// # Panics
+/// If the experiment has no such figure: the texts are part of the program.
+pub fn figure(experiment: &str, name: &str) -> Figure {
+    let FigureText { title, source } = &TEXTS[experiment].figures[name];
+    Figure::new(name, title, source)
 }
 
 /// Fills the places `{NAME}` and `{NAME:.DIGITS}` of a text.

@@ -12,8 +12,7 @@ const SAMPLES: usize = 6000;
 
 /// Adds the table and the comparisons.
 pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
-    let mut table =
-        Table::new("LPF before and after the rotation (section 3.4): steps of i_d and i_q", &[]);
+    let mut table = texts::table("as-printed", "order");
     let [mut settles, mut all] = [true, true];
     for hz in FRAME_HZ {
         let (before, after) = (swing(hz, false)?, swing(hz, true)?);
@@ -26,7 +25,7 @@ pub fn add(outcome: &mut Outcome) -> Result<(), Error> {
             ("filter before the rotation (mA)", milli(before)),
         ]);
     }
-    outcome.tables.push(table.note(texts::note("as-printed/order", &[])));
+    outcome.tables.push(table);
     outcome.metrics.set("orders_that_settle", f64::from(u8::from(settles) + u8::from(all)));
     outcome.compared.extend([
         named("order_matters").simulated(settles != all),

@@ -40,9 +40,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
     ]);
     let target = vec![(0.0, 1800.0), (SECONDS, 1800.0)];
     let stop = printed("Figure 37", "time at which the quadrature current is zero") / 1e3;
-    let title = "Five turns with the encoder on the plant of Eq. 4.1 (its unit taken as radians): the printed controller, and the \
-         cascade of the drive";
-    let figure = Figure::new("position", title, "Figure 37");
+    let figure = texts::figure("as-printed", "position");
     let panel = Panel::new("time (s)", "position (°)")
         .with(Series::line("printed controller", literal.degrees))
         .with(Series::line("cascade of the drive", ours.degrees))

@@ -16,8 +16,7 @@ const IQ_A: f64 = 1.5;
 
 /// Adds the table of runs and the comparisons.
 pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
-    let mut table =
-        Table::new("Table 1 as runs: angle error over a second at 1.5 A, and the carrier", &[]);
+    let mut table = texts::table("as-printed", "sources");
     for column in COLUMNS {
         // This holds by construction.
         let without = f64::from(column != COLUMNS[0]);
@@ -45,7 +44,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) -> Result<(), Error> {
             outcome.compared.push(Compared { unknown, ..place }.simulated(works));
         }
     }
-    outcome.tables.push(table.note(texts::note("as-printed/sources", &[])));
+    outcome.tables.push(table);
     Ok(())
 }
 

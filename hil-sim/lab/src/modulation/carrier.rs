@@ -52,10 +52,8 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
 
     let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
     let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);
-    let title = "Eq. 2.15: a band-limited signal A and the injection, their product, and the product \
-             after BPF";
     let (behind, gain) = (Series::line("behind BPF", f), Series::reference("gain of BPF", gain));
-    let figure = Figure::new("spectrum", title, "Figure 11")
+    let figure = texts::figure("modulation", "spectrum")
         .panel(panel().with(Series::line("A", a)).with(Series::line("carrier", c)))
         .panel(panel().with(Series::line("A times carrier", p)))
         .panel(panel().with(behind).with(gain));
