@@ -6,6 +6,7 @@ mod direct;
 mod precision;
 
 use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Section, Sos};
+use drive_settings::tuning::bisected;
 
 use crate::prelude::*;
 use crate::recomputed::CARRIER_HZ;
@@ -177,17 +178,11 @@ fn expanded(sections: &[Section]) -> [Vec<f64>; 2] {
 /// Returns the frequencies in Hz at which `f` changes its sign.
 fn crossings(f: impl Fn(f64) -> f64) -> Vec<f64> {
     let grid: Vec<f64> = (1..3000).map(|k| f64::from(k) + 0.123).collect();
-    let mut found = Vec::new();
-    for pair in grid.windows(2) {
-        let (mut low, mut high) = (pair[0], pair[1]);
-        if (f(low) > 0.0) == (f(high) > 0.0) {
-            continue;
-        }
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if (f(low) > 0.0) == (f(middle) > 0.0) { low = middle } else { high = middle }
-        }
-        found.push(low);
-    }
-    found
+    let is_positive = |hz: f64| f(hz) > 0.0;
+    let changes = grid.windows(2).filter(|pair| is_positive(pair[0]) != is_positive(pair[1]));
+    let crossing = |pair: &[f64]| {
+        let begins = is_positive(pair[0]);
+        bisected((pair[0], pair[1]), 40, &|hz| is_positive(hz) == begins).0
+    };
+    changes.map(crossing).collect()
 }

@@ -105,8 +105,8 @@ fn a1_test_vectors() {
 #[test]
 fn poles_are_those_of_the_continuous_machine() {
     for (machine, h) in cases() {
-        let exact = machine.current_voltage(h);
-        for z in exact.poles() {
+        let exact = machine.delta(h).current_voltage();
+        for z in exact.delta().poles_minus_one().map(|e| e + 1.0) {
             assert!((z * z - exact.f1 * z - exact.f0).norm() < 1e-14);
             // Eq. 25, which prints |z² - f1 z - f0|² for real z, has these roots as well.
             let CurrentVoltage { f1, f0, .. } = exact;
@@ -126,7 +126,7 @@ fn a2_least_squares_on_clean_data_is_exact_and_complex_equals_real() {
             let clean = Trial::printed(machine, signal, h, Noise::NONE).run(1, 0);
             let noisy = Trial::printed(machine, signal, h, Noise::PRINTED).run(1, 0);
             // Clean data come from the fine series, which equals the exponential to within 1e-13.
-            let truth = machine.current_voltage(h).array();
+            let truth = machine.delta(h).current_voltage().array();
             let complex = clean.regression().unwrap().delta.current_voltage().array();
             for (estimated, truth) in complex.iter().zip(truth) {
                 assert!((estimated - truth).abs() < 1e-10, "{machine:?} {h} {signal:?}");
@@ -177,7 +177,7 @@ fn a3_what_models_b_and_c_lose_without_noise() {
 fn a3_model_d_is_the_exact_inverse() {
     for (machine, h) in cases() {
         for (coefficients, bound) in
-            [(machine.current_voltage(h), 1e-9), (series(&machine, h), 2e-7)]
+            [(machine.delta(h).current_voltage(), 1e-9), (series(&machine, h), 2e-7)]
         {
             let errors = percent(&model_d(&coefficients.delta(), h), &machine);
             let worst = errors.iter().fold(0.0f64, |worst, e| worst.max(1e-2 * e.abs()));
@@ -217,7 +217,7 @@ fn a4_model_b_inverts_equation_32_and_c_takes_the_minus_root() {
 fn what_cannot_be_identified_says_why() {
     let h = 50e-6;
     // Standstill: Models B and C divide by the speed; D does not.
-    let still = Parameters::PX.at(0.0).current_voltage(h).delta();
+    let still = Parameters::PX.at(0.0).delta(h);
     let b = model_b(&FirstOrderTheta::from(still), h);
     assert_eq!((b.r_s, b.omega_m), (Err(NotIdentifiable::NoSpeed), Ok(0.0)));
     let c = model_c(&still, h);

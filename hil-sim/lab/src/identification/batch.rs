@@ -86,10 +86,6 @@ pub struct Regression {
     pub delta: Delta,
     /// Upper triangular factor of the regression, for unknowns in the order of [`Delta::array`].
     pub r: Matrix4<Complex>,
-    /// Ratio of the singular values, with the columns scaled to equal length.
-    pub condition: f64,
-    /// Remaining squared error, A².
-    pub residual: f64,
 }
 
 impl Data {
@@ -113,8 +109,6 @@ impl Data {
         Ok(Regression {
             delta: Delta::from_array(theta.into()),
             r: solution.r.fixed_view::<4, 4>(0, 0).into(),
-            condition: solution.condition,
-            residual: solution.residual,
         })
     }
 

@@ -67,12 +67,7 @@ impl Parameters {
         }
     }
 
-    /// The exact sampled equation between current and voltage, with `h` s between samples.
-    pub fn current_voltage(&self, h: f64) -> CurrentVoltage {
-        self.delta(h).current_voltage()
-    }
-
-    /// The exact sampled equation in differences.
+    /// The exact sampled equation between current and voltage in differences, with `h` s between samples.
     pub fn delta(&self, h: f64) -> Delta {
         self.continuous().exact(h).delta()
     }
@@ -204,12 +199,6 @@ impl CurrentVoltage {
         [f1.re, f1.im, f0.re, f0.im, h1.re, h1.im, h0.re, h0.im]
     }
 
-    /// The discrete poles: roots of z² - f1 z - f0. With their conjugates they are the four roots of Eq. 25, which is
-    /// |z² - f1 z - f0|² written out for real z.
-    pub fn poles(&self) -> [Complex; 2] {
-        self.delta().poles_minus_one().map(|e| e + 1.0)
-    }
-
     /// Returns the coefficients of the equation in differences.
     pub fn delta(&self) -> Delta {
         let Self { f1, f0, h1, h0 } = *self;
@@ -236,7 +225,8 @@ pub struct Delta {
 
 impl Delta {
     /// Poles minus one, the larger first: roots of e² + (1 - g1) e - g0. The smaller root comes from the product of the
-    /// two, so that it keeps its digits.
+    /// two, so that it keeps its digits. The poles, roots of z² - f1 z - f0, and their conjugates are the four roots of
+    /// Eq. 25, which is |z² - f1 z - f0|² written out for real z.
     pub fn poles_minus_one(&self) -> [Complex; 2] {
         let half = (Complex::ONE - self.g1) * 0.5;
         let root = (half * half + self.g0).sqrt();
