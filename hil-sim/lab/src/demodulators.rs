@@ -23,18 +23,19 @@ const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 
 /// Results of one demodulation.
 struct DemodulationResults {
+    demodulation: Demodulation,
     /// Curves with saliency and without, by q-axis current.
     maps: [Vec<Curve>; 2],
     seen: Vec<SignalQuality>,
     isotropic: Vec<SignalQuality>,
     /// Delay, samples; none if the saliency makes no difference.
     delay: Option<f64>,
-    /// Results by kind of reference and controller.
-    tracked: Vec<Option<ClosedLoop>>,
+    /// Results of each kind of reference and controller that it has.
+    tracked: Vec<(ReferenceKind, ClosedLoop)>,
 }
 
 impl DemodulationResults {
-    fn of(demodulation: &Demodulation, context: &Context<'_>) -> Result<Self, Error> {
+    fn of(demodulation: Demodulation, context: &Context<'_>) -> Result<Self, Error> {
         let (config, seed) = (context.config, context.seed);
         let mut isotropic = config.clone();
         injection_map::take_saliency(&mut isotropic);
@@ -50,22 +51,23 @@ impl DemodulationResults {
             IQ_A.par_iter().map(quality).collect::<Result<Vec<_>, _>>()
         };
         let learned = learning::reference_of(demodulation.0, &demodulation.config(config), seed)?;
-        let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
-            let Some(config) = demodulation.drive(kind, config, learned) else { return Ok(None) };
+        let track = |config: &Config| -> Result<ClosedLoop, Error> {
             let case = |&rpm: &f64| OperatingPoint { rpm, iq: RUN_IQ_A, seed };
-            let turning = SPEEDS_RPM.par_iter().map(|rpm| steady_run(&config, case(rpm), 1.0));
+            let turning = SPEEDS_RPM.par_iter().map(|rpm| steady_run(config, case(rpm), 1.0));
             let turning = turning.collect::<Result<_, _>>()?;
-            Ok(Some(ClosedLoop { steps: tracked::steps(&config, seed)?, turning }))
+            Ok(ClosedLoop { steps: tracked::steps(config, seed)?, turning })
         };
+        let drive = |&kind| Some((kind, demodulation.drive(kind, config, learned)?));
+        let drives = ReferenceKind::VALUES.iter().filter_map(drive);
         let mut found = Self {
+            demodulation,
             maps: [map(true)?, map(false)?],
             seen: at_each(config)?,
             isotropic: at_each(&isotropic)?,
             delay: None,
-            tracked: ReferenceKind::VALUES
-                .iter()
-                .map(|&kind| track(kind))
-                .collect::<Result<_, _>>()?,
+            tracked: drives
+                .map(|(kind, config)| Ok((kind, track(&config)?)))
+                .collect::<Result<_, Error>>()?,
         };
         if found.isotropic_share() < 0.5 {
             found.delay = Some(signal::delay(demodulation.config(config), DELAY_IQ_A, seed)?);
@@ -96,25 +98,23 @@ struct ClosedLoop {
 /// # Errors
 /// If the configuration or the drive is refused.
 pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let found = context.in_parallel("demodulators", &DEMODULATIONS, |_, demodulation| {
+    let found = context.in_parallel("demodulators", &DEMODULATIONS, |_, &demodulation| {
         DemodulationResults::of(demodulation, context)
     })?;
 
     let mut outcome = Outcome::default();
-    let all = || DEMODULATIONS.iter().zip(&found);
-    outcome.tables.push(seen_table(all()));
+    outcome.tables.push(seen_table(&found));
     outcome.tables.push(tracked_table(&found));
-    outcome.figures.extend(all().map(|(demodulation, f)| map_figure(demodulation, f)));
+    outcome.figures.extend(found.iter().map(map_figure));
     outcome.figures.push(steps_figure(&found));
-    for (demodulation, f) in all() {
-        let m = &mut outcome.metrics;
+    for f in &found {
+        let (m, key) = (&mut outcome.metrics, f.demodulation.key());
         let (seen, _) = f.at_one_ampere();
-        m.set(format!("{}_delay_samples", demodulation.key()), f.delay.unwrap_or(f64::NAN));
-        m.set(format!("{}_noise_deg", demodulation.key()), degrees(seen.noise / seen.slope));
-        m.set(format!("{}_isotropic_share", demodulation.key()), f.isotropic_share());
-        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
-            let (Some(t), kind) = (tracked, kind.word()) else { continue };
-            let name = |what: &str| format!("{}_{kind}_{what}", demodulation.key());
+        m.set(format!("{key}_delay_samples"), f.delay.unwrap_or(f64::NAN));
+        m.set(format!("{key}_noise_deg"), degrees(seen.noise / seen.slope));
+        m.set(format!("{key}_isotropic_share"), f.isotropic_share());
+        for (kind, t) in &f.tracked {
+            let name = |what: &str| format!("{key}_{}_{what}", kind.word());
             m.set(name("steps_lost"), f64::from(u8::from(t.steps.lost)));
             m.set(name("steps_rms_deg"), t.steps.stats.rms());
             m.set(name("steps_max_deg"), t.steps.stats.largest());
@@ -133,13 +133,13 @@ fn degrees(radians: f64) -> f64 {
     radians.to_degrees().abs()
 }
 
-fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
-    let rows = all.flat_map(|(demodulation, f)| {
+fn seen_table(found: &[DemodulationResults]) -> Table {
+    let rows = found.iter().flat_map(|f| {
         IQ_A.iter().zip(&f.seen).zip(&f.isotropic).map(|((iq, s), i)| {
             [
-                ("demodulation", Cell::from(demodulation.name())),
+                ("demodulation", Cell::from(f.demodulation.name())),
                 ("iq (A)", Cell::fixed(*iq, 1)),
-                ("unit", Cell::from(demodulation.unit())),
+                ("unit", Cell::from(f.demodulation.unit())),
                 ("signal", Cell::fixed(s.signal * 1e3, 2)),
                 ("slope (per rad)", Cell::fixed(s.slope * 1e3, 1)),
                 ("noise, rms", Cell::fixed(s.noise * 1e3, 3)),
@@ -154,33 +154,30 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {
-    let fixed =
-        ["demodulation", "reference", "delay (samples)", "torque steps, rms (°)", "largest (°)"];
-    let by_speed = |rpm: f64| ["mean", "rms"].map(|of| format!("{rpm} rpm, {of} (°)"));
-    let heads =
-        fixed.map(String::from).into_iter().chain(SPEEDS_RPM.into_iter().flat_map(by_speed));
-    let heads = heads.collect();
-    let mut table = Table { columns: heads, ..texts::table("demodulators", "tracked") };
+    let mut table = texts::table("demodulators", "tracked");
     table.note = table.note.replace("{iq_a}", &RUN_IQ_A.to_string());
-    for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
-        for (kind, tracked) in ReferenceKind::VALUES.iter().zip(&f.tracked) {
-            let (Some(t), kind) = (tracked, kind.word()) else { continue };
-            let delay = Cell::fixed_or_dash(f.delay, 1);
-            let mut row = vec![Cell::from(demodulation.name()), Cell::from(kind), delay];
-            let mut add = |lost: bool, values: [f64; 2]| {
-                row.extend(values.map(|x| if lost { "lost".into() } else { Cell::fixed(x, 2) }));
-            };
-            add(t.steps.lost, [t.steps.stats.rms(), t.steps.stats.largest()]);
-            for run in &t.turning {
-                add(run.lost, [run.error.mean(), run.error.rms()]);
+    let shown = |lost: bool, x: f64| if lost { "lost".into() } else { Cell::fixed(x, 2) };
+    for f in found {
+        for (kind, ClosedLoop { steps, turning }) in &f.tracked {
+            let mut row = vec![
+                ("demodulation".to_owned(), Cell::from(f.demodulation.name())),
+                ("reference".to_owned(), kind.word().into()),
+                ("delay (samples)".to_owned(), Cell::fixed_or_dash(f.delay, 1)),
+                ("torque steps, rms (°)".to_owned(), shown(steps.lost, steps.stats.rms())),
+                ("largest (°)".to_owned(), shown(steps.lost, steps.stats.largest())),
+            ];
+            for (rpm, run) in SPEEDS_RPM.iter().zip(turning) {
+                row.push((format!("{rpm} rpm, mean (°)"), shown(run.lost, run.error.mean())));
+                row.push((format!("{rpm} rpm, rms (°)"), shown(run.lost, run.error.rms())));
             }
-            table.row(row);
+            table.record(row);
         }
     }
     table
 }
 
-fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
+fn map_figure(f: &DemodulationResults) -> Figure {
+    let demodulation = f.demodulation;
     let panel = |family: &[Curve], of: &str| {
         let y = format!("{of} ({})", demodulation.unit());
         injection_map::panel(y, &IQ_A, family)
@@ -198,11 +195,10 @@ fn steps_figure(found: &[DemodulationResults]) -> Figure {
         Panel::new(x, "error, learned reference (°)").y_range(-60.0, 60.0),
         Panel::new(x, "error, learned, retuned (°)").y_range(-20.0, 20.0),
     ];
-    for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
-        for (panel, tracked) in panels.iter_mut().zip(&f.tracked) {
-            if let Some(t) = tracked {
-                panel.series.push(Series::line(demodulation.name(), t.steps.error.clone()));
-            }
+    for f in found {
+        for (kind, t) in &f.tracked {
+            let line = Series::line(f.demodulation.name(), t.steps.error.clone());
+            panels[kind.place()].series.push(line);
         }
     }
     panels.into_iter().fold(texts::figure("demodulators", "steps"), Figure::panel)
