@@ -39,7 +39,7 @@ impl<'a> Context<'a> {
         let bar = self.progress.bar(label, jobs.len() as u64);
         let one = |(number, job): (usize, &J)| {
             let result = run(number as u64, job);
-            bar.advance(1);
+            bar.inc(1);
             result
         };
         jobs.par_iter().enumerate().map(one).collect()

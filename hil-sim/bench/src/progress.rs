@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+pub use indicatif::ProgressBar;
+use indicatif::{MultiProgress, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 
 /// Makes the progress bars of a command.
 #[derive(Clone)]
@@ -21,8 +22,8 @@ impl Progress {
         Self(MultiProgress::with_draw_target(ProgressDrawTarget::hidden()))
     }
 
-    /// Makes a bar for `length` units of work.
-    pub fn bar(&self, label: &str, length: u64) -> Bar {
+    /// Makes a bar for `length` units of work, which is removed when it is dropped. Many threads may use it at once.
+    pub fn bar(&self, label: &str, length: u64) -> ProgressBar {
         let bar = self.0.add(ProgressBar::new(length).with_finish(ProgressFinish::AndClear));
         let template = "{msg:24} {bar:32} {percent:>3}% {elapsed}";
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -30,21 +31,6 @@ impl Progress {
         }
         bar.set_message(label.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Bar(bar)
-    }
-}
-
-/// A progress bar, which is removed when dropped. Many threads may use it at once.
-pub struct Bar(ProgressBar);
-
-impl Bar {
-    /// Adds `units` of finished work.
-    pub fn advance(&self, units: u64) {
-        self.0.inc(units);
-    }
-
-    /// Changes the label.
-    pub fn label(&self, label: &str) {
-        self.0.set_message(label.to_owned());
+        bar
     }
 }

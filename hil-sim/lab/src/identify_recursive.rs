@@ -85,9 +85,9 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let machine = Parameters::PX.at(speed);
         let trial = Trial::printed(machine, signal, H, Noise::NONE);
         let clean = estimate(&trial, Noise::NONE, seconds, context.seed)?;
-        bar.advance(1);
+        bar.inc(1);
         let noisy = estimate(&trial, LEVEL, seconds, context.seed)?;
-        bar.advance(1);
+        bar.inc(1);
         let times = [0, 1].map(|k| convergence(&clean.estimates, k));
         slowest[index] = times[0].max(times[1]);
         table.record([

@@ -8,12 +8,12 @@ use crate::experiments::source::evidence::Evidence;
 use crate::experiments::{self, EXPERIMENTS};
 use crate::outcome::Origin;
 use crate::prelude::*;
-use crate::progress::Bar;
+use crate::progress::ProgressBar;
 use crate::report::{self, Section};
 
 /// Shows the names of the running experiments.
 struct Running<'a> {
-    bar: &'a Bar,
+    bar: &'a ProgressBar,
     names: Mutex<Vec<&'static str>>,
 }
 
@@ -22,7 +22,7 @@ impl Running<'_> {
         // A panic in another thread ends the program anyway.
         if let Ok(mut names) = self.names.lock() {
             change(&mut names);
-            self.bar.label(&names.join(", "));
+            self.bar.set_message(names.join(", "));
         }
     }
 
@@ -30,7 +30,7 @@ impl Running<'_> {
         self.change(|names| names.push(experiment.name));
         let outcome = experiment.run(context).unwrap_or_else(|error| Outcome::refused(&error));
         self.change(|names| names.retain(|name| *name != experiment.name));
-        self.bar.advance(1);
+        self.bar.inc(1);
         outcome
     }
 }

@@ -111,7 +111,7 @@ impl Scenario {
                 record.points.push(Point { t, turns, angle_error_deg, ..*p });
                 record.references.push(value);
             });
-            progress.advance(1);
+            progress.inc(1);
             record.fault = rig.fault();
             if record.fault.is_some() {
                 break;
