@@ -179,12 +179,8 @@ impl Config {
 /// [`Error::Refused`] with the setting. If nobody set it, the message adds what its rule depends on.
 pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
     settings.build().map_err(|error| {
-        let by_rule = match error {
-            SettingsError::Range { name, .. } => {
-                find(name).is_some_and(|entry| entry.get(settings) == drive::Value::Auto)
-            }
-            SettingsError::Word(..) | SettingsError::Tuning(_) => false,
-        };
+        let is_auto = |name| find(name).is_some_and(|it| it.get(settings) == drive::Value::Auto);
+        let by_rule = matches!(error, SettingsError::Range { name, .. } if is_auto(name));
         let rule = "; it was not set: its rule follows from nameplate, motor, measurement.range_a and inverter.dc_link_v";
         Error::Refused(format!("{error}{}", if by_rule { rule } else { "" }))
     })

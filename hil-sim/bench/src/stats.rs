@@ -2,6 +2,7 @@
 
 pub mod exact;
 
+use drive_settings::tuning::bisected;
 use serde::{Deserialize, Serialize};
 
 /// Mean, rms and largest magnitude of a signal.
@@ -115,10 +116,6 @@ pub fn upper_bound_95(events: u64, trials: u64) -> f64 {
         }
         sum
     };
-    let (mut low, mut high) = (0.0, 10.0 + 3.0 * events as f64);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if at_most(middle) > 0.05 { low = middle } else { high = middle }
-    }
-    high / trials as f64
+    let most = 10.0 + 3.0 * events as f64;
+    bisected((0.0, most), 60, &|mean| at_most(mean) > 0.05).1 / trials as f64
 }

@@ -32,11 +32,6 @@ impl Session {
         Self { link }
     }
 
-    /// The connection.
-    pub fn link(&mut self) -> &mut Link {
-        &mut self.link
-    }
-
     /// Enters lines up to the first that fails; the answers go to standard output.
     ///
     /// # Errors

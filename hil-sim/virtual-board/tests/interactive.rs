@@ -297,7 +297,7 @@ fn the_console_program_understands_the_image() {
     let (mut board, _shown, port) = begin(command(&folder, &[]));
     let link = Link::new(port.try_clone().unwrap(), port, |_: &str| ());
     let mut session = Session::new(link);
-    let catalogue = Catalogue::read(session.link()).unwrap();
+    let catalogue = Catalogue::read(&mut session.link).unwrap();
     assert!(catalogue.settings() > 50);
     for (line, word) in [("rel", "relock"), ("set motor.r_", "motor.r_s"), ("log w", "warn")] {
         assert!(catalogue.complete(line).1.iter().any(|found| found == word), "{line}");

@@ -107,7 +107,14 @@ impl Key {
     pub fn allowed_text(self) -> String {
         let has_rule = matches!(self, Self::Drive(entry) if entry.has_rule());
         let auto = if has_rule { ", or auto" } else { "" };
-        format!("{}{auto}", self.allowed().describe(self.unit()))
+        match self.allowed() {
+            Allowed::Range { min, max } => {
+                let range = format!("{min} to {max} {}", self.unit());
+                format!("{}{auto}", range.trim_end())
+            }
+            Allowed::Words(words) => words.join(", "),
+            Allowed::Switch => "yes, no".to_owned(),
+        }
     }
 
     /// Reads the value.

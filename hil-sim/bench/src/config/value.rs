@@ -74,17 +74,6 @@ pub enum Allowed {
     Switch,
 }
 
-impl Allowed {
-    /// Describes the allowed values in words, with the unit.
-    pub fn describe(&self, unit: &str) -> String {
-        match self {
-            Self::Range { min, max } => format!("{min} to {max} {unit}").trim_end().to_owned(),
-            Self::Words(words) => words.join(", "),
-            Self::Switch => "yes, no".to_owned(),
-        }
-    }
-}
-
 /// A type that a field of the configuration can have.
 pub trait Field: Sized {
     /// Returns the value as text or TOML would give it.
