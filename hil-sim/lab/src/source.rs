@@ -5,7 +5,7 @@
 
 pub mod errata;
 pub mod evidence;
-mod formula;
+pub mod formula;
 
 use std::collections::HashMap;
 use std::sync::LazyLock;

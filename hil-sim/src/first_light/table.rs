@@ -2,7 +2,7 @@
 //! on before gates and fault input were judged.
 
 use super::evidence::{Evidence, Verdict};
-
+use crate::experiments::source::formula::evaluate;
 use crate::prelude::*;
 
 /// First words of the lines after which every gate stays off. Any other line counts as one that switches the power stage on.
@@ -192,17 +192,8 @@ impl Board {
 
     /// Returns the value of an expression. An invalid one gives a value that is not a number, and no reading lies within it.
     pub fn number(&self, expression: &str) -> f64 {
-        let text = self.fill(expression);
-        // A sign at the beginning is not an operator.
-        let Some(at) = text.rfind(['+', '-', '*']).filter(|at| *at > 0) else {
-            return text.parse().unwrap_or(f64::NAN);
-        };
-        let (a, b) = (self.number(&text[..at]), self.number(&text[at + 1..]));
-        match &text[at..=at] {
-            "+" => a + b,
-            "-" => a - b,
-            _ => a * b,
-        }
+        let value = |name: &str| self.values.get(name)?.parse().ok();
+        evaluate(expression, &value).unwrap_or(f64::NAN)
     }
 
     /// Whether the board has three current sensors.
