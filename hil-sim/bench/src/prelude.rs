@@ -19,6 +19,6 @@ pub use crate::experiment::{Context, Experiment, LOST_DEG, assumptions};
 pub use crate::outcome::{Cell, Column, Compared, Figure, Metrics, Outcome, Panel, Series, Table};
 pub use crate::plant::{Load, Plant};
 pub use crate::progress::Progress;
-pub use crate::rig::{Point, RATE_HZ, Rig, fault_text, tracks, wrapped_degrees};
+pub use crate::rig::{Point, RATE_HZ, Rig, fault_text, wrapped_degrees};
 pub use crate::statistics::{Study, or_refusal, seed_of, whole};
 pub use crate::stats::{Stats, quantile, sorted};

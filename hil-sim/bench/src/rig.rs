@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
 use crate::stats::Stats;
 use drive_core::learned::Learned;
-use drive_core::printed::DemodulatorKind;
 use drive_core::{
     Accepted, AngleSource, Command, Drive, Fault, FrontEndState, Mode, Sample, State, Stop,
 };
@@ -106,7 +105,7 @@ impl Rig {
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
         rig.plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
-        if config.prepare.learn && tracks(&config.drive) {
+        if config.prepare.learn && config.drive.tracks_synchronously() {
             rig.set_load(Load::Locked)?;
             rig.learn()?;
             // The flux decays.
@@ -295,12 +294,6 @@ impl Rig {
     pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
         self.plant.set_load(load).map_err(Error::refused)
     }
-}
-
-/// Whether a drive with these settings tracks the saliency and can learn it.
-pub fn tracks(settings: &Settings) -> bool {
-    settings.angle_source == AngleSource::Injection
-        && settings.injection.demodulator == DemodulatorKind::Synchronous
 }
 
 /// Describes a fault in words, with its number.

@@ -81,7 +81,7 @@ impl Battery {
         let (group, config) = (self.group(number), &self.config);
         once(&self.drives[group], || {
             let drive = Drive::new(built(&config.drive)?);
-            if !(config.prepare.learn && tracks(&config.drive)) {
+            if !(config.prepare.learn && config.drive.tracks_synchronously()) {
                 return Ok(Ok(drive));
             }
             let mut bench = config.clone();

@@ -65,7 +65,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 /// If the settings are refused.
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Learnt, Error> {
     let drive = Drive::new(built(&config.drive)?);
-    if tracks(&config.drive) { learned(config, drive, seed) } else { Ok(Ok(drive)) }
+    if config.drive.tracks_synchronously() { learned(config, drive, seed) } else { Ok(Ok(drive)) }
 }
 
 /// The runs, with the cases in alternation, so that each shard has its part of each case.

@@ -125,8 +125,8 @@ impl Settings {
         rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
     }
 
-    /// Whether the angle comes from the synchronous demodulation.
-    pub(crate) fn tracks_synchronously(&self) -> bool {
+    /// Whether the angle comes from the synchronous demodulation, whose saliency the drive can learn.
+    pub fn tracks_synchronously(&self) -> bool {
         self.angle_source == AngleSource::Injection
             && self.injection.demodulator == DemodulatorKind::Synchronous
     }
