@@ -65,10 +65,7 @@ impl Image {
     /// The contents are no image, or damaged.
     pub fn new(mut bytes: Vec<u8>) -> Result<Self, &'static str> {
         bytes.resize(bytes.len().next_multiple_of(PAGE), 0xff);
-        let word = |at: usize| {
-            let word = bytes.get(at..at + 4)?;
-            Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-        };
+        let word = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
         // The list of pieces (`memory.x`) begins with the previous piece.
         let begins =
             |at: &usize| [word(*at), word(at + 4)] == [FLASH, FLASH + *at as u32].map(Some);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use drive_settings::Settings;
 use drive_settings::value::Words as _;
 
-use super::value::{Allowed, CopyTo as _, Field, Value};
+use super::value::{Allowed, Field, Value};
 pub use super::words::*;
 use crate::plant::{IronSettings, PlantSettings};
 
@@ -90,7 +90,12 @@ macro_rules! keys {
         impl Config {
             /// Copies the values of the keys to the settings of the plant; where a key is unset, the setting stays.
             pub(super) fn copy_to(&self, $plant: &mut PlantSettings, $iron: &mut IronSettings) {
-                $($($(self.$group.$field.copy_to(&mut $place);)?)+)+
+                $($($(
+                    // A value that is always set is `Some` of itself.
+                    if let Some(value) = Option::from(self.$group.$field) {
+                        $place = value;
+                    }
+                )?)+)+
             }
         }
 

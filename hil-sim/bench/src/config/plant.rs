@@ -7,7 +7,6 @@ use drive_core::io::CONVERTER_CODES;
 use drive_settings::value::Words as _;
 
 use super::{Config, FluxLevel, LoadMode};
-use crate::config::value::CopyTo as _;
 use crate::plant::{FAMILIES, IronSettings, Load, MeasurementSettings, PlantSettings};
 
 /// Scales of the drive's current channels a and b that match these sensors, without the sensors' errors.
@@ -51,9 +50,9 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     plant.measurement.noise_a *= relative_range;
     plant.measurement.lsb_a *= relative_range;
     plant.measurement.dc_link_v *= relative_voltage.max(1.0);
-    s.dc_link_range_v
-        .map(|v| v / f64::from(CONVERTER_CODES))
-        .copy_to(&mut plant.measurement.dc_link_v);
+    if let Some(range_v) = s.dc_link_range_v {
+        plant.measurement.dc_link_v = range_v / f64::from(CONVERTER_CODES);
+    }
     plant.measurement.heat_sink_code = config.drive.scales.ntc.code(s.heat_sink_c as f32);
     plant.mechanics.stops = config.shaft.stops_turns * TAU;
     plant.mechanics.load = match config.load.mode {

@@ -133,23 +133,3 @@ impl<T: Field> Field for Option<T> {
         }
     }
 }
-
-/// A value of the configuration that the settings of the plant have as well.
-pub trait CopyTo<T> {
-    /// Copies the value; a value that is not set leaves `place` unchanged.
-    fn copy_to(self, place: &mut T);
-}
-
-impl<T> CopyTo<T> for T {
-    fn copy_to(self, place: &mut T) {
-        *place = self;
-    }
-}
-
-impl<T> CopyTo<T> for Option<T> {
-    fn copy_to(self, place: &mut T) {
-        if let Some(value) = self {
-            *place = value;
-        }
-    }
-}
