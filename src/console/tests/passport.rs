@@ -6,7 +6,7 @@ use drive_commission::Step;
 use hil_sim::Config;
 use hil_sim::config::motors::Motor;
 use hil_sim::config::{LoadMode, RangeKind};
-use hil_sim::experiments::full_range;
+use hil_sim::experiments::find;
 use hil_sim::passport::{of_console, write};
 use hil_sim::rig::Rig;
 
@@ -83,7 +83,7 @@ fn apart(motor: &str, runs: u32) -> (usize, f64, f64) {
     let [original, twin] = [original, twin].map(|mut config| {
         config.full_range.kind = Some(RangeKind::Constant);
         config.extent.runs = Some(runs);
-        full_range::EXPERIMENT.outcome(&config, 1).unwrap().metrics
+        find("full-range").unwrap().outcome(&config, 1).unwrap().metrics
     });
     let largest = |end: &str| {
         let of = original.iter().filter(|(name, _)| name.ends_with(end));
