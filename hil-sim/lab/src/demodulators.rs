@@ -154,8 +154,7 @@ fn seen_table(found: &[DemodulationResults]) -> Table {
 }
 
 fn tracked_table(found: &[DemodulationResults]) -> Table {
-    let mut table = texts::table("demodulators", "tracked");
-    table.note = table.note.replace("{iq_a}", &RUN_IQ_A.to_string());
+    let mut table = texts::table_with("demodulators", "tracked", &[("iq_a", RUN_IQ_A)]);
     let shown = |lost: bool, x: f64| if lost { "lost".into() } else { Cell::fixed(x, 2) };
     for f in found {
         for (kind, ClosedLoop { steps, turning }) in &f.tracked {

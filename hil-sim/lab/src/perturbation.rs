@@ -154,8 +154,8 @@ pub fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for m in results.iter().filter(|m| m.lost > 0) {
         outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
     }
-    let mut table = texts::table("perturbation", "steps");
-    table.title = table.title.replace("{seeds}", &SEEDS.to_string());
+    let seeds = [("seeds", SEEDS as f64)];
+    let mut table = texts::table_with("perturbation", "steps", &seeds);
     let is_load = |m: &&StepResponse| m.case.is_load();
     for m in &results {
         table.record([

@@ -40,7 +40,7 @@ static TEXTS: LazyLock<HashMap<String, Texts>> = LazyLock::new(|| {
 /// Adds the remarks of an experiment. A place gets the value of its name, or else the metric of its name.
 ///
 /// # Panics
-/// If the experiment has no texts: they are part of the program.
+/// If the experiment has no texts, or a place no value: the texts are part of the program.
 pub fn add_remarks(outcome: &mut Outcome, experiment: &str, values: &[(&str, f64)]) {
     let remarks = &TEXTS[experiment].remarks;
     outcome.remarks.extend(remarks.iter().map(|text| filled(text, values, &outcome.metrics)));
@@ -51,8 +51,17 @@ pub fn add_remarks(outcome: &mut Outcome, experiment: &str, values: &[(&str, f64
 /// # Panics
 /// If the experiment has no such table: the texts are part of the program.
 pub fn table(experiment: &str, name: &str) -> Table {
+    table_with(experiment, name, &[])
+}
+
+/// Makes a table of an experiment, without rows, with these values at the places of its title and its note.
+///
+/// # Panics
+/// As [`table`], or if a place has no value.
+pub fn table_with(experiment: &str, name: &str, values: &[(&str, f64)]) -> Table {
     let TableText { title, note } = &TEXTS[experiment].tables[name];
-    Table::new(title, &[]).note(note)
+    let text = |text| filled(text, values, &Metrics::default());
+    Table::new(text(title), &[]).note(text(note))
 }
 
 /// Makes a figure of an experiment, without panels.
@@ -70,11 +79,11 @@ fn filled(text: &str, values: &[(&str, f64)], metrics: &Metrics) -> String {
     for (part, is_place) in text.split(['{', '}']).zip([false, true].into_iter().cycle()) {
         let (name, digits) = part.split_once(":.").unwrap_or((part, ""));
         let given = values.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
-        let value = given.or_else(|| metrics.get(name)).unwrap_or(f64::NAN);
+        let value = || given.or_else(|| metrics.get(name)).expect(name);
         filled += &match digits.parse::<usize>() {
             _ if !is_place => part.to_owned(),
-            Ok(digits) => format!("{value:.digits$}"),
-            Err(_) => value.to_string(),
+            Ok(digits) => format!("{:.digits$}", value()),
+            Err(_) => value().to_string(),
         };
     }
     filled
