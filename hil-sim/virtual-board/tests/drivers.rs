@@ -125,11 +125,7 @@ fn a_wrong_polarity_is_caught_at_the_first_pulse() -> Result<()> {
             move |seen: &str| {
                 is(
                     seen,
-                    if interlock {
-                        BadGates::Interlocked { leg }
-                    } else {
-                        BadGates::Together { leg }
-                    },
+                    if interlock { BadGates::Interlocked(leg) } else { BadGates::Together(leg) },
                 )
             }
         };

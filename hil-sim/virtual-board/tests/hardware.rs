@@ -7,7 +7,6 @@ use hil_sim::config::LoadMode;
 use virtual_board::board::rom::{N_BOOT0, N_SWBOOT0};
 use virtual_board::chip::TICKS_PER_PERIOD;
 use virtual_board::periph::Reset;
-use virtual_board::power_stage::driver::Request;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
 use virtual_board::{Board, Image, Options, Pair};
 
@@ -86,9 +85,9 @@ fn gates_on(board: &mut Board) -> Vec<String> {
         let requests = driver.requests(leg, &chip.gpio, &chip.tim1, true);
         for (side, request) in ["high", "low"].into_iter().zip(requests) {
             match request {
-                Request::Undefined => on.push(format!("{side} {name} perhaps")),
-                Request::Known(wave) if wave.at(0) => on.push(format!("{side} {name}")),
-                Request::Known(_) => {}
+                None => on.push(format!("{side} {name} perhaps")),
+                Some(wave) if wave.at(0) => on.push(format!("{side} {name}")),
+                Some(_) => {}
             }
         }
     }

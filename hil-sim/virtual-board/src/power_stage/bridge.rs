@@ -5,7 +5,7 @@ use induction_drive::board::PWM_TOP;
 use thiserror::Error;
 
 use super::PowerStage;
-use super::driver::{Driver, Request};
+use super::driver::Driver;
 use crate::periph::tim1::{Tim1, Wave};
 use crate::{periph::gpio::Gpio, time::TICKS_PER_S};
 
@@ -34,18 +34,12 @@ pub enum BadGates {
         /// Switch, 0 is the high side.
         side: usize,
     },
-    /// Both switches of a leg are on together.
-    #[error("both switches of leg {} are on", LEGS[*leg])]
-    Together {
-        /// Leg, 0 is a.
-        leg: usize,
-    },
-    /// Both inputs of a leg request on; the driver's interlock keeps both switches off.
-    #[error("both inputs of leg {} request on, and the driver blocks", LEGS[*leg])]
-    Interlocked {
-        /// Leg, 0 is a.
-        leg: usize,
-    },
+    /// Both switches of this leg, 0 is a, are on together.
+    #[error("both switches of leg {} are on", LEGS[*_0])]
+    Together(usize),
+    /// Both inputs of this leg, 0 is a, request on; the driver's interlock keeps both switches off.
+    #[error("both inputs of leg {} request on, and the driver blocks", LEGS[*_0])]
+    Interlocked(usize),
     /// The switches of a leg follow each other too soon.
     #[error("leg {} has a dead time of {:.2} us", LEGS[*leg], us(*dead_time))]
     Short {
@@ -173,12 +167,14 @@ impl Leg {
     fn new(driver: &Driver, own: u32, leg: usize, gpio: &[Gpio], tim1: &Tim1) -> Self {
         let period = tim1.period();
         let requests = driver.requests(leg, gpio, tim1, true);
-        let undefined = requests.map(|request| request == Request::Undefined);
-        let [high, low] = requests.map(|request| request.at_worst(period));
+        let undefined = requests.map(|request| request.is_none());
+        // In the worst case a switch whose level is not defined is on.
+        let [high, low] =
+            requests.map(|request| request.unwrap_or_else(|| Wave::constant(period, true)));
         let (pieces, interlocked) = pieces(high, low, driver.interlock);
         let ideal = driver.requests(leg, gpio, tim1, false);
         let compare = match ideal {
-            [Request::Known(high), Request::Known(low)] if low == high.inverted() => {
+            [Some(high), Some(low)] if low == high.inverted() => {
                 // As a share of the plant's top, independent of the timer's.
                 Some((high.high() * u32::from(PWM_TOP) / period) as u16)
             }
@@ -223,10 +219,10 @@ impl Leg {
             }
         }
         if self.pieces.iter().any(|piece| piece.on == [true; 2]) {
-            return Err(BadGates::Together { leg });
+            return Err(BadGates::Together(leg));
         }
         if self.interlocked {
-            return Err(BadGates::Interlocked { leg });
+            return Err(BadGates::Interlocked(leg));
         }
         match self.gaps(0).chain(self.gaps(1)).min() {
             Some(dead_time) if dead_time < shortest => Err(BadGates::Short { leg, dead_time }),
@@ -258,36 +254,18 @@ fn with_dead_time(mut pieces: Vec<Piece>, own: u32) -> Vec<Piece> {
     if own == 0 {
         return pieces;
     }
-    let count = pieces.len();
     for side in [0, 1] {
         // Ticks at the end of the period since the other switch was last on.
-        let mut since = own;
-        let mut later = 0;
-        for piece in pieces.iter().rev() {
-            if piece.on[1 - side] {
-                since = later;
-                break;
-            }
-            later += piece.ticks;
-        }
-        let mut made = Vec::with_capacity(count + 2);
+        let last = pieces.iter().rposition(|piece| piece.on[1 - side]);
+        let mut since = last.map_or(own, |n| pieces[n + 1..].iter().map(|piece| piece.ticks).sum());
+        let mut made = Vec::with_capacity(pieces.len() + 2);
         for piece in pieces {
-            if piece.on[1 - side] {
-                since = 0;
-                made.push(piece);
-                continue;
-            }
-            let wait = if piece.on[side] { own.saturating_sub(since).min(piece.ticks) } else { 0 };
-            if wait > 0 {
-                let mut off = piece;
-                off.ticks = wait;
-                off.on[side] = false;
-                made.push(off);
-            }
-            if wait < piece.ticks {
-                made.push(Piece { from: piece.from + wait, ticks: piece.ticks - wait, ..piece });
-            }
-            since += piece.ticks;
+            let (on, other) = (piece.on[side], piece.on[1 - side]);
+            let wait = if on && !other { own.saturating_sub(since).min(piece.ticks) } else { 0 };
+            let off = Piece { ticks: wait, on: [false; 2], ..piece };
+            let rest = Piece { from: piece.from + wait, ticks: piece.ticks - wait, ..piece };
+            made.extend([off, rest].into_iter().filter(|piece| piece.ticks > 0));
+            since = if other { 0 } else { since + piece.ticks };
         }
         pieces = made;
     }

@@ -42,24 +42,9 @@ pub struct Driver {
     pub dead_time_s: f64,
 }
 
-/// The request of an input over a PWM period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Request {
-    /// Whether the switch is requested on, at each time.
-    Known(Wave),
-    /// The level is not defined: on or off.
-    Undefined,
-}
-
-impl Request {
-    /// Returns the request in the worst case: on if the level is not defined.
-    pub fn at_worst(self, period: u32) -> Wave {
-        match self {
-            Self::Known(wave) => wave,
-            Self::Undefined => Wave::constant(period, true),
-        }
-    }
-}
+/// The request of an input over a PWM period: whether the switch is requested on, at each time. With none, the level is
+/// not defined: on or off.
+pub type Request = Option<Wave>;
 
 /// Returns the level that resistors set: low below the first threshold, high above the second, none in between.
 pub fn level(pulls: impl Iterator<Item = Pull> + Clone, thresholds: (f64, f64)) -> Option<bool> {
@@ -93,19 +78,17 @@ impl Input {
             Pad::Input | Pad::Analog => Output::Released,
         };
         let level = self.level(port.pull(number));
-        match driven {
-            Output::Driven(wave) if port.open_drain(number) => match level {
-                Some(true) => Request::Known(asks(wave)),
-                // The high level is not driven, and nothing else sets it.
-                Some(false) => Request::Known(asks(Wave::constant(period, false))),
-                None => Request::Undefined,
-            },
-            Output::Driven(wave) => Request::Known(asks(wave)),
-            Output::Unknown => Request::Undefined,
-            Output::Released => level.map_or(Request::Undefined, |level| {
-                Request::Known(asks(Wave::constant(period, level)))
-            }),
-        }
+        let constant = |level| Wave::constant(period, level);
+        let wave = match driven {
+            // The high level is not driven: the resistors set it, or nothing does.
+            Output::Driven(wave) if port.open_drain(number) => {
+                level.map(|high| if high { wave } else { constant(false) })
+            }
+            Output::Driven(wave) => Some(wave),
+            Output::Unknown => None,
+            Output::Released => level.map(constant),
+        };
+        wave.map(asks)
     }
 }
 
