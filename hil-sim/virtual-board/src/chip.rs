@@ -18,7 +18,7 @@ use crate::periph::tim1::{Event, Tim1};
 use crate::periph::uart::{self, Uart};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::periph::{
-    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dacs, encoder::EncoderTimer, flash::Flash,
+    adc::Adc, analog::Comparators, crc::CrcUnit, dac::Dac, encoder::EncoderTimer, flash::Flash,
     gpio::Gpio, iwdg::Iwdg, pwr::Pwr, rcc::Rcc, tim8::Tim8, time_base::TimeBase, wwdg::Wwdg,
 };
 use crate::power_stage::{self, watch::GateWatch};
@@ -141,7 +141,7 @@ defaults! {
         /// Timer of the power stage.
         pub tim1: Tim1,
         /// Timer of the brake chopper.
-        pub tim8: Tim8 = Tim8::at_reset(),
+        pub tim8: Tim8 = Tim8(Store::of("TIM8")),
         /// Timer of the encoder.
         pub tim2: EncoderTimer,
         /// Time base.
@@ -155,7 +155,7 @@ defaults! {
         /// Comparators.
         pub comp: Comparators,
         /// Reference voltages of the comparators.
-        pub dac: Dacs,
+        pub dac: [Dac; 2] = [1, 3].map(Dac::new),
         /// Console.
         pub lpuart: Uart,
         /// Field bus.
@@ -255,14 +255,14 @@ impl Chip {
             self.scs.systick.next_event(),
             self.rcc.next_event(),
             self.comp.next_event(),
-            self.dac.next_event(self.now),
+            self.dac[0].next_event(self.now),
+            self.dac[1].next_event(self.now),
             self.dc_link.next_event(),
             self.back_on.unwrap_or(NEVER),
             self.now.saturating_add(PATIENCE),
         ]
         .into_iter()
-        .min()
-        .unwrap_or(NEVER)
+        .fold(NEVER, u64::min)
     }
 
     /// Checks the gates; called whenever a pin or the timer's outputs may have changed.

@@ -180,8 +180,8 @@ impl Chip {
                 let low = if offset == IDR { self.grounded[port(address)] } else { 0 };
                 Some(self.gpio[port(address)].read(offset)? & !low)
             }
-            DAC1 => self.dac.read(0, offset, now),
-            DAC3 => self.dac.read(1, offset, now),
+            DAC1 => self.dac[0].read(offset, now),
+            DAC3 => self.dac[1].read(offset, now),
             _ => None,
         }
     }
@@ -228,8 +228,8 @@ impl Chip {
             },
             EXTI => self.exti.write(offset, value)?,
             GPIOA..=GPIOG => self.gpio[port(address)].write(offset, value)?,
-            DAC1 => self.dac.write(0, offset, value, rules)?,
-            DAC3 => self.dac.write(1, offset, value, rules)?,
+            DAC1 => self.dac[0].write(offset, value, rules)?,
+            DAC3 => self.dac[1].write(offset, value, rules)?,
             _ => return None,
         };
         self.check_rules(address, value);

@@ -90,7 +90,7 @@ impl Chip {
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
             let level = self.level_of(n);
-            let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
+            let code = level.map(|(which, channel)| self.dac[which].code(channel, self.now));
             self.comp.references[n] = code.map_or(u16::MAX, |code| code + self.comparator_offset);
         }
         match self.damage {
@@ -108,8 +108,9 @@ impl Chip {
     pub(super) fn check_reference(&mut self, offset: u32) {
         let n = ((offset - 0x200) / 4) as usize;
         if let (true, Some((which, channel))) = (self.comp.is_on(n), self.level_of(n)) {
-            let (ready, comp, dac) = (self.dac.seen_ready(which, channel), n + 1, [1, 3][which]);
-            self.rules.require(ready, Rule::DacReady, || {
+            let (dac, comp) = (&self.dac[which], n + 1);
+            self.rules.require(dac.seen_ready(channel), Rule::DacReady, || {
+                let dac = dac.number;
                 format!("COMP{comp} is on, but DAC{dac}_SR.DAC{channel}RDY was never read as set")
             });
         }

@@ -40,38 +40,41 @@ impl Channel {
 }
 
 defaults! {
-    /// One DAC.
+    /// A DAC.
     #[derive(Clone, Debug)]
-    struct Dac {
+    pub struct Dac {
+        /// Its number in the names of registers.
+        pub number: u32,
         store: Store = Store::of("DAC"),
         channels: [Channel; 2],
     }
 }
 
-/// Both DACs.
-#[derive(Clone, Debug, Default)]
-pub struct Dacs([Dac; 2]);
+impl Dac {
+    /// Makes the DAC with this number.
+    pub fn new(number: u32) -> Self {
+        Self { number, ..Self::default() }
+    }
 
-impl Dacs {
-    /// Returns the output of channel 1 or 2 of a DAC, counts.
-    pub fn code(&self, which: usize, channel: usize, now: u64) -> u16 {
-        self.0[which].channels[channel - 1].output(now)
+    /// Returns the output of channel 1 or 2, counts.
+    pub fn code(&self, channel: usize, now: u64) -> u16 {
+        self.channels[channel - 1].output(now)
     }
 
     /// Whether the program has read that a channel is ready.
-    pub fn seen_ready(&self, which: usize, channel: usize) -> bool {
-        self.0[which].channels[channel - 1].seen_ready
+    pub fn seen_ready(&self, channel: usize) -> bool {
+        self.channels[channel - 1].seen_ready
     }
 
     /// Returns the time at which an output settles next.
     pub fn next_event(&self, now: u64) -> u64 {
-        let all = self.0.iter().flat_map(|dac| dac.channels.iter().map(|c| c.settled_at));
-        all.filter(|at| *at > now).min().unwrap_or(NEVER)
+        let settled = self.channels.iter().map(|channel| channel.settled_at);
+        settled.filter(|at| *at > now).min().unwrap_or(NEVER)
     }
 
     /// Reads a register.
-    pub fn read(&mut self, which: usize, offset: u32, now: u64) -> Option<u32> {
-        let Dac { store, channels } = &mut self.0[which];
+    pub fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        let Self { store, channels, .. } = self;
         let value = store.read(offset)?;
         if let Some(n) = DOR.iter().position(|known| *known == offset) {
             return Some(u32::from(channels[n].code));
@@ -87,27 +90,20 @@ impl Dacs {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        which: usize,
-        offset: u32,
-        value: u32,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
         let now = rules.now;
-        let Dac { store, channels } = &mut self.0[which];
+        let Self { number, store, channels } = self;
         let on = |store: &Store, n: usize| store.get(CR) >> (16 * n) & 1 != 0;
         let was = [on(store, 0), on(store, 1)];
-        let name = ["DAC1", "DAC3"][which];
         if offset == MCR {
             for n in 0..2 {
                 let mode = |value: u32| value >> (16 * n) & 7;
                 if mode(value) == mode(store.get(MCR)) {
                     continue;
                 }
-                rules.require(!was[n], Rule::DacMode, || format!("{name}_MCR while it is on"));
+                rules.require(!was[n], Rule::DacMode, || format!("DAC{number}_MCR while it is on"));
                 rules.require(channels[n].has_data, Rule::DacMode, || {
-                    format!("{name}_MCR before the first data of channel {}", n + 1)
+                    format!("DAC{number}_MCR before the first data of channel {}", n + 1)
                 });
             }
             if was.contains(&true) {

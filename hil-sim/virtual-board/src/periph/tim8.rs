@@ -18,11 +18,6 @@ const PWM_1: u32 = 0x60;
 pub struct Tim8(pub Store);
 
 impl Tim8 {
-    /// Returns the state after a reset.
-    pub fn at_reset() -> Self {
-        Self(Store::of("TIM8"))
-    }
-
     /// Returns the share of a period in which its first output is high. A new compare value takes effect at once, not in the next period.
     pub fn duty(&self) -> f64 {
         let get = |offset| self.0.get(offset);
