@@ -31,6 +31,8 @@ pub enum Backing {
 pub const FLASH: u32 = 0x0800_0000;
 /// Flash in both banks, bytes.
 pub const FLASH_SIZE: u32 = 512 * 1024;
+/// First address after the flash.
+pub const FLASH_END: u32 = FLASH + FLASH_SIZE;
 /// The second bank. It begins with the control code's copy.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
 /// The last quarter of the second bank, which the firmware writes. Its accesses go through the model of the flash, so
@@ -62,7 +64,7 @@ pub const SYSTEM: u32 = 0x1fff_0000;
 pub const MAP: [(u32, u32, Backing); 11] = [
     (SYSTEM, 0x7000, Backing::Flash),
     (FLASH, STORED - FLASH, Backing::Flash),
-    (STORED, FLASH + FLASH_SIZE - STORED, Backing::Registers),
+    (STORED, FLASH_END - STORED, Backing::Registers),
     (0x1fff_7000, 0x1000, Backing::Registers),
     (RAM, RAM_SIZE, Backing::Ram),
     (CCM, CCM_SIZE, Backing::Ram),

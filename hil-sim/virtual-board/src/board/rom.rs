@@ -8,7 +8,7 @@ use induction_drive::board::HSI_HZ;
 
 use super::Board;
 use crate::chip::TICKS_PER_S;
-use crate::memory::{FLASH, FLASH_SIZE, STORED, SYSTEM};
+use crate::memory::{FLASH, FLASH_END, STORED, SYSTEM};
 use crate::periph::Reset;
 use crate::periph::flash::{ERASE, PAGE, PROGRAM};
 use crate::periph::rcc::{AHB2ENR, On};
@@ -188,7 +188,7 @@ impl Board {
             [_, _, ref at @ ..] if at.len() < 5 => (true, Vec::new()),
             [command, _, ref at @ ..] if at.len() == 5 => {
                 let place = address(&at[..4]);
-                let right = sums_up(at) && (FLASH..FLASH + FLASH_SIZE).contains(&place);
+                let right = sums_up(at) && (FLASH..FLASH_END).contains(&place);
                 if right && command == 0x21 {
                     self.answer(&[ACK]);
                     self.jump(place);
@@ -240,7 +240,7 @@ impl Board {
 
     fn erase(&mut self, page: u32) -> bool {
         let at = FLASH + page * PAGE as u32;
-        let inside = at < FLASH + FLASH_SIZE && !self.chip().flash.power_lost;
+        let inside = at < FLASH_END && !self.chip().flash.power_lost;
         if inside {
             self.change(at, &[0xff; PAGE], ERASE);
         }

@@ -52,6 +52,9 @@ const IWDG: u32 = 0x4000_3000;
 const RCC: u32 = 0x4002_1000;
 /// Address of the factory calibration; the counts of the chip's internal reference are at its offset 0x1aa (datasheet, VREFINT_CAL).
 const FACTORY: u32 = 0x1fff_7400;
+const DBGMCU: u32 = 0xe004_2000;
+/// First address of the registers of the core.
+const CORE: u32 = 0xe000_0000;
 const BDTR: u32 = TIM1 + 0x44;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
@@ -119,35 +122,15 @@ impl Chip {
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 | USART3 => Some(0),
-            _ if (0xe000_e400..0xe000_e4f0).contains(&address) => self.scs.read(address, self.now),
             _ => self.read_word(address),
         }
     }
 
     fn read_word(&mut self, address: u32) -> Option<u32> {
-        let offset = address & 0x3ff;
-        let now = self.now;
-        if address >= 0xe000_0000 {
-            return match address & !0xfff {
-                0xe004_2000 => self.debug.read(offset),
-                _ => self.scs.read(address, now),
-            };
-        }
-        if (memory::STORED..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
-            self.fetch(address, 4);
-            let (value, torn) = self.flash.load(address);
-            if torn {
-                self.flash_error();
-            }
-            return Some(value);
-        }
-        if !self.is_clocked(address) {
-            return self.at_reset(address);
-        }
-        self.read_clocked(address)
+        if self.is_clocked(address) { self.read_clocked(address) } else { self.at_reset(address) }
     }
 
-    /// Reads a register of a peripheral whose clock is on.
+    /// Reads a register of a peripheral whose clock is on, or of one without a clock of its own.
     pub(super) fn read_clocked(&mut self, address: u32) -> Option<u32> {
         let (offset, now) = (address & 0x3ff, self.now);
         match address & !0x3ff {
@@ -182,27 +165,25 @@ impl Chip {
             }
             DAC1 => self.dac[0].read(offset, now),
             DAC3 => self.dac[1].read(offset, now),
+            memory::STORED..memory::FLASH_END => {
+                self.fetch(address, 4);
+                let (value, torn) = self.flash.load(address);
+                if torn {
+                    self.flash_error();
+                }
+                Some(value)
+            }
+            DBGMCU => self.debug.read(offset),
+            CORE.. => self.scs.read(address, now),
             _ => None,
         }
     }
 
     fn write_word(&mut self, address: u32, value: u32) -> Option<()> {
-        let offset = address & 0x3ff;
-        let now = self.now;
-        if address >= 0xe000_0000 {
-            let effect = match address & !0xfff {
-                0xe004_2000 => self.debug.write(offset, value)?,
-                _ => self.scs.write(address, value, now)?,
-            };
-            return self.follow(effect);
-        }
-        if (memory::STORED..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
-            let effect = self.flash.store(address, value, now)?;
-            return self.follow(effect);
-        }
         if !self.is_clocked(address) {
             return Some(());
         }
+        let (offset, now) = (address & 0x3ff, self.now);
         let locked = self.monitor_is_locked();
         let rules = &mut self.rules;
         let effect = match address & !0x3ff {
@@ -230,6 +211,9 @@ impl Chip {
             GPIOA..=GPIOG => self.gpio[port(address)].write(offset, value)?,
             DAC1 => self.dac[0].write(offset, value, rules)?,
             DAC3 => self.dac[1].write(offset, value, rules)?,
+            memory::STORED..memory::FLASH_END => self.flash.store(address, value, now)?,
+            DBGMCU => self.debug.write(offset, value)?,
+            CORE.. => self.scs.write(address, value, now)?,
             _ => return None,
         };
         self.check_rules(address, value);

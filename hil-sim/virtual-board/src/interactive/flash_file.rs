@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use hil_sim::Error;
 
-use crate::memory::{FLASH, FLASH_SIZE, STORED};
+use crate::memory::{FLASH_END, STORED};
 use crate::periph::flash::Flash;
 
 /// First bytes of the file, including its version.
 const MARK: &[u8; 16] = b"virtual flash 2\n";
 /// Number of bytes of the contents.
-const BANK: usize = (FLASH + FLASH_SIZE - STORED) as usize;
+const BANK: usize = (FLASH_END - STORED) as usize;
 /// Number of bytes with a bit for every double word.
 const TORN: usize = BANK / 64;
 

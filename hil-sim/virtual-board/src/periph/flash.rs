@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::{Effect, Store, bits, offsets};
-use crate::memory::{BANK_2, FLASH, FLASH_SIZE, STORED};
+use crate::memory::{BANK_2, FLASH, FLASH_END, FLASH_SIZE, STORED};
 use crate::rules::{Rule, Rules};
 
 offsets! { ACR = 0x00, KEYR = 0x08, SR = 0x10, CR = 0x14, ECCR = 0x18, OPTR = 0x20 }
@@ -28,7 +28,7 @@ const BROWN_OUT: [f64; 8] = [1.66, 2.0, 2.26, 2.57, 2.83, 2.83, 2.83, 2.83];
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
 /// Size of the writable part, bytes.
-const SIZE: usize = (FLASH + FLASH_SIZE - STORED) as usize;
+const SIZE: usize = (FLASH_END - STORED) as usize;
 /// Bytes of a page.
 pub const PAGE: usize = 2048;
 /// Typical time, ticks, of programming a double word: 82 us (datasheet).
