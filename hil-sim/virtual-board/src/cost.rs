@@ -90,14 +90,11 @@ pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
         let half = |at: usize| Some(u16::from_le_bytes([*code.get(at)?, *code.get(at + 1)?]));
         let first = half(at)?;
         let offset = at as u32;
-        let cycles = if first >> 11 >= 0b11101 {
-            let second = half(at + 2)?;
-            at += 4;
-            long(first, second, &mut before)
-        } else {
-            at += 2;
-            short(first, &mut before)
-        };
+        let is_long = first >> 11 >= 0b11101;
+        let cycles;
+        (cycles, before) =
+            if is_long { long(first, half(at + 2)?, before) } else { short(first, before) };
+        at += if is_long { 4 } else { 2 };
         Some(Instruction { offset, cycles })
     })
 }
@@ -110,82 +107,71 @@ struct Previous {
     result: Option<u16>,
 }
 
+/// Cycles of an instruction, and its properties for the next one.
+type Timing = (u32, Previous);
+
+const MEMORY: Previous = Previous { memory: true, result: None };
+const STORE: Timing = (1, MEMORY);
+
 /// A load takes one cycle if it follows a load or a store.
-fn load(before: &mut Previous) -> u32 {
-    let cycles = if before.memory { 1 } else { 2 };
-    *before = Previous { memory: true, result: None };
-    cycles
+fn load(before: Previous) -> Timing {
+    (if before.memory { 1 } else { 2 }, MEMORY)
 }
 
-fn store(before: &mut Previous) -> u32 {
-    *before = Previous { memory: true, result: None };
-    1
+fn plain(cycles: u32) -> Timing {
+    (cycles, Previous::default())
 }
 
-fn plain(cycles: u32, before: &mut Previous) -> u32 {
-    *before = Previous::default();
-    cycles
-}
-
-fn short(w: u16, before: &mut Previous) -> u32 {
+fn short(w: u16, before: Previous) -> Timing {
     let low = u32::from(w & 0xff);
     match w >> 8 {
         0x48..=0x4f | 0x56..=0x5f => load(before),
         0x60..=0x9f if w & 0x0800 != 0 => load(before),
-        0x50..=0x55 | 0x60..=0x9f => store(before),
+        0x50..=0x55 | 0x60..=0x9f => STORE,
         // PUSH, POP, with the link register or the program counter.
-        0xb5 | 0xbd => plain(2 + low.count_ones(), before),
-        0xb4 | 0xbc | 0xc0..=0xcf => plain(1 + low.count_ones(), before),
-        _ => plain(1, before),
+        0xb5 | 0xbd => plain(2 + low.count_ones()),
+        0xb4 | 0xbc | 0xc0..=0xcf => plain(1 + low.count_ones()),
+        _ => plain(1),
     }
 }
 
-fn long(w: u16, v: u16, before: &mut Previous) -> u32 {
+fn long(w: u16, v: u16, before: Previous) -> Timing {
     let is_load = w & 0x10 != 0;
     match w >> 8 {
-        0xe8 | 0xe9 if w & 0x40 == 0 => plain(1 + u32::from(v).count_ones(), before),
+        0xe8 | 0xe9 if w & 0x40 == 0 => plain(1 + u32::from(v).count_ones()),
         // Table branch.
-        0xe8 if w & 0xfff0 == 0xe8d0 && v & 0xffe0 == 0xf000 => plain(2, before),
+        0xe8 if w & 0xfff0 == 0xe8d0 && v & 0xffe0 == 0xf000 => plain(2),
         // LDREX, STREX and their like.
         0xe8 if w & 0x0120 == 0 && is_load => load(before),
-        0xe8 if w & 0x0120 == 0 => store(before),
-        0xe8 | 0xe9 => plain(3, before),
+        0xe8 if w & 0x0120 == 0 => STORE,
+        0xe8 | 0xe9 => plain(3),
         0xec..=0xee => float(w, v, before),
         0xf8 | 0xf9 if is_load => load(before),
-        0xf8 | 0xf9 => store(before),
+        0xf8 | 0xf9 => STORE,
         // SDIV, UDIV.
-        0xfb if w & 0xffd0 == 0xfb90 => plain(6, before),
-        _ => plain(1, before),
+        0xfb if w & 0xffd0 == 0xfb90 => plain(6),
+        _ => plain(1),
     }
 }
 
-fn float(w: u16, v: u16, before: &mut Previous) -> u32 {
-    let double = v >> 8 & 1 != 0;
+fn float(w: u16, v: u16, before: Previous) -> Timing {
+    let double = u32::from(v >> 8 & 1);
     let vd = (v >> 12 & 15) << 1 | w >> 6 & 1;
     let vn = (w & 15) << 1 | v >> 7 & 1;
     let vm = (v & 15) << 1 | v >> 5 & 1;
-    let needed = before.result;
-    let waits = |sources: &[u16]| u32::from(needed.is_some_and(|r| sources.contains(&r)));
+    let waits = |sources: &[u16]| u32::from(before.result.is_some_and(|r| sources.contains(&r)));
     if w >> 8 != 0xee {
-        if w & 0xffe0 == 0xec40 {
-            return plain(2, before);
-        }
-        if w & 0x0120 != 0x0100 {
-            return plain(1 + u32::from(v & 0xff), before);
-        }
-        // VLDR, VSTR.
-        if w & 0x10 == 0 {
-            let cycles = 2 + u32::from(double) + waits(&[vd]);
-            store(before);
-            return cycles;
-        }
-        load(before);
-        return 2 + u32::from(double);
+        return match w {
+            _ if w & 0xffe0 == 0xec40 => plain(2),
+            _ if w & 0x0120 != 0x0100 => plain(1 + u32::from(v & 0xff)),
+            // VLDR, VSTR.
+            _ if w & 0x10 != 0 => (2 + double, MEMORY),
+            _ => (2 + double + waits(&[vd]), MEMORY),
+        };
     }
     // A move between the register files.
     if v & 0x10 != 0 {
-        let cycles = 1 + waits(&[vn]);
-        return plain(cycles, before);
+        return plain(1 + waits(&[vn]));
     }
     let (operation, more) = (w >> 4 & 0xb, w & 0xf);
     let (cycles, sources): (u32, &[u16]) = match operation {
@@ -198,8 +184,7 @@ fn float(w: u16, v: u16, before: &mut Previous) -> u32 {
         0xb if v & 0x40 == 0 => (1, &[]),
         _ => (1, &[vm]),
     };
-    let cycles = cycles + waits(sources);
     let compares = operation == 0xb && (more == 4 || more == 5);
-    *before = Previous { memory: false, result: (!compares).then_some(vd) };
-    cycles
+    let result = (!compares).then_some(vd);
+    (cycles + waits(sources), Previous { memory: false, result })
 }
