@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use gimli::{EndianArcSlice, RunTimeEndian};
-use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use object::elf::PT_LOAD;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Architecture, Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use crate::{memory::Region, power_stage::REFERENCE};
 
@@ -104,18 +106,22 @@ impl Image {
     /// # Errors
     /// The contents are not an ELF for this chip.
     pub fn parse(bytes: Vec<u8>) -> Result<Self> {
-        let segments = segments(&bytes)?;
-        let file = object::File::parse(&*bytes)?;
+        let file = ElfFile32::<object::Endianness>::parse(&*bytes)?;
+        ensure!(file.architecture() == Architecture::Arm, "not for an Arm processor");
+        let (endian, mut segments) = (file.endian(), Vec::new());
+        for program in file.elf_program_headers() {
+            let data = program.data(endian, &*bytes).unwrap_or_default();
+            if program.p_type(endian) == PT_LOAD && !data.is_empty() {
+                segments.push(Segment { address: program.p_paddr(endian), bytes: data.to_vec() });
+            }
+        }
         let mut symbols: Vec<_> = file.symbols().filter_map(|symbol| named(&symbol)).collect();
         // If several symbols have one address, the largest comes last.
         symbols.sort_unstable_by_key(|symbol| (symbol.region.address, symbol.region.size));
-        let endian = RunTimeEndian::Little;
         let section = |id: gimli::SectionId| -> Result<Slice> {
-            let data = match file.section_by_name(id.name()) {
-                Some(section) => section.uncompressed_data()?,
-                None => Cow::Borrowed(&[][..]),
-            };
-            Ok(EndianArcSlice::new(data.into(), endian))
+            let section = file.section_by_name(id.name());
+            let data = section.map(|section| section.uncompressed_data()).transpose()?;
+            Ok(EndianArcSlice::new(data.unwrap_or_default().into(), RunTimeEndian::Little))
         };
         let lines = addr2line::Context::from_dwarf(gimli::Dwarf::load(section)?)?;
         Ok(Self { segments, symbols, lines, bytes })
@@ -197,21 +203,4 @@ fn named<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Symbol> {
     let region = Region { address: symbol.address() as u32 & !1, size: symbol.size() as u32 };
     let is_code = symbol.kind() == SymbolKind::Text;
     Some(Symbol { region, name: name.replace(['<', '>'], ""), is_code })
-}
-
-fn segments(bytes: &[u8]) -> Result<Vec<Segment>> {
-    use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
-    use object::read::elf::{FileHeader, ProgramHeader};
-    let header = FileHeader32::<object::Endianness>::parse(bytes)?;
-    let endian = header.endian()?;
-    ensure!(header.e_machine(endian) == EM_ARM, "not for an Arm processor");
-    let mut segments = Vec::new();
-    for program in header.program_headers(endian, bytes)? {
-        let data = program.data(endian, bytes).unwrap_or_default();
-        if program.p_type(endian) == PT_LOAD && !data.is_empty() {
-            let address = program.p_paddr(endian);
-            segments.push(Segment { address, bytes: data.to_vec() });
-        }
-    }
-    Ok(segments)
 }
