@@ -69,15 +69,6 @@ impl Switches {
     }
 }
 
-/// The sensors of the phase currents.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sensors {
-    /// Sensors in the lines a and b, as the configuration of the plant describes them.
-    InLine,
-    /// Shunts below the three low sides.
-    LowSide(Shunts),
-}
-
 /// The circuit at the pin of the dc link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DcLinkPin {
@@ -114,8 +105,8 @@ pub struct PowerStage {
     pub terminals: [&'static str; 3],
     /// Thermistor of the heat sink.
     pub ntc: Ntc,
-    /// The current sensors.
-    pub sensors: Sensors,
+    /// Shunts below the three low sides; if none, sensors in the lines a and b, as in the configuration.
+    pub shunts: Option<Shunts>,
     /// Dc-link voltage per volt at the chip's pin; if none, as in the configuration.
     pub dc_link_divider: Option<f64>,
     /// Delay of the drivers, s, and voltage drop of a switch against the current, V; if none, as in the configuration.

@@ -9,7 +9,7 @@ use hil_sim::plant::Load;
 use induction_drive::boards::{self, ANALOG, CONTACTS, Currents, Level};
 use virtual_board::board::Debugger;
 use virtual_board::periph::Reset;
-use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, Sensors, channel};
+use virtual_board::power_stage::{ALL, CODES, REFERENCE_V, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
 
 use crate::common::until_said as said;
@@ -98,9 +98,9 @@ fn the_firmware_and_the_power_stage_agree() {
             assert!((seen / volts - 1.0).abs() < 0.01, "{name}: {seen} V of {volts} V");
         }
         // Currents: gains to 1 %, zero to 0.3 % of the range, both signs.
-        match (stage.sensors, board.currents.shunts) {
-            (Sensors::InLine, None) => {}
-            (Sensors::LowSide(shunts), Some(boards::Shunts { settle_s, .. })) => {
+        match (stage.shunts, board.currents.shunts) {
+            (None, None) => {}
+            (Some(shunts), Some(boards::Shunts { settle_s, .. })) => {
                 let scales = &settings.scales;
                 for line in [scales.current_a, scales.current_b, scales.current_c] {
                     for code in [200, 1000, 3000, 4000] {

@@ -6,7 +6,7 @@ use drive_core::Compare;
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::bridge::{BadGates, Leg};
 use virtual_board::power_stage::shunts::Shunts;
-use virtual_board::power_stage::{ALL, PowerStage, Sensors};
+use virtual_board::power_stage::{ALL, PowerStage};
 
 const MIDDLE: [u32; 3] = [TOP / 2; 3];
 
@@ -250,10 +250,7 @@ fn loaded(stage: &'static PowerStage, volts: f64) -> Result<Script> {
 }
 
 fn shunts(stage: &PowerStage) -> Shunts {
-    match stage.sensors {
-        Sensors::LowSide(shunts) => shunts,
-        Sensors::InLine => panic!("{} has no shunts", stage.name),
-    }
+    stage.shunts.unwrap_or_else(|| panic!("{} has no shunts", stage.name))
 }
 
 /// Returns the voltage at a phase that causes a fraction of the shunts' range.

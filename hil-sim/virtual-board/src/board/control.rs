@@ -3,8 +3,8 @@
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
+use crate::addresses::Addresses;
 use crate::cost::{self, Block};
-use crate::{addresses::Addresses, power_stage::Sensors};
 
 /// One control interrupt as observed from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +75,8 @@ impl Board {
         }
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both ADCs convert the third current as their second channel.
-        let in_line = chip.gates.stage.sensors == Sensors::InLine;
-        let (current_c, slow) = if in_line { (0, 1) } else { (one[1], 2) };
+        let has_shunts = chip.gates.stage.shunts.is_some();
+        let (current_c, slow) = if has_shunts { (one[1], 2) } else { (0, 1) };
         let sample = Sample {
             current_a: one[0] + upper_a,
             current_b: two[0] + upper_b,

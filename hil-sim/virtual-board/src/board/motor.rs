@@ -10,7 +10,7 @@ use super::{Board, Options};
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
-use crate::power_stage::{CODES, Sensors, channel};
+use crate::power_stage::{CODES, channel};
 
 /// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
@@ -62,16 +62,13 @@ struct Top {
 impl Connection {
     pub(super) fn new(options: &Options) -> Self {
         let (stage, seed) = (options.power_stage, options.seed);
-        let shunts = match stage.sensors {
-            Sensors::InLine => None,
-            Sensors::LowSide(shunts) => {
-                let delay_s = stage.delay_and_drop.map_or(0.0, |(delay, _)| delay);
-                let delay = (delay_s * TICKS_PER_S as f64) as i64;
-                let rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let (amplifiers, bridge, top, before) = Default::default();
-                Some(ShuntReader { shunts, delay, rng, amplifiers, bridge, top, before })
-            }
-        };
+        let shunts = stage.shunts.map(|shunts| {
+            let delay_s = stage.delay_and_drop.map_or(0.0, |(delay, _)| delay);
+            let delay = (delay_s * TICKS_PER_S as f64) as i64;
+            let rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let (amplifiers, bridge, top, before) = Default::default();
+            ShuntReader { shunts, delay, rng, amplifiers, bridge, top, before }
+        });
         Self {
             at: 0,
             applied: Compare::OFF,

@@ -8,7 +8,7 @@ use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
 use crate::cpu::Counting;
-use crate::power_stage::{self, CODES, DcLinkPin, PowerStage, REFERENCE_V, Sensors};
+use crate::power_stage::{self, CODES, DcLinkPin, PowerStage, REFERENCE_V};
 use induction_drive::board as firmware_board;
 
 /// Options of a board.
@@ -37,7 +37,7 @@ impl Options {
     pub fn plant(stage: &PowerStage, config: &Config) -> PlantSettings {
         let mut plant = hil_sim::config::plant_settings(config);
         let settings = stage.firmware_settings();
-        if stage.sensors == Sensors::InLine {
+        if stage.shunts.is_none() {
             // The ADCs have another reference than the source's; their counts cover the range of the sensors.
             let gain = f64::from(settings.scales.current_a.gain / Line::CHANNEL_A.gain);
             let source = MeasurementSettings::default();
@@ -79,7 +79,7 @@ impl Options {
         wanted.scales.full_scale = image.scales.full_scale;
         // This setting is saved already.
         wanted.injection.synchronous.allow_unlearned = image.injection.synchronous.allow_unlearned;
-        let in_line = stage.sensors == Sensors::InLine;
+        let in_line = stage.shunts.is_none();
         // The sensors of the reference board come from the configuration.
         let may_differ =
             SETTINGS.iter().filter(|entry| !in_line || entry.get(&wanted) != entry.get(&default));

@@ -4,7 +4,7 @@ use drive_settings::Ntc;
 
 use super::driver::{Driver, Input, Pull};
 use super::shunts::Shunts;
-use super::{DcLinkPin, GateLimits, PowerStage, Sensors, Switches};
+use super::{DcLinkPin, GateLimits, PowerStage, Switches};
 
 /// All boards.
 pub const ALL: [&PowerStage; 4] = [&REFERENCE, &IHM08M1, &IHM023V3, &IPMM10B];
@@ -68,7 +68,7 @@ pub const REFERENCE: PowerStage = PowerStage {
     analog_only: &[],
     terminals: ["B5 B7 B9 B10 B11 C4 C5", "C7 C9 A12", "B12 B13 B14"],
     ntc: Ntc::DEFAULT,
-    sensors: Sensors::InLine,
+    shunts: None,
     dc_link_divider: None,
     delay_and_drop: None,
     motor: None,
@@ -92,7 +92,7 @@ const IHM08M1: PowerStage = PowerStage {
     dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
     analog_only: &[(0, 11), (1, 14), (1, 15)],
     terminals: ["B5 B7 B9 - C7 - -", "- - -", "B12 - B13"],
-    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
+    shunts: Some(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
     dc_link_divider: Some(19.15),
     // 125 ns (L6398 data sheet). The voltage drop of a switch is small; assumed.
@@ -112,7 +112,7 @@ const IHM023V3: PowerStage = PowerStage {
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
     terminals: ["- - - - - - -", "- - -", "- - -"],
     ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },
-    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
+    shunts: Some(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
     // 125 ns (L6390 data sheet); voltage drop of an IGBT, assumed.
     delay_and_drop: Some((125e-9, 1.5)),
@@ -126,7 +126,7 @@ const IPMM10B: PowerStage = PowerStage {
     name: "nucleo-g474re-ipmm10b",
     driver: Driver { high: PULLED_DOWN, low: PULLED_DOWN, interlock: true, dead_time_s: 0.0 },
     ntc: Ntc { ohm_25: 85e3, beta_k: 4092.0, divider_ohm: 12e3, ..Ntc::DEFAULT },
-    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
+    shunts: Some(Shunts { volts_per_a: -0.08 * 2.1, zero_v: 1.65, ..AMPLIFIERS }),
     delay_and_drop: Some((125e-9, 1.0)),
     ..IHM023V3
 };

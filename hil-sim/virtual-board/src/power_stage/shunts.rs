@@ -108,14 +108,11 @@ fn cut(pieces: &[Piece], phase: i64, ticks: u32) -> impl Iterator<Item = (u32, u
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ALL, Sensors};
+    use super::super::ALL;
     use super::*;
 
     fn shunts() -> Shunts {
-        match ALL[1].sensors {
-            Sensors::LowSide(shunts) => shunts,
-            Sensors::InLine => panic!("the board has shunts"),
-        }
+        ALL[1].shunts.expect("the board has shunts")
     }
 
     #[test]
