@@ -70,7 +70,7 @@ const IT_STATE: u32 = 0x0600_fc00;
 /// Registers and memories of a stopped core.
 pub struct CoreState {
     registers: Context,
-    memories: [(u32, Vec<u8>); 2],
+    memories: Vec<(u32, Vec<u8>)>,
 }
 
 /// Size of the pieces, bytes, that are compared before they are written, because written code is translated again.
@@ -245,10 +245,10 @@ impl Cpu {
     /// An error of the emulator.
     pub fn keep(&self) -> Result<CoreState, uc_error> {
         let registers = self.uc.context_init()?;
-        let mut memories = memory::VOLATILE.map(|(base, size)| (base, vec![0; size as usize]));
-        for (base, bytes) in &mut memories {
-            self.uc.mem_read(u64::from(*base), bytes)?;
-        }
+        let contents = |(base, size): (u32, u32)| {
+            Ok((base, self.uc.mem_read_as_vec(u64::from(base), size as usize)?))
+        };
+        let memories = memory::VOLATILE.into_iter().map(contents).collect::<Result<_, _>>()?;
         Ok(CoreState { registers, memories })
     }
 

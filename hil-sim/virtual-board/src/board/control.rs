@@ -59,20 +59,13 @@ impl Board {
         let chip = self.cpu.chip_mut();
         chip.begin_interrupt();
         let mut hardware = Hardware::empty();
-        if chip.adc.over_current() {
-            hardware |= Hardware::ANALOG_WATCHDOG;
-        }
-        if chip.tim1.broken() {
-            hardware |= Hardware::BREAK;
-        }
+        hardware.set(Hardware::ANALOG_WATCHDOG, chip.adc.over_current());
+        hardware.set(Hardware::BREAK, chip.tim1.broken());
         let (ended, complete) = chip.adc.ended();
-        if ended && !complete {
-            hardware |= Hardware::CONVERTER_OVERRUN;
-        }
+        hardware.set(Hardware::CONVERTER_OVERRUN, ended && !complete);
         // With the drive off, the firmware switches it on again.
-        if !chip.tim8.main_output() && chip.tim1.main_output() {
-            hardware |= Hardware::CHOPPER_OFF;
-        }
+        let chopper_off = !chip.tim8.main_output() && chip.tim1.main_output();
+        hardware.set(Hardware::CHOPPER_OFF, chopper_off);
         let [(one, upper_a), (two, upper_b)] = chip.adc.data();
         // With three shunts both ADCs convert the third current as their second channel.
         let has_shunts = chip.gates.stage.shunts.is_some();

@@ -4,7 +4,8 @@
 use anyhow::{Result, bail};
 
 use super::Board;
-use crate::{cpu::Register, memory};
+use crate::cpu::{Cpu, Register};
+use crate::memory;
 
 /// The state of the core before a control interrupt.
 #[derive(PartialEq)]
@@ -32,19 +33,21 @@ impl Poison {
     }
 }
 
-impl Board {
+impl Preempted {
     /// Returns the state of the core, with the stack between two addresses.
-    fn preempted(&self, sp: u32, top: u32) -> Preempted {
+    fn new(cpu: &Cpu, sp: u32, top: u32) -> Self {
         let mut stack = vec![0; top.saturating_sub(sp.max(memory::RAM)) as usize];
-        self.cpu.read(sp, &mut stack);
-        Preempted { registers: self.cpu.registers(), sp, stack }
+        cpu.read(sp, &mut stack);
+        Self { registers: cpu.registers(), sp, stack }
     }
+}
 
+impl Board {
     /// Stores the state before a control interrupt.
     pub(super) fn remember(&mut self) {
-        let Some(mut poison) = self.poison.take() else { return };
-        poison.before = Some(self.preempted(self.cpu.get(Register::SP), poison.top));
-        self.poison = Some(poison);
+        let Some(poison) = &mut self.poison else { return };
+        let sp = self.cpu.get(Register::SP);
+        poison.before = Some(Preempted::new(&self.cpu, sp, poison.top));
     }
 
     /// Compares the state after a control interrupt with the state before it.
@@ -53,8 +56,8 @@ impl Board {
     /// The states differ.
     pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
-        let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };
-        let after = self.preempted(before.sp, top);
+        let Some(before) = poison.before.take() else { return Ok(()) };
+        let after = Preempted::new(&self.cpu, before.sp, poison.top);
         if after != before {
             let at = self.image.location(self.cpu.get(Register::PC));
             let (before, after) = (before.registers, after.registers);
@@ -62,10 +65,8 @@ impl Board {
                 "a control interrupt changed the code it preempted at {at}: {before:x?} became {after:x?}"
             );
         }
-        if let Some(poison) = &mut self.poison {
-            poison.intact += 1;
-            poison.in_floating_point += u64::from(self.cpu.uses_float());
-        }
+        poison.intact += 1;
+        poison.in_floating_point += u64::from(self.cpu.uses_float());
         Ok(())
     }
 }

@@ -46,9 +46,7 @@ impl Cpu {
             self.uc.mem_write(u64::from(page), &bytes.borrow())?;
         }
         let Some(page) = wanted else { return Ok(()) };
-        let mut kept = vec![0; GUARD_PAGE as usize];
-        self.uc.mem_read(u64::from(page), &mut kept)?;
-        let bytes = Rc::new(RefCell::new(kept));
+        let bytes = Rc::new(RefCell::new(self.uc.mem_read_as_vec(u64::from(page), size)?));
         let (read, written) = (Rc::clone(&bytes), Rc::clone(&bytes));
         self.uc.mem_unmap(u64::from(page), size)?;
         self.uc.mmio_map(

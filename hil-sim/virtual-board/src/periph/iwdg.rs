@@ -44,9 +44,7 @@ impl Iwdg {
 
     /// Accounts for a stop of its clock for some ticks.
     pub fn delay(&mut self, ticks: u64) {
-        if self.expires != NEVER {
-            self.expires += ticks;
-        }
+        self.expires = self.expires.saturating_add(ticks);
     }
 
     /// Reads a register.

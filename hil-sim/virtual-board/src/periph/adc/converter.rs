@@ -126,14 +126,13 @@ impl Converter {
             (NEVER, Some(at)) => (0, at + lasts(0)),
             (done_at, _) => (running.rank, done_at),
         };
-        let mut samplings = Vec::new();
-        for rank in first..=self.last(sequence) {
+        let sampling = |rank| {
             if rank > first {
                 ends += lasts(rank);
             }
-            samplings.push((self.channel(sequence, rank), ends - CONVERSION * clock / 2));
-        }
-        samplings
+            (self.channel(sequence, rank), ends - CONVERSION * clock / 2)
+        };
+        (first..=self.last(sequence)).map(sampling).collect()
     }
 
     /// Returns the time at which the next conversion or the start-up ends.
